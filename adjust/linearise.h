@@ -1,0 +1,44 @@
+// Analytic linearisation of single residuals: what merge/ condenses and what the tests hold against automatic
+// differentiation. All residuals and Jacobians are already divided by sigma; robust weighting is the caller's.
+#pragma once
+
+#include "adjust/tile_problem.h"
+
+namespace megablock {
+
+struct ImageResidual {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 6> by_frame;
+  Eigen::Matrix<double, 2, 6> by_mount;
+  Eigen::Matrix<double, 2, kIntrinsicCount> by_intrinsics;
+  Eigen::Matrix<double, 2, 3> by_point;
+  bool in_front = false;  // Z > 0; otherwise the rest is undefined and the observation must not take part
+};
+ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrinsics& intrinsics,
+                              const Eigen::Vector3d& point, const Eigen::Vector2d& measured, double inverse_sigma);
+
+struct FrameResidual3 {
+  Eigen::Vector3d residual;
+  Eigen::Matrix<double, 3, 6> by_frame;
+};
+FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior);
+FrameResidual3 linearise_attitude(const Pose& frame, const AttitudePrior& prior);
+
+struct RelativeResidual {
+  Eigen::Matrix<double, 6, 1> residual;
+  Eigen::Matrix<double, 6, 6> by_from, by_to;
+};
+RelativeResidual linearise_relative(const Pose& from, const Pose& to, const TileProblem::RelativeTerm& term);
+
+struct MountResidual {
+  Eigen::Matrix<double, 6, 1> residual;
+  Eigen::Matrix<double, 6, 6> by_mount;
+};
+MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& term);
+
+// Robust weighting as Ceres (corrector): residual and Jacobian are scaled by sqrt(rho'); the second-order term is
+// applied where rho'' > 0 and dropped where rho'' <= 0 (always, for the losses here).
+// Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a camera.
+double evaluate_cost(const TileProblem& problem, const TileState& state);
+
+}  // namespace megablock

@@ -1,0 +1,130 @@
+// The observations and unknowns of one tile: the input of the tile bundle adjustment (adjust/), of the condensed normal
+// equations (merge/) and, with one tile for the whole block, of the monolithic reference.
+//
+// Residuals, each divided by its sigma (r is dimensionless; cost F = 1/2 sum rho(|r|^2)):
+//   image            project(K, to_camera(frame, mount, X)) - measured                                   [2]
+//   position         C + R' lever_arm - P                                                                [3]
+//   attitude         Log(R R_prior')                       (rotation about the rig's axes)               [3]
+//   relative pose    Log(R_to R_from' R_measured'), R_from (C_to - C_from) - T_measured                  [3 + 3]
+//   point prior      X - X_0                               (control points)                              [3]
+//   intrinsics prior k - k_0                               (per parameter with finite sigma)             [<= 8]
+//   mount prior      Log(R R_0'), C - C_0                                                                [6]
+// Robust losses act on image residuals (all), position priors and relative poses (their own option).
+//
+// Unknowns: frames (6, pose_update), free intrinsics (camera_free bit mask), free mounts (6), points (3).
+// Every table is ascending by global index; a local index is a row of its table.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/block.h"
+#include "io/image_graph.h"
+#include "io/tracks.h"
+
+namespace megablock {
+
+struct RobustLoss {
+  enum class Kind : std::uint8_t { kNone, kHuber, kCauchy };
+  Kind kind = Kind::kNone;
+  double scale = 1;  // in sigmas: Huber's corner, Cauchy's scale
+  // rho(s) of the squared norm s, with first and second derivative: {rho, rho', rho''}, as ceres::LossFunction.
+  std::array<double, 3> evaluate(double squared_norm) const;
+};
+
+struct MountId {
+  RigIndex rig;
+  std::int32_t mount = 0;
+  friend auto operator<=>(const MountId&, const MountId&) = default;
+};
+
+struct TileImage {
+  ImageIndex image;
+  LocalFrame frame;
+  LocalCamera camera;
+  std::int32_t mount = -1;  // row of TileProblem::mounts
+};
+
+// A point of the tile: a track or a control point (an index into Block::control_points).
+struct TilePoint {
+  PointRole role = PointRole::kTie;
+  std::int64_t index = -1;  // TrackIndex value or control point row
+};
+
+struct TileProblem {
+  std::vector<FrameIndex> frames;
+  std::vector<CameraIndex> cameras;
+  std::vector<std::uint8_t> camera_free;  // [cameras] bit p set: intrinsic parameter p is an unknown
+  std::vector<MountId> mounts;
+  std::vector<std::uint8_t> mount_free;   // [mounts] 1: six unknowns
+  std::vector<TileImage> images;
+
+  // Points (tracks ascending, then control points ascending) and their observations.
+  std::vector<TilePoint> points;
+  std::vector<std::int64_t> begin;        // [points + 1]
+  std::vector<LocalImage> image;          // [observations]
+  std::vector<double> x, y;               // px
+  std::vector<double> inverse_sigma;      // 1/px
+  // 1 = takes part. Points with fewer than two kept observations and no prior take no part at all.
+  std::vector<std::uint8_t> kept;
+
+  struct PositionTerm { LocalFrame frame; PositionPrior prior; };
+  struct AttitudeTerm { LocalFrame frame; AttitudePrior prior; };
+  struct RelativeTerm { LocalFrame from, to; Pose pose; double rotation_sigma_rad, position_sigma_m; };
+  struct PointTerm { LocalPoint point; Eigen::Vector3d position, sigma; };  // sigma infinite: axis free
+  struct IntrinsicTerm { LocalCamera camera; Intrinsics value; std::array<double, kIntrinsicCount> sigma; };
+  struct MountTerm { std::int32_t mount; Pose value; double rotation_sigma_rad, position_sigma_m; };
+  std::vector<PositionTerm> positions;
+  std::vector<AttitudeTerm> attitudes;
+  std::vector<RelativeTerm> relatives;
+  std::vector<PointTerm> point_priors;
+  std::vector<IntrinsicTerm> intrinsic_priors;
+  std::vector<MountTerm> mount_priors;
+
+  RobustLoss image_loss, position_loss, relative_loss;
+
+  std::int64_t point_count() const { return static_cast<std::int64_t>(points.size()); }
+  std::int64_t observation_count() const { return static_cast<std::int64_t>(image.size()); }
+  // A point takes part: two or more kept observations, or one and a prior.
+  bool active(std::int64_t point) const;
+};
+
+// Values of the tile's unknowns, rows as in the problem's tables.
+struct TileState {
+  std::vector<Pose> frames;
+  std::vector<Intrinsics> cameras;
+  std::vector<Pose> mounts;
+  std::vector<Eigen::Vector3d> points;
+};
+
+struct ObservationOptions {
+  double image_sigma_px = 0.5;    // a-priori sigma of a tie point measurement per axis, px
+  RobustLoss image_loss{RobustLoss::Kind::kHuber, 2.0};
+  RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
+  RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
+  bool use_position_priors = true;
+  bool use_attitude_priors = true;
+  void check() const;             // throws InputError
+};
+
+// Which tile owns what (merge.md, "Unknowns and ownership").
+// Tracks: the tile with most of its observations' frames, ties to the lower tile number.
+TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end);
+
+// Builds a tile's problem: all rows of `owned` (the tile's track file) whose images belong to oriented frames, the
+// control points, priors and relative poses that the tile owns (a frame's priors: the frame's tile; a camera's prior:
+// the tile of the first oriented image that uses it; a relative pose: lower tile number of its two frames).
+// Every observation starts kept. Observations of images without pose are left out of `kept` (0), not out of the rows,
+// so that rows stay aligned with the track file; then the control points' measurements follow.
+TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
+                              const TrackSet& owned, const ObservationOptions& options);
+
+// Values for the problem's tables from the block's; points as given (one per row of problem.points).
+TileState make_tile_state(const TileProblem& problem, const BlockState& state, std::vector<Eigen::Vector3d> points);
+// Writes frames, cameras and mounts of the tile back into the block's state.
+void store_tile_state(const TileProblem& problem, const TileState& tile, BlockState& state);
+
+}  // namespace megablock

@@ -1,0 +1,53 @@
+# A room is a folder of sources that becomes one static library, megablock::<room>.
+# Every .cpp directly in the folder, or in one of its sub-folders other than `main`, belongs to it.
+# Files named *_avx2.cpp are compiled for AVX2 and FMA; they hold raw-pointer kernels only, reached by
+# run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them: their ABI depends on the flags).
+
+add_library(megablock_options INTERFACE)
+target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})
+# Contraction off: a*b+c gives the same bits wherever the compiler could have fused it or not.
+target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow -ffp-contract=off)
+if(MEGABLOCK_WERROR)
+  target_compile_options(megablock_options INTERFACE -Werror)
+endif()
+if(MEGABLOCK_SANITIZE)
+  target_compile_options(megablock_options INTERFACE -fsanitize=address,undefined
+                         -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+  target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+function(megablock_room name)
+  cmake_parse_arguments(ROOM "" "" "DEPENDS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${name}/*.cpp ${name}/*/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/${name}/main/")
+  if(NOT sources)
+    set(type INTERFACE)
+    add_library(megablock_${name} INTERFACE)
+  else()
+    set(type PUBLIC)
+    add_library(megablock_${name} STATIC ${sources})
+    foreach(source IN LISTS sources)
+      if(source MATCHES "_avx2\\.cpp$")
+        set_source_files_properties(${source} PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma")
+      endif()
+    endforeach()
+  endif()
+  target_link_libraries(megablock_${name} ${type} megablock_options ${ROOM_DEPENDS})
+  add_library(megablock::${name} ALIAS megablock_${name})
+endfunction()
+
+# One test program from the .cpp files of a folder under tests/, all of its cases labelled.
+function(megablock_tests target folder)
+  cmake_parse_arguments(TESTS "" "LABEL;TIMEOUT" "LINK" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp)
+  if(NOT sources)
+    return()
+  endif()
+  if(NOT TESTS_TIMEOUT)
+    set(TESTS_TIMEOUT 120)
+  endif()
+  add_executable(${target} ${sources})
+  target_link_libraries(${target} PRIVATE ${TESTS_LINK} GTest::gmock GTest::gtest_main)
+  gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
+                       PROPERTIES LABELS ${TESTS_LABEL} TIMEOUT ${TESTS_TIMEOUT})
+endfunction()

@@ -1,0 +1,96 @@
+#include "io/block.h"
+
+#include <cmath>
+#include <unordered_set>
+
+#include "io/error.h"
+
+namespace megablock {
+
+BlockState initial_state(const Block& block) {
+  BlockState state;
+  state.frames.resize(block.frames.size());
+  state.oriented.assign(block.frames.size(), 0);
+  for (std::size_t f = 0; f < block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (!block.frames[frame].given_pose) continue;
+    state.frames[frame] = *block.frames[frame].given_pose;
+    state.oriented[frame] = 1;
+  }
+  for (const Camera& camera : block.cameras) state.cameras.push_back(camera.intrinsics);
+  for (const Rig& rig : block.rigs) {
+    std::vector<Pose> poses;
+    for (const Mount& mount : rig.mounts) poses.push_back(mount.pose);
+    state.mounts.push_back(std::move(poses));
+  }
+  return state;
+}
+
+namespace {
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw InputError(message);
+}
+
+void check_unit(const Pose& pose, const std::string& what) {
+  require(std::abs(pose.rotation.norm() - 1) < 1e-9, what + ": rotation is not a unit quaternion");
+  require(pose.centre.allFinite(), what + ": position is not finite");
+}
+
+void check_names(const auto& items, const std::string& kind) {
+  std::unordered_set<std::string> seen;
+  for (const auto& item : items)
+    require(seen.insert(item.name).second, kind + " '" + item.name + "' appears twice; names must differ");
+}
+
+bool positive(const Eigen::Vector3d& sigma) { return (sigma.array() > 0).all(); }
+
+}  // namespace
+
+void check(const Block& block) {
+  check_names(block.cameras, "camera");
+  check_names(block.images, "image");
+  check_names(block.control_points, "control point");
+  for (const Camera& camera : block.cameras) {
+    require(camera.width > 0 && camera.height > 0, "camera '" + camera.name + "': width and height must be positive");
+    require(camera.intrinsics[kFocal] > 0, "camera '" + camera.name + "': focal length must be positive (pixels)");
+    for (double sigma : camera.prior_sigma)
+      require(sigma >= 0, "camera '" + camera.name + "': a prior sigma is negative or not a number");
+  }
+  for (const Rig& rig : block.rigs) {
+    require(!rig.mounts.empty(), "rig '" + rig.name + "': has no camera");
+    require(rig.mounts.front().held(), "rig '" + rig.name + "': its first mount is the reference and must be held");
+    for (const Mount& mount : rig.mounts) {
+      require(block.cameras.contains(mount.camera), "rig '" + rig.name + "': a mount names no camera of the block");
+      check_unit(mount.pose, "rig '" + rig.name + "'");
+    }
+  }
+  for (const Frame& frame : block.frames) {
+    require(block.rigs.contains(frame.rig), "frame '" + frame.name + "': names no rig of the block");
+    if (frame.position_prior)
+      require(frame.position_prior->position.allFinite() && positive(frame.position_prior->sigma),
+              "frame '" + frame.name + "': position prior must be finite with positive sigmas (metres)");
+    if (frame.attitude_prior)
+      require(positive(frame.attitude_prior->sigma_rad), "frame '" + frame.name + "': attitude sigmas must be positive");
+    if (frame.given_pose) check_unit(*frame.given_pose, "frame '" + frame.name + "'");
+  }
+  for (const Image& image : block.images) {
+    require(block.frames.contains(image.frame), "image '" + image.name + "': names no frame of the block");
+    require(image.mount >= 0 && image.mount < static_cast<int>(block.rig_of(image.frame).mounts.size()),
+            "image '" + image.name + "': its rig has no such mount");
+  }
+  for (const RelativePose& relative : block.relative_poses) {
+    require(block.frames.contains(relative.from) && block.frames.contains(relative.to),
+            "a relative pose names no frame of the block");
+    require(relative.rotation_sigma_rad > 0 && relative.position_sigma_m > 0, "a relative pose has no positive sigmas");
+  }
+  for (const ControlPoint& point : block.control_points) {
+    require(positive(point.sigma), "control point '" + point.name + "': sigmas must be positive (metres)");
+    for (const ImageMeasurement& m : point.measurements) {
+      require(block.images.contains(m.image), "control point '" + point.name + "': names no image of the block");
+      require(m.pixel.allFinite() && m.sigma_px > 0, "control point '" + point.name + "': bad image measurement");
+    }
+  }
+}
+
+}  // namespace megablock

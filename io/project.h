@@ -1,0 +1,43 @@
+// The project file (YAML, docs/project-file.md): where the images are, what is known of them, the options of the job.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/block.h"
+
+namespace megablock {
+
+// Options of the stages, by the names of the project file. Defaults: see the option structs of the rooms; an unset
+// value means "the room's default" so that defaults live in one place.
+struct StageSettings {
+  struct Entry {
+    std::string section, key, value;  // e.g. "features", "max_features", "8000"
+    std::string where;                // file:line, for messages
+  };
+  std::vector<Entry> entries;
+};
+
+struct Project {
+  std::string file;               // absolute path of the project file
+  Block block;                    // images, cameras, rigs, priors, control as read
+  std::string tie_points;         // HDF5 of given tracks (write_tracks), absolute; empty: features and matching run
+  StageSettings settings;
+  std::vector<std::pair<std::string, std::string>> unreadable;  // image file and reason, reported and skipped
+  std::vector<std::string> warnings;                             // one line each: GPS at 0,0, duplicates, outliers ...
+};
+
+// Reads and validates; InputError with file:line for unknown keys, wrong types or units, missing files.
+Project read_project(const std::string& path);
+
+struct InitOptions {
+  std::string images;             // folder, searched recursively, names sorted
+  std::string output = "block.yaml";
+  std::string gcp_file, mask_folder;  // optional
+  std::string camera_grouping = "exif";  // "exif" (make, model, size, focal), "folder", "one"
+};
+// Scans the images and writes the project file. Returns its one-paragraph summary.
+std::string init_project(const InitOptions& options);
+
+}  // namespace megablock

@@ -1,0 +1,88 @@
+// The result of a job: everything that exports, the report and `evaluate` read. One file, result/block.h5.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "io/block.h"
+#include "io/image_graph.h"
+#include "io/tracks.h"
+
+namespace megablock {
+
+struct FailedUnit {
+  std::string stage, unit, reason;
+};
+
+struct StageStatistics {
+  std::string name;
+  double seconds = 0;          // wall clock of the stage
+  double peak_rss_mib = 0;     // largest of the ranks
+  std::int64_t units = 0, failed = 0;
+};
+
+struct SeamCheck {
+  std::int64_t node = -1;     // of the merge tree
+  double statistic = 0;       // T, chi-square distributed
+  std::int64_t degrees = 0;
+  double threshold = 0;
+  std::string note;           // names the suspected tile on alarm
+};
+
+struct BlockResult {
+  Block block;
+  BlockState state;
+  Tiles tiles;
+  IndexedVector<FrameIndex, std::uint8_t> boundary;  // 1 = touched by two or more tiles
+
+  // Posterior covariances, a-priori variance factor 1 unless scaled. Empty when not computed.
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  using Matrix8 = Eigen::Matrix<double, 8, 8>;
+  IndexedVector<FrameIndex, Matrix6> frame_covariance;    // (rotation increment rad, centre m)
+  IndexedVector<CameraIndex, Matrix8> camera_covariance;  // held parameters: zero
+
+  // Tracks of all tiles in global track order. point NaN = not triangulated.
+  TrackSet tracks;
+  std::vector<Eigen::Vector3d> points;             // [tracks]
+  std::vector<Eigen::Matrix3d> point_covariance;   // [tracks] or empty
+  std::vector<std::uint8_t> kept;                  // [observations]
+  std::vector<float> residual_x, residual_y;       // [observations] adjusted minus measured, px
+
+  struct ControlResult {
+    Eigen::Vector3d adjusted;                      // ground frame; NaN = not seen by two oriented images
+    Eigen::Matrix3d covariance;
+    std::vector<Eigen::Vector2d> residual_px;      // per measurement; NaN = image not oriented
+  };
+  std::vector<ControlResult> control;              // in block order
+
+  // Figures (status --json).
+  double variance_factor = 1;       // a-posteriori, = chi2_per_dof
+  double chi2 = 0;
+  std::int64_t degrees_of_freedom = 0;
+  int global_iterations = 0;
+  double newton_decrement = 0;
+  std::string gauge;                // "fixed by priors" or "free, inner constraints over N frames" ...
+  std::vector<SeamCheck> seams;
+  std::vector<FailedUnit> failures; // images and units, with reasons
+  std::vector<StageStatistics> stages;
+  std::vector<std::string> notes;   // warnings for the report, one line each
+  std::string digest;               // see result_digest()
+};
+
+void write_result(const std::string& path, const BlockResult& result);
+BlockResult read_result(const std::string& path);
+
+// Hash of the exact bits of every pose, camera, point and kept observation in global order; independent of file layout,
+// tiles' files and ranks.
+std::string result_digest(const BlockResult& result);
+
+// Means over kept observations of triangulated points: Euclidean residual length, and its root mean square.
+struct ReprojectionStatistics {
+  std::int64_t oriented_images = 0, points = 0, observations = 0;
+  double mean_px = 0, rms_px = 0, mean_track_length = 0;
+};
+ReprojectionStatistics reprojection_statistics(const BlockResult& result);
+
+}  // namespace megablock

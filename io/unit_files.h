@@ -1,0 +1,53 @@
+// Readers and writers of the unit files: one pair of functions per kind (shapes, types and units: docs/job-format.md).
+// Writers write a plain HDF5 file at `path` (JobStore::write seals it); readers throw StoreError naming the file.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/block.h"
+#include "io/features.h"
+#include "io/image_graph.h"
+#include "io/tracks.h"
+
+namespace megablock {
+
+void write_block(const std::string& path, const Block& block);
+Block read_block(const std::string& path);
+
+void write_features(const std::string& path, const std::vector<ImageFeatures>& images);
+std::vector<ImageFeatures> read_features(const std::string& path);
+
+void write_candidates(const std::string& path, const CandidateGraph& graph);
+CandidateGraph read_candidates(const std::string& path);
+
+void write_matches(const std::string& path, const std::vector<VerifiedPair>& pairs);
+std::vector<VerifiedPair> read_matches(const std::string& path);
+
+void write_tiles(const std::string& path, const Tiles& tiles);
+Tiles read_tiles(const std::string& path);
+
+void write_tracks(const std::string& path, const TrackSet& tracks);
+TrackSet read_tracks(const std::string& path);
+
+// Poses, intrinsics and mounts of the whole block (after orientation, after each global iteration).
+void write_state(const std::string& path, const BlockState& state);
+BlockState read_state(const std::string& path);
+
+// What a tile's adjustment leaves: its view of the unknowns, its points and the verdict on each observation, aligned
+// with the rows of the tile's track file (then its control points in block order).
+struct TileAdjustment {
+  std::vector<FrameIndex> frames;
+  std::vector<Pose> poses;                       // [frames]
+  std::vector<std::int64_t> observations;        // [frames], kept ones: the boundary frame starts from the richest tile
+  std::vector<CameraIndex> cameras;
+  std::vector<Intrinsics> intrinsics;            // [cameras]
+  std::vector<std::int64_t> camera_observations; // [cameras]
+  std::vector<Eigen::Vector3d> points;           // [tracks + control points]; NaN = not triangulated
+  std::vector<std::uint8_t> kept;                // [observations of tracks, then of control points] 1 = kept
+  std::string summary;                           // one line for the log and the report
+};
+void write_adjustment(const std::string& path, const TileAdjustment& adjustment);
+TileAdjustment read_adjustment(const std::string& path);
+
+}  // namespace megablock

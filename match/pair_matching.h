@@ -1,0 +1,30 @@
+// k-best mutual matching of two images and its verification by two-view geometry.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "io/block.h"
+#include "io/features.h"
+
+namespace megablock {
+
+struct MatchOptions {
+  int k_best = 1;                 // neighbours kept per feature: 1, or 3 on repeated facades (CN-12)
+  double ratio = 0.8;             // a neighbour passes when its distance < ratio x distance of neighbour k + 1
+  double max_residual_px = 3.0;   // of verification: epipolar (Sampson) or transfer residual
+  int min_inliers = 20;           // fewer: the pair is not verified
+  void check() const;             // throws InputError
+};
+
+// Mutual matches (row in a, row in b), ascending. Exact: the same as comparing all pairs with integer arithmetic.
+std::vector<std::pair<std::int32_t, std::int32_t>> match_descriptors(const std::vector<SiftDescriptor>& a,
+                                                                     const std::vector<SiftDescriptor>& b,
+                                                                     const MatchOptions& options);
+
+// Matches and verifies one pair; model kNone when it does not pass. Deterministic: seeded by the two image indices.
+VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
+                        const MatchOptions& options);
+
+}  // namespace megablock
