@@ -19,8 +19,7 @@ Distortion distort(const Intrinsics& k, double x, double y) {
   const double slope = k[kRadial1] + r2 * (2 * k[kRadial2] + 3 * r2 * k[kRadial3]);  // d radial / d r2
   const double p1 = k[kDecentring1], p2 = k[kDecentring2];
   Distortion d;
-  d.point = {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-             y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
+  d.point = {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
   const double cross = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y;
   d.jacobian << radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x, cross,  //
       cross, radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x;

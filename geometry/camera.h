@@ -15,8 +15,16 @@
 namespace megablock {
 
 // Positions of the parameters in `Intrinsics`.
-enum IntrinsicParameter : int { kFocal = 0, kPrincipalX, kPrincipalY, kRadial1, kRadial2, kRadial3, kDecentring1,
-                                kDecentring2 };
+enum IntrinsicParameter : int {
+  kFocal = 0,
+  kPrincipalX,
+  kPrincipalY,
+  kRadial1,
+  kRadial2,
+  kRadial3,
+  kDecentring1,
+  kDecentring2
+};
 inline constexpr int kIntrinsicCount = 8;
 using Intrinsics = std::array<double, kIntrinsicCount>;  // f, cx, cy [px], k1, k2, k3, p1, p2
 

@@ -44,8 +44,7 @@ inline Eigen::Vector3d to_camera(const Pose& frame, const Pose& mount, const Eig
 
 // Pose of a single camera in the ground frame: rotation ground -> camera and projection centre.
 inline Pose camera_pose(const Pose& frame, const Pose& mount) {
-  return {(mount.rotation * frame.rotation).normalized(),
-          frame.centre + frame.rotation.conjugate() * mount.centre};
+  return {(mount.rotation * frame.rotation).normalized(), frame.centre + frame.rotation.conjugate() * mount.centre};
 }
 
 }  // namespace megablock

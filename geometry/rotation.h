@@ -70,13 +70,17 @@ double rotation_angle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 // Photogrammetric omega-phi-kappa (radians): R_cw(photo, y up, looking along -z) = Rk Rp Ro; and the navigation
 // yaw-pitch-roll of a body (x forward, y right, z down) in NED. Both refer to the camera of architecture.md
 // (x right, y down, looking along +z); see rotation.cpp for the axis changes.
-struct OmegaPhiKappa { double omega, phi, kappa; };
+struct OmegaPhiKappa {
+  double omega, phi, kappa;
+};
 OmegaPhiKappa omega_phi_kappa(const Eigen::Quaterniond& rotation_cw);
 Eigen::Quaterniond rotation_from(const OmegaPhiKappa& angles);
 
 // yaw clockwise from north, pitch up positive, roll right wing down positive; of the camera's viewing direction as
 // a gimbal reports it: yaw = pitch = roll = 0 looks north along the horizon, pitch = -90 deg is nadir.
-struct YawPitchRoll { double yaw, pitch, roll; };
+struct YawPitchRoll {
+  double yaw, pitch, roll;
+};
 YawPitchRoll yaw_pitch_roll(const Eigen::Quaterniond& rotation_cw);
 Eigen::Quaterniond rotation_from(const YawPitchRoll& angles);
 
