@@ -36,6 +36,16 @@ struct MountResidual {
 };
 MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& term);
 
+// Priors that are linear in their unknowns; their derivative is the inverse sigma. Axes with infinite sigma and
+// parameters without a finite positive sigma give zero.
+inline Eigen::Vector3d point_prior_residual(const Eigen::Vector3d& point, const TileProblem::PointTerm& term) {
+  return (point - term.position).cwiseQuotient(term.sigma);
+}
+inline double intrinsic_prior_residual(const Intrinsics& value, const TileProblem::IntrinsicTerm& term, int parameter) {
+  const auto k = static_cast<std::size_t>(parameter);
+  return intrinsic_prior_weight(term, parameter) * (value[k] - term.value[k]);
+}
+
 // Robust weighting as Ceres (corrector): residual and Jacobian are scaled by sqrt(rho'); the second-order term is
 // applied where rho'' > 0 and dropped where rho'' <= 0 (always, for the losses here).
 // Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a camera.

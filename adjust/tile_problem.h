@@ -65,7 +65,7 @@ struct TileProblem {
   // Points (tracks ascending, then control points ascending) and their observations.
   std::vector<TilePoint> points;
   std::vector<std::int64_t> begin;        // [points + 1]
-  std::vector<LocalImage> image;          // [observations]
+  std::vector<LocalImage> image;          // [observations]; -1 where the frame has no pose (never kept)
   std::vector<double> x, y;               // px
   std::vector<double> inverse_sigma;      // 1/px
   // 1 = takes part. Points with fewer than two kept observations and no prior take no part at all.
@@ -91,6 +91,12 @@ struct TileProblem {
   // A point takes part: two or more kept observations, or one and a prior.
   bool active(std::int64_t point) const;
 };
+
+// Inverse sigma of one parameter of an intrinsics prior; 0 where the parameter is held or free without prior.
+inline double intrinsic_prior_weight(const TileProblem::IntrinsicTerm& term, int parameter) {
+  const double sigma = term.sigma[static_cast<std::size_t>(parameter)];
+  return sigma > 0 ? 1 / sigma : 0;
+}
 
 // Values of the tile's unknowns, rows as in the problem's tables.
 struct TileState {

@@ -1,0 +1,153 @@
+// Derivatives by the right perturbation R Exp(w) (geometry/rotation.h), C + d:
+//
+//   X_rig = R (X - C):          by w: -R [X - C]x,   by d: -R,          by X: R
+//   X_cam = R_m (X_rig - C_m):  by w_m: -R_m [X_rig - C_m]x,  by d_m: -R_m,  by X_rig: R_m
+//   C + R' l:                   by w: [R' l]x (as Exp(-w) R' l),  by d: I
+//   Log(R Exp(w) R_0') = Log(E Exp(R_0 w)),  E = R R_0':  by w: J_r^-1(Log E) R_0
+//   E = R_to R_from' R_m':      by w_to: J_r^-1(Log E) R_m R_from,  by w_from: the negative of it
+#include "adjust/linearise.h"
+
+#include <limits>
+
+namespace megablock {
+
+namespace {
+
+Eigen::Matrix3d skew3(const Eigen::Vector3d& v) { return skew<double>(v); }
+
+// Log(R R_0') and its derivative by the right perturbation of R.
+struct RotationDifference {
+  Eigen::Vector3d value;
+  Eigen::Matrix3d by_rotation;
+};
+RotationDifference rotation_difference(const Eigen::Quaterniond& rotation, const Eigen::Quaterniond& reference) {
+  const Eigen::Vector3d value = rotation_log<double>(rotation * reference.conjugate());
+  return {value, right_jacobian_inverse(value) * reference.toRotationMatrix()};
+}
+
+}  // namespace
+
+ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrinsics& intrinsics,
+                              const Eigen::Vector3d& point, const Eigen::Vector2d& measured, double inverse_sigma) {
+  ImageResidual result;
+  const Eigen::Matrix3d frame_rotation = frame.rotation.toRotationMatrix();
+  const Eigen::Matrix3d mount_rotation = mount.rotation.toRotationMatrix();
+  const Eigen::Vector3d from_frame = point - frame.centre;
+  const Eigen::Vector3d from_mount = frame_rotation * from_frame - mount.centre;
+  const Eigen::Vector3d in_camera = mount_rotation * from_mount;
+  result.in_front = in_camera.z() > 0;
+  if (!result.in_front) return result;
+
+  const ProjectionJacobian projection = project_with_jacobian(intrinsics, in_camera);
+  const Eigen::Matrix<double, 2, 3> by_rig = inverse_sigma * projection.by_point * mount_rotation;
+  const Eigen::Matrix<double, 2, 3> by_point = by_rig * frame_rotation;
+  result.residual = inverse_sigma * (projection.pixel - measured);
+  result.by_point = by_point;
+  result.by_frame << -by_point * skew3(from_frame), -by_point;
+  result.by_mount << -by_rig * skew3(from_mount), -by_rig;
+  result.by_intrinsics = inverse_sigma * projection.by_intrinsics;
+  return result;
+}
+
+FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior) {
+  const Eigen::Vector3d arm = frame.rotation.conjugate() * prior.lever_arm;
+  const Eigen::Vector3d weight = prior.sigma.cwiseInverse();
+  FrameResidual3 result;
+  result.residual = weight.cwiseProduct(frame.centre - prior.position + arm);
+  result.by_frame << weight.asDiagonal() * skew3(arm), Eigen::Matrix3d(weight.asDiagonal());
+  return result;
+}
+
+FrameResidual3 linearise_attitude(const Pose& frame, const AttitudePrior& prior) {
+  const Eigen::Vector3d weight = prior.sigma_rad.cwiseInverse();
+  const RotationDifference difference = rotation_difference(frame.rotation, prior.rotation_cw);
+  FrameResidual3 result;
+  result.residual = weight.cwiseProduct(difference.value);
+  result.by_frame << weight.asDiagonal() * difference.by_rotation, Eigen::Matrix3d::Zero();
+  return result;
+}
+
+RelativeResidual linearise_relative(const Pose& from, const Pose& to, const TileProblem::RelativeTerm& term) {
+  const Eigen::Matrix3d from_rotation = from.rotation.toRotationMatrix();
+  const double rotation_weight = 1 / term.rotation_sigma_rad, position_weight = 1 / term.position_sigma_m;
+  const Eigen::Vector3d base = to.centre - from.centre;
+  const Eigen::Vector3d rotation = rotation_log<double>(to.rotation * (term.pose.rotation * from.rotation).conjugate());
+  const Eigen::Matrix3d by_rotation =
+      rotation_weight * right_jacobian_inverse(rotation) * term.pose.rotation.toRotationMatrix() * from_rotation;
+
+  RelativeResidual result;
+  result.residual << rotation_weight * rotation, position_weight * (from_rotation * base - term.pose.centre);
+  result.by_from.setZero();
+  result.by_to.setZero();
+  result.by_to.topLeftCorner<3, 3>() = by_rotation;
+  result.by_from.topLeftCorner<3, 3>() = -by_rotation;
+  result.by_to.bottomRightCorner<3, 3>() = position_weight * from_rotation;
+  result.by_from.bottomLeftCorner<3, 3>() = -position_weight * from_rotation * skew3(base);
+  result.by_from.bottomRightCorner<3, 3>() = -position_weight * from_rotation;
+  return result;
+}
+
+MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& term) {
+  const double rotation_weight = 1 / term.rotation_sigma_rad, position_weight = 1 / term.position_sigma_m;
+  const RotationDifference difference = rotation_difference(mount.rotation, term.value.rotation);
+  MountResidual result;
+  result.residual << rotation_weight * difference.value, position_weight * (mount.centre - term.value.centre);
+  result.by_mount.setZero();
+  result.by_mount.topLeftCorner<3, 3>() = rotation_weight * difference.by_rotation;
+  result.by_mount.bottomRightCorner<3, 3>() = position_weight * Eigen::Matrix3d::Identity();
+  return result;
+}
+
+namespace {
+
+double image_cost(const TileProblem& problem, const TileState& state) {
+  double sum = 0;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      const Eigen::Vector3d in_camera =
+          to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]);
+      if (!(in_camera.z() > 0)) return std::numeric_limits<double>::infinity();
+      const Eigen::Vector2d difference =
+          project(state.cameras[image.camera.value], in_camera) - Eigen::Vector2d(problem.x[row], problem.y[row]);
+      sum += problem.image_loss.evaluate((problem.inverse_sigma[row] * difference).squaredNorm())[0];
+    }
+  }
+  return sum;
+}
+
+double prior_cost(const TileProblem& problem, const TileState& state) {
+  double sum = 0;
+  for (const auto& term : problem.positions) {
+    const double s = linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm();
+    sum += problem.position_loss.evaluate(s)[0];
+  }
+  for (const auto& term : problem.attitudes)
+    sum += linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm();
+  for (const auto& term : problem.relatives) {
+    const auto r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual;
+    sum += problem.relative_loss.evaluate(r.squaredNorm())[0];
+  }
+  for (const auto& term : problem.point_priors)
+    if (problem.active(term.point.value))
+      sum += point_prior_residual(state.points[term.point.value], term).squaredNorm();
+  for (const auto& term : problem.intrinsic_priors) {
+    for (int k = 0; k < kIntrinsicCount; ++k) {
+      const double r = intrinsic_prior_residual(state.cameras[term.camera.value], term, k);
+      sum += r * r;
+    }
+  }
+  for (const auto& term : problem.mount_priors)
+    sum += linearise_mount(state.mounts[term.mount], term).residual.squaredNorm();
+  return sum;
+}
+
+}  // namespace
+
+double evaluate_cost(const TileProblem& problem, const TileState& state) {
+  return 0.5 * (image_cost(problem, state) + prior_cost(problem, state));
+}
+
+}  // namespace megablock

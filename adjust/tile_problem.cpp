@@ -1,0 +1,338 @@
+#include "adjust/tile_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "io/error.h"
+
+namespace megablock {
+
+std::array<double, 3> RobustLoss::evaluate(double squared_norm) const {
+  const double s = squared_norm, b = scale * scale;
+  constexpr double kTiny = std::numeric_limits<double>::min();
+  switch (kind) {
+    case Kind::kNone:
+      break;
+    case Kind::kHuber:
+      if (s > b) {
+        const double r = std::sqrt(s);
+        const double first = std::max(kTiny, scale / r);
+        return {2 * scale * r - b, first, -first / (2 * s)};
+      }
+      break;
+    case Kind::kCauchy: {
+      const double inverse = 1 / (1 + s / b);
+      return {b * std::log1p(s / b), std::max(kTiny, inverse), -inverse * inverse / b};
+    }
+  }
+  return {s, 1, 0};
+}
+
+bool TileProblem::active(std::int64_t point) const {
+  int count = 0;
+  for (std::int64_t row = begin[point]; row < begin[point + 1]; ++row) {
+    count += kept[row] != 0;
+    if (count >= 2) return true;
+  }
+  return count == 1 && points[point].role == PointRole::kControl;
+}
+
+void ObservationOptions::check() const {
+  if (!(image_sigma_px > 0)) throw InputError("image_sigma_px must be positive (pixels)");
+  for (const RobustLoss& loss : {image_loss, position_loss, relative_loss})
+    if (loss.kind != RobustLoss::Kind::kNone && !(loss.scale > 0))
+      throw InputError("the scale of a robust loss must be positive (sigmas)");
+}
+
+TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end) {
+  std::vector<TileIndex> seen;
+  for (const ImageIndex* image = begin; image != end; ++image) {
+    const TileIndex tile = tiles.tile_of_frame[block.images[*image].frame];
+    if (tile.valid()) seen.push_back(tile);
+  }
+  std::sort(seen.begin(), seen.end());
+  TileIndex best;
+  std::ptrdiff_t most = 0;
+  for (auto run = seen.begin(); run != seen.end();) {
+    const auto next = std::upper_bound(run, seen.end(), *run);
+    if (next - run > most) {
+      most = next - run;
+      best = *run;
+    }
+    run = next;
+  }
+  return best;
+}
+
+namespace {
+
+// A prior on half of a mount (only its rotation or only its position) holds the other half by these sigmas.
+constexpr double kHeldRotationRad = 1e-7;
+constexpr double kHeldPositionM = 1e-6;
+
+template <typename Value>
+void make_distinct(std::vector<Value>& values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
+// Row of `value` in an ascending table, -1 when it is not there.
+template <typename Value>
+std::int32_t row_of(const std::vector<Value>& table, const Value& value) {
+  const auto it = std::lower_bound(table.begin(), table.end(), value);
+  return it == table.end() || *it != value ? -1 : static_cast<std::int32_t>(it - table.begin());
+}
+
+class TileBuilder {
+ public:
+  TileBuilder(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile, const TrackSet& owned,
+              const ObservationOptions& options)
+      : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options) {}
+
+  TileProblem build() {
+    problem_.image_loss = options_.image_loss;
+    problem_.position_loss = options_.position_loss;
+    problem_.relative_loss = options_.relative_loss;
+    select_control_points();
+    select_relative_poses();
+    select_prior_owners();
+    make_tables();
+    for (std::int64_t t = 0; t < owned_.track_count(); ++t) add_track(t);
+    for (std::int64_t row : control_points_) add_control_point(row);
+    add_frame_priors();
+    add_relative_poses();
+    add_camera_priors();
+    add_mount_priors();
+    return std::move(problem_);
+  }
+
+ private:
+  bool oriented(FrameIndex frame) const { return state_.oriented[frame] != 0; }
+  bool oriented(ImageIndex image) const { return oriented(block_.images[image].frame); }
+  bool has_prior(const Frame& frame) const {
+    return (options_.use_position_priors && frame.position_prior) ||
+           (options_.use_attitude_priors && frame.attitude_prior);
+  }
+  MountId mount_of(ImageIndex image) const {
+    return {block_.frames[block_.images[image].frame].rig, block_.images[image].mount};
+  }
+  const Mount& mount(const MountId& id) const { return block_.rigs[id.rig].mounts[static_cast<std::size_t>(id.mount)]; }
+
+  void select_control_points() {
+    std::vector<ImageIndex> measured;
+    for (std::size_t row = 0; row < block_.control_points.size(); ++row) {
+      measured.clear();
+      for (const ImageMeasurement& m : block_.control_points[row].measurements) measured.push_back(m.image);
+      if (owner_tile(block_, tiles_, measured.data(), measured.data() + measured.size()) == tile_)
+        control_points_.push_back(static_cast<std::int64_t>(row));
+    }
+  }
+
+  void select_relative_poses() {
+    for (std::size_t row = 0; row < block_.relative_poses.size(); ++row) {
+      const RelativePose& relative = block_.relative_poses[row];
+      if (!oriented(relative.from) || !oriented(relative.to)) continue;
+      if (std::min(tiles_.tile_of_frame[relative.from], tiles_.tile_of_frame[relative.to]) == tile_)
+        relative_poses_.push_back(row);
+    }
+  }
+
+  // The priors of a camera and of a mount belong to the tile of the first oriented image that uses it.
+  void select_prior_owners() {
+    IndexedVector<CameraIndex, std::uint8_t> camera_seen(block_.cameras.size(), 0);
+    std::vector<std::vector<std::uint8_t>> mount_seen;
+    std::size_t open = block_.cameras.size();
+    for (const Rig& rig : block_.rigs) {
+      mount_seen.emplace_back(rig.mounts.size(), 0);
+      open += rig.mounts.size();
+    }
+    for (std::size_t i = 0; i < block_.images.size() && open > 0; ++i) {
+      const ImageIndex image(static_cast<std::int64_t>(i));
+      const TileIndex home = tiles_.tile_of_frame[block_.images[image].frame];
+      if (!oriented(image) || !home.valid()) continue;
+      const MountId id = mount_of(image);
+      auto& mount_flag = mount_seen[static_cast<std::size_t>(id.rig.value)][static_cast<std::size_t>(id.mount)];
+      if (mount_flag) continue;  // then its camera has been seen as well
+      mount_flag = 1;
+      --open;
+      if (home == tile_) prior_mounts_.push_back(id);
+      const CameraIndex camera = mount(id).camera;
+      if (camera_seen[camera]) continue;
+      camera_seen[camera] = 1;
+      --open;
+      if (home == tile_) prior_cameras_.push_back(camera);
+    }
+    make_distinct(prior_cameras_);
+    make_distinct(prior_mounts_);
+  }
+
+  void make_tables() {
+    std::vector<ImageIndex> images(owned_.image);
+    for (std::int64_t row : control_points_)
+      for (const ImageMeasurement& m : block_.control_points[static_cast<std::size_t>(row)].measurements)
+        images.push_back(m.image);
+    make_distinct(images);
+    std::erase_if(images, [&](ImageIndex image) { return !oriented(image); });
+
+    std::vector<FrameIndex>& frames = problem_.frames;
+    problem_.cameras = prior_cameras_;
+    problem_.mounts = prior_mounts_;
+    for (ImageIndex image : images) {
+      frames.push_back(block_.images[image].frame);
+      problem_.mounts.push_back(mount_of(image));
+      problem_.cameras.push_back(block_.camera_of(image));
+    }
+    for (std::size_t f = 0; f < block_.frames.size(); ++f) {
+      const FrameIndex frame(static_cast<std::int64_t>(f));
+      if (tiles_.tile_of_frame[frame] == tile_ && oriented(frame) && has_prior(block_.frames[frame]))
+        frames.push_back(frame);
+    }
+    for (std::size_t row : relative_poses_) {
+      frames.push_back(block_.relative_poses[row].from);
+      frames.push_back(block_.relative_poses[row].to);
+    }
+    make_distinct(frames);
+    make_distinct(problem_.cameras);
+    make_distinct(problem_.mounts);
+
+    for (ImageIndex image : images) {
+      problem_.images.push_back({image, LocalFrame(row_of(frames, block_.images[image].frame)),
+                                 LocalCamera(row_of(problem_.cameras, block_.camera_of(image))),
+                                 row_of(problem_.mounts, mount_of(image))});
+    }
+    image_table_ = std::move(images);
+    for (CameraIndex camera : problem_.cameras) problem_.camera_free.push_back(free_mask(block_.cameras[camera]));
+    for (const MountId& id : problem_.mounts) problem_.mount_free.push_back(mount(id).held() ? 0 : 1);
+    problem_.begin.push_back(0);
+  }
+
+  static std::uint8_t free_mask(const Camera& camera) {
+    unsigned mask = 0;
+    for (int k = 0; k < kIntrinsicCount; ++k)
+      if (camera.prior_sigma[static_cast<std::size_t>(k)] != 0) mask |= 1u << k;
+    return static_cast<std::uint8_t>(mask);
+  }
+
+  void add_observation(ImageIndex image, double x, double y, double sigma) {
+    const std::int32_t row = row_of(image_table_, image);
+    problem_.image.push_back(LocalImage(row));
+    problem_.x.push_back(x);
+    problem_.y.push_back(y);
+    problem_.inverse_sigma.push_back(1 / sigma);
+    problem_.kept.push_back(row >= 0);
+  }
+
+  void add_track(std::int64_t t) {
+    problem_.points.push_back({PointRole::kTie, owned_.id[t].value});
+    for (std::int64_t row = owned_.begin[t]; row < owned_.begin[t + 1]; ++row)
+      add_observation(owned_.image[row], from_fixed_pixel(owned_.x[row]), from_fixed_pixel(owned_.y[row]),
+                      options_.image_sigma_px);
+    problem_.begin.push_back(problem_.observation_count());
+  }
+
+  void add_control_point(std::int64_t row) {
+    const ControlPoint& control = block_.control_points[static_cast<std::size_t>(row)];
+    const LocalPoint point(static_cast<std::int32_t>(problem_.points.size()));
+    problem_.points.push_back({control.role, row});
+    for (const ImageMeasurement& m : control.measurements)
+      add_observation(m.image, m.pixel.x(), m.pixel.y(), m.sigma_px);
+    problem_.begin.push_back(problem_.observation_count());
+    if (control.role != PointRole::kControl) return;
+    TileProblem::PointTerm term{point, control.position, control.sigma};
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!std::isnan(control.position[axis])) continue;  // unknown height
+      term.position[axis] = 0;
+      term.sigma[axis] = std::numeric_limits<double>::infinity();
+    }
+    problem_.point_priors.push_back(term);
+  }
+
+  void add_frame_priors() {
+    for (std::size_t f = 0; f < problem_.frames.size(); ++f) {
+      if (tiles_.tile_of_frame[problem_.frames[f]] != tile_) continue;
+      const Frame& frame = block_.frames[problem_.frames[f]];
+      const LocalFrame local(static_cast<std::int32_t>(f));
+      if (options_.use_position_priors && frame.position_prior)
+        problem_.positions.push_back({local, *frame.position_prior});
+      if (options_.use_attitude_priors && frame.attitude_prior)
+        problem_.attitudes.push_back({local, *frame.attitude_prior});
+    }
+  }
+
+  void add_relative_poses() {
+    for (std::size_t row : relative_poses_) {
+      const RelativePose& relative = block_.relative_poses[row];
+      problem_.relatives.push_back({LocalFrame(row_of(problem_.frames, relative.from)),
+                                    LocalFrame(row_of(problem_.frames, relative.to)), relative.pose,
+                                    relative.rotation_sigma_rad, relative.position_sigma_m});
+    }
+  }
+
+  void add_camera_priors() {
+    for (CameraIndex index : prior_cameras_) {
+      const Camera& camera = block_.cameras[index];
+      const bool any = std::any_of(camera.prior_sigma.begin(), camera.prior_sigma.end(),
+                                   [](double sigma) { return sigma > 0 && std::isfinite(sigma); });
+      if (any)
+        problem_.intrinsic_priors.push_back(
+            {LocalCamera(row_of(problem_.cameras, index)), camera.intrinsics, camera.prior_sigma});
+    }
+  }
+
+  void add_mount_priors() {
+    for (const MountId& id : prior_mounts_) {
+      const Mount& m = mount(id);
+      if (m.held() || (std::isinf(m.rotation_sigma_rad) && std::isinf(m.position_sigma_m))) continue;
+      problem_.mount_priors.push_back({row_of(problem_.mounts, id), m.pose,
+                                       m.rotation_sigma_rad > 0 ? m.rotation_sigma_rad : kHeldRotationRad,
+                                       m.position_sigma_m > 0 ? m.position_sigma_m : kHeldPositionM});
+    }
+  }
+
+  const Block& block_;
+  const BlockState& state_;
+  const Tiles& tiles_;
+  const TileIndex tile_;
+  const TrackSet& owned_;
+  const ObservationOptions& options_;
+  TileProblem problem_;
+  std::vector<std::int64_t> control_points_;
+  std::vector<std::size_t> relative_poses_;
+  std::vector<CameraIndex> prior_cameras_;
+  std::vector<MountId> prior_mounts_;
+  std::vector<ImageIndex> image_table_;
+};
+
+}  // namespace
+
+TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
+                              const TrackSet& owned, const ObservationOptions& options) {
+  options.check();
+  if (state.oriented.size() != block.frames.size() || tiles.tile_of_frame.size() != block.frames.size())
+    throw InputError("the block's state or tiles have another number of frames than the block");
+  return TileBuilder(block, state, tiles, tile, owned, options).build();
+}
+
+TileState make_tile_state(const TileProblem& problem, const BlockState& state, std::vector<Eigen::Vector3d> points) {
+  if (points.size() != problem.points.size())
+    throw InputError("the tile has " + std::to_string(problem.points.size()) + " points, values were given for " +
+                     std::to_string(points.size()));
+  TileState tile;
+  for (FrameIndex frame : problem.frames) tile.frames.push_back(state.frames[frame]);
+  for (CameraIndex camera : problem.cameras) tile.cameras.push_back(state.cameras[camera]);
+  for (const MountId& id : problem.mounts)
+    tile.mounts.push_back(state.mounts[id.rig][static_cast<std::size_t>(id.mount)]);
+  tile.points = std::move(points);
+  return tile;
+}
+
+void store_tile_state(const TileProblem& problem, const TileState& tile, BlockState& state) {
+  for (std::size_t f = 0; f < problem.frames.size(); ++f) state.frames[problem.frames[f]] = tile.frames[f];
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) state.cameras[problem.cameras[c]] = tile.cameras[c];
+  for (std::size_t m = 0; m < problem.mounts.size(); ++m)
+    state.mounts[problem.mounts[m].rig][static_cast<std::size_t>(problem.mounts[m].mount)] = tile.mounts[m];
+}
+
+}  // namespace megablock
