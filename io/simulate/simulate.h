@@ -46,6 +46,8 @@ struct SimulatedBlock {
   BlockState truth;
   TrackSet tracks;                     // noisy observations, all tracks
   std::vector<Eigen::Vector3d> points; // true positions [tracks]
+  std::vector<std::uint8_t> outlier;   // [observations] 1 = replaced by a wrong position
+  std::vector<Eigen::Vector3d> control_truth;  // true positions [block.control_points]
 };
 
 SimulatedBlock simulate_block(const SimulationOptions& options);

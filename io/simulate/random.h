@@ -1,0 +1,57 @@
+// Random numbers with the same bits everywhere: the distributions of the standard library differ between libraries.
+//
+// SplitMix64 (Steele, Lea, Flood 2014). A generator is named by (seed, stream), so that every frame draws from its own
+// stream and no result depends on the order in which frames are visited.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+namespace megablock {
+
+// Finaliser of SplitMix64: a bijection that spreads every input bit over the whole word.
+inline std::uint64_t mix_bits(std::uint64_t z) {
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return z ^ (z >> 31);
+}
+
+class Random {
+ public:
+  // What a stream is drawn for; streams of different purposes are independent.
+  enum class Purpose : std::uint64_t { kCamera = 1, kTerrain, kFrame, kTracks, kNoise, kPriors, kControl, kImage };
+
+  Random(std::uint64_t seed, Purpose purpose, std::uint64_t item = 0)
+      : state_(mix_bits(mix_bits(mix_bits(seed + kStep) + static_cast<std::uint64_t>(purpose) * kStep) + item)) {}
+
+  std::uint64_t next() { return mix_bits(state_ += kStep); }
+  double uniform() { return static_cast<double>(next() >> 11) * 0x1p-53; }  // [0, 1)
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+  std::int64_t below(std::int64_t n) { return static_cast<std::int64_t>(uniform() * static_cast<double>(n)); }
+
+  // Standard normal deviate (Box-Muller; the second of the pair is dropped so that there is no hidden state).
+  double normal() {
+    const double radius = std::sqrt(-2 * std::log(1 - uniform()));
+    return radius * std::cos(2 * std::numbers::pi * uniform());
+  }
+  Eigen::Vector3d normal3() {
+    const double x = normal(), y = normal(), z = normal();
+    return {x, y, z};
+  }
+  // Poisson deviate by inversion; for means up to a few tens.
+  int poisson(double mean) {
+    double product = uniform();
+    const double limit = std::exp(-mean);
+    int n = 0;
+    for (; product > limit; ++n) product *= uniform();
+    return n;
+  }
+
+ private:
+  static constexpr std::uint64_t kStep = 0x9e3779b97f4a7c15ULL;
+  std::uint64_t state_;
+};
+
+}  // namespace megablock
