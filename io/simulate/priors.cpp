@@ -137,7 +137,7 @@ void simulate_control(const SimulationOptions& options, const Layout& layout, Si
         static_cast<std::int64_t>(control) * total < static_cast<std::int64_t>(options.control_points) * (i + 1);
     control += is_control;
     point.role = is_control ? PointRole::kControl : PointRole::kCheck;
-    point.name = (is_control ? "control" : "check") + std::to_string(i);
+    point.name.append(is_control ? "control" : "check").append(std::to_string(i));
     point.position = truth + options.control_sigma_m * random.normal3();
     point.sigma.setConstant(options.control_sigma_m);
     for (const Sighting& s : seen) {

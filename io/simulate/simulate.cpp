@@ -1,7 +1,9 @@
 #include "io/simulate/simulate.h"
 
 #include <cmath>
+#include <iomanip>
 #include <limits>
+#include <sstream>
 
 #include "io/error.h"
 #include "io/simulate/scene.h"
@@ -14,9 +16,10 @@ void require(bool condition, const std::string& message) {
   if (!condition) throw InputError("simulation: " + message);
 }
 
-std::string padded(std::int64_t value, int digits) {
-  std::string text = std::to_string(value);
-  return std::string(static_cast<std::size_t>(std::max<std::int64_t>(0, digits - std::ssize(text))), '0') + text;
+std::string frame_name(std::int64_t index) {
+  std::ostringstream name;
+  name << 'f' << std::setw(6) << std::setfill('0') << index;
+  return name.str();
 }
 
 }  // namespace
@@ -48,7 +51,7 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
   const CameraIndex index = layout.block.cameras.next_index();
   Random random(options.seed, Random::Purpose::kCamera, static_cast<std::uint64_t>(index.value));
   Camera camera;
-  camera.name = "camera" + std::to_string(index.value);
+  camera.name.append("camera").append(std::to_string(index.value));
   camera.width = options.image_width;
   camera.height = options.image_height;
   camera.focal_known = true;
@@ -82,13 +85,15 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   const RigIndex rig(0);
   const std::size_t cameras = layout.block.rigs[rig].mounts.size();
   Frame frame;
-  frame.name = "f" + padded(index.value, 6);
+  frame.name = frame_name(index.value);
   frame.rig = rig;
   frame.pass = pass;
   frame.time_s = 1.6e9 + time_s;
   for (std::size_t m = 0; m < cameras; ++m) {
     Image image;
-    image.name = frame.name + (cameras > 1 ? "_c" + std::to_string(m) : "") + ".jpg";
+    image.name = frame.name;
+    if (cameras > 1) image.name.append("_c").append(std::to_string(m));
+    image.name.append(".jpg");
     image.frame = index;
     image.mount = static_cast<int>(m);
     layout.block.images.push_back(std::move(image));
