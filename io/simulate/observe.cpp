@@ -18,7 +18,8 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
     const ImageIndex image(static_cast<std::int64_t>(i));
     const Image& entry = block.images[image];
     const Pose& mount = layout.truth.mounts[block.frames[entry.frame].rig][static_cast<std::size_t>(entry.mount)];
-    views_.push_back({camera_pose(layout.truth.frames[entry.frame], mount), block.camera_of(image).value});
+    const Pose pose = camera_pose(layout.truth.frames[entry.frame], mount);
+    views_.push_back({pose.rotation.toRotationMatrix(), pose.centre, block.camera_of(image).value});
   }
   // The distortion polynomial turns back far outside the image; only rays inside the corners are projected.
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
@@ -62,11 +63,11 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
 void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<Sighting>& seen) const {
   const Pose& pose = layout_.truth.frames[FrameIndex(frame)];
   if ((pose.centre - point.position).head<2>().norm() > layout_.scene->range_m()) return;
-  bool visible = false, tested = false;  // the line of sight is tested once per frame, after the first frustum holds
+  if (!layout_.scene->visible(pose.centre, point)) return;
   const auto cameras = static_cast<std::int64_t>(layout_.block.rigs[RigIndex(0)].mounts.size());
   for (std::int64_t i = frame * cameras; i < (frame + 1) * cameras; ++i) {
     const View& view = views_[static_cast<std::size_t>(i)];
-    const Eigen::Vector3d inside = to_inside(view.pose, point.position);
+    const Eigen::Vector3d inside = view.rotation * (point.position - view.centre);
     if (inside.z() < 0.5) continue;
     const CameraIndex camera(view.camera);
     const double radius_sq = inside.head<2>().squaredNorm() / (inside.z() * inside.z());
@@ -76,9 +77,6 @@ void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<S
     if (pixel.x() < margin_px_ || pixel.x() > size.width - margin_px_ || pixel.y() < margin_px_ ||
         pixel.y() > size.height - margin_px_)
       continue;
-    if (!tested) visible = layout_.scene->visible(pose.centre, point);
-    tested = true;
-    if (!visible) return;
     seen.push_back({ImageIndex(i), pixel});
   }
 }

@@ -60,7 +60,8 @@ class Observer {
 
  private:
   struct View {
-    Pose pose;  // ground to camera
+    Eigen::Matrix3d rotation;  // ground to camera
+    Eigen::Vector3d centre;
     std::int64_t camera = 0;
   };
   void look(std::int64_t frame, const SurfacePoint& point, std::vector<Sighting>& seen) const;

@@ -22,8 +22,14 @@ constexpr double kCamera = 2.5;  // height of the rig above the road
 constexpr double kRange = 40;
 constexpr double kLane = 1.75;  // a drive keeps to the right of the axis
 
-// Distance to the nearest street axis in one coordinate.
-double off_axis(double x, double spacing) { return std::abs(x - spacing * std::round(x / spacing)); }
+// Number of the nearest street axis in one coordinate, and the distance to it. (std::round is a slow call at the
+// baseline instruction set.)
+std::int64_t nearest_axis(double x, double spacing) {
+  return static_cast<std::int64_t>(x / spacing + (x < 0 ? -0.5 : 0.5));
+}
+double off_axis(double x, double spacing) {
+  return std::abs(x - spacing * static_cast<double>(nearest_axis(x, spacing)));
+}
 
 class StreetScene : public Scene {
  public:
@@ -38,7 +44,7 @@ class StreetScene : public Scene {
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
     const bool street_along_x = off_axis(frame.centre.y(), spacing_) < off_axis(frame.centre.x(), spacing_);
     const int along = street_along_x ? 0 : 1, across = 1 - along;
-    const double axis = spacing_ * std::round(frame.centre[across] / spacing_);
+    const double axis = spacing_ * static_cast<double>(nearest_axis(frame.centre[across], spacing_));
     const double place = frame.centre[along] + random.uniform(-0.6, 0.6) * kRange;
     const double side = random.uniform() < 0.5 ? -1 : 1;
     const bool road = random.uniform() < 0.3;
@@ -63,6 +69,11 @@ class StreetScene : public Scene {
     const Eigen::Vector3d sight = point.position - eye;
     const double distance = sight.norm();
     if (distance > kRange || distance < 2 || -sight.dot(point.normal) < 0.12 * distance) return false;
+    for (const int across : {0, 1})  // both ends in one street
+      if (nearest_axis(eye[across], spacing_) == nearest_axis(point.position[across], spacing_) &&
+          std::max(off_axis(eye[across], spacing_), off_axis(point.position[across], spacing_)) <=
+              kFacade + kFacadeDepth)
+        return true;
     constexpr int kSteps = 12;
     for (int i = 1; i < kSteps; ++i) {
       const Eigen::Vector3d place = eye + sight * (static_cast<double>(i) / kSteps);

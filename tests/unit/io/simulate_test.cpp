@@ -99,6 +99,185 @@ TEST_P(SimulateTest, SeedDecidesEverything) {
   EXPECT_NE(a.truth.frames.front().centre, c.truth.frames.front().centre);
 }
 
+// Root mean square of a list of normalised 3-vectors per axis; 1 when the stated sigmas are true.
+double rms(const std::vector<Eigen::Vector3d>& normalised) {
+  double sum = 0;
+  for (const Eigen::Vector3d& v : normalised) sum += v.squaredNorm() / 3;
+  return std::sqrt(sum / static_cast<double>(normalised.size()));
+}
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+TEST_P(SimulateTest, PriorsHaveTheStatedNoise) {
+  SimulationOptions options = GetParam();
+  options.attitude_sigma_deg = 0.3;
+  options.relative_position_sigma_m = 0.02;
+  options.gps_share = 0.5;
+  const SimulatedBlock s = simulate_block(options);
+  std::vector<Eigen::Vector3d> position, attitude, turn, step, start;
+  for (std::size_t i = 0; i < s.block.frames.size(); ++i) {
+    const FrameIndex index(static_cast<std::int64_t>(i));
+    const Frame& frame = s.block.frames[index];
+    const Pose& truth = s.truth.frames[index];
+    if (frame.position_prior) {
+      const PositionPrior& p = *frame.position_prior;
+      ASSERT_DOUBLE_EQ(p.sigma.x(), options.gps_sigma_m);
+      const Eigen::Vector3d antenna = truth.centre + truth.rotation.conjugate() * p.lever_arm;
+      position.push_back((antenna - p.position).cwiseQuotient(p.sigma));
+    }
+    ASSERT_TRUE(frame.attitude_prior && frame.given_pose);
+    const Eigen::Quaterniond error = truth.rotation * frame.attitude_prior->rotation_cw.conjugate();
+    attitude.push_back(rotation_log<double>(error).cwiseQuotient(frame.attitude_prior->sigma_rad));
+    start.push_back((frame.given_pose->centre - truth.centre) / options.start_position_error_m);
+  }
+  std::int64_t breaks = 0;
+  for (std::size_t i = 1; i < s.block.frames.size(); ++i)
+    breaks += s.block.frames[FrameIndex(static_cast<std::int64_t>(i))].pass !=
+              s.block.frames[FrameIndex(static_cast<std::int64_t>(i) - 1)].pass;
+  ASSERT_EQ(std::ssize(s.block.relative_poses), options.frames - 1 - breaks);
+  for (const RelativePose& r : s.block.relative_poses) {
+    ASSERT_EQ(s.block.frames[r.from].pass, s.block.frames[r.to].pass);
+    const Pose &a = s.truth.frames[r.from], &b = s.truth.frames[r.to];
+    turn.push_back(rotation_log<double>(b.rotation * a.rotation.conjugate() * r.pose.rotation.conjugate()) /
+                   r.rotation_sigma_rad);
+    step.push_back((a.rotation * (b.centre - a.centre) - r.pose.centre) / r.position_sigma_m);
+    ASSERT_DOUBLE_EQ(r.rotation_sigma_rad, options.relative_rotation_sigma_deg * kDegree);
+  }
+  EXPECT_EQ(std::ssize(position), options.frames / 2);
+  EXPECT_NEAR(rms(position), 1, 0.2);
+  EXPECT_NEAR(rms(attitude), 1, 0.15);
+  EXPECT_NEAR(rms(turn), 1, 0.15);
+  EXPECT_NEAR(rms(step), 1, 0.15);
+  EXPECT_NEAR(rms(start), 1, 0.5);  // correlated along the passes
+}
+
+TEST_P(SimulateTest, ControlIsMeasuredWithItsNoise) {
+  SimulationOptions options = GetParam();
+  options.control_points = 30;
+  options.check_points = 15;
+  const SimulatedBlock s = simulate_block(options);
+  ASSERT_EQ(s.block.control_points.size(), s.control_truth.size());
+  ASSERT_GE(s.control_truth.size(), 44u);
+  double chi2 = 0, n = 0;
+  std::int64_t control = 0;
+  std::vector<Eigen::Vector3d> position;
+  for (std::size_t p = 0; p < s.control_truth.size(); ++p) {
+    const ControlPoint& point = s.block.control_points[p];
+    control += point.role == PointRole::kControl;
+    position.push_back((point.position - s.control_truth[p]).cwiseQuotient(point.sigma));
+    ASSERT_GE(point.measurements.size(), 2u);
+    for (const ImageMeasurement& m : point.measurements) {
+      const Eigen::Vector3d inside = in_camera(s, m.image, s.control_truth[p]);
+      ASSERT_GT(inside.z(), 0);
+      chi2 += ((project(s.truth.cameras[s.block.camera_of(m.image)], inside) - m.pixel) / m.sigma_px).squaredNorm();
+      n += 2;
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(control), 2.0 / 3 * static_cast<double>(s.control_truth.size()), 1.5);
+  EXPECT_NEAR(chi2 / n, 1, 5 * std::sqrt(2 / n));
+  EXPECT_NEAR(rms(position), 1, 0.3);
+}
+
+TEST_P(SimulateTest, OutliersHaveTheirShareAndLeaveTheOthersAlone) {
+  SimulationOptions options = GetParam();
+  options.frames = 60;
+  options.outlier_share = 0.05;
+  const SimulatedBlock s = simulate_block(options);
+  const auto n = static_cast<double>(s.outlier.size());
+  double share = 0;
+  std::int64_t wrong_inlier = 0, right_outlier = 0;
+  for (std::size_t t = 0; t < s.points.size(); ++t)
+    for (auto o = static_cast<std::size_t>(s.tracks.begin[t]); o < static_cast<std::size_t>(s.tracks.begin[t + 1]);
+         ++o) {
+      const ImageIndex image = s.tracks.image[o];
+      const Eigen::Vector2d measured(from_fixed_pixel(s.tracks.x[o]), from_fixed_pixel(s.tracks.y[o]));
+      const double error =
+          (project(s.truth.cameras[s.block.camera_of(image)], in_camera(s, image, s.points[t])) - measured).norm();
+      share += s.outlier[o] / n;
+      wrong_inlier += !s.outlier[o] && error > 6 * options.image_noise_px;
+      right_outlier += s.outlier[o] && error < 6 * options.image_noise_px;
+    }
+  EXPECT_NEAR(share, 0.05, 5 * std::sqrt(0.05 * 0.95 / n));
+  EXPECT_EQ(wrong_inlier, 0);
+  EXPECT_LE(right_outlier, 2);
+}
+
+TEST_P(SimulateTest, CamerasStartNominalUnlessHeld) {
+  SimulationOptions options = GetParam();
+  options.frames = 20;
+  for (const bool calibrate : {true, false}) {
+    options.calibrate = calibrate;
+    const SimulatedBlock s = simulate_block(options);
+    for (std::size_t c = 0; c < s.block.cameras.size(); ++c) {
+      const CameraIndex index(static_cast<std::int64_t>(c));
+      const Camera& camera = s.block.cameras[index];
+      EXPECT_NE(s.truth.cameras[index][kRadial1], 0);
+      EXPECT_EQ(camera.intrinsics == s.truth.cameras[index], !calibrate);
+      EXPECT_EQ(camera.prior_sigma[kFocal] > 0, calibrate);
+    }
+  }
+}
+
+// Share of an image's ground footprint that its neighbour sees, from the distances of the projection centres.
+TEST(SimulateAerial, OverlapsAreAsAsked) {
+  SimulationOptions options = aerial_options();
+  options.frames = 200;
+  options.forward_overlap = 0.7;
+  options.side_overlap = 0.4;
+  const SimulatedBlock s = simulate_block(options);
+  double along = 0, n = 0, first = 0, second = 0, n_first = 0, n_second = 0;
+  for (std::size_t i = 0; i < s.block.frames.size(); ++i) {
+    const FrameIndex f(static_cast<std::int64_t>(i));
+    const Pose& pose = s.truth.frames[f];
+    const Eigen::Vector3d view = pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    EXPECT_LT(view.z(), -std::cos(6 * kDegree));  // nadir
+    if (s.block.frames[f].pass == 0) first += pose.centre.y(), ++n_first;
+    if (s.block.frames[f].pass == 1) second += pose.centre.y(), ++n_second;
+    const FrameIndex next(f.value + 1);
+    if (!s.block.frames.contains(next) || s.block.frames[next].pass != s.block.frames[f].pass) continue;
+    along += std::abs(s.truth.frames[next].centre.x() - pose.centre.x());
+    ++n;
+  }
+  const double scale = options.height_m / options.focal_px;
+  EXPECT_NEAR(1 - along / n / (scale * options.image_height), 0.7, 0.01);
+  EXPECT_NEAR(1 - (second / n_second - first / n_first) / (scale * options.image_width), 0.4, 0.02);
+}
+
+TEST(SimulateStreet, PassesShareTracksAndPointsAreNear) {
+  const SimulatedBlock s = simulate_block(street_options());
+  std::int64_t shared = 0;
+  for (std::size_t t = 0; t < s.points.size(); ++t) {
+    bool pass[2] = {false, false};
+    for (auto o = s.tracks.begin[t]; o < s.tracks.begin[t + 1]; ++o) {
+      const FrameIndex frame = s.block.images[s.tracks.image[static_cast<std::size_t>(o)]].frame;
+      ASSERT_LT((s.truth.frames[frame].centre - s.points[t]).norm(), 41);
+      pass[s.block.frames[frame].pass] = true;
+    }
+    shared += pass[0] && pass[1];
+  }
+  EXPECT_GT(shared, s.tracks.track_count() / 10);
+  EXPECT_LT(shared, s.tracks.track_count() / 2);
+  // Cameras around the compass: the viewing directions of a level rig sum to nearly nothing.
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Pose& mount : s.truth.mounts.front()) sum += mount.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  EXPECT_LT(sum.norm(), 0.2);
+}
+
+TEST(SimulateOptions, NonsenseIsRefused) {
+  SimulationOptions options;
+  options.frames = 1;
+  EXPECT_THROW(simulate_block(options), InputError);
+  options = {};
+  options.mean_track = 1;
+  EXPECT_THROW(simulate_block(options), InputError);
+  options = {};
+  options.outlier_share = 1.5;
+  EXPECT_THROW(simulate_block(options), InputError);
+  options = {};
+  options.terrain_relief_m = 1000;
+  EXPECT_THROW(simulate_block(options), InputError);
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, SimulateTest, testing::Values(aerial_options(), street_options()),
                          [](const auto& scene) { return scene.index == 0 ? "aerial" : "street"; });
 
