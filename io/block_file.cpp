@@ -1,0 +1,344 @@
+// The block as read from project file and image headers: docs/job-format.md, "Block".
+#include "io/hdf5_block.h"
+#include "io/hdf5_tables.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+void put_ground(Hdf5Writer& file, const GroundFrame& ground) {
+  file.group("ground", "local topocentric frame: east, north, up; metres");
+  file.attribute("ground", "georeferenced", static_cast<std::uint8_t>(ground.georeferenced));
+  file.attribute("ground", "latitude_deg", ground.latitude_deg);
+  file.attribute("ground", "longitude_deg", ground.longitude_deg);
+  file.attribute("ground", "height_m", ground.height_m);
+  file.attribute("ground", "crs", ground.crs);
+}
+
+GroundFrame get_ground(const Hdf5Reader& file) {
+  GroundFrame ground;
+  ground.georeferenced = file.attribute<std::uint8_t>("ground", "georeferenced") != 0;
+  ground.latitude_deg = file.attribute<double>("ground", "latitude_deg");
+  ground.longitude_deg = file.attribute<double>("ground", "longitude_deg");
+  ground.height_m = file.attribute<double>("ground", "height_m");
+  ground.crs = file.text_attribute("ground", "crs");
+  return ground;
+}
+
+void put_cameras(Hdf5Writer& file, const IndexedVector<CameraIndex, Camera>& cameras) {
+  std::vector<std::int32_t> size;
+  std::vector<double> intrinsics, sigma;
+  for (const Camera& camera : cameras) {
+    size.insert(size.end(), {camera.width, camera.height});
+    intrinsics.insert(intrinsics.end(), camera.intrinsics.begin(), camera.intrinsics.end());
+    sigma.insert(sigma.end(), camera.prior_sigma.begin(), camera.prior_sigma.end());
+  }
+  file.group("cameras", "one row per physical camera");
+  file.texts("cameras/name", column(cameras, [](const Camera& c) { return c.name; }));
+  file.matrix("cameras/size", size, 2, {"px", "width, height"});
+  file.matrix("cameras/start_intrinsics", intrinsics, kIntrinsicCount,
+              {"px, px, px, 1, 1, 1, 1, 1", "start values of f, cx, cy, k1, k2, k3, p1, p2"});
+  file.matrix("cameras/prior_sigma", sigma, kIntrinsicCount,
+              {"px, px, px, 1, 1, 1, 1, 1", "prior sigmas; 0: held, infinity: free without prior"});
+  file.vector("cameras/focal_known", column(cameras, [](const Camera& c) -> std::uint8_t { return c.focal_known; }),
+              {"", "1: from EXIF, sensor table or project file; 0: a guess"});
+  file.texts("cameras/mask_path", column(cameras, [](const Camera& c) { return c.mask_path; }));
+}
+
+IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
+  const std::vector<std::string> names = file.texts("cameras/name");
+  const auto count = static_cast<std::int64_t>(names.size());
+  const auto size = file.matrix<std::int32_t>("cameras/size", 2, count);
+  const auto intrinsics = file.matrix<double>("cameras/start_intrinsics", kIntrinsicCount, count);
+  const auto sigma = file.matrix<double>("cameras/prior_sigma", kIntrinsicCount, count);
+  const auto known = file.vector<std::uint8_t>("cameras/focal_known", count);
+  const std::vector<std::string> masks = file.texts("cameras/mask_path", count);
+  IndexedVector<CameraIndex, Camera> cameras(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    Camera& camera = cameras[CameraIndex(static_cast<std::int64_t>(i))];
+    camera.name = names[i];
+    camera.width = size[2 * i];
+    camera.height = size[2 * i + 1];
+    std::copy_n(&intrinsics[kIntrinsicCount * i], kIntrinsicCount, camera.intrinsics.begin());
+    std::copy_n(&sigma[kIntrinsicCount * i], kIntrinsicCount, camera.prior_sigma.begin());
+    camera.focal_known = known[i] != 0;
+    camera.mask_path = masks[i];
+  }
+  return cameras;
+}
+
+void put_rigs(Hdf5Writer& file, const IndexedVector<RigIndex, Rig>& rigs) {
+  std::vector<Mount> mounts;
+  for (const Rig& rig : rigs) mounts.insert(mounts.end(), rig.mounts.begin(), rig.mounts.end());
+  file.group("rigs", "one row per rig");
+  file.texts("rigs/name", column(rigs, [](const Rig& r) { return r.name; }));
+  file.vector("rigs/mounts", column(rigs, [](const Rig& r) { return static_cast<std::int32_t>(r.mounts.size()); }),
+              {"", "number of mounts: rows of the group 'mounts', in the order of the rigs"});
+  file.group("mounts", "one row per camera of a rig");
+  file.vector("mounts/camera", column(mounts, [](const Mount& m) { return m.camera.value; }), {"", "row in cameras"});
+  file.group("mounts/start");
+  write_poses(file, "mounts/start", column(mounts, [](const Mount& m) { return m.pose; }), "camera", "rig");
+  file.vector("mounts/rotation_sigma", column(mounts, [](const Mount& m) { return m.rotation_sigma_rad; }),
+              {"rad", "prior sigma; 0: held"});
+  file.vector("mounts/position_sigma", column(mounts, [](const Mount& m) { return m.position_sigma_m; }),
+              {"m", "prior sigma; 0: held"});
+}
+
+IndexedVector<RigIndex, Rig> get_rigs(const Hdf5Reader& file) {
+  const std::vector<std::string> names = file.texts("rigs/name");
+  const std::vector<Pose> poses = read_poses(file, "mounts/start");
+  const auto count = static_cast<std::int64_t>(poses.size());
+  const auto begin = begin_of(file, "rigs/mounts",
+                              file.vector<std::int64_t>("rigs/mounts", static_cast<std::int64_t>(names.size())), count);
+  const auto cameras = file.vector<std::int64_t>("mounts/camera", count);
+  const auto rotation_sigma = file.vector<double>("mounts/rotation_sigma", count);
+  const auto position_sigma = file.vector<double>("mounts/position_sigma", count);
+  IndexedVector<RigIndex, Rig> rigs;
+  for (std::size_t r = 0; r < names.size(); ++r) {
+    Rig rig{names[r], {}};
+    for (auto m = static_cast<std::size_t>(begin[r]); m < static_cast<std::size_t>(begin[r + 1]); ++m)
+      rig.mounts.push_back({CameraIndex(cameras[m]), poses[m], rotation_sigma[m], position_sigma[m]});
+    rigs.push_back(std::move(rig));
+  }
+  return rigs;
+}
+
+// A prior that a frame may lack is a row of NaN together with a 0 in `present`.
+void put_frame_priors(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& frames) {
+  const auto position = [](auto member) {
+    return [member](const Frame& f) -> Eigen::Vector3d {
+      return f.position_prior ? (*f.position_prior).*member : absent_vector();
+    };
+  };
+  file.group("frames/position_prior", "GNSS positions of the antenna; rows of NaN: none");
+  file.vector("frames/position_prior/present",
+              column(frames, [](const Frame& f) -> std::uint8_t { return f.position_prior.has_value(); }));
+  file.matrix("frames/position_prior/position", vectors3(frames, position(&PositionPrior::position)), 3,
+              {"m", "ground frame"});
+  file.matrix("frames/position_prior/sigma", vectors3(frames, position(&PositionPrior::sigma)), 3,
+              {"m", "east, north, up"});
+  file.matrix("frames/position_prior/lever_arm", vectors3(frames, position(&PositionPrior::lever_arm)), 3,
+              {"m", "antenna in the rig: antenna = C + R' lever_arm"});
+
+  file.group("frames/attitude_prior", "observed attitudes in the ground frame; rows of NaN: none");
+  file.vector("frames/attitude_prior/present",
+              column(frames, [](const Frame& f) -> std::uint8_t { return f.attitude_prior.has_value(); }));
+  file.matrix("frames/attitude_prior/rotation_wxyz",
+              quaternions(frames,
+                          [](const Frame& f) {
+                            return f.attitude_prior ? f.attitude_prior->rotation_cw : absent_quaternion();
+                          }),
+              4, {"", "unit quaternion, ground -> rig"});
+  file.matrix("frames/attitude_prior/sigma",
+              vectors3(frames,
+                       [](const Frame& f) -> Eigen::Vector3d {
+                         return f.attitude_prior ? f.attitude_prior->sigma_rad : absent_vector();
+                       }),
+              3, {"rad", "about the rig's x, y, z axes"});
+
+  file.group("frames/given", "approximate poses from a file; rows of NaN: none");
+  file.vector("frames/given/present",
+              column(frames, [](const Frame& f) -> std::uint8_t { return f.given_pose.has_value(); }));
+  write_poses(file, "frames/given",
+              column(frames,
+                     [](const Frame& f) {
+                       return f.given_pose ? *f.given_pose : Pose{absent_quaternion(), absent_vector()};
+                     }),
+              "rig", "ground frame");
+}
+
+void get_frame_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {
+  const auto count = static_cast<std::int64_t>(frames.size());
+  const auto has_position = file.vector<std::uint8_t>("frames/position_prior/present", count);
+  const auto position = file.matrix<double>("frames/position_prior/position", 3, count);
+  const auto sigma = file.matrix<double>("frames/position_prior/sigma", 3, count);
+  const auto lever_arm = file.matrix<double>("frames/position_prior/lever_arm", 3, count);
+  const auto has_attitude = file.vector<std::uint8_t>("frames/attitude_prior/present", count);
+  const auto attitude = file.matrix<double>("frames/attitude_prior/rotation_wxyz", 4, count);
+  const auto attitude_sigma = file.matrix<double>("frames/attitude_prior/sigma", 3, count);
+  const auto has_given = file.vector<std::uint8_t>("frames/given/present", count);
+  const std::vector<Pose> given = read_poses(file, "frames/given", count);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Frame& frame = frames[FrameIndex(static_cast<std::int64_t>(i))];
+    if (has_position[i])
+      frame.position_prior = PositionPrior{vector3(position, i), vector3(sigma, i), vector3(lever_arm, i)};
+    if (has_attitude[i]) frame.attitude_prior = AttitudePrior{quaternion(attitude, i), vector3(attitude_sigma, i)};
+    if (has_given[i]) frame.given_pose = given[i];
+  }
+}
+
+void put_frames(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& frames) {
+  file.group("frames", "one row per frame: a pose of a rig");
+  file.texts("frames/name", column(frames, [](const Frame& f) { return f.name; }));
+  file.vector("frames/rig", column(frames, [](const Frame& f) { return f.rig.value; }), {"", "row in rigs"});
+  file.vector("frames/pass", column(frames, [](const Frame& f) { return f.pass; }),
+              {"", "acquisition line, -1: unknown"});
+  file.vector("frames/time", column(frames, [](const Frame& f) { return f.time_s; }),
+              {"s", "of acquisition, since 1970; NaN: unknown"});
+  put_frame_priors(file, frames);
+}
+
+IndexedVector<FrameIndex, Frame> get_frames(const Hdf5Reader& file) {
+  const std::vector<std::string> names = file.texts("frames/name");
+  const auto count = static_cast<std::int64_t>(names.size());
+  const auto rigs = file.vector<std::int64_t>("frames/rig", count);
+  const auto passes = file.vector<std::int64_t>("frames/pass", count);
+  const auto times = file.vector<double>("frames/time", count);
+  IndexedVector<FrameIndex, Frame> frames(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    Frame& frame = frames[FrameIndex(static_cast<std::int64_t>(i))];
+    frame.name = names[i];
+    frame.rig = RigIndex(rigs[i]);
+    frame.pass = passes[i];
+    frame.time_s = times[i];
+  }
+  get_frame_priors(file, frames);
+  return frames;
+}
+
+void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images, const Block& block) {
+  file.group("images", "one row per exposure");
+  file.texts("images/name", column(images, [](const Image& i) { return i.name; }));
+  file.texts("images/path", column(images, [](const Image& i) { return i.path; }),
+             {"", "image file; empty for simulated tie points"});
+  file.vector("images/frame", column(images, [](const Image& i) { return i.frame.value; }), {"", "row in frames"});
+  file.vector("images/mount", column(images, [](const Image& i) { return static_cast<std::int32_t>(i.mount); }),
+              {"", "mount within the frame's rig"});
+  std::vector<std::int64_t> cameras;
+  for (const Image& image : images) {
+    // A block that was not checked may dangle; its camera is then unknown, and the reader does not use this column.
+    const bool sound = block.frames.contains(image.frame) && block.rigs.contains(block.frames[image.frame].rig) &&
+                       image.mount >= 0 &&
+                       static_cast<std::size_t>(image.mount) < block.rig_of(image.frame).mounts.size();
+    cameras.push_back(sound ? block.rig_of(image.frame).mounts[static_cast<std::size_t>(image.mount)].camera.value
+                            : -1);
+  }
+  file.vector("images/camera", cameras, {"", "row in cameras (follows from frame and mount)"});
+  file.vector("images/file_hash", column(images, [](const Image& i) { return i.file_hash; }),
+              {"", "XXH3 of the image file, 0: none"});
+}
+
+IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
+  const std::vector<std::string> names = file.texts("images/name");
+  const auto count = static_cast<std::int64_t>(names.size());
+  const std::vector<std::string> paths = file.texts("images/path", count);
+  const auto frames = file.vector<std::int64_t>("images/frame", count);
+  const auto mounts = file.vector<std::int32_t>("images/mount", count);
+  const auto hashes = file.vector<std::uint64_t>("images/file_hash", count);
+  IndexedVector<ImageIndex, Image> images;
+  images.reserve(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i)
+    images.push_back({names[i], paths[i], FrameIndex(frames[i]), mounts[i], hashes[i]});
+  return images;
+}
+
+void put_relative_poses(Hdf5Writer& file, const std::vector<RelativePose>& relatives) {
+  file.group("relative_poses", "observed poses of one frame in another");
+  file.vector("relative_poses/from", column(relatives, [](const RelativePose& r) { return r.from.value; }),
+              {"", "row in frames"});
+  file.vector("relative_poses/to", column(relatives, [](const RelativePose& r) { return r.to.value; }),
+              {"", "row in frames"});
+  write_poses(file, "relative_poses", column(relatives, [](const RelativePose& r) { return r.pose; }), "frame 'to'",
+              "frame 'from'");
+  file.vector("relative_poses/rotation_sigma",
+              column(relatives, [](const RelativePose& r) { return r.rotation_sigma_rad; }), {"rad", ""});
+  file.vector("relative_poses/position_sigma",
+              column(relatives, [](const RelativePose& r) { return r.position_sigma_m; }), {"m", ""});
+}
+
+std::vector<RelativePose> get_relative_poses(const Hdf5Reader& file) {
+  const std::vector<Pose> poses = read_poses(file, "relative_poses");
+  const auto count = static_cast<std::int64_t>(poses.size());
+  const auto from = file.vector<std::int64_t>("relative_poses/from", count);
+  const auto to = file.vector<std::int64_t>("relative_poses/to", count);
+  const auto rotation_sigma = file.vector<double>("relative_poses/rotation_sigma", count);
+  const auto position_sigma = file.vector<double>("relative_poses/position_sigma", count);
+  std::vector<RelativePose> relatives;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    relatives.push_back({FrameIndex(from[i]), FrameIndex(to[i]), poses[i], rotation_sigma[i], position_sigma[i]});
+  return relatives;
+}
+
+void put_control(Hdf5Writer& file, const std::vector<ControlPoint>& points) {
+  std::vector<ImageMeasurement> measurements;
+  std::vector<double> pixels;
+  for (const ControlPoint& point : points)
+    for (const ImageMeasurement& m : point.measurements) {
+      measurements.push_back(m);
+      pixels.insert(pixels.end(), {m.pixel.x(), m.pixel.y()});
+    }
+  file.group("control", "control and check points");
+  file.texts("control/name", column(points, [](const ControlPoint& p) { return p.name; }));
+  file.vector("control/role", column(points, [](const ControlPoint& p) { return static_cast<std::uint8_t>(p.role); }),
+              {"", "1: control point, 2: check point"});
+  file.matrix("control/position", vectors3(points, [](const ControlPoint& p) { return p.position; }), 3,
+              {"m", "given, ground frame; NaN in z: unknown height"});
+  file.matrix("control/sigma", vectors3(points, [](const ControlPoint& p) { return p.sigma; }), 3, {"m", "given"});
+  file.vector("control/measurements",
+              column(points, [](const ControlPoint& p) { return static_cast<std::int32_t>(p.measurements.size()); }),
+              {"", "number of image measurements: rows of the group 'control/measurement', in order"});
+  file.group("control/measurement", "image measurements of the control and check points");
+  file.vector("control/measurement/image",
+              column(measurements, [](const ImageMeasurement& m) { return m.image.value; }), {"", "row in images"});
+  file.matrix("control/measurement/pixel", pixels, 2, {"px", "x, y; pixel centres at +0.5"});
+  file.vector("control/measurement/sigma", column(measurements, [](const ImageMeasurement& m) { return m.sigma_px; }),
+              {"px", ""});
+}
+
+std::vector<ControlPoint> get_control(const Hdf5Reader& file) {
+  const std::vector<std::string> names = file.texts("control/name");
+  const auto count = static_cast<std::int64_t>(names.size());
+  const auto roles = file.vector<std::uint8_t>("control/role", count);
+  const auto positions = file.matrix<double>("control/position", 3, count);
+  const auto sigmas = file.matrix<double>("control/sigma", 3, count);
+  const auto images = file.vector<std::int64_t>("control/measurement/image");
+  const auto rows = static_cast<std::int64_t>(images.size());
+  const auto pixels = file.matrix<double>("control/measurement/pixel", 2, rows);
+  const auto sigma_px = file.vector<double>("control/measurement/sigma", rows);
+  const auto begin =
+      begin_of(file, "control/measurements", file.vector<std::int64_t>("control/measurements", count), rows);
+  std::vector<ControlPoint> points;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (roles[i] > static_cast<std::uint8_t>(PointRole::kCheck)) file.fail("control/role", "holds an unknown role");
+    ControlPoint point{names[i], static_cast<PointRole>(roles[i]), vector3(positions, i), vector3(sigmas, i), {}};
+    for (auto m = static_cast<std::size_t>(begin[i]); m < static_cast<std::size_t>(begin[i + 1]); ++m)
+      point.measurements.push_back({ImageIndex(images[m]), {pixels[2 * m], pixels[2 * m + 1]}, sigma_px[m]});
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+}  // namespace
+
+void put_block(Hdf5Writer& file, const Block& block) {
+  put_ground(file, block.ground);
+  put_cameras(file, block.cameras);
+  put_rigs(file, block.rigs);
+  put_frames(file, block.frames);
+  put_images(file, block.images, block);
+  put_relative_poses(file, block.relative_poses);
+  put_control(file, block.control_points);
+}
+
+Block get_block(const Hdf5Reader& file) {
+  Block block;
+  block.ground = get_ground(file);
+  block.cameras = get_cameras(file);
+  block.rigs = get_rigs(file);
+  block.frames = get_frames(file);
+  block.images = get_images(file);
+  block.relative_poses = get_relative_poses(file);
+  block.control_points = get_control(file);
+  return block;
+}
+
+void write_block(const std::string& path, const Block& block) {
+  Hdf5Writer file(path, "block");
+  put_block(file, block);
+  file.close();
+}
+
+Block read_block(const std::string& path) { return get_block(Hdf5Reader(path, "block")); }
+
+}  // namespace megablock

@@ -1,0 +1,166 @@
+// HDF5 files behind two small classes: everything the project stores goes through them.
+//
+// Files are written with libver 'latest', without time stamps and in a fixed order of calls, so that equal contents
+// give equal bytes. One writer per file; HDF5's own file locking is off (network file systems). Datasets above 16 KiB
+// are chunked, shuffled and deflated. Every file carries the root attributes `kind` and `format_version`.
+//
+// Errors: StoreError naming file and dataset; a full disk, quota or read-only directory while writing is an InputError.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace megablock {
+
+// Of every file the project writes and of the trailer of units; raised when the meaning or layout of any file changes.
+inline constexpr std::uint32_t kFormatVersion = 1;
+
+// An HDF5 identifier with its closing function.
+class Hdf5Handle {
+ public:
+  using Close = int (*)(std::int64_t);
+  Hdf5Handle() = default;
+  Hdf5Handle(std::int64_t id, Close close) : id_(id), close_(close) {}
+  ~Hdf5Handle() { reset(); }
+  Hdf5Handle(Hdf5Handle&& other) noexcept : id_(other.release()), close_(other.close_) {}
+  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept {
+    reset();
+    close_ = other.close_;
+    id_ = other.release();
+    return *this;
+  }
+  std::int64_t id() const { return id_; }
+  std::int64_t release() {
+    const std::int64_t id = id_;
+    id_ = -1;
+    return id;
+  }
+  void reset() {
+    if (id_ >= 0) close_(id_);
+    id_ = -1;
+  }
+
+ private:
+  std::int64_t id_ = -1;
+  Close close_ = nullptr;
+};
+
+enum class ElementType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat, kDouble };
+
+template <typename T>
+constexpr ElementType element_type() {
+  static_assert(std::is_arithmetic_v<T> && !std::is_same_v<T, bool>);
+  if constexpr (std::is_same_v<T, float>) return ElementType::kFloat;
+  if constexpr (std::is_same_v<T, double>) return ElementType::kDouble;
+  if constexpr (sizeof(T) == 1) return std::is_signed_v<T> ? ElementType::kInt8 : ElementType::kUint8;
+  if constexpr (sizeof(T) == 2) return std::is_signed_v<T> ? ElementType::kInt16 : ElementType::kUint16;
+  if constexpr (sizeof(T) == 4) return std::is_signed_v<T> ? ElementType::kInt32 : ElementType::kUint32;
+  return std::is_signed_v<T> ? ElementType::kInt64 : ElementType::kUint64;
+}
+
+// Attributes `units` and `description` of a dataset; empty ones are not written.
+struct DatasetNote {
+  std::string units, description;
+};
+
+class Hdf5Writer {
+ public:
+  // Replaces a file that is there.
+  Hdf5Writer(const std::string& path, const std::string& kind);
+  // Destroyed without close(), as by an exception, the file is left behind incomplete: the caller removes it.
+  ~Hdf5Writer() = default;
+  // Writes everything out; nothing may follow.
+  void close();
+
+  // Names are paths in the file, '/' between groups; a group must be made before what is in it.
+  void group(const std::string& name, const std::string& description = {});
+
+  template <typename T>
+  void vector(const std::string& name, const std::vector<T>& values, const DatasetNote& note = {}) {
+    dataset(name, element_type<T>(), values.data(), {static_cast<std::int64_t>(values.size())}, note);
+  }
+  // Row-major [rows x columns]; values.size() must be a multiple of columns.
+  template <typename T>
+  void matrix(const std::string& name, const std::vector<T>& values, std::int64_t columns,
+              const DatasetNote& note = {}) {
+    const auto rows = static_cast<std::int64_t>(values.size()) / columns;
+    dataset(name, element_type<T>(), values.data(), {rows, columns}, note);
+  }
+  // Integers in the smallest signed type that holds them all; readers ask for any integer type.
+  void integers(const std::string& name, const std::vector<std::int64_t>& values, const DatasetNote& note = {});
+  // Fixed-length UTF-8 strings, padded with zero bytes to the longest.
+  void texts(const std::string& name, const std::vector<std::string>& values, const DatasetNote& note = {});
+  void dataset(const std::string& name, ElementType type, const void* values, const std::vector<std::int64_t>& shape,
+               const DatasetNote& note);
+
+  // Attribute of a group or dataset ("/" is the file's root).
+  template <typename T>
+  void attribute(const std::string& object, const std::string& name, T value) requires std::is_arithmetic_v<T> {
+    scalar_attribute(object, name, element_type<T>(), &value);
+  }
+  void attribute(const std::string& object, const std::string& name, const std::string& value);
+
+ private:
+  void scalar_attribute(const std::string& object, const std::string& name, ElementType type, const void* value);
+  void write_dataset(const std::string& name, std::int64_t file_type, std::int64_t memory_type, const void* values,
+                     const std::vector<std::int64_t>& shape, const DatasetNote& note);
+  std::int64_t checked(std::int64_t result, const std::string& name) const;  // throws when result < 0
+
+  std::string path_;
+  Hdf5Handle file_;
+};
+
+class Hdf5Reader {
+ public:
+  // Throws StoreError when the file is missing, no HDF5 file, of another kind or format version.
+  Hdf5Reader(const std::string& path, const std::string& kind);
+
+  const std::string& path() const { return path_; }
+  bool has(const std::string& name) const;  // group or dataset
+  std::vector<std::int64_t> shape(const std::string& name) const;
+
+  // Values converted to T; with `size` >= 0 a dataset of another length is an error.
+  template <typename T>
+  std::vector<T> vector(const std::string& name, std::int64_t size = -1) const {
+    const std::vector<std::int64_t> extent = checked_shape(name, 1, size);
+    std::vector<T> values(static_cast<std::size_t>(extent[0]));
+    read(name, element_type<T>(), values.data());
+    return values;
+  }
+  // Row-major values of a [rows x columns] dataset; the column count must agree, and the row count when rows >= 0.
+  template <typename T>
+  std::vector<T> matrix(const std::string& name, std::int64_t columns, std::int64_t rows = -1) const {
+    const std::vector<std::int64_t> extent = checked_shape(name, 2, rows, columns);
+    std::vector<T> values(static_cast<std::size_t>(extent[0] * extent[1]));
+    read(name, element_type<T>(), values.data());
+    return values;
+  }
+  std::vector<std::string> texts(const std::string& name, std::int64_t size = -1) const;
+
+  bool has_attribute(const std::string& object, const std::string& name) const;
+  template <typename T>
+  T attribute(const std::string& object, const std::string& name) const {
+    T value{};
+    scalar_attribute(object, name, element_type<T>(), &value);
+    return value;
+  }
+  std::string text_attribute(const std::string& object, const std::string& name) const;
+
+  // Throws StoreError "<file>: <dataset>: <what>; ..." for contents that contradict themselves.
+  [[noreturn]] void fail(const std::string& name, const std::string& what) const;
+
+ private:
+  void read(const std::string& name, ElementType type, void* values) const;
+  void scalar_attribute(const std::string& object, const std::string& name, ElementType type, void* value) const;
+  std::vector<std::int64_t> checked_shape(const std::string& name, int dimensions, std::int64_t rows,
+                                          std::int64_t columns = -1) const;
+  std::int64_t checked(std::int64_t result, const std::string& name) const;
+
+  std::string path_;
+  Hdf5Handle file_;
+};
+
+}  // namespace megablock

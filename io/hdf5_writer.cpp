@@ -1,0 +1,143 @@
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+#include "io/error.h"
+#include "io/file_error.h"
+#include "io/hdf5_types.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::size_t kCompressFrom = 16384;  // bytes; smaller datasets are stored as they are
+constexpr hsize_t kChunkBytes = 1 << 19;      // of one chunk before compression
+constexpr unsigned kDeflateLevel = 1;         // higher levels gain a few per cent for several times the time
+
+Hdf5Handle without_times(hid_t property_class) {
+  Hdf5Handle properties(H5Pcreate(property_class), &H5Pclose);
+  H5Pset_obj_track_times(properties.id(), false);
+  return properties;
+}
+
+Hdf5Handle text_type(std::size_t length) {
+  Hdf5Handle type(H5Tcopy(H5T_C_S1), &H5Tclose);
+  H5Tset_size(type.id(), std::max<std::size_t>(length, 1));
+  H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
+  H5Tset_cset(type.id(), H5T_CSET_UTF8);
+  return type;
+}
+
+// Chunks are whole rows; the longest dimension is the first.
+void set_compression(hid_t properties, const std::vector<hsize_t>& extent, std::size_t element_bytes) {
+  std::size_t row_bytes = element_bytes;
+  for (std::size_t d = 1; d < extent.size(); ++d) row_bytes *= extent[d];
+  if (row_bytes == 0 || row_bytes * extent[0] < kCompressFrom) return;
+  std::vector<hsize_t> chunk = extent;
+  chunk[0] = std::min(extent[0], std::max<hsize_t>(1, kChunkBytes / row_bytes));
+  H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data());
+  H5Pset_shuffle(properties);
+  H5Pset_deflate(properties, kDeflateLevel);
+}
+
+template <typename T>
+bool fits(std::int64_t lowest, std::int64_t highest) {
+  return lowest >= std::numeric_limits<T>::min() && highest <= std::numeric_limits<T>::max();
+}
+
+}  // namespace
+
+Hdf5Writer::Hdf5Writer(const std::string& path, const std::string& kind) : path_(path) {
+  silence_hdf5();
+  const Hdf5Handle creation = without_times(H5P_FILE_CREATE);
+  const Hdf5Handle access = file_access();
+  file_ = Hdf5Handle(checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()), ""), &H5Fclose);
+  attribute("/", "kind", kind);
+  attribute("/", "format_version", kFormatVersion);
+}
+
+void Hdf5Writer::close() {
+  checked(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "");
+  checked(H5Fclose(file_.release()), "");
+}
+
+void Hdf5Writer::group(const std::string& name, const std::string& description) {
+  const Hdf5Handle creation = without_times(H5P_GROUP_CREATE);
+  const Hdf5Handle made(checked(H5Gcreate2(file_.id(), name.c_str(), H5P_DEFAULT, creation.id(), H5P_DEFAULT), name),
+                        &H5Gclose);
+  if (!description.empty()) attribute(name, "description", description);
+}
+
+void Hdf5Writer::integers(const std::string& name, const std::vector<std::int64_t>& values, const DatasetNote& note) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const std::int64_t lowest = values.empty() ? 0 : *low, highest = values.empty() ? 0 : *high;
+  hid_t type = H5T_STD_I64LE;
+  if (fits<std::int8_t>(lowest, highest)) {
+    type = H5T_STD_I8LE;
+  } else if (fits<std::int16_t>(lowest, highest)) {
+    type = H5T_STD_I16LE;
+  } else if (fits<std::int32_t>(lowest, highest)) {
+    type = H5T_STD_I32LE;
+  }
+  write_dataset(name, type, H5T_NATIVE_INT64, values.data(), {static_cast<std::int64_t>(values.size())}, note);
+}
+
+void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& values, const DatasetNote& note) {
+  std::size_t length = 1;
+  for (const std::string& value : values) length = std::max(length, value.size());
+  std::string padded(length * values.size(), '\0');
+  for (std::size_t i = 0; i < values.size(); ++i) std::memcpy(&padded[i * length], values[i].data(), values[i].size());
+  const Hdf5Handle type = text_type(length);
+  write_dataset(name, type.id(), type.id(), padded.data(), {static_cast<std::int64_t>(values.size())}, note);
+}
+
+void Hdf5Writer::dataset(const std::string& name, ElementType type, const void* values,
+                         const std::vector<std::int64_t>& shape, const DatasetNote& note) {
+  write_dataset(name, file_type(type), memory_type(type), values, shape, note);
+}
+
+void Hdf5Writer::write_dataset(const std::string& name, std::int64_t file_type, std::int64_t memory_type,
+                               const void* values, const std::vector<std::int64_t>& shape, const DatasetNote& note) {
+  const std::vector<hsize_t> extent(shape.begin(), shape.end());
+  const Hdf5Handle space(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
+  const Hdf5Handle creation = without_times(H5P_DATASET_CREATE);
+  set_compression(creation.id(), extent, H5Tget_size(file_type));
+  const Hdf5Handle set(
+      checked(H5Dcreate2(file_.id(), name.c_str(), file_type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
+              name),
+      &H5Dclose);
+  if (H5Sget_simple_extent_npoints(space.id()) > 0)
+    checked(H5Dwrite(set.id(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
+  if (!note.units.empty()) attribute(name, "units", note.units);
+  if (!note.description.empty()) attribute(name, "description", note.description);
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name, const std::string& value) {
+  const Hdf5Handle type = text_type(value.size());
+  const Hdf5Handle space(H5Screate(H5S_SCALAR), &H5Sclose);
+  const Hdf5Handle made(checked(H5Acreate_by_name(file_.id(), object.c_str(), name.c_str(), type.id(), space.id(),
+                                                  H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                                object + "@" + name),
+                        &H5Aclose);
+  checked(H5Awrite(made.id(), type.id(), value.empty() ? "" : value.data()), object + "@" + name);
+}
+
+void Hdf5Writer::scalar_attribute(const std::string& object, const std::string& name, ElementType type,
+                                  const void* value) {
+  const Hdf5Handle space(H5Screate(H5S_SCALAR), &H5Sclose);
+  const Hdf5Handle made(checked(H5Acreate_by_name(file_.id(), object.c_str(), name.c_str(), file_type(type), space.id(),
+                                                  H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                                object + "@" + name),
+                        &H5Aclose);
+  checked(H5Awrite(made.id(), memory_type(type), value), object + "@" + name);
+}
+
+std::int64_t Hdf5Writer::checked(std::int64_t result, const std::string& name) const {
+  if (result >= 0) return result;
+  const Hdf5Failure failure = last_hdf5_failure();
+  if (failure.error != 0) throw_file_error(path_, "written", failure.error);
+  throw StoreError(path_ + ": " + (name.empty() ? "" : name + ": ") + "cannot be written (" + failure.description +
+                   ")");
+}
+
+}  // namespace megablock
