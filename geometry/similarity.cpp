@@ -1,0 +1,104 @@
+#include "geometry/similarity.h"
+
+#include <Eigen/SVD>
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace megablock {
+
+Similarity Similarity::inverse() const {
+  const Eigen::Quaterniond back = rotation.conjugate();
+  return {1 / scale, back, -(back * translation) / scale};
+}
+
+std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
+                                         std::span<const double> weights) {
+  const std::size_t count = from.size();
+  if (count < 2 || to.size() != count) return std::nullopt;
+  const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
+
+  double total = 0;
+  Eigen::Vector3d mean_from = Eigen::Vector3d::Zero(), mean_to = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    total += weight(i);
+    mean_from += weight(i) * from[i];
+    mean_to += weight(i) * to[i];
+  }
+  if (!(total > 0)) return std::nullopt;
+  mean_from /= total;
+  mean_to /= total;
+
+  double spread = 0;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d x = from[i] - mean_from, y = to[i] - mean_to;
+    spread += weight(i) * x.squaredNorm();
+    covariance += weight(i) * y * x.transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (!(spread > 0) || !(svd.singularValues()(0) > 0)) return std::nullopt;
+  Eigen::Vector3d sign(1, 1, 1);  // a reflection would fit better: give up the weakest axis
+  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
+
+  Similarity result;
+  const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  result.rotation = Eigen::Quaterniond(rotation).normalized();
+  result.scale = svd.singularValues().dot(sign) / spread;
+  result.translation = mean_to - result.scale * (result.rotation * mean_from);
+  if (!(result.scale > 0) || !result.translation.allFinite()) return std::nullopt;
+  return result;
+}
+
+namespace {
+
+double cauchy_cost(const Similarity& s, std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
+                   std::span<const double> sigma) {
+  double cost = 0;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    cost += std::log1p((s(from[i]) - to[i]).squaredNorm() / (sigma[i] * sigma[i]));
+  return cost;
+}
+
+}  // namespace
+
+std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d> from,
+                                                std::span<const Eigen::Vector3d> to, std::span<const double> sigma,
+                                                int samples, std::uint64_t seed) {
+  const std::size_t count = from.size();
+  std::vector<double> weights(count);
+  for (std::size_t i = 0; i < count; ++i) weights[i] = 1 / (sigma[i] * sigma[i]);
+  auto best = fit_similarity(from, to, weights);
+  if (!best) return std::nullopt;
+  double best_cost = cauchy_cost(*best, from, to, sigma);
+  const auto consider = [&](const std::optional<Similarity>& candidate) {
+    if (!candidate) return false;
+    const double cost = cauchy_cost(*candidate, from, to, sigma);
+    if (!(cost < best_cost)) return false;
+    best = candidate;
+    best_cost = cost;
+    return true;
+  };
+
+  std::mt19937_64 random(seed);
+  for (int sample = 0; sample < samples && count > 3; ++sample) {
+    std::array<Eigen::Vector3d, 3> a, b;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t i = random() % count;  // a point drawn twice only wastes the sample
+      a[k] = from[i];
+      b[k] = to[i];
+    }
+    consider(fit_similarity(a, b));
+  }
+  constexpr int kIterations = 100;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    for (std::size_t i = 0; i < count; ++i)
+      weights[i] = 1 / (sigma[i] * sigma[i] + ((*best)(from[i]) - to[i]).squaredNorm());
+    const double before = best_cost;
+    if (!consider(fit_similarity(from, to, weights)) || before - best_cost < 1e-12 * before) break;
+  }
+  return best;
+}
+
+}  // namespace megablock

@@ -1,0 +1,41 @@
+// Similarity transformation (scale, rotation, translation) between two sets of points: y = s R x + t.
+//
+// Least squares in closed form after Umeyama, "Least-squares estimation of transformation parameters between two point
+// patterns", IEEE PAMI 13(4), 1991, with weights. The robust variant minimises sum log(1 + (|r_i| / sigma_i)^2)
+// (Cauchy): the best of the least squares solution and of samples of three points, refined by iterated reweighting.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "geometry/pose.h"
+
+namespace megablock {
+
+struct Similarity {
+  double scale = 1;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return scale * (rotation * x) + translation; }
+  // Pose of a frame after its ground coordinates are transformed.
+  Pose operator()(const Pose& pose) const {
+    return {(pose.rotation * rotation.conjugate()).normalized(), (*this)(pose.centre)};
+  }
+  Similarity inverse() const;
+};
+
+// Weighted least squares from -> to; weights of squared distances, empty = all one. Two points or points on one line
+// leave the rotation about the line arbitrary (but proper). Empty with fewer than two points or no extent.
+std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
+                                         std::span<const double> weights = {});
+
+// Robust fit; sigma in the units of `to`, one per point. Deterministic: the samples depend on `seed` alone.
+std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d> from,
+                                                std::span<const Eigen::Vector3d> to, std::span<const double> sigma,
+                                                int samples = 300, std::uint64_t seed = 1);
+
+}  // namespace megablock

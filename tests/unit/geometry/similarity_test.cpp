@@ -1,0 +1,100 @@
+#include "geometry/similarity.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+namespace megablock {
+namespace {
+
+struct Clouds {
+  Similarity truth{2.5, rotation_exp<double>({0.3, -1.2, 0.8}), {1e5, -2e4, 300}};
+  std::vector<Eigen::Vector3d> from, to;
+
+  explicit Clouds(int count, double noise = 0, Eigen::Vector3d extent = {100, 60, 20}) {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> place(-1, 1);
+    std::normal_distribution<double> error(0, 1);
+    for (int i = 0; i < count; ++i) {
+      from.push_back(extent.cwiseProduct(Eigen::Vector3d(place(random), place(random), place(random))));
+      to.push_back(truth(from.back()) + noise * Eigen::Vector3d(error(random), error(random), error(random)));
+    }
+  }
+};
+
+void expect_same(const Similarity& a, const Similarity& b, double relative, double metres) {
+  EXPECT_NEAR(a.scale / b.scale, 1, relative);
+  EXPECT_LT(rotation_angle(a.rotation, b.rotation), relative);
+  EXPECT_LT((a.translation - b.translation).norm(), metres);
+}
+
+TEST(Similarity, RecoversAnExactTransformation) {
+  for (int count : {3, 4, 50}) {
+    const Clouds clouds(count);
+    const auto found = fit_similarity(clouds.from, clouds.to);
+    ASSERT_TRUE(found);
+    expect_same(*found, clouds.truth, 1e-11, 1e-8);
+    for (const auto& x : clouds.from) EXPECT_LT((found->inverse()((*found)(x)) - x).norm(), 1e-9);
+  }
+}
+
+TEST(Similarity, MinimisesTheWeightedSquares) {
+  const Clouds clouds(30, 3);
+  std::vector<double> weights;
+  for (int i = 0; i < 30; ++i) weights.push_back(0.1 + i % 5);
+  const auto cost = [&](const Similarity& s) {
+    double sum = 0;
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      sum += weights[i] * (s(clouds.from[i]) - clouds.to[i]).squaredNorm();
+    return sum;
+  };
+  const Similarity found = fit_similarity(clouds.from, clouds.to, weights).value();
+  for (double step : {-1e-4, 1e-4}) {
+    Similarity other = found;
+    other.scale *= 1 + step;
+    EXPECT_GT(cost(other), cost(found));
+    for (int axis = 0; axis < 3; ++axis) {
+      other = found;
+      other.rotation = rotation_update(found.rotation, step * Eigen::Vector3d::Unit(axis));
+      EXPECT_GT(cost(other), cost(found));
+      other = found;
+      other.translation[axis] += step;
+      EXPECT_GT(cost(other), cost(found));
+    }
+  }
+}
+
+TEST(Similarity, MovesPosesWithTheirGround) {
+  const Similarity s{0.5, rotation_exp<double>({0.1, 0.2, -2}), {7, 8, 9}};
+  const Pose pose{rotation_exp<double>({1, -0.5, 0.2}), {3, -4, 5}};
+  const Eigen::Vector3d point(10, 20, -30);
+  EXPECT_LT((to_inside(s(pose), s(point)) - s.scale * to_inside(pose, point)).norm(), 1e-12);
+}
+
+TEST(Similarity, NeverReflectsFlatOrMirroredPoints) {
+  const Clouds flat(20, 0, {100, 60, 0});
+  expect_same(fit_similarity(flat.from, flat.to).value(), flat.truth, 1e-10, 1e-7);
+  std::vector<Eigen::Vector3d> mirrored;
+  for (Eigen::Vector3d x : Clouds(20).from) mirrored.push_back(x.cwiseProduct(Eigen::Vector3d(1, 1, -1)));
+  const Similarity found = fit_similarity(Clouds(20).from, mirrored).value();
+  EXPECT_NEAR(found.rotation.toRotationMatrix().determinant(), 1, 1e-12);
+}
+
+TEST(Similarity, RobustFitIgnoresGrossErrors) {
+  Clouds clouds(60, 0.5);
+  for (std::size_t i = 0; i < 60; i += 3) clouds.to[i] += Eigen::Vector3d(1e4, 2e3 * static_cast<double>(i % 7), -500);
+  const std::vector<double> sigma(60, 0.5);
+  const auto found = fit_similarity_robust(clouds.from, clouds.to, sigma);
+  ASSERT_TRUE(found);
+  expect_same(*found, clouds.truth, 0.01, 0.5);
+}
+
+TEST(Similarity, RefusesPointsWithoutExtent) {
+  const std::vector<Eigen::Vector3d> one(1, Eigen::Vector3d::Ones()), same(5, Eigen::Vector3d::Ones());
+  EXPECT_FALSE(fit_similarity(one, one));
+  EXPECT_FALSE(fit_similarity(same, same));
+}
+
+}  // namespace
+}  // namespace megablock
