@@ -1,0 +1,48 @@
+// A result held against the truth: errors of the poses, and whether the stated precision is true.
+//
+// With e the error of a frame's position and C its posterior covariance, e'C^-1 e is chi-square distributed with three
+// degrees of freedom: sqrt(mean over frames of e'C^-1 e / 3) is 1 when the stated sigmas are true. Likewise for the
+// rotation increment w of R_true = R_adjusted Exp(w).
+#pragma once
+
+#include <limits>
+#include <string>
+
+#include "io/pose_csv.h"
+#include "io/result.h"
+
+namespace megablock {
+
+struct EvaluateOptions {
+  // Similarity between result and truth removed first: kAuto = when nothing fixes the datum of the result.
+  enum class Align { kAuto, kNever, kAlways } align = Align::kAuto;
+  bool scale_sigma = false;  // multiply covariances by the a-posteriori variance factor
+};
+
+struct Evaluation {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+  std::int64_t frames = 0;          // compared
+  std::int64_t frames_missing = 0;  // of the truth, without a pose in the result
+  bool aligned = false;             // a similarity was removed first
+  double position_rms_m = kNone;    // root mean square length of the position errors
+  double position_max_m = kNone;
+  double rotation_rms_deg = kNone;         // root mean square rotation angle
+  double relative_position_rms_m = kNone;  // errors of the vectors between successive frames of a pass
+  double normalised_error_position = kNone, normalised_error_rotation = kNone;  // none without covariances
+  std::int64_t check_points = 0, control_points = 0;                            // with an adjusted position
+  double check_rms_m = kNone, check_rms_horizontal_m = kNone, check_rms_vertical_m = kNone;
+  double control_rms_m = kNone;
+};
+
+// Frames are matched by name (a frame's own, else the name of its first image). Check points are compared with the
+// positions stated in the block. InputError when no frame matches, or fewer than three where a similarity is needed.
+Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const EvaluateOptions& options = {});
+Evaluation evaluate(const BlockResult& result, const BlockState& truth, const EvaluateOptions& options = {});
+
+// `path`: a pose CSV, a truth.h5 (write_state) of the same frames, or a folder with truth.csv.
+Evaluation evaluate(const BlockResult& result, const std::string& path, const EvaluateOptions& options = {});
+
+std::string to_json(const Evaluation& evaluation);  // one object; figures that do not exist are null
+
+}  // namespace megablock

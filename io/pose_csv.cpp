@@ -1,0 +1,140 @@
+#include "io/pose_csv.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <unordered_set>
+
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::array<const char*, 8> kColumns = {"name", "qw", "qx", "qy", "qz", "x", "y", "z"};
+
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> fields;
+  std::stringstream stream(line);
+  for (std::string field; std::getline(stream, field, ',');) {
+    const auto first = field.find_first_not_of(" \t\r"), last = field.find_last_not_of(" \t\r");
+    fields.push_back(first == std::string::npos ? "" : field.substr(first, last - first + 1));
+  }
+  return fields;
+}
+
+class CsvReader {
+ public:
+  explicit CsvReader(const std::string& path) : path_(path), stream_(path) {
+    if (!stream_) throw InputError(path + ": cannot be read; give a CSV file of poses");
+  }
+
+  PoseTable read() {
+    std::string line;
+    while (std::getline(stream_, line)) {
+      ++line_;
+      if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+      if (line.front() == '#') {
+        read_origin(line);
+      } else if (columns_.empty()) {
+        read_header(split(line));
+      } else {
+        read_row(split(line));
+      }
+    }
+    if (table_.names.empty()) fail("no poses; expected the columns name,qw,qx,qy,qz,x,y,z");
+    return std::move(table_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& message) const {
+    throw InputError(path_ + ":" + std::to_string(line_) + ": " + message);
+  }
+
+  void read_origin(const std::string& line) {
+    std::istringstream words(line.substr(1));
+    std::string key;
+    GroundFrame ground;
+    if (!(words >> key) || key != "origin:") return;
+    if (!(words >> ground.latitude_deg >> ground.longitude_deg >> ground.height_m))
+      fail("origin: expected latitude, longitude (degrees) and height (metres)");
+    ground.georeferenced = true;
+    ground.crs = "EPSG:4979";
+    table_.ground = ground;
+  }
+
+  void read_header(const std::vector<std::string>& fields) {
+    for (const char* column : kColumns) {
+      const auto found = std::find(fields.begin(), fields.end(), column);
+      if (found == fields.end())
+        fail(std::string("column '") + column + "' is missing; expected name,qw,qx,qy,qz,x,y,z");
+      columns_.push_back(static_cast<std::size_t>(found - fields.begin()));
+    }
+  }
+
+  void read_row(const std::vector<std::string>& fields) {
+    std::array<double, 8> value{};
+    for (std::size_t c = 0; c < kColumns.size(); ++c) {
+      if (columns_[c] >= fields.size()) fail(std::string("column '") + kColumns[c] + "' is missing in this line");
+      const std::string& field = fields[columns_[c]];
+      if (c == 0) continue;
+      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
+      if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
+        fail(std::string(kColumns[c]) + ": '" + field + "' is not a number");
+    }
+    Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
+    if (std::abs(rotation.norm() - 1) > 1e-3) fail("qw,qx,qy,qz is not a unit quaternion");
+    rotation.normalize();
+    const std::string& name = fields[columns_[0]];
+    if (!seen_.insert(name).second) fail("frame '" + name + "' appears twice");
+    table_.names.push_back(name);
+    table_.poses.push_back({rotation, {value[5], value[6], value[7]}});
+  }
+
+  std::string path_;
+  std::ifstream stream_;
+  std::int64_t line_ = 0;
+  std::vector<std::size_t> columns_;  // position of each of kColumns
+  std::unordered_set<std::string> seen_;
+  PoseTable table_;
+};
+
+}  // namespace
+
+PoseTable pose_table(const Block& block, const BlockState& state) {
+  PoseTable table;
+  if (block.ground.georeferenced) table.ground = block.ground;
+  for (std::size_t f = 0; f < block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (!state.oriented[frame]) continue;
+    table.names.push_back(block.frames[frame].name);
+    table.poses.push_back(state.frames[frame]);
+  }
+  return table;
+}
+
+void write_pose_csv(const std::string& path, const Block& block, const BlockState& state) {
+  std::ofstream stream(path);
+  stream.precision(17);
+  const GroundFrame& ground = block.ground;
+  if (ground.georeferenced)
+    stream << "# origin: " << ground.latitude_deg << ' ' << ground.longitude_deg << ' ' << ground.height_m << '\n';
+  stream << "name,qw,qx,qy,qz,x,y,z,pass\n";
+  for (std::size_t f = 0; f < block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (!state.oriented[frame]) continue;
+    const Eigen::Quaterniond& q = state.frames[frame].rotation;
+    const Eigen::Vector3d& c = state.frames[frame].centre;
+    stream << block.frames[frame].name << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << c.x()
+           << ',' << c.y() << ',' << c.z() << ',' << block.frames[frame].pass << '\n';
+  }
+  stream.close();
+  if (!stream) throw InputError(path + ": cannot be written");
+}
+
+PoseTable read_pose_csv(const std::string& path) { return CsvReader(path).read(); }
+
+}  // namespace megablock

@@ -1,0 +1,111 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "io/error.h"
+#include "io/pose_csv.h"
+#include "io/simulate/simulate.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SimulateWriteTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(testing::TempDir()) / (std::string("simulate_write_") + info->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  void write_text(const std::string& name, const std::string& text) const { std::ofstream(file(name)) << text; }
+  // The message of the error that reading the file causes.
+  std::string reading_fails(const std::string& text) const {
+    write_text("poses.csv", text);
+    try {
+      read_pose_csv(file("poses.csv"));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(SimulateWriteTest, FilesHoldTheBlock) {
+  SimulationOptions options;
+  options.frames = 12;
+  options.control_points = 4;
+  const SimulatedBlock s = simulate_block(options);
+  write_simulated_block(s, folder_.string());
+
+  const Block block = read_block(file("given.h5"));
+  ASSERT_EQ(block.frames.size(), s.block.frames.size());
+  EXPECT_EQ(block.frames.back().given_pose->centre, s.block.frames.back().given_pose->centre);
+  EXPECT_EQ(block.control_points.size(), s.block.control_points.size());
+  const TrackSet tracks = read_tracks(file("tie_points.h5"));
+  EXPECT_EQ(tracks.x, s.tracks.x);
+  EXPECT_EQ(tracks.image, s.tracks.image);
+  const BlockState truth = read_state(file("truth.h5"));
+  EXPECT_EQ(truth.cameras.front(), s.truth.cameras.front());
+
+  std::ifstream yaml(file("block.yaml"));
+  std::stringstream text;
+  text << yaml.rdbuf();
+  EXPECT_NE(text.str().find("block: given.h5"), std::string::npos);
+  EXPECT_NE(text.str().find("tie_points: tie_points.h5"), std::string::npos);
+
+  const PoseTable poses = read_pose_csv(file("truth.csv"));
+  ASSERT_EQ(poses.names.size(), s.block.frames.size());
+  ASSERT_TRUE(poses.ground.has_value());
+  EXPECT_EQ(poses.ground->latitude_deg, s.block.ground.latitude_deg);
+  for (std::size_t f = 0; f < poses.names.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    EXPECT_EQ(poses.names[f], s.block.frames[frame].name);
+    EXPECT_EQ(poses.poses[f].centre, s.truth.frames[frame].centre);  // 17 digits: the same bits
+    EXPECT_LT(rotation_angle(poses.poses[f].rotation, s.truth.frames[frame].rotation), 1e-15);
+  }
+}
+
+TEST_F(SimulateWriteTest, ColumnsOfAPoseTableMayStandInAnyOrder) {
+  write_text("poses.csv",
+             "# a comment\nx,y,z,roll,name,qx,qy,qz,qw\n1, 2,3,99,a.jpg,0,0,0,1\r\n\n4,5,6,99,b.jpg,0.6,0,0,0.8\n");
+  const PoseTable table = read_pose_csv(file("poses.csv"));
+  ASSERT_EQ(table.names, (std::vector<std::string>{"a.jpg", "b.jpg"}));
+  EXPECT_EQ(table.poses[0].centre, Eigen::Vector3d(1, 2, 3));
+  EXPECT_NEAR(table.poses[1].rotation.w(), 0.8, 1e-15);
+  EXPECT_NEAR(table.poses[1].rotation.x(), 0.6, 1e-15);
+  EXPECT_FALSE(table.ground.has_value());
+}
+
+TEST_F(SimulateWriteTest, BadPoseTablesAreNamedByLine) {
+  const std::string header = "name,qw,qx,qy,qz,x,y,z\n";
+  EXPECT_NE(reading_fails("name,qw,qx,qy,qz,x,y\n").find("poses.csv:1: column 'z'"), std::string::npos);
+  EXPECT_NE(reading_fails(header + "a,1,0,0,0,1,2,three\n").find(":2: z: 'three'"), std::string::npos);
+  EXPECT_NE(reading_fails(header + "a,1,0,0,0,1,2,nan\n").find(":2: z: 'nan'"), std::string::npos);
+  EXPECT_NE(reading_fails(header + "a,1,1,0,0,1,2,3\n").find(":2: qw,qx,qy,qz"), std::string::npos);
+  EXPECT_NE(reading_fails(header + "a,1,0,0,0,1,2,3\na,1,0,0,0,1,2,3\n").find(":3: frame 'a' appears twice"),
+            std::string::npos);
+  EXPECT_NE(reading_fails(header + "a,1,0,0\n").find(":2: column 'qz'"), std::string::npos);
+  EXPECT_NE(reading_fails("# origin: 48 x\n" + header).find(":1: origin"), std::string::npos);
+  EXPECT_NE(reading_fails(header).find("no poses"), std::string::npos);
+  EXPECT_THROW(read_pose_csv(file("missing.csv")), InputError);
+}
+
+TEST_F(SimulateWriteTest, AFolderThatCannotBeMadeIsReported) {
+  write_text("occupied", "");
+  SimulationOptions options;
+  options.frames = 4;
+  EXPECT_THROW(write_simulated_block(simulate_block(options), file("occupied")), InputError);
+}
+
+}  // namespace
+}  // namespace megablock
