@@ -1,0 +1,220 @@
+#include "io/evaluate.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <unordered_map>
+
+#include "geometry/similarity.h"
+#include "io/error.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Match {
+  FrameIndex frame;
+  Pose truth;
+};
+
+// Sum of normalised squares of the errors whose covariance is positive definite.
+class NormalisedError {
+ public:
+  void add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+    const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
+    if (factor.info() != Eigen::Success) return;
+    sum_ += error.dot(factor.solve(error)) / 3;
+    ++count_;
+  }
+  double value() const { return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : Evaluation::kNone; }
+
+ private:
+  double sum_ = 0;
+  std::int64_t count_ = 0;
+};
+
+class RootMeanSquare {
+ public:
+  void add(double squared) {
+    sum_ += squared;
+    ++count_;
+  }
+  double value() const { return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : Evaluation::kNone; }
+  std::int64_t count() const { return count_; }
+
+ private:
+  double sum_ = 0;
+  std::int64_t count_ = 0;
+};
+
+// Oriented frames of the result with their true poses, in block order.
+std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& truth) {
+  std::unordered_map<std::string, std::size_t> row;
+  for (std::size_t i = 0; i < truth.names.size(); ++i) row.emplace(truth.names[i], i);
+  const Block& block = result.block;
+  std::vector<std::string> first_image(block.frames.size());
+  for (const Image& image : block.images) {
+    std::string& name = first_image[static_cast<std::size_t>(image.frame.value)];
+    if (name.empty()) name = image.name;
+  }
+  std::vector<Match> matches;
+  for (std::size_t f = 0; f < block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (!result.state.oriented[frame]) continue;
+    auto found = row.find(block.frames[frame].name);
+    if (found == row.end()) found = row.find(first_image[f]);
+    if (found != row.end()) matches.push_back({frame, truth.poses[found->second]});
+  }
+  if (matches.empty())
+    throw InputError("no oriented frame of the result has a true pose of the same name; the truth begins with '" +
+                     (truth.names.empty() ? std::string() : truth.names.front()) + "'");
+  return matches;
+}
+
+// Nothing but the images fixes the datum.
+bool is_free(const BlockResult& result) {
+  if (!result.gauge.empty()) return result.gauge.starts_with("free");
+  for (std::size_t f = 0; f < result.block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (result.state.oriented[frame] && result.block.frames[frame].position_prior) return false;
+  }
+  for (const ControlPoint& point : result.block.control_points)
+    if (point.role == PointRole::kControl && point.measurements.size() >= 2) return false;
+  return true;
+}
+
+Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
+  std::vector<Eigen::Vector3d> from, to;
+  for (const Match& m : matches) {
+    from.push_back(result.state.frames[m.frame].centre);
+    to.push_back(m.truth.centre);
+  }
+  const auto similarity = matches.size() >= 3 ? fit_similarity(from, to) : std::nullopt;
+  if (!similarity)
+    throw InputError("the result is a free block: at least three frames at different places are needed to align it");
+  return *similarity;
+}
+
+void check_ground(const GroundFrame& of_result, const std::optional<GroundFrame>& of_truth) {
+  if (!of_truth || !of_result.georeferenced) return;
+  const auto differs = [](double a, double b, double tolerance) { return std::abs(a - b) > tolerance; };
+  if (differs(of_result.latitude_deg, of_truth->latitude_deg, 1e-10) ||
+      differs(of_result.longitude_deg, of_truth->longitude_deg, 1e-10) ||
+      differs(of_result.height_m, of_truth->height_m, 1e-5))
+    throw InputError("the truth refers to another origin than the job; write 'origin: [" +
+                     std::to_string(of_truth->latitude_deg) + ", " + std::to_string(of_truth->longitude_deg) + ", " +
+                     std::to_string(of_truth->height_m) + "]' into the project file");
+}
+
+void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Similarity& similarity,
+                     double variance_factor, Evaluation& evaluation) {
+  RootMeanSquare position, rotation, relative;
+  NormalisedError normalised_position, normalised_rotation;
+  double largest = 0;
+  const Eigen::Matrix3d turn = similarity.rotation.toRotationMatrix();
+  const Eigen::Matrix3d stretch = similarity.scale * turn;
+  Eigen::Vector3d previous_error = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Match& m = matches[i];
+    const Pose pose = similarity(result.state.frames[m.frame]);
+    const Eigen::Vector3d error = pose.centre - m.truth.centre;
+    const Eigen::Vector3d angle = rotation_log<double>(pose.rotation.conjugate() * m.truth.rotation);
+    position.add(error.squaredNorm());
+    rotation.add(angle.squaredNorm());
+    largest = std::max(largest, error.norm());
+    // Neighbours follow one another in their pass.
+    const auto& frames = result.block.frames;
+    if (i > 0 && matches[i - 1].frame.value == m.frame.value - 1 &&
+        frames[matches[i - 1].frame].pass == frames[m.frame].pass)
+      relative.add((error - previous_error).squaredNorm());
+    previous_error = error;
+    if (result.frame_covariance.empty()) continue;
+    const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
+    normalised_rotation.add(angle, turn * covariance.topLeftCorner<3, 3>() * turn.transpose());
+    normalised_position.add(error, stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose());
+  }
+  evaluation.frames = position.count();
+  evaluation.position_rms_m = position.value();
+  evaluation.position_max_m = largest;
+  evaluation.rotation_rms_deg = rotation.value() * 180 / std::numbers::pi;
+  evaluation.relative_position_rms_m = relative.value();
+  evaluation.normalised_error_position = normalised_position.value();
+  evaluation.normalised_error_rotation = normalised_rotation.value();
+}
+
+void evaluate_control(const BlockResult& result, Evaluation& evaluation) {
+  RootMeanSquare control, check, horizontal, vertical;
+  for (std::size_t i = 0; i < result.control.size(); ++i) {
+    const ControlPoint& point = result.block.control_points[i];
+    const Eigen::Vector3d error = result.control[i].adjusted - point.position;
+    if (!error.allFinite()) continue;
+    (point.role == PointRole::kCheck ? check : control).add(error.squaredNorm());
+    if (point.role != PointRole::kCheck) continue;
+    horizontal.add(error.head<2>().squaredNorm());
+    vertical.add(error.z() * error.z());
+  }
+  evaluation.check_points = check.count();
+  evaluation.control_points = control.count();
+  evaluation.check_rms_m = check.value();
+  evaluation.check_rms_horizontal_m = horizontal.value();
+  evaluation.check_rms_vertical_m = vertical.value();
+  evaluation.control_rms_m = control.value();
+}
+
+}  // namespace
+
+Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const EvaluateOptions& options) {
+  const std::vector<Match> matches = match_by_name(result, truth);
+  Evaluation evaluation;
+  evaluation.frames_missing = static_cast<std::int64_t>(truth.names.size() - matches.size());
+  evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
+                       (options.align == EvaluateOptions::Align::kAuto && is_free(result));
+  if (!evaluation.aligned) check_ground(result.block.ground, truth.ground);
+  const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
+  const double variance_factor = options.scale_sigma ? result.variance_factor : 1;
+  evaluate_frames(result, matches, similarity, variance_factor, evaluation);
+  // The positions of check points are in the ground frame of the block: nothing to compare with when it is free.
+  if (!evaluation.aligned) evaluate_control(result, evaluation);
+  return evaluation;
+}
+
+Evaluation evaluate(const BlockResult& result, const BlockState& truth, const EvaluateOptions& options) {
+  if (truth.frames.size() != result.block.frames.size())
+    throw InputError("the truth has " + std::to_string(truth.frames.size()) + " frames, the result " +
+                     std::to_string(result.block.frames.size()) + "; give the truth as a CSV file of poses instead");
+  PoseTable table = pose_table(result.block, truth);
+  return evaluate(result, table, options);
+}
+
+Evaluation evaluate(const BlockResult& result, const std::string& path, const EvaluateOptions& options) {
+  if (fs::is_directory(path)) return evaluate(result, (fs::path(path) / "truth.csv").string(), options);
+  if (fs::path(path).extension() == ".h5") return evaluate(result, read_state(path), options);
+  return evaluate(result, read_pose_csv(path), options);
+}
+
+std::string to_json(const Evaluation& e) {
+  nlohmann::ordered_json json;  // a value that is not a number is written as null
+  json["frames"] = e.frames;
+  json["frames_missing"] = e.frames_missing;
+  json["aligned"] = e.aligned;
+  json["position_rms_m"] = e.position_rms_m;
+  json["position_max_m"] = e.position_max_m;
+  json["rotation_rms_deg"] = e.rotation_rms_deg;
+  json["relative_position_rms_m"] = e.relative_position_rms_m;
+  json["normalised_error_position"] = e.normalised_error_position;
+  json["normalised_error_rotation"] = e.normalised_error_rotation;
+  json["check_points"] = e.check_points;
+  json["check_rms_m"] = e.check_rms_m;
+  json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;
+  json["check_rms_vertical_m"] = e.check_rms_vertical_m;
+  json["control_points"] = e.control_points;
+  json["control_rms_m"] = e.control_rms_m;
+  return json.dump(2);
+}
+
+}  // namespace megablock
