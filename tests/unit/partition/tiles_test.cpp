@@ -1,0 +1,425 @@
+#include "partition/tiles.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <set>
+
+#include "io/error.h"
+
+namespace megablock {
+namespace {
+
+FrameGraph sorted(std::int64_t frames, std::vector<FrameEdge> edges) {
+  std::sort(edges.begin(), edges.end());
+  return {frames, std::move(edges)};
+}
+
+void add(std::vector<FrameEdge>& edges, std::int64_t a, std::int64_t b, std::int64_t weight) {
+  edges.push_back({FrameIndex(std::min(a, b)), FrameIndex(std::max(a, b)), weight});
+}
+
+// rows x columns frames from number `start`, linked to their neighbours (diagonals weaker).
+std::vector<FrameEdge> grid(int rows, int columns, std::int64_t start = 0, std::int64_t weight = 100) {
+  std::vector<FrameEdge> edges;
+  const auto at = [&](int r, int c) { return start + std::int64_t{r} * columns + c; };
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c) {
+      if (c + 1 < columns) add(edges, at(r, c), at(r, c + 1), weight);
+      if (r + 1 < rows) add(edges, at(r, c), at(r + 1, c), weight);
+      if (r + 1 < rows && c + 1 < columns) add(edges, at(r, c), at(r + 1, c + 1), weight / 2);
+      if (r + 1 < rows && c > 0) add(edges, at(r, c), at(r + 1, c - 1), weight / 2);
+    }
+  return edges;
+}
+
+std::vector<std::int64_t> tile_sizes(const Tiles& tiles) {
+  std::vector<std::int64_t> sizes(static_cast<std::size_t>(tiles.tile_count), 0);
+  for (TileIndex tile : tiles.tile_of_frame)
+    if (tile.valid()) ++sizes.at(static_cast<std::size_t>(tile.value));
+  return sizes;
+}
+
+void expect_tree(const MergeTree& tree, std::int64_t tiles) {
+  ASSERT_EQ(tree.nodes.size(), tiles == 0 ? 0u : static_cast<std::size_t>(2 * tiles - 1));
+  std::set<std::int64_t> leaves;
+  int roots = 0;
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    const MergeTree::Node& node = tree.nodes[n];
+    const auto number = static_cast<std::int64_t>(n);
+    roots += node.parent < 0;
+    if (node.parent >= 0) {
+      EXPECT_GT(node.parent, number) << "children come before parents";
+    }
+    ASSERT_EQ(node.left < 0, node.right < 0);
+    if (node.left < 0) {
+      EXPECT_EQ(node.level, 0);
+      EXPECT_TRUE(leaves.insert(node.tile.value).second);
+    } else {
+      EXPECT_FALSE(node.tile.valid());
+      const auto& left = tree.nodes.at(static_cast<std::size_t>(node.left));
+      const auto& right = tree.nodes.at(static_cast<std::size_t>(node.right));
+      EXPECT_EQ(left.parent, number);
+      EXPECT_EQ(right.parent, number);
+      EXPECT_EQ(node.level, 1 + std::max(left.level, right.level));
+    }
+  }
+  EXPECT_EQ(roots, tiles == 0 ? 0 : 1);
+  if (tiles > 0) {
+    EXPECT_EQ(tree.nodes.back().parent, -1);
+    EXPECT_EQ(*leaves.begin(), 0);
+    EXPECT_EQ(*leaves.rbegin(), tiles - 1);
+  }
+}
+
+void expect_tiles(const FrameGraph& graph, const Tiles& tiles, const TileOptions& options) {
+  expect_tree(tiles.tree, tiles.tile_count);
+  for (std::int64_t size : tile_sizes(tiles)) {
+    EXPECT_GE(size, 1);
+    EXPECT_LE(size, options.tile_max_frames);
+  }
+  std::map<std::int64_t, std::set<std::int32_t>> components;
+  for (std::int64_t f = 0; f < graph.frame_count; ++f) {
+    const FrameIndex frame(f);
+    EXPECT_EQ(tiles.tile_of_frame[frame].valid(), tiles.component[frame] >= 0);
+    components[tiles.tile_of_frame[frame].value].insert(tiles.component[frame]);
+  }
+  for (const auto& [tile, of_tile] : components) EXPECT_EQ(of_tile.size(), 1u) << "tile " << tile;
+  std::vector<FrameEdge> dropped;
+  for (const FrameEdge& edge : graph.edges)
+    if (tiles.tile_of_frame[edge.a] != tiles.tile_of_frame[edge.b] && edge.weight < options.weak_link_tracks)
+      dropped.push_back(edge);
+    else
+      EXPECT_EQ(tiles.component[edge.a], tiles.component[edge.b]);
+  EXPECT_EQ(tiles.dropped_links, dropped);
+}
+
+// Frames of a component are reached from one another without the dropped links.
+void expect_connected_components(const FrameGraph& graph, const Tiles& tiles) {
+  std::vector<std::int64_t> label(static_cast<std::size_t>(graph.frame_count));
+  for (std::size_t i = 0; i < label.size(); ++i) label[i] = static_cast<std::int64_t>(i);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const FrameEdge& edge : graph.edges) {
+      if (std::binary_search(tiles.dropped_links.begin(), tiles.dropped_links.end(), edge)) continue;
+      auto &a = label[static_cast<std::size_t>(edge.a.value)], &b = label[static_cast<std::size_t>(edge.b.value)];
+      if (a != b) changed = true, a = b = std::min(a, b);
+    }
+  }
+  std::map<std::int32_t, std::set<std::int64_t>> labels;
+  for (std::int64_t f = 0; f < graph.frame_count; ++f)
+    if (tiles.component[FrameIndex(f)] >= 0)
+      labels[tiles.component[FrameIndex(f)]].insert(label[static_cast<std::size_t>(f)]);
+  for (const auto& [component, of_component] : labels) EXPECT_EQ(of_component.size(), 1u);
+}
+
+// Frames on the root's separator: those linked across the two halves of the whole.
+std::int64_t root_separator(const FrameGraph& graph, const BisectionTree& cut) {
+  const MergeTree::Node& root = cut.tree.nodes.back();
+  std::int64_t first_right = 0;  // leaves are numbered in tree order: the left half holds the lower ones
+  for (std::int64_t n = 0; n <= root.left; ++n) first_right += cut.tree.nodes[static_cast<std::size_t>(n)].tile.valid();
+  std::set<std::int64_t> left, right;
+  for (const FrameEdge& edge : graph.edges) {
+    const bool a = cut.leaf_of_node[static_cast<std::size_t>(edge.a.value)] < first_right;
+    const bool b = cut.leaf_of_node[static_cast<std::size_t>(edge.b.value)] < first_right;
+    if (a == b) continue;
+    (a ? left : right).insert(edge.a.value);
+    (b ? left : right).insert(edge.b.value);
+  }
+  return static_cast<std::int64_t>(std::min(left.size(), right.size()));
+}
+
+TEST(Bisect, SeparatorOfAGridIsAboutOneRow) {
+  const FrameGraph graph = sorted(60 * 40, grid(60, 40));
+  const BisectionTree cut = bisect(graph, 1300);
+  ASSERT_EQ(cut.tree.nodes.size(), 3u);
+  EXPECT_LE(root_separator(graph, cut), 44);  // a straight cut has 40
+}
+
+TEST(Bisect, HalvesAreBalanced) {
+  const FrameGraph graph = sorted(50 * 64, grid(50, 64));
+  const BisectionTree cut = bisect(graph, 430);
+  std::map<std::int32_t, int> size;
+  for (std::int32_t leaf : cut.leaf_of_node) ++size[leaf];
+  ASSERT_EQ(size.size(), 8u);
+  for (const auto& [leaf, count] : size) EXPECT_NEAR(count, 400, 40);
+  expect_tree(cut.tree, 8);
+}
+
+TEST(Bisect, KeepsTheLimitDownToSmallLeaves) {
+  const FrameGraph graph = sorted(23 * 31, grid(23, 31));
+  for (std::int64_t limit : {1, 2, 7, 32, 100, 712, 713}) {
+    const BisectionTree cut = bisect(graph, limit);
+    std::map<std::int32_t, std::int64_t> size;
+    for (std::int32_t leaf : cut.leaf_of_node) ++size[leaf];
+    for (const auto& [leaf, count] : size) EXPECT_LE(count, limit);
+    expect_tree(cut.tree, static_cast<std::int64_t>(size.size()));
+  }
+}
+
+TEST(Bisect, GraphsWithoutLinksStarsAndEmptyOnes) {
+  EXPECT_TRUE(bisect({0, {}}, 5).tree.nodes.empty());
+  EXPECT_EQ(bisect({1, {}}, 5).leaf_of_node, std::vector<std::int32_t>{0});
+  expect_tree(bisect({100, {}}, 10).tree, 11);  // planned 5 % below the limit
+  std::vector<FrameEdge> star;
+  for (int leaf = 1; leaf < 500; ++leaf) add(star, 0, leaf, 20);
+  const BisectionTree cut = bisect(sorted(500, star), 50);
+  std::map<std::int32_t, int> size;
+  for (std::int32_t leaf : cut.leaf_of_node) ++size[leaf];
+  for (const auto& [leaf, count] : size) EXPECT_LE(count, 50);
+  EXPECT_LT(size.size(), 40u);
+}
+
+TEST(Bisect, RefusesWhatMetisCannotNumber) {
+  EXPECT_THROW(bisect({std::int64_t{1} << 31, {}}, 500), ComputeError);
+  EXPECT_THROW(bisect({10, {}}, 0), InputError);
+}
+
+TEST(Bisect, HugeWeightsDoNotOverflow) {
+  std::vector<FrameEdge> edges = grid(20, 20, 0, std::int64_t{1} << 40);
+  const FrameGraph graph = sorted(400, edges);
+  const BisectionTree cut = bisect(graph, 250);
+  EXPECT_LE(root_separator(graph, cut), 24);
+}
+
+TEST(MakeTiles, FourTilesFromAHundredFrames) {
+  TileOptions options;
+  const FrameGraph hundred = sorted(100, grid(10, 10));
+  const Tiles tiles = make_tiles(hundred, options);
+  EXPECT_EQ(tiles.tile_count, 4);
+  for (std::int64_t size : tile_sizes(tiles)) EXPECT_NEAR(static_cast<double>(size), 25, 3);
+  expect_tiles(hundred, tiles, options);
+  EXPECT_EQ(make_tiles(sorted(99, grid(9, 11)), options).tile_count, 1);
+}
+
+TEST(MakeTiles, LimitAndInvariants) {
+  TileOptions options;
+  options.tile_max_frames = 100;
+  const FrameGraph graph = sorted(40 * 50, grid(40, 50));
+  const Tiles tiles = make_tiles(graph, options);
+  expect_tiles(graph, tiles, options);
+  EXPECT_GE(tiles.tile_count, 20);
+  EXPECT_LE(tiles.tile_count, 26);
+  EXPECT_TRUE(tiles.dropped_links.empty());
+  EXPECT_GE(tiles.tree.nodes.back().level, 4);
+}
+
+TEST(MakeTiles, SameTilesEveryTime) {
+  TileOptions options;
+  options.tile_max_frames = 60;
+  const FrameGraph graph = sorted(30 * 40, grid(30, 40));
+  const Tiles first = make_tiles(graph, options);
+  for (int i = 0; i < 3; ++i) {
+    std::srand(static_cast<unsigned>(i));  // METIS draws from the C library's generator
+    EXPECT_EQ(make_tiles(graph, options).tile_of_frame, first.tile_of_frame);
+  }
+}
+
+TEST(MakeTiles, DisjointSetsAreComponentsUnderOneRoot) {
+  std::vector<FrameEdge> edges = grid(5, 8, 0);
+  for (const FrameEdge& edge : grid(10, 12, 40)) edges.push_back(edge);
+  for (const FrameEdge& edge : grid(1, 2, 160)) edges.push_back(edge);
+  const FrameGraph graph = sorted(163, edges);  // frame 162 is alone
+  TileOptions options;
+  const Tiles tiles = make_tiles(graph, options);
+  expect_tiles(graph, tiles, options);
+  EXPECT_EQ(tiles.component[FrameIndex(40)], 0);  // the largest
+  EXPECT_EQ(tiles.component[FrameIndex(0)], 1);
+  EXPECT_EQ(tiles.component[FrameIndex(160)], 2);
+  EXPECT_EQ(tiles.component[FrameIndex(162)], -1);
+  EXPECT_FALSE(tiles.tile_of_frame[FrameIndex(162)].valid());
+  EXPECT_GE(tiles.tile_count, 4);
+}
+
+TEST(MakeTiles, ManySmallSetsKeepTheTreeShallow) {
+  std::vector<FrameEdge> edges;
+  for (int i = 0; i < 300; ++i) add(edges, 2 * i, 2 * i + 1, 30);
+  const FrameGraph graph = sorted(600, edges);
+  const Tiles tiles = make_tiles(graph, {});
+  EXPECT_EQ(tiles.tile_count, 300);
+  expect_tiles(graph, tiles, {});
+  EXPECT_LE(tiles.tree.nodes.back().level, 9);
+}
+
+TEST(MakeTiles, EmptyAndSingleFrame) {
+  expect_tiles({0, {}}, make_tiles({0, {}}, {}), {});
+  const Tiles single = make_tiles({1, {}}, {});
+  EXPECT_EQ(single.tile_count, 0);
+  EXPECT_EQ(single.component[FrameIndex(0)], -1);
+  expect_tiles({1, {}}, single, {});
+}
+
+TEST(MakeTiles, WeakLinkBetweenDistantTilesIsDropped) {
+  std::vector<FrameEdge> edges = grid(10, 40);
+  add(edges, 0, 399, 5);  // opposite corners: one false match
+  add(edges, 20, 21 + 40, 5);
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end(),
+                          [](const FrameEdge& a, const FrameEdge& b) { return a.a == b.a && a.b == b.b; }),
+              edges.end());
+  const FrameGraph graph = sorted(400, edges);
+  TileOptions options;
+  const Tiles tiles = make_tiles(graph, options);
+  expect_tiles(graph, tiles, options);
+  EXPECT_TRUE(std::binary_search(tiles.dropped_links.begin(), tiles.dropped_links.end(),
+                                 FrameEdge{FrameIndex(0), FrameIndex(399), 5}));
+}
+
+TEST(MakeTiles, AWeakBridgeMakesTwoComponents) {
+  std::vector<FrameEdge> edges = grid(5, 10, 0);
+  for (const FrameEdge& edge : grid(5, 10, 50)) edges.push_back(edge);
+  add(edges, 3, 77, 7);
+  const FrameGraph graph = sorted(100, edges);
+  const Tiles tiles = make_tiles(graph, {});
+  expect_tiles(graph, tiles, {});
+  EXPECT_NE(tiles.component[FrameIndex(3)], tiles.component[FrameIndex(77)]);
+  EXPECT_EQ(tiles.dropped_links.size(), 1u);
+}
+
+TEST(MakeTiles, AFrameWithSeveralWeakLinksToOneSetStays) {
+  std::vector<FrameEdge> edges = grid(5, 5);
+  add(edges, 12, 25, 4);
+  add(edges, 13, 25, 4);
+  const FrameGraph graph = sorted(26, edges);
+  const Tiles tiles = make_tiles(graph, {});
+  EXPECT_EQ(tiles.component[FrameIndex(25)], 0);
+  expect_tiles(graph, tiles, {});
+}
+
+TEST(MakeTiles, PartsHeldByWeakLinksAloneFallApart) {
+  std::vector<FrameEdge> edges = grid(10, 10, 0);
+  for (const FrameEdge& edge : grid(10, 10, 100)) edges.push_back(edge);
+  for (int i = 0; i < 10; ++i) add(edges, 90 + i, 100 + i, 3);  // 30 tracks in total, none strong
+  const FrameGraph graph = sorted(200, edges);
+  const Tiles tiles = make_tiles(graph, {});
+  expect_tiles(graph, tiles, {});
+  expect_connected_components(graph, tiles);
+  EXPECT_NE(tiles.component[FrameIndex(0)], tiles.component[FrameIndex(199)]);
+  EXPECT_EQ(tiles.dropped_links.size(), 10u);
+}
+
+TEST(MakeTiles, TilesAreInOnePiece) {
+  TileOptions options;
+  options.tile_max_frames = 80;
+  const FrameGraph graph = sorted(40 * 40, grid(40, 40));
+  const Tiles tiles = make_tiles(graph, options);
+  std::vector<FrameEdge> inner;
+  for (const FrameEdge& edge : graph.edges)
+    if (tiles.tile_of_frame[edge.a] == tiles.tile_of_frame[edge.b]) inner.push_back(edge);
+  TileOptions whole;
+  whole.min_tiles = 1;
+  const Tiles pieces = make_tiles(sorted(1600, inner), whole);
+  EXPECT_EQ(1 + *std::max_element(pieces.component.begin(), pieces.component.end()), tiles.tile_count);
+}
+
+TEST(MakeTiles, HundredThousandFramesInSeconds) {
+  std::vector<FrameEdge> edges = grid(316, 316);
+  for (int r = 0; r < 316; ++r)
+    for (int c = 0; c < 316; ++c)
+      for (int step : {2, 3, 4, 5, 6, 7})
+        if (c + step < 316) add(edges, r * 316 + c, r * 316 + c + step, 100 / step);
+  const FrameGraph graph = sorted(316 * 316, edges);
+  const auto start = std::chrono::steady_clock::now();
+  const Tiles tiles = make_tiles(graph, {});
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  RecordProperty("seconds", std::to_string(seconds));
+  std::cout << graph.edges.size() << " links, " << tiles.tile_count << " tiles, " << seconds << " s\n";
+  expect_tiles(graph, tiles, {});
+  EXPECT_LT(seconds, 15);  // about 2 s on an idle core
+}
+
+TEST(ExtendTiles, KeepsOldAssignmentsAndJoinsTheBestTile) {
+  TileOptions options;
+  const FrameGraph before = sorted(144, grid(12, 12));
+  const Tiles previous = make_tiles(before, options);
+  std::vector<FrameEdge> edges = before.edges;
+  add(edges, 0, 144, 50);
+  add(edges, 1, 144, 50);
+  add(edges, 143, 144, 60);
+  add(edges, 144, 145, 40);  // a chain of new frames
+  const FrameGraph after = sorted(146, edges);
+  const Tiles tiles = extend_tiles(after, previous, options);
+  expect_tiles(after, tiles, options);
+  EXPECT_EQ(tiles.tile_count, previous.tile_count);
+  for (std::int64_t f = 0; f < 144; ++f)
+    EXPECT_EQ(tiles.tile_of_frame[FrameIndex(f)], previous.tile_of_frame[FrameIndex(f)]);
+  ASSERT_EQ(previous.tile_of_frame[FrameIndex(0)], previous.tile_of_frame[FrameIndex(1)]);
+  EXPECT_EQ(tiles.tile_of_frame[FrameIndex(144)], tiles.tile_of_frame[FrameIndex(0)]);
+  EXPECT_EQ(tiles.tile_of_frame[FrameIndex(145)], tiles.tile_of_frame[FrameIndex(0)]);
+}
+
+TEST(ExtendTiles, WithoutNewFramesNothingChanges) {
+  TileOptions options;
+  options.tile_max_frames = 40;
+  std::vector<FrameEdge> edges = grid(12, 12);
+  for (const FrameEdge& edge : grid(6, 6, 144)) edges.push_back(edge);
+  const FrameGraph graph = sorted(180, edges);
+  const Tiles previous = make_tiles(graph, options);
+  const Tiles tiles = extend_tiles(graph, previous, options);
+  EXPECT_EQ(tiles.tile_of_frame, previous.tile_of_frame);
+  EXPECT_EQ(tiles.component, previous.component);
+  ASSERT_EQ(tiles.tree.nodes.size(), previous.tree.nodes.size());
+  for (std::size_t n = 0; n < tiles.tree.nodes.size(); ++n) {
+    EXPECT_EQ(tiles.tree.nodes[n].left, previous.tree.nodes[n].left);
+    EXPECT_EQ(tiles.tree.nodes[n].right, previous.tree.nodes[n].right);
+    EXPECT_EQ(tiles.tree.nodes[n].tile, previous.tree.nodes[n].tile);
+  }
+}
+
+TEST(ExtendTiles, BisectsATileOverTheLimit) {
+  TileOptions options;
+  options.tile_max_frames = 40;
+  const FrameGraph before = sorted(120, grid(12, 10));
+  const Tiles previous = make_tiles(before, options);
+  const FrameGraph after = sorted(240, grid(24, 10));
+  const Tiles tiles = extend_tiles(after, previous, options);
+  expect_tiles(after, tiles, options);
+  expect_connected_components(after, tiles);
+  EXPECT_GT(tiles.tile_count, previous.tile_count);
+  std::int64_t moved = 0;
+  for (std::int64_t f = 0; f < 120; ++f)
+    moved += tiles.tile_of_frame[FrameIndex(f)] != previous.tile_of_frame[FrameIndex(f)];
+  EXPECT_LT(moved, 60);  // tiles away from the new frames keep all of theirs
+}
+
+TEST(ExtendTiles, NewSetsAndJoinedComponents) {
+  TileOptions options;
+  std::vector<FrameEdge> edges = grid(5, 8, 0);
+  for (const FrameEdge& edge : grid(5, 7, 40)) edges.push_back(edge);
+  const FrameGraph before = sorted(75, edges);
+  const Tiles previous = make_tiles(before, options);
+  ASSERT_EQ(previous.tile_count, 2);
+  add(edges, 10, 75, 30);  // joins the two sets
+  add(edges, 50, 75, 20);
+  add(edges, 76, 77, 30);  // a set of its own
+  add(edges, 5, 78, 3);    // too weak: no tile
+  const FrameGraph after = sorted(79, edges);
+  const Tiles tiles = extend_tiles(after, previous, options);
+  expect_tiles(after, tiles, options);
+  EXPECT_EQ(tiles.component[FrameIndex(0)], 0);
+  EXPECT_EQ(tiles.component[FrameIndex(60)], 0);
+  EXPECT_EQ(tiles.component[FrameIndex(77)], 1);
+  EXPECT_EQ(tiles.component[FrameIndex(78)], -1);
+  EXPECT_EQ(tiles.tile_count, 3);
+}
+
+TEST(ExtendTiles, FromNothingAndOntoAShrunkBlock) {
+  const FrameGraph graph = sorted(100, grid(10, 10));
+  const Tiles fresh = make_tiles(graph, {});
+  EXPECT_EQ(extend_tiles(graph, Tiles(), {}).tile_of_frame, fresh.tile_of_frame);
+  EXPECT_THROW(extend_tiles(sorted(90, grid(9, 10)), fresh, {}), InputError);
+}
+
+TEST(TileOptions, Checked) {
+  TileOptions options;
+  options.tile_max_frames = 1;
+  EXPECT_THROW(make_tiles({}, options), InputError);
+  options = {};
+  options.weak_link_tracks = 0;
+  EXPECT_THROW(options.check(), InputError);
+}
+
+}  // namespace
+}  // namespace megablock
