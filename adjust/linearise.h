@@ -48,7 +48,8 @@ inline double intrinsic_prior_residual(const Intrinsics& value, const TileProble
 
 // Robust weighting as Ceres (corrector): residual and Jacobian are scaled by sqrt(rho'); the second-order term is
 // applied where rho'' > 0 and dropped where rho'' <= 0 (always, for the losses here).
-// Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a camera.
+// Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a
+// camera.
 double evaluate_cost(const TileProblem& problem, const TileState& state);
 
 }  // namespace megablock

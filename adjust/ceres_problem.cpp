@@ -1,0 +1,253 @@
+#include "adjust/ceres_problem.h"
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/sized_cost_function.h>
+
+#include <algorithm>
+
+#include "adjust/linearise.h"
+#include "io/error.h"
+
+namespace megablock {
+
+void to_block(const Pose& pose, double* block) {
+  const Eigen::Quaterniond& q = pose.rotation;
+  block[0] = q.w(), block[1] = q.x(), block[2] = q.y(), block[3] = q.z();
+  Eigen::Map<Eigen::Vector3d>(block + 4) = pose.centre;
+}
+
+Pose from_block(const double* block) {
+  return {Eigen::Quaterniond(block[0], block[1], block[2], block[3]), Eigen::Map<const Eigen::Vector3d>(block + 4)};
+}
+
+// q Exp(w) = q (1, w/2) to first order, so dq/dw_i = q e_i / 2 for the imaginary units e_i. The q e_i are
+// orthonormal, so dw_i/dq = 2 (q e_i)'.
+Eigen::Matrix<double, 3, 4> quaternion_to_tangent(const double* q) {
+  Eigen::Matrix<double, 3, 4> result;
+  result << -q[1], q[0], q[3], -q[2],  //
+      -q[2], -q[3], q[0], q[1],        //
+      -q[3], q[2], -q[1], q[0];
+  return 2 * result;
+}
+
+bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
+  to_block(pose_update(from_block(x), Eigen::Map<const PoseIncrement>(delta)), x_plus_delta);
+  return true;
+}
+
+bool PoseManifold::PlusJacobian(const double* x, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>> map(jacobian);
+  map.setZero();
+  map.topLeftCorner<4, 3>() = 0.25 * quaternion_to_tangent(x).transpose();
+  map.bottomRightCorner<3, 3>().setIdentity();
+  return true;
+}
+
+bool PoseManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
+  const Pose a = from_block(y), b = from_block(x);
+  Eigen::Map<PoseIncrement> map(y_minus_x);
+  map << rotation_log<double>(b.rotation.conjugate() * a.rotation), a.centre - b.centre;
+  return true;
+}
+
+bool PoseManifold::MinusJacobian(const double* x, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> map(jacobian);
+  map.setZero();
+  map.topLeftCorner<3, 4>() = quaternion_to_tangent(x);
+  map.bottomRightCorner<3, 3>().setIdentity();
+  return true;
+}
+
+namespace {
+
+// linearise_image for Ceres. Ceres multiplies a pose's Jacobian by dq/dw; dw/dq is its left inverse.
+class AnalyticImage : public ceres::SizedCostFunction<2, kPoseBlock, kPoseBlock, kIntrinsicCount, 3> {
+ public:
+  AnalyticImage(const Eigen::Vector2d& measured, double inverse_sigma)
+      : measured_(measured), inverse_sigma_(inverse_sigma) {}
+
+  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
+    Intrinsics intrinsics;
+    std::copy_n(blocks[2], kIntrinsicCount, intrinsics.begin());
+    const Pose frame = from_block(blocks[0]), mount = from_block(blocks[1]);
+    const Eigen::Vector3d point = Eigen::Map<const Eigen::Vector3d>(blocks[3]);
+    Eigen::Map<Eigen::Vector2d> result(residual);
+    if (jacobians == nullptr) {
+      const Eigen::Vector3d in_camera = to_camera(frame, mount, point);
+      if (!(in_camera.z() > 0)) return false;
+      result = inverse_sigma_ * (project(intrinsics, in_camera) - measured_);
+      return true;
+    }
+    const ImageResidual image = linearise_image(frame, mount, intrinsics, point, measured_, inverse_sigma_);
+    if (!image.in_front) return false;
+    result = image.residual;
+    if (jacobians[0]) write_pose(image.by_frame, blocks[0], jacobians[0]);
+    if (jacobians[1]) write_pose(image.by_mount, blocks[1], jacobians[1]);
+    if (jacobians[2]) as_matrix<kIntrinsicCount>(jacobians[2]) = image.by_intrinsics;
+    if (jacobians[3]) as_matrix<3>(jacobians[3]) = image.by_point;
+    return true;
+  }
+
+ private:
+  template <int kColumns>
+  static Eigen::Map<Eigen::Matrix<double, 2, kColumns, Eigen::RowMajor>> as_matrix(double* jacobian) {
+    return Eigen::Map<Eigen::Matrix<double, 2, kColumns, Eigen::RowMajor>>(jacobian);
+  }
+  static void write_pose(const Eigen::Matrix<double, 2, 6>& by_tangent, const double* block, double* jacobian) {
+    auto map = as_matrix<kPoseBlock>(jacobian);
+    map.leftCols<4>() = by_tangent.leftCols<3>() * quaternion_to_tangent(block);
+    map.rightCols<3>() = by_tangent.rightCols<3>();
+  }
+
+  Eigen::Vector2d measured_;
+  double inverse_sigma_;
+};
+
+std::unique_ptr<ceres::LossFunction> ceres_loss(const RobustLoss& loss) {
+  switch (loss.kind) {
+    case RobustLoss::Kind::kHuber:
+      return std::make_unique<ceres::HuberLoss>(loss.scale);
+    case RobustLoss::Kind::kCauchy:
+      return std::make_unique<ceres::CauchyLoss>(loss.scale);
+    case RobustLoss::Kind::kNone:
+      break;
+  }
+  return nullptr;
+}
+
+ceres::Problem::Options problem_options() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.disable_all_safety_checks = true;
+  return options;
+}
+
+template <int kResiduals, int... kBlocks, typename Functor>
+ceres::CostFunction* automatic(Functor functor) {
+  return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlocks...>(new Functor(std::move(functor)));
+}
+
+}  // namespace
+
+CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options)
+    : frames_(state.frames.size()),
+      mounts_(state.mounts.size()),
+      cameras_(state.cameras),
+      points_(state.points.size()),
+      point_used_(problem.points.size(), 0),
+      image_loss_(ceres_loss(problem.image_loss)),
+      position_loss_(ceres_loss(problem.position_loss)),
+      relative_loss_(ceres_loss(problem.relative_loss)),
+      ceres_(std::make_unique<ceres::Problem>(problem_options())) {
+  const auto& camera_free = options.camera_free.empty() ? problem.camera_free : options.camera_free;
+  if (state.frames.size() != problem.frames.size() || state.cameras.size() != problem.cameras.size() ||
+      state.mounts.size() != problem.mounts.size() || state.points.size() != problem.points.size() ||
+      camera_free.size() != problem.cameras.size())
+    throw InputError("the tile's state does not fit its problem");
+  for (std::size_t f = 0; f < frames_.size(); ++f) to_block(state.frames[f], frames_[f].data());
+  for (std::size_t m = 0; m < mounts_.size(); ++m) to_block(state.mounts[m], mounts_[m].data());
+  for (std::size_t p = 0; p < points_.size(); ++p) Eigen::Map<Eigen::Vector3d>(points_[p].data()) = state.points[p];
+  add_images(problem, options.derivatives);
+  add_priors(problem);
+  hold_parameters(problem, camera_free);
+}
+
+CeresTile::~CeresTile() = default;
+
+void CeresTile::add_images(const TileProblem& problem, CeresOptions::Derivatives derivatives) {
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    point_used_[p] = 1;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      const Eigen::Vector2d measured(problem.x[row], problem.y[row]);
+      const double weight = problem.inverse_sigma[row];
+      ceres::CostFunction* cost =
+          derivatives == CeresOptions::Derivatives::kAnalytic
+              ? static_cast<ceres::CostFunction*>(new AnalyticImage(measured, weight))
+              : automatic<2, kPoseBlock, kPoseBlock, kIntrinsicCount, 3>(residual::ImageMeasured{measured, weight});
+      ceres_->AddResidualBlock(cost, image_loss_.get(), frame(image.frame.value), mount(image.mount),
+                               camera(image.camera.value), point(p));
+    }
+  }
+}
+
+void CeresTile::add_priors(const TileProblem& problem) {
+  for (const auto& term : problem.positions)
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::PositionMeasured{term.prior}), position_loss_.get(),
+                             frame(term.frame.value));
+  for (const auto& term : problem.attitudes)
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}), nullptr,
+                             frame(term.frame.value));
+  for (const auto& term : problem.relatives)
+    ceres_->AddResidualBlock(automatic<6, kPoseBlock, kPoseBlock>(residual::RelativeMeasured{term}),
+                             relative_loss_.get(), frame(term.from.value), frame(term.to.value));
+  for (const auto& term : problem.point_priors)
+    if (point_used_[term.point.value])
+      ceres_->AddResidualBlock(automatic<3, 3>(residual::PointKnown{term}), nullptr, point(term.point.value));
+  for (const auto& term : problem.intrinsic_priors)
+    ceres_->AddResidualBlock(automatic<kIntrinsicCount, kIntrinsicCount>(residual::IntrinsicsKnown{term}), nullptr,
+                             camera(term.camera.value));
+  for (const auto& term : problem.mount_priors)
+    ceres_->AddResidualBlock(automatic<6, kPoseBlock>(residual::MountKnown{term}), nullptr, mount(term.mount));
+}
+
+void CeresTile::hold_parameters(const TileProblem& problem, const std::vector<std::uint8_t>& camera_free) {
+  for (auto& block : frames_)
+    if (ceres_->HasParameterBlock(block.data())) ceres_->SetManifold(block.data(), &pose_manifold_);
+  for (std::size_t m = 0; m < mounts_.size(); ++m) {
+    if (!ceres_->HasParameterBlock(mounts_[m].data())) continue;
+    ceres_->SetManifold(mounts_[m].data(), &pose_manifold_);
+    if (!problem.mount_free[m]) ceres_->SetParameterBlockConstant(mounts_[m].data());
+  }
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    double* block = cameras_[c].data();
+    if (!ceres_->HasParameterBlock(block)) continue;
+    std::vector<int> held;
+    for (int k = 0; k < kIntrinsicCount; ++k)
+      if (!(camera_free[c] >> k & 1)) held.push_back(k);
+    if (held.size() == kIntrinsicCount) {
+      ceres_->SetParameterBlockConstant(block);
+    } else if (!held.empty()) {
+      camera_manifolds_.push_back(std::make_unique<ceres::SubsetManifold>(kIntrinsicCount, held));
+      ceres_->SetManifold(block, camera_manifolds_.back().get());
+    }
+  }
+}
+
+bool CeresTile::unknown(double* block) const {
+  return ceres_->HasParameterBlock(block) && !ceres_->IsParameterBlockConstant(block);
+}
+
+std::vector<double*> CeresTile::unknown_blocks_without_points() {
+  std::vector<double*> blocks;
+  const auto add = [&](auto& table) {
+    for (auto& block : table)
+      if (unknown(block.data())) blocks.push_back(block.data());
+  };
+  add(frames_);
+  add(cameras_);
+  add(mounts_);
+  return blocks;
+}
+
+std::vector<double*> CeresTile::unknown_blocks() {
+  std::vector<double*> blocks = unknown_blocks_without_points();
+  for (std::size_t p = 0; p < points_.size(); ++p)
+    if (point_used_[p]) blocks.push_back(points_[p].data());
+  return blocks;
+}
+
+void CeresTile::store(TileState& state) const {
+  // As Plus left them: already unit, and held blocks keep their bits.
+  for (std::size_t f = 0; f < frames_.size(); ++f) state.frames[f] = from_block(frames_[f].data());
+  for (std::size_t m = 0; m < mounts_.size(); ++m) state.mounts[m] = from_block(mounts_[m].data());
+  state.cameras = cameras_;
+  for (std::size_t p = 0; p < points_.size(); ++p)
+    if (point_used_[p]) state.points[p] = Eigen::Map<const Eigen::Vector3d>(points_[p].data());
+}
+
+}  // namespace megablock

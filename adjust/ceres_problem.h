@@ -1,0 +1,62 @@
+// A tile's observations and unknowns as a ceres::Problem: shared by the tile adjustment (analytic derivatives, fast)
+// and by the monolithic reference of merge/ (automatic derivatives, none of our linearisation code).
+#pragma once
+
+#include <ceres/problem.h>
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "adjust/ceres_residuals.h"
+
+namespace megablock {
+
+struct CeresOptions {
+  enum class Derivatives { kAutomatic, kAnalytic } derivatives = Derivatives::kAutomatic;
+  // Bit masks of the estimated intrinsics, one per camera of the problem; empty = problem.camera_free.
+  std::vector<std::uint8_t> camera_free;
+};
+
+// Builds and owns the ceres::Problem and the parameter blocks. Holds the active points and their kept observations
+// only; frames and cameras without any residual are not in the Ceres problem. Held parameters: whole blocks constant,
+// single intrinsics by a SubsetManifold. The datum is left as the observations give it (see datum.h).
+class CeresTile {
+ public:
+  CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options = {});
+  CeresTile(const CeresTile&) = delete;
+  CeresTile& operator=(const CeresTile&) = delete;
+  ~CeresTile();
+
+  ceres::Problem& problem() { return *ceres_; }
+  double* frame(std::int64_t row) { return frames_[row].data(); }
+  double* mount(std::int64_t row) { return mounts_[row].data(); }
+  double* camera(std::int64_t row) { return cameras_[row].data(); }
+  double* point(std::int64_t row) { return points_[row].data(); }
+
+  // The blocks with unknowns: frames, cameras, mounts, points, each in the order of its table. Given to
+  // ceres::Problem::EvaluateOptions they fix the order of the columns (tangent sizes: 6, free intrinsics, 6, 3).
+  std::vector<double*> unknown_blocks();
+  // The same without points.
+  std::vector<double*> unknown_blocks_without_points();
+
+  // Writes the blocks' values back (points that take no part keep their value).
+  void store(TileState& state) const;
+
+ private:
+  void add_images(const TileProblem& problem, CeresOptions::Derivatives derivatives);
+  void add_priors(const TileProblem& problem);
+  void hold_parameters(const TileProblem& problem, const std::vector<std::uint8_t>& camera_free);
+  bool unknown(double* block) const;
+
+  std::vector<std::array<double, kPoseBlock>> frames_, mounts_;
+  std::vector<Intrinsics> cameras_;
+  std::vector<std::array<double, 3>> points_;
+  std::vector<std::uint8_t> point_used_;
+  PoseManifold pose_manifold_;
+  std::vector<std::unique_ptr<ceres::Manifold>> camera_manifolds_;
+  std::unique_ptr<ceres::LossFunction> image_loss_, position_loss_, relative_loss_;
+  std::unique_ptr<ceres::Problem> ceres_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,138 @@
+// The residuals of a tile for Ceres' automatic differentiation: written from the definitions in tile_problem.h alone,
+// independent of linearise.cpp, so that either can be held against the other.
+//
+// Parameter blocks: frame and mount 7 (quaternion w, x, y, z, then centre), camera 8 (Intrinsics), point 3.
+// PoseManifold gives a pose the project's tangent increment (PoseIncrement, right perturbation): Jacobians, gradients
+// and steps that Ceres reports in tangent space have the six columns of a frame in our order and sign.
+#pragma once
+
+#include <ceres/manifold.h>
+
+#include "adjust/tile_problem.h"
+
+namespace megablock {
+
+inline constexpr int kPoseBlock = 7;
+
+class PoseManifold : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return kPoseBlock; }
+  int TangentSize() const override { return 6; }
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
+  bool PlusJacobian(const double* x, double* jacobian) const override;
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
+  bool MinusJacobian(const double* x, double* jacobian) const override;
+};
+
+// Rows: the derivatives of the quaternion (w, x, y, z) by the right perturbation are this matrix / 4, transposed;
+// the derivative of the perturbation by the quaternion is the matrix itself.
+Eigen::Matrix<double, 3, 4> quaternion_to_tangent(const double* quaternion_wxyz);
+
+void to_block(const Pose& pose, double* block);
+Pose from_block(const double* block);
+
+namespace residual {
+
+template <typename Scalar>
+using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+
+template <typename Scalar>
+Eigen::Quaternion<Scalar> rotation_of(const Scalar* pose) {
+  return Eigen::Quaternion<Scalar>(pose[0], pose[1], pose[2], pose[3]);
+}
+template <typename Scalar>
+Vector3<Scalar> centre_of(const Scalar* pose) {
+  return Vector3<Scalar>(pose[4], pose[5], pose[6]);
+}
+
+struct ImageMeasured {
+  Eigen::Vector2d measured;
+  double inverse_sigma;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* mount, const Scalar* camera, const Scalar* point,
+                  Scalar* result) const {
+    const Vector3<Scalar> ground(point[0], point[1], point[2]);
+    const Vector3<Scalar> in_rig = to_inside<Scalar>(rotation_of(frame), centre_of(frame), ground);
+    const Vector3<Scalar> in_camera = to_inside<Scalar>(rotation_of(mount), centre_of(mount), in_rig);
+    if (!(in_camera.z() > Scalar(0))) return false;
+    const Eigen::Matrix<Scalar, 2, 1> pixel = project<Scalar>(camera, in_camera);
+    result[0] = (pixel.x() - measured.x()) * inverse_sigma;
+    result[1] = (pixel.y() - measured.y()) * inverse_sigma;
+    return true;
+  }
+};
+
+struct PositionMeasured {
+  PositionPrior prior;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, Scalar* result) const {
+    const Vector3<Scalar> arm = rotation_of(frame).conjugate() * prior.lever_arm.cast<Scalar>();
+    for (int i = 0; i < 3; ++i) result[i] = (frame[4 + i] - prior.position[i] + arm[i]) / prior.sigma[i];
+    return true;
+  }
+};
+
+struct AttitudeMeasured {
+  AttitudePrior prior;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, Scalar* result) const {
+    const Eigen::Quaternion<Scalar> reference = prior.rotation_cw.cast<Scalar>();
+    const Vector3<Scalar> w = rotation_log<Scalar>(rotation_of(frame) * reference.conjugate());
+    for (int i = 0; i < 3; ++i) result[i] = w[i] / prior.sigma_rad[i];
+    return true;
+  }
+};
+
+struct RelativeMeasured {
+  TileProblem::RelativeTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* from, const Scalar* to, Scalar* result) const {
+    const Eigen::Quaternion<Scalar> measured = term.pose.rotation.cast<Scalar>();
+    const Vector3<Scalar> w =
+        rotation_log<Scalar>(rotation_of(to) * rotation_of(from).conjugate() * measured.conjugate());
+    const Vector3<Scalar> base = to_inside<Scalar>(rotation_of(from), centre_of(from), centre_of(to));
+    for (int i = 0; i < 3; ++i) {
+      result[i] = w[i] / term.rotation_sigma_rad;
+      result[3 + i] = (base[i] - term.pose.centre[i]) / term.position_sigma_m;
+    }
+    return true;
+  }
+};
+
+struct PointKnown {
+  TileProblem::PointTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* point, Scalar* result) const {
+    for (int i = 0; i < 3; ++i) result[i] = (point[i] - term.position[i]) * (1 / term.sigma[i]);
+    return true;
+  }
+};
+
+struct IntrinsicsKnown {
+  TileProblem::IntrinsicTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* camera, Scalar* result) const {
+    for (std::size_t k = 0; k < kIntrinsicCount; ++k) {
+      const double sigma = term.sigma[k];
+      result[k] = (camera[k] - term.value[k]) * (sigma > 0 ? 1 / sigma : 0.0);
+    }
+    return true;
+  }
+};
+
+struct MountKnown {
+  TileProblem::MountTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* mount, Scalar* result) const {
+    const Eigen::Quaternion<Scalar> reference = term.value.rotation.cast<Scalar>();
+    const Vector3<Scalar> w = rotation_log<Scalar>(rotation_of(mount) * reference.conjugate());
+    for (int i = 0; i < 3; ++i) {
+      result[i] = w[i] / term.rotation_sigma_rad;
+      result[3 + i] = (mount[4 + i] - term.value.centre[i]) / term.position_sigma_m;
+    }
+    return true;
+  }
+};
+
+}  // namespace residual
+}  // namespace megablock
