@@ -20,21 +20,23 @@ struct StageSettings {
 };
 
 struct Project {
-  std::string file;               // absolute path of the project file
-  Block block;                    // images, cameras, rigs, priors, control as read
-  std::string tie_points;         // HDF5 of given tracks (write_tracks), absolute; empty: features and matching run
+  std::string file;        // absolute path of the project file
+  Block block;             // images, cameras, rigs, priors, control as read
+  std::string tie_points;  // HDF5 of given tracks (write_tracks), absolute; empty: features and matching run
   StageSettings settings;
   std::vector<std::pair<std::string, std::string>> unreadable;  // image file and reason, reported and skipped
-  std::vector<std::string> warnings;                             // one line each: GPS at 0,0, duplicates, outliers ...
+  std::vector<std::string> warnings;                            // one line each: GPS at 0,0, duplicates, outliers ...
 };
 
 // Reads and validates; InputError with file:line for unknown keys, wrong types or units, missing files.
 Project read_project(const std::string& path);
+// The same in the ground frame of a running job, so that images added later cannot move the origin.
+Project read_project(const std::string& path, const std::optional<GroundFrame>& ground);
 
 struct InitOptions {
-  std::string images;             // folder, searched recursively, names sorted
+  std::string images;  // folder, searched recursively, names sorted
   std::string output = "block.yaml";
-  std::string gcp_file, mask_folder;  // optional
+  std::string gcp_file, mask_folder;     // optional
   std::string camera_grouping = "exif";  // "exif" (make, model, size, focal), "folder", "one"
 };
 // Scans the images and writes the project file. Returns its one-paragraph summary.

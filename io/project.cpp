@@ -1,0 +1,90 @@
+// The project file, section by section. What the images say comes first, what the file says overrides it.
+#include "io/project.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "io/error.h"
+#include "io/image_scan.h"
+#include "io/project_sections.h"
+#include "io/settings_reader.h"
+#include "io/unit_files.h"
+#include "io/yaml_reader.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+StageSettings read_stage_settings(YamlReader& top) {
+  StageSettings settings;
+  for (const std::string& section : stage_sections()) {
+    auto reader = top.mapping(section);
+    if (!reader) continue;
+    for (const std::string& key : reader->keys()) {
+      const auto value = reader->text(key);
+      settings.entries.push_back({section, key, *value, reader->where(key)});
+    }
+  }
+  return settings;
+}
+
+void read_simulated_block(YamlReader& top, Project& project, const std::string& block_file) {
+  try {
+    project.block = read_block(block_file);
+  } catch (const StoreError& error) {
+    throw InputError(top.where("block") + ": block: " + error.what());
+  }
+}
+
+// Keys in which files are named or the block is changed, in the order in which they build on one another.
+void read_block_sections(YamlReader& top, Project& project, const std::optional<GroundFrame>& ground) {
+  const auto images = top.existing_folder("images");
+  const auto block_file = top.existing_file("block");
+  if (images && block_file)
+    throw InputError(top.where("block") + ": 'images' and 'block' exclude each other; give one of them");
+  if (!images && !block_file)
+    throw InputError(top.where() + ": key 'images' (a folder of images) is missing; add for example 'images: images'");
+  if (const auto tie_points = top.existing_file("tie_points")) project.tie_points = *tie_points;
+  if (block_file && project.tie_points.empty())
+    throw InputError(top.where("block") + ": 'block' needs 'tie_points' as well: there are no images to measure in");
+
+  std::vector<ScannedImage> scanned;
+  if (images) scanned = scan_images(*images, project);
+  if (images && scanned.empty())
+    throw InputError(top.where("images") + ": images: no readable image (jpg, png, tif) below '" + *images + "'" +
+                     (project.unreadable.empty()
+                          ? ""
+                          : "; first reason: " + project.unreadable[0].first + ": " + project.unreadable[0].second));
+  if (block_file) read_simulated_block(top, project, *block_file);
+
+  auto cameras = top.mapping("cameras");
+  const CameraGrouping grouping = cameras ? read_camera_grouping(*cameras) : CameraGrouping::kExif;
+  if (images) add_images(scanned, grouping, project.block);
+  if (cameras) read_cameras(*cameras, project.block);
+  if (const auto masks = top.existing_folder("masks")) read_masks(*masks, project);
+  read_positions(top, scanned, ground, project);
+  read_attitudes(top, scanned, project);
+}
+
+}  // namespace
+
+Project read_project(const std::string& path) { return read_project(path, std::nullopt); }
+
+Project read_project(const std::string& path, const std::optional<GroundFrame>& ground) {
+  Project project;
+  project.file = fs::absolute(path).lexically_normal().string();
+  YamlReader top = read_yaml(path);
+  project.settings = read_stage_settings(top);
+  read_block_sections(top, project, ground);
+  top.finish();
+  check(project.block);
+  return project;
+}
+
+}  // namespace megablock

@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <filesystem>
+
+#include "io/error.h"
+#include "io/project_sections.h"
+#include "io/settings_reader.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Names of `calibrate: [...]`: the parameters and two words for groups of them.
+std::vector<int> parameters_named(const std::string& name, const std::string& where) {
+  if (name == "focal") return {kFocal};
+  if (name == "principal_point") return {kPrincipalX, kPrincipalY};
+  for (int p = 0; p < kIntrinsicCount; ++p)
+    if (name == kIntrinsicNames[static_cast<std::size_t>(p)]) return {p};
+  throw InputError(where + ": calibrate: '" + name +
+                   "' is no camera parameter; they are focal, principal_point, f, cx, cy, k1, k2, k3, p1, p2");
+}
+
+void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
+  std::array<double, kIntrinsicCount> sigma{};
+  for (const auto& item : list)
+    for (const int p : parameters_named(item.IsScalar() ? item.Scalar() : "", where))
+      sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(p)];
+  camera.prior_sigma = sigma;
+}
+
+void read_focal(YamlReader& reader, Camera& camera) {
+  const auto pixels = reader.positive_number("focal_px");
+  const auto millimetres = reader.positive_number("focal_mm"), sensor = reader.positive_number("sensor_mm");
+  if (pixels && millimetres)
+    throw InputError(reader.where("focal_mm") + ": give focal_px, or focal_mm with sensor_mm, not both");
+  if (millimetres.has_value() != sensor.has_value())
+    throw InputError(reader.where() + ": focal_mm and sensor_mm (width along the larger side) belong together");
+  if (!pixels && !millimetres) return;
+  camera.intrinsics[kFocal] = pixels ? *pixels : *millimetres / *sensor * std::max(camera.width, camera.height);
+  camera.focal_known = true;
+}
+
+void read_distortion(YamlReader& reader, Camera& camera) {
+  auto distortion = reader.mapping("distortion");
+  if (!distortion) return;
+  for (int p = kRadial1; p < kIntrinsicCount; ++p)
+    if (const auto value = distortion->number(kIntrinsicNames[static_cast<std::size_t>(p)]))
+      camera.intrinsics[static_cast<std::size_t>(p)] = *value;
+  distortion->finish();
+}
+
+void read_camera(YamlReader& reader, Camera& camera) {
+  read_focal(reader, camera);
+  if (const auto point = reader.numbers("principal_point_px", 2)) {
+    camera.intrinsics[kPrincipalX] = (*point)[0];
+    camera.intrinsics[kPrincipalY] = (*point)[1];
+  }
+  read_distortion(reader, camera);
+  camera.prior_sigma = default_intrinsic_sigmas(camera);
+  if (const auto calibrate = reader.node("calibrate")) {
+    const std::string where = reader.where("calibrate");
+    if (calibrate->IsSequence())
+      hold_except(*calibrate, where, camera);
+    else if (!*reader.flag("calibrate"))
+      camera.prior_sigma.fill(0);
+  }
+  if (const auto mask = reader.existing_file("mask")) camera.mask_path = *mask;
+  reader.finish();
+}
+
+std::string names_of(const Block& block) {
+  std::string list;
+  for (const Camera& camera : block.cameras) list += (list.empty() ? "'" : ", '") + camera.name + "'";
+  return list;
+}
+
+void check_mask(const Camera& camera, const std::string& where) {
+  ImageHeader header;
+  try {
+    header = read_image_header(camera.mask_path);
+  } catch (const InputError& error) {
+    throw InputError(where + ": mask '" + camera.mask_path + "': " + error.what());
+  }
+  if (header.width == camera.width && header.height == camera.height) return;
+  throw InputError(where + ": mask '" + camera.mask_path + "' has " + std::to_string(header.width) + " x " +
+                   std::to_string(header.height) + " pixels, camera '" + camera.name + "' has " +
+                   std::to_string(camera.width) + " x " + std::to_string(camera.height));
+}
+
+}  // namespace
+
+CameraGrouping read_camera_grouping(YamlReader& cameras) {
+  const std::string grouping = cameras.text("grouping").value_or("exif");
+  if (grouping == "exif") return CameraGrouping::kExif;
+  if (grouping == "folder") return CameraGrouping::kFolder;
+  if (grouping == "one") return CameraGrouping::kOne;
+  throw InputError(cameras.where("grouping") + ": cameras.grouping: '" + grouping + "' is none of: exif, folder, one");
+}
+
+void read_cameras(YamlReader& cameras, Block& block) {
+  for (Camera& camera : block.cameras) {
+    if (auto reader = cameras.mapping("default")) read_camera(*reader, camera);
+    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, camera);
+    if (!camera.mask_path.empty()) check_mask(camera, cameras.where());
+  }
+  for (const std::string& key : cameras.keys())
+    if (key != "grouping" && key != "default" &&
+        std::none_of(block.cameras.begin(), block.cameras.end(), [&](const Camera& c) { return c.name == key; }))
+      throw InputError(cameras.where(key) + ": cameras: no camera is named '" + key + "'; the cameras are " +
+                       names_of(block) + " (and 'default' for all, 'grouping')");
+}
+
+void read_masks(const std::string& folder, Project& project) {
+  std::vector<std::string> used;
+  for (Camera& camera : project.block.cameras) {
+    std::string name = camera.name;
+    std::replace(name.begin(), name.end(), '/', '_');
+    const std::string path = (fs::path(folder) / (name + ".png")).string();
+    if (!fs::is_regular_file(path)) continue;
+    used.push_back(path);
+    if (camera.mask_path.empty()) camera.mask_path = path;
+    check_mask(camera, project.file);
+  }
+  for (const auto& item : fs::directory_iterator(folder))
+    if (item.path().extension() == ".png" && std::find(used.begin(), used.end(), item.path().string()) == used.end())
+      project.warnings.push_back("mask '" + item.path().string() + "' is named after no camera; the cameras are " +
+                                 names_of(project.block));
+}
+
+}  // namespace megablock

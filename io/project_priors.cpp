@@ -1,0 +1,143 @@
+// Position and attitude priors: what the images say (EXIF, XMP), the options `gps`, `attitude`, `origin`.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "io/crs.h"
+#include "io/error.h"
+#include "io/project_sections.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kDefaultHorizontalSigma = 3, kDefaultVerticalSigma = 6;  // metres
+constexpr double kUnknownHeightSigma = 1000;                              // metres: the height is not known
+constexpr double kTiltSigmaDeg = 3, kYawSigmaDeg = 10;                    // of a gimbal
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+
+struct GpsOptions {
+  bool use = true;
+  std::optional<double> sigma_horizontal, sigma_vertical;
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
+};
+
+GpsOptions read_gps_options(YamlReader& top) {
+  GpsOptions options;
+  auto reader = top.mapping("gps");
+  if (!reader) return options;
+  options.use = reader->flag("use").value_or(true);
+  options.sigma_horizontal = reader->positive_number("sigma_horizontal_m");
+  options.sigma_vertical = reader->positive_number("sigma_vertical_m");
+  if (const auto arm = reader->numbers("lever_arm_m", 3)) options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
+  reader->finish();
+  return options;
+}
+
+// The file's figures, else the image's own accuracy, else the defaults; a DOP can only widen the default (taken as
+// metres per unit, as phones write their accuracy there).
+Eigen::Vector3d position_sigma(const ImageHeader& header, const GpsOptions& options) {
+  const double own = header.position_sigma_horizontal_m;
+  double horizontal = own > 0 ? own : kDefaultHorizontalSigma;
+  if (!(own > 0) && header.dop > horizontal) horizontal = header.dop;
+  double vertical = header.position_sigma_vertical_m;
+  if (!(vertical > 0)) vertical = horizontal * (kDefaultVerticalSigma / kDefaultHorizontalSigma);
+  horizontal = options.sigma_horizontal.value_or(horizontal);
+  vertical = options.sigma_vertical.value_or(vertical);
+  if (!std::isfinite(header.position->height_m)) vertical = kUnknownHeightSigma;
+  return {horizontal, horizontal, vertical};
+}
+
+void set_position_priors(const std::vector<ScannedImage>& scanned,
+                         const std::vector<std::optional<Geodetic>>& positions, const GpsOptions& options,
+                         Block& block) {
+  const Georeference georeference(block.ground);
+  for (std::size_t i = 0; i < scanned.size(); ++i) {
+    if (!positions[i]) continue;
+    ImageHeader header = scanned[i].header;
+    header.position = positions[i];
+    Geodetic position = *positions[i];
+    if (!std::isfinite(position.height_m)) position.height_m = block.ground.height_m;
+    PositionPrior prior;
+    prior.position = georeference.to_local(position);
+    prior.sigma = position_sigma(header, options);
+    prior.lever_arm = options.lever_arm;
+    block.frames[FrameIndex(static_cast<std::int64_t>(i))].position_prior = prior;
+  }
+}
+
+GroundFrame ground_at(const Geodetic& origin) {
+  return {true, origin.latitude_deg, origin.longitude_deg, origin.height_m, "EPSG:4979"};
+}
+
+std::optional<GroundFrame> read_origin(YamlReader& top) {
+  const auto origin = top.numbers("origin", 3);
+  if (!origin) return std::nullopt;
+  const Geodetic position{(*origin)[0], (*origin)[1], (*origin)[2]};
+  if (std::abs(position.latitude_deg) > 90 || std::abs(position.longitude_deg) > 180)
+    throw InputError(top.where("origin") + ": origin must be [latitude_deg, longitude_deg, height_m] (WGS84)");
+  return ground_at(position);
+}
+
+}  // namespace
+
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::optional<GroundFrame>& ground,
+                    Project& project) {
+  Block& block = project.block;
+  const GpsOptions options = read_gps_options(top);
+  const auto origin = read_origin(top);
+  if (!options.use)
+    for (Frame& frame : block.frames) frame.position_prior.reset();
+  std::vector<std::optional<Geodetic>> positions(scanned.size());
+  if (options.use) positions = screen_positions(scanned, project.warnings);
+  std::vector<Geodetic> known;
+  for (const auto& position : positions)
+    if (position) known.push_back(*position);
+  if (ground)
+    block.ground = *ground;
+  else if (origin)
+    block.ground = *origin;
+  else if (!known.empty())
+    block.ground = ground_at(rounded_median(known));
+  if (!known.empty() && !block.ground.georeferenced) {
+    project.warnings.push_back("GPS positions are not used: the job's block is not georeferenced");
+    return;
+  }
+  if (!known.empty()) set_position_priors(scanned, positions, options, block);
+}
+
+void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project) {
+  bool use = true;
+  std::optional<double> sigma_deg;
+  if (auto reader = top.mapping("attitude")) {
+    use = reader->flag("use").value_or(true);
+    sigma_deg = reader->positive_number("sigma_deg");
+    reader->finish();
+  }
+  Block& block = project.block;
+  if (!use)
+    for (Frame& frame : block.frames) frame.attitude_prior.reset();
+  if (!use || scanned.empty() || !block.ground.georeferenced) return;
+  const Georeference georeference(block.ground);
+  const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kRadiansPerDegree;
+  const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kRadiansPerDegree;
+  for (std::size_t i = 0; i < scanned.size(); ++i) {
+    if (!scanned[i].header.attitude) continue;
+    const auto& angles = *scanned[i].header.attitude;
+    Frame& frame = block.frames[FrameIndex(static_cast<std::int64_t>(i))];
+    AttitudePrior prior;
+    prior.rotation_cw = rotation_from(YawPitchRoll{
+        angles.yaw_deg * kRadiansPerDegree, angles.pitch_deg * kRadiansPerDegree, angles.roll_deg * kRadiansPerDegree});
+    if (frame.position_prior)
+      prior.rotation_cw =
+          (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))
+              .normalized();
+    // Heading is worse than the vertical: the ground's (tilt, tilt, yaw) seen about the camera's axes.
+    const Eigen::Matrix3d r = prior.rotation_cw.toRotationMatrix();
+    const Eigen::Vector3d variance(tilt * tilt, tilt * tilt, yaw * yaw);
+    prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();
+    frame.attitude_prior = prior;
+  }
+}
+
+}  // namespace megablock

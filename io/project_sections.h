@@ -1,0 +1,23 @@
+// The sections of the project file that change the block. Internal to io/ (project.cpp).
+#pragma once
+
+#include "io/image_scan.h"
+#include "io/yaml_reader.h"
+
+namespace megablock {
+
+// cameras: grouping and overrides by camera name ("default" for all of them).
+CameraGrouping read_camera_grouping(YamlReader& cameras);
+void read_cameras(YamlReader& cameras, Block& block);
+
+// masks: a folder with one PNG per camera, "<camera name>.png" ('/' in a name written as '_').
+void read_masks(const std::string& folder, Project& project);
+
+// gps, origin: position priors in the ground frame; fixes the ground frame. `ground` overrides both (a running job's).
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::optional<GroundFrame>& ground,
+                    Project& project);
+
+// attitude: attitude priors from the images' angles, turned to the block's vertical.
+void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);
+
+}  // namespace megablock
