@@ -89,12 +89,21 @@ class Hdf5Writer {
     const auto rows = static_cast<std::int64_t>(values.size()) / columns;
     dataset(name, element_type<T>(), values.data(), {rows, columns}, note);
   }
+  // Row-major values of any shape.
+  template <typename T>
+  void array(const std::string& name, const std::vector<T>& values, const std::vector<std::int64_t>& shape,
+             const DatasetNote& note = {}) {
+    dataset(name, element_type<T>(), values.data(), shape, note);
+  }
   // Integers in the smallest signed type that holds them all; readers ask for any integer type.
   void integers(const std::string& name, const std::vector<std::int64_t>& values, const DatasetNote& note = {});
   // Fixed-length UTF-8 strings, padded with zero bytes to the longest.
   void texts(const std::string& name, const std::vector<std::string>& values, const DatasetNote& note = {});
   void dataset(const std::string& name, ElementType type, const void* values, const std::vector<std::int64_t>& shape,
                const DatasetNote& note);
+
+  // A second name for a dataset (hard link).
+  void link(const std::string& existing, const std::string& name);
 
   // Attribute of a group or dataset ("/" is the file's root).
   template <typename T>
@@ -125,16 +134,17 @@ class Hdf5Reader {
   // Values converted to T; with `size` >= 0 a dataset of another length is an error.
   template <typename T>
   std::vector<T> vector(const std::string& name, std::int64_t size = -1) const {
-    const std::vector<std::int64_t> extent = checked_shape(name, 1, size);
-    std::vector<T> values(static_cast<std::size_t>(extent[0]));
-    read(name, element_type<T>(), values.data());
-    return values;
+    return array<T>(name, {size});
   }
   // Row-major values of a [rows x columns] dataset; the column count must agree, and the row count when rows >= 0.
   template <typename T>
   std::vector<T> matrix(const std::string& name, std::int64_t columns, std::int64_t rows = -1) const {
-    const std::vector<std::int64_t> extent = checked_shape(name, 2, rows, columns);
-    std::vector<T> values(static_cast<std::size_t>(extent[0] * extent[1]));
+    return array<T>(name, {rows, columns});
+  }
+  // Row-major values of a dataset that must have this shape, -1: any length.
+  template <typename T>
+  std::vector<T> array(const std::string& name, const std::vector<std::int64_t>& expected) const {
+    std::vector<T> values(checked_size(name, expected));
     read(name, element_type<T>(), values.data());
     return values;
   }
@@ -155,8 +165,8 @@ class Hdf5Reader {
  private:
   void read(const std::string& name, ElementType type, void* values) const;
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, void* value) const;
-  std::vector<std::int64_t> checked_shape(const std::string& name, int dimensions, std::int64_t rows,
-                                          std::int64_t columns = -1) const;
+  // Number of values of a dataset, whose shape must be as expected.
+  std::size_t checked_size(const std::string& name, const std::vector<std::int64_t>& expected) const;
   std::int64_t checked(std::int64_t result, const std::string& name) const;
 
   std::string path_;

@@ -12,6 +12,14 @@ Hdf5Handle open_dataset(hid_t file, const std::string& name) {
   return {H5Dopen2(file, name.c_str(), H5P_DEFAULT), &H5Dclose};
 }
 
+// "[12, 3]", "[any, 3]"
+std::string shape_text(const std::vector<std::int64_t>& shape) {
+  std::string text = "[";
+  for (std::size_t d = 0; d < shape.size(); ++d)
+    text += (d > 0 ? ", " : "") + (shape[d] < 0 ? "any" : std::to_string(shape[d]));
+  return text + "]";
+}
+
 }  // namespace
 
 Hdf5Reader::Hdf5Reader(const std::string& path, const std::string& kind) : path_(path) {
@@ -46,16 +54,16 @@ std::vector<std::int64_t> Hdf5Reader::shape(const std::string& name) const {
   return {extent.begin(), extent.end()};
 }
 
-std::vector<std::int64_t> Hdf5Reader::checked_shape(const std::string& name, int dimensions, std::int64_t rows,
-                                                    std::int64_t columns) const {
-  std::vector<std::int64_t> extent = shape(name);
-  if (static_cast<int>(extent.size()) != dimensions)
-    fail(name, "has " + std::to_string(extent.size()) + " dimensions, not " + std::to_string(dimensions));
-  if (rows >= 0 && extent[0] != rows)
-    fail(name, "has " + std::to_string(extent[0]) + " rows, not " + std::to_string(rows));
-  if (columns >= 0 && extent[1] != columns)
-    fail(name, "has " + std::to_string(extent[1]) + " columns, not " + std::to_string(columns));
-  return extent;
+std::size_t Hdf5Reader::checked_size(const std::string& name, const std::vector<std::int64_t>& expected) const {
+  const std::vector<std::int64_t> found = shape(name);
+  bool agrees = found.size() == expected.size();
+  std::size_t size = 1;
+  for (std::size_t d = 0; agrees && d < found.size(); ++d) {
+    agrees = expected[d] < 0 || found[d] == expected[d];
+    size *= static_cast<std::size_t>(found[d]);
+  }
+  if (!agrees) fail(name, "has shape " + shape_text(found) + ", not " + shape_text(expected));
+  return size;
 }
 
 void Hdf5Reader::read(const std::string& name, ElementType type, void* values) const {
@@ -65,7 +73,7 @@ void Hdf5Reader::read(const std::string& name, ElementType type, void* values) c
 }
 
 std::vector<std::string> Hdf5Reader::texts(const std::string& name, std::int64_t size) const {
-  const auto rows = static_cast<std::size_t>(checked_shape(name, 1, size)[0]);
+  const auto rows = checked_size(name, {size});
   const Hdf5Handle set = open_dataset(file_.id(), name);
   const Hdf5Handle type(checked(H5Dget_type(set.id()), name), &H5Tclose);
   if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) > 0)

@@ -112,6 +112,10 @@ void Hdf5Writer::write_dataset(const std::string& name, std::int64_t file_type, 
   if (!note.description.empty()) attribute(name, "description", note.description);
 }
 
+void Hdf5Writer::link(const std::string& existing, const std::string& name) {
+  checked(H5Lcreate_hard(file_.id(), existing.c_str(), file_.id(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), name);
+}
+
 void Hdf5Writer::attribute(const std::string& object, const std::string& name, const std::string& value) {
   const Hdf5Handle type = text_type(value.size());
   const Hdf5Handle space(H5Screate(H5S_SCALAR), &H5Sclose);

@@ -1,33 +1,25 @@
 // Current values of poses, intrinsics and mounts: docs/job-format.md, "State".
+#include <algorithm>
+
+#include "io/hdf5_state.h"
 #include "io/hdf5_tables.h"
 #include "io/unit_files.h"
 
 namespace megablock {
 
-void write_state(const std::string& path, const BlockState& state) {
+void put_state(Hdf5Writer& file, const BlockState& state) {
   std::vector<double> intrinsics;
   for (const Intrinsics& values : state.cameras) intrinsics.insert(intrinsics.end(), values.begin(), values.end());
   std::vector<Pose> mounts;
   for (const std::vector<Pose>& rig : state.mounts) mounts.insert(mounts.end(), rig.begin(), rig.end());
-
-  Hdf5Writer file(path, "state");
-  file.group("frames");
   write_poses(file, "frames", state.frames, "rig", "ground frame");
   file.vector("frames/oriented", state.oriented, {"", "1: the frame has a pose"});
-  file.group("cameras");
   file.matrix("cameras/intrinsics", intrinsics, kIntrinsicCount,
               {"px, px, px, 1, 1, 1, 1, 1", "f, cx, cy, k1, k2, k3, p1, p2"});
-  file.group("rigs");
-  file.vector("rigs/mounts",
-              column(state.mounts, [](const std::vector<Pose>& rig) { return static_cast<std::int32_t>(rig.size()); }),
-              {"", "number of mounts: rows of the group 'mounts', in the order of the rigs"});
-  file.group("mounts");
   write_poses(file, "mounts", mounts, "camera", "rig");
-  file.close();
 }
 
-BlockState read_state(const std::string& path) {
-  const Hdf5Reader file(path, "state");
+BlockState get_state(const Hdf5Reader& file) {
   BlockState state;
   state.frames = IndexedVector<FrameIndex, Pose>(read_poses(file, "frames"));
   state.oriented = IndexedVector<FrameIndex, std::uint8_t>(
@@ -44,5 +36,17 @@ BlockState read_state(const std::string& path) {
     state.mounts.push_back({mounts.begin() + begin[r], mounts.begin() + begin[r + 1]});
   return state;
 }
+
+void write_state(const std::string& path, const BlockState& state) {
+  Hdf5Writer file(path, "state");
+  for (const char* group : {"frames", "cameras", "rigs", "mounts"}) file.group(group);
+  file.vector("rigs/mounts",
+              column(state.mounts, [](const std::vector<Pose>& rig) { return static_cast<std::int32_t>(rig.size()); }),
+              {"", "number of mounts: rows of the group 'mounts', in the order of the rigs"});
+  put_state(file, state);
+  file.close();
+}
+
+BlockState read_state(const std::string& path) { return get_state(Hdf5Reader(path, "state")); }
 
 }  // namespace megablock

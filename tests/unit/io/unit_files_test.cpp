@@ -3,30 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <fstream>
 
 #include "io/error.h"
 #include "io/hdf5_file.h"
 #include "tests/unit/io/example_block.h"
+#include "tests/unit/io/same_bits.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
 
 using ::testing::HasSubstr;
-
-// Equal bits, so that NaN equals NaN and -0 differs from 0.
-bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
-bool same_bits(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return same_bits(a.x(), b.x()) && same_bits(a.y(), b.y()) && same_bits(a.z(), b.z());
-}
-bool same_bits(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-  return same_bits(a.w(), b.w()) && same_bits(a.vec(), b.vec());
-}
-bool same_bits(const Pose& a, const Pose& b) {
-  return same_bits(a.rotation, b.rotation) && same_bits(a.centre, b.centre);
-}
 
 void expect_equal(const Camera& a, const Camera& b) {
   EXPECT_EQ(a.name, b.name);

@@ -1,0 +1,53 @@
+// What a tile's adjustment leaves: docs/job-format.md, "Adjustment".
+#include <algorithm>
+
+#include "io/hdf5_tables.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+void write_adjustment(const std::string& path, const TileAdjustment& adjustment) {
+  std::vector<double> intrinsics;
+  for (const Intrinsics& values : adjustment.intrinsics)
+    intrinsics.insert(intrinsics.end(), values.begin(), values.end());
+  Hdf5Writer file(path, "adjustment");
+  file.attribute("/", "summary", adjustment.summary);
+  file.group("frames", "frames the tile's residuals touch");
+  file.vector("frames/index", plain(adjustment.frames), {"", "frame index in the block"});
+  write_poses(file, "frames", adjustment.poses, "rig", "ground frame");
+  file.vector("frames/observations", adjustment.observations, {"", "number of kept observations"});
+  file.group("cameras", "cameras the tile's residuals touch");
+  file.vector("cameras/index", plain(adjustment.cameras), {"", "camera index in the block"});
+  file.matrix("cameras/intrinsics", intrinsics, kIntrinsicCount,
+              {"px, px, px, 1, 1, 1, 1, 1", "f, cx, cy, k1, k2, k3, p1, p2"});
+  file.vector("cameras/observations", adjustment.camera_observations, {"", "number of kept observations"});
+  file.group("points", "rows of the tile's track file, then its control points in block order");
+  file.matrix("points/position", vectors3(adjustment.points, [](const Eigen::Vector3d& p) { return p; }), 3,
+              {"m", "ground frame; NaN: not triangulated"});
+  file.group("observations", "rows of the tile's track file, then those of its control points");
+  file.vector("observations/kept", adjustment.kept, {"", "1: kept, 0: rejected"});
+  file.close();
+}
+
+TileAdjustment read_adjustment(const std::string& path) {
+  const Hdf5Reader file(path, "adjustment");
+  TileAdjustment adjustment;
+  adjustment.summary = file.text_attribute("/", "summary");
+  adjustment.frames = indices<FrameIndex>(file.vector<std::int64_t>("frames/index"));
+  const auto frames = static_cast<std::int64_t>(adjustment.frames.size());
+  adjustment.poses = read_poses(file, "frames", frames);
+  adjustment.observations = file.vector<std::int64_t>("frames/observations", frames);
+  adjustment.cameras = indices<CameraIndex>(file.vector<std::int64_t>("cameras/index"));
+  const auto cameras = static_cast<std::int64_t>(adjustment.cameras.size());
+  const auto intrinsics = file.matrix<double>("cameras/intrinsics", kIntrinsicCount, cameras);
+  adjustment.intrinsics.resize(adjustment.cameras.size());
+  for (std::size_t c = 0; c < adjustment.intrinsics.size(); ++c)
+    std::copy_n(&intrinsics[kIntrinsicCount * c], kIntrinsicCount, adjustment.intrinsics[c].begin());
+  adjustment.camera_observations = file.vector<std::int64_t>("cameras/observations", cameras);
+  const auto points = file.matrix<double>("points/position", 3);
+  for (std::size_t p = 0; p < points.size() / 3; ++p) adjustment.points.push_back(vector3(points, p));
+  adjustment.kept = file.vector<std::uint8_t>("observations/kept");
+  return adjustment;
+}
+
+}  // namespace megablock

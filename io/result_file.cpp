@@ -1,0 +1,262 @@
+// result/block.h5: docs/job-format.md, "Result".
+#include <algorithm>
+
+#include "io/error.h"
+#include "io/hdf5_block.h"
+#include "io/hdf5_state.h"
+#include "io/hdf5_tables.h"
+#include "io/hdf5_tiles.h"
+#include "io/result.h"
+
+namespace megablock {
+
+namespace {
+
+// Square matrices of a list, one behind the other (symmetric, so the order of rows and columns does not matter).
+template <typename Scalar, typename Matrices>
+std::vector<Scalar> flattened(const Matrices& matrices) {
+  std::vector<Scalar> values;
+  for (const auto& matrix : matrices)
+    for (Eigen::Index i = 0; i < matrix.size(); ++i) values.push_back(static_cast<Scalar>(matrix.data()[i]));
+  return values;
+}
+
+template <typename Matrix, typename Scalar>
+std::vector<Matrix> square_matrices(const std::vector<Scalar>& values) {
+  constexpr std::size_t kSize = Matrix::SizeAtCompileTime;
+  std::vector<Matrix> matrices(values.size() / kSize);
+  for (std::size_t m = 0; m < matrices.size(); ++m)
+    for (std::size_t i = 0; i < kSize; ++i) matrices[m].data()[i] = static_cast<double>(values[m * kSize + i]);
+  return matrices;
+}
+
+void require_size(std::size_t found, std::size_t expected, const char* what) {
+  if (found != expected)
+    throw ComputeError("the result has " + std::to_string(found) + " " + what + ", expected " +
+                       std::to_string(expected));
+}
+
+void check_sizes(const BlockResult& result) {
+  const std::size_t tracks = result.tracks.id.size(), observations = result.tracks.image.size();
+  require_size(result.state.frames.size(), result.block.frames.size(), "frame poses");
+  require_size(result.boundary.size(), result.block.frames.size(), "boundary flags");
+  require_size(result.points.size(), tracks, "points");
+  require_size(result.kept.size(), observations, "verdicts on observations");
+  require_size(result.residual_x.size(), observations, "residuals");
+  require_size(result.residual_y.size(), observations, "residuals");
+  if (!result.point_covariance.empty()) require_size(result.point_covariance.size(), tracks, "point covariances");
+  if (!result.control.empty())
+    require_size(result.control.size(), result.block.control_points.size(), "control point results");
+  for (std::size_t p = 0; p < result.control.size(); ++p)
+    require_size(result.control[p].residual_px.size(), result.block.control_points[p].measurements.size(),
+                 "residuals of a control point");
+}
+
+std::int64_t rows(const auto& items) { return static_cast<std::int64_t>(items.size()); }
+
+void put_precision(Hdf5Writer& file, const BlockResult& result) {
+  if (!result.frame_covariance.empty())
+    file.array("frames/covariance", flattened<double>(result.frame_covariance), {rows(result.frame_covariance), 6, 6},
+               {"rad, m", "posterior, of (rotation increment about the ground axes, centre)"});
+  if (!result.camera_covariance.empty())
+    file.array("cameras/covariance", flattened<double>(result.camera_covariance),
+               {rows(result.camera_covariance), kIntrinsicCount, kIntrinsicCount},
+               {"px, px, px, 1, 1, 1, 1, 1", "posterior, of f, cx, cy, k1, k2, k3, p1, p2; held: 0"});
+}
+
+void get_precision(const Hdf5Reader& file, BlockResult& result) {
+  if (file.has("frames/covariance"))
+    result.frame_covariance = IndexedVector<FrameIndex, BlockResult::Matrix6>(square_matrices<BlockResult::Matrix6>(
+        file.array<double>("frames/covariance", {rows(result.block.frames), 6, 6})));
+  if (file.has("cameras/covariance"))
+    result.camera_covariance = IndexedVector<CameraIndex, BlockResult::Matrix8>(square_matrices<BlockResult::Matrix8>(
+        file.array<double>("cameras/covariance", {rows(result.block.cameras), 8, 8})));
+}
+
+void put_points(Hdf5Writer& file, const BlockResult& result) {
+  const TrackSet& tracks = result.tracks;
+  file.group("points", "one row per track in global order");
+  file.vector("points/id", plain(tracks.id), {"", "global index"});
+  file.vector("points/begin", tracks.begin.empty() ? std::vector<std::int64_t>{0} : tracks.begin,
+              {"", "observations of point i are rows begin[i] to begin[i + 1] (exclusive)"});
+  file.matrix("points/position", vectors3(result.points, [](const Eigen::Vector3d& p) { return p; }), 3,
+              {"m", "ground frame; NaN: not triangulated"});
+  if (!result.point_covariance.empty())
+    file.array("points/covariance", flattened<float>(result.point_covariance), {tracks.track_count(), 3, 3},
+               {"m^2", "posterior"});
+  file.group("observations", "one row per image measurement, in the order of the points");
+  file.attribute("observations", "observations_complete", std::uint8_t{1});
+  file.integers("observations/image", plain(tracks.image), {"", "row in images"});
+  file.vector("observations/x", tracks.x, {"2^-10 px", "to the right, pixel centres at +0.5"});
+  file.vector("observations/y", tracks.y, {"2^-10 px", "down, pixel centres at +0.5"});
+  file.vector("observations/feature", tracks.feature, {"", "row in the image's features, -1: none"});
+  file.vector("observations/kept", result.kept, {"", "1: kept, 0: rejected"});
+  file.vector("observations/residual_x", result.residual_x, {"px", "adjusted minus measured"});
+  file.vector("observations/residual_y", result.residual_y, {"px", "adjusted minus measured"});
+}
+
+void get_points(const Hdf5Reader& file, BlockResult& result) {
+  if (file.attribute<std::uint8_t>("observations", "observations_complete") != 1)
+    file.fail("observations", "is not complete: a file of observations was missing when it was written");
+  TrackSet& tracks = result.tracks;
+  tracks.id = indices<TrackIndex>(file.vector<std::int64_t>("points/id"));
+  const std::int64_t count = tracks.track_count();
+  tracks.begin = file.vector<std::int64_t>("points/begin", count + 1);
+  tracks.image = indices<ImageIndex>(file.vector<std::int64_t>("observations/image"));
+  const std::int64_t observations = tracks.observation_count();
+  begin_of(file, "points/begin", counts_of(tracks.begin), observations);
+  tracks.x = file.vector<std::int32_t>("observations/x", observations);
+  tracks.y = file.vector<std::int32_t>("observations/y", observations);
+  tracks.feature = file.vector<std::int32_t>("observations/feature", observations);
+  result.kept = file.vector<std::uint8_t>("observations/kept", observations);
+  result.residual_x = file.vector<float>("observations/residual_x", observations);
+  result.residual_y = file.vector<float>("observations/residual_y", observations);
+  const auto positions = file.matrix<double>("points/position", 3, count);
+  for (std::size_t p = 0; p < tracks.id.size(); ++p) result.points.push_back(vector3(positions, p));
+  if (file.has("points/covariance"))
+    result.point_covariance = square_matrices<Eigen::Matrix3d>(file.array<float>("points/covariance", {count, 3, 3}));
+}
+
+void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::ControlResult>& control) {
+  if (control.empty()) return;
+  using Result = BlockResult::ControlResult;
+  file.matrix("control/adjusted", vectors3(control, [](const Result& c) { return c.adjusted; }), 3,
+              {"m", "ground frame; NaN: not seen by two oriented images"});
+  file.array("control/covariance", flattened<double>(column(control, [](const Result& c) { return c.covariance; })),
+             {rows(control), 3, 3}, {"m^2", "posterior, of the adjusted position"});
+  std::vector<double> residuals;
+  for (const Result& result : control)
+    for (const Eigen::Vector2d& r : result.residual_px) residuals.insert(residuals.end(), {r.x(), r.y()});
+  file.matrix("control/measurement/residual", residuals, 2,
+              {"px", "adjusted minus measured, x, y; NaN: image not oriented"});
+}
+
+std::vector<BlockResult::ControlResult> get_control_results(const Hdf5Reader& file, const Block& block) {
+  if (!file.has("control/adjusted")) return {};
+  const std::int64_t count = rows(block.control_points);
+  const auto adjusted = file.matrix<double>("control/adjusted", 3, count);
+  const auto covariances = square_matrices<Eigen::Matrix3d>(file.array<double>("control/covariance", {count, 3, 3}));
+  const auto residuals =
+      file.matrix<double>("control/measurement/residual", 2, file.shape("control/measurement/image").at(0));
+  std::vector<BlockResult::ControlResult> control;
+  std::size_t row = 0;
+  for (std::size_t p = 0; p < block.control_points.size(); ++p) {
+    BlockResult::ControlResult result{vector3(adjusted, p), covariances[p], {}};
+    for (std::size_t m = 0; m < block.control_points[p].measurements.size(); ++m, ++row)
+      result.residual_px.push_back({residuals[2 * row], residuals[2 * row + 1]});
+    control.push_back(std::move(result));
+  }
+  return control;
+}
+
+void put_figures(Hdf5Writer& file, const BlockResult& result) {
+  file.attribute("/", "variance_factor", result.variance_factor);
+  file.attribute("/", "chi2", result.chi2);
+  file.attribute("/", "degrees_of_freedom", result.degrees_of_freedom);
+  file.attribute("/", "global_iterations", result.global_iterations);
+  file.attribute("/", "newton_decrement", result.newton_decrement);
+  file.attribute("/", "gauge", result.gauge);
+  file.attribute("/", "digest", result.digest);
+}
+
+void get_figures(const Hdf5Reader& file, BlockResult& result) {
+  result.variance_factor = file.attribute<double>("/", "variance_factor");
+  result.chi2 = file.attribute<double>("/", "chi2");
+  result.degrees_of_freedom = file.attribute<std::int64_t>("/", "degrees_of_freedom");
+  result.global_iterations = file.attribute<int>("/", "global_iterations");
+  result.newton_decrement = file.attribute<double>("/", "newton_decrement");
+  result.gauge = file.text_attribute("/", "gauge");
+  result.digest = file.text_attribute("/", "digest");
+}
+
+void put_seams(Hdf5Writer& file, const std::vector<SeamCheck>& seams) {
+  file.group("seams", "chi-square test of each merge of two sub-blocks");
+  file.vector("seams/node", column(seams, [](const SeamCheck& s) { return s.node; }), {"", "of the merge tree"});
+  file.vector("seams/statistic", column(seams, [](const SeamCheck& s) { return s.statistic; }));
+  file.vector("seams/degrees", column(seams, [](const SeamCheck& s) { return s.degrees; }));
+  file.vector("seams/threshold", column(seams, [](const SeamCheck& s) { return s.threshold; }));
+  file.texts("seams/note", column(seams, [](const SeamCheck& s) { return s.note; }));
+}
+
+std::vector<SeamCheck> get_seams(const Hdf5Reader& file) {
+  const auto node = file.vector<std::int64_t>("seams/node");
+  const auto statistic = file.vector<double>("seams/statistic", rows(node));
+  const auto degrees = file.vector<std::int64_t>("seams/degrees", rows(node));
+  const auto threshold = file.vector<double>("seams/threshold", rows(node));
+  const std::vector<std::string> note = file.texts("seams/note", rows(node));
+  std::vector<SeamCheck> seams;
+  for (std::size_t i = 0; i < node.size(); ++i)
+    seams.push_back({node[i], statistic[i], degrees[i], threshold[i], note[i]});
+  return seams;
+}
+
+void put_record(Hdf5Writer& file, const BlockResult& result) {
+  const std::vector<FailedUnit>& failures = result.failures;
+  file.group("failures", "images and units that failed");
+  file.texts("failures/stage", column(failures, [](const FailedUnit& f) { return f.stage; }));
+  file.texts("failures/unit", column(failures, [](const FailedUnit& f) { return f.unit; }));
+  file.texts("failures/reason", column(failures, [](const FailedUnit& f) { return f.reason; }));
+  const std::vector<StageStatistics>& stages = result.stages;
+  file.group("stages", "what the stages took");
+  file.texts("stages/name", column(stages, [](const StageStatistics& s) { return s.name; }));
+  file.vector("stages/seconds", column(stages, [](const StageStatistics& s) { return s.seconds; }),
+              {"s", "wall clock"});
+  file.vector("stages/peak_rss", column(stages, [](const StageStatistics& s) { return s.peak_rss_mib; }),
+              {"MiB", "largest of the ranks"});
+  file.vector("stages/units", column(stages, [](const StageStatistics& s) { return s.units; }));
+  file.vector("stages/failed", column(stages, [](const StageStatistics& s) { return s.failed; }));
+  file.texts("notes", result.notes, {"", "warnings, one line each"});
+}
+
+void get_record(const Hdf5Reader& file, BlockResult& result) {
+  const std::vector<std::string> stage = file.texts("failures/stage");
+  const std::vector<std::string> unit = file.texts("failures/unit", rows(stage));
+  const std::vector<std::string> reason = file.texts("failures/reason", rows(stage));
+  for (std::size_t i = 0; i < stage.size(); ++i) result.failures.push_back({stage[i], unit[i], reason[i]});
+  const std::vector<std::string> name = file.texts("stages/name");
+  const auto seconds = file.vector<double>("stages/seconds", rows(name));
+  const auto peak = file.vector<double>("stages/peak_rss", rows(name));
+  const auto units = file.vector<std::int64_t>("stages/units", rows(name));
+  const auto failed = file.vector<std::int64_t>("stages/failed", rows(name));
+  for (std::size_t i = 0; i < name.size(); ++i)
+    result.stages.push_back({name[i], seconds[i], peak[i], units[i], failed[i]});
+  result.notes = file.texts("notes");
+}
+
+}  // namespace
+
+void write_result(const std::string& path, const BlockResult& result) {
+  check_sizes(result);
+  Hdf5Writer file(path, "result");
+  put_figures(file, result);
+  put_block(file, result.block);
+  put_state(file, result.state);
+  file.vector("frames/boundary", result.boundary, {"", "1: touched by observations of two or more tiles"});
+  put_tiles(file, result.tiles);
+  file.link("tiles/tile_of_frame", "frames/tile");
+  put_precision(file, result);
+  put_points(file, result);
+  put_control_results(file, result.control);
+  put_seams(file, result.seams);
+  put_record(file, result);
+  file.close();
+}
+
+BlockResult read_result(const std::string& path) {
+  const Hdf5Reader file(path, "result");
+  BlockResult result;
+  get_figures(file, result);
+  result.block = get_block(file);
+  result.state = get_state(file);
+  result.boundary =
+      IndexedVector<FrameIndex, std::uint8_t>(file.vector<std::uint8_t>("frames/boundary", rows(result.block.frames)));
+  result.tiles = get_tiles(file);
+  get_precision(file, result);
+  get_points(file, result);
+  result.control = get_control_results(file, result.block);
+  result.seams = get_seams(file);
+  get_record(file, result);
+  return result;
+}
+
+}  // namespace megablock
