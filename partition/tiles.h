@@ -8,11 +8,11 @@
 namespace megablock {
 
 struct TileOptions {
-  std::int64_t tile_max_frames = 500;    // of a tile
-  std::int64_t min_tiles = 4;            // from min_tiles_from frames up (per component in proportion)
-  std::int64_t min_tiles_from = 100;     // frames
-  std::int64_t weak_link_tracks = 8;     // frame pairs across tiles with fewer tracks are dropped and listed
-  void check() const;                    // throws InputError
+  std::int64_t tile_max_frames = 500;  // of a tile
+  std::int64_t min_tiles = 4;          // from min_tiles_from frames up (per component in proportion)
+  std::int64_t min_tiles_from = 100;   // frames
+  std::int64_t weak_link_tracks = 8;   // frame pairs across tiles with fewer tracks are dropped and listed
+  void check() const;                  // throws InputError
 };
 
 // METIS recursive bisection with fixed seed; components by size (descending), then lowest frame. Single-threaded (METIS
