@@ -1,0 +1,80 @@
+// A tile: its condensed normal equations on the boundary unknowns, and the way back down.
+//
+// Inside the tile the bisection goes on to cells of about 32 frames. A point belongs to the cell with most of its
+// observations and is eliminated there: with V = sum J_p'J_p + lambda D_p = C C', W_i = J_i'J_p and Y_i = W_i C^-T,
+//
+//     K_ij -= Y_i Y_j',   b_i -= Y_i C^-1 b_p,   x_p = C^-T (C^-1 b_p - sum Y_i' x_i).
+//
+// The cells' fronts are then eliminated depth-first like the nodes of the merge tree. The boundary block is never
+// factorised: in a tile without a datum it is singular.
+// Robust weights as Ceres (sqrt(rho'), no second-order term); D = diagonal of J'J.
+#pragma once
+
+#include "adjust/tile_problem.h"
+#include "merge/front.h"
+#include "merge/plan.h"
+
+namespace megablock {
+
+// Every unknown that a kept residual of the tile touches, ascending. What make_plan needs of each tile.
+UnknownList tile_unknowns(const TileProblem& problem);
+
+// Symbolic work of a tile, done once per verdict on observations.
+struct TilePlan {
+  UnknownList unknowns;                           // touched, ascending
+  UnknownList boundary;                           // passed to the merge tree, ascending
+  EliminationPlan cells;                          // leaves = cells
+  std::vector<std::vector<std::int64_t>> points;  // [cells] active points, ascending
+  // Rows of the problem's tables of observations without a point, [cells].
+  std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, intrinsic_priors, mount_priors;
+  // Position in `unknowns`, -1: held or untouched.
+  std::vector<std::int64_t> unknown_of_frame, unknown_of_camera, unknown_of_mount;
+};
+// `node` is the tile's leaf in the plan of the merge tree.
+TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 32);
+
+// Factors of a tile's cells, by node of TilePlan::cells. Empty: recompute.
+struct TileFactor {
+  std::vector<FrontFactor> nodes;
+  bool empty() const { return nodes.empty(); }
+  std::int64_t byte_count() const;
+  Bytes to_bytes() const;
+  static TileFactor from_bytes(const Bytes& bytes);
+};
+
+struct TileCondensation {
+  UpdateMatrix update;
+  TileFactor factor;
+};
+
+// Linearises at `state`, eliminates the tile's points and interior unknowns. `extra` (may be null): further right-hand
+// sides, rows = plan.unknowns. Throws ComputeError when a kept observation is behind its camera.
+TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
+                               const Step* extra = nullptr);
+
+// Step of everything in the tile.
+struct TileStep {
+  Step unknowns;                        // of plan.unknowns
+  std::vector<Eigen::Vector3d> points;  // [points], zero for points that take no part
+  double damping_norm = 0;              // sum of D x^2 over the tile's own residuals; the predicted decrease of the
+                                        // block is 1/2 (decrement^2 + lambda * sum of these)
+};
+// From the boundary's step. `factor` empty: condensed again (same bits).
+TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
+                         const TileFactor& factor, const Step& boundary);
+
+// state (+) step; every tile that holds a frame computes the same bits.
+TileState apply_step(const TileProblem& problem, const TileState& state, const TileStep& step);
+
+// Posterior covariances of a tile, from factors of a pass with lambda = 0.
+struct TileCovariance {
+  CovarianceMatrix boundary;                         // as given
+  std::vector<Eigen::Matrix<double, 6, 6>> frames;   // [frames]; zero where untouched
+  std::vector<Eigen::Matrix<double, 8, 8>> cameras;  // [cameras]; held parameters zero
+  std::vector<Eigen::Matrix<double, 6, 6>> mounts;   // [mounts]
+  std::vector<Eigen::Matrix3d> points;               // [points]; zero for points that take no part
+};
+TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
+                               const TileFactor& factor, const CovarianceMatrix& boundary);
+
+}  // namespace megablock

@@ -1,0 +1,136 @@
+// Dense fronts: the elimination step shared by the cells of a tile and the nodes of the merge tree.
+//
+// A front holds the normal equations K x = b over the unknowns E that are eliminated here and the unknowns P that are
+// passed up. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update matrix is
+//
+//     S = K_PP - Y Y',   s = b_P - Y z,
+//
+// the Newton decrement grows by |z|^2, and on the way down x_E = L^-T (z - Y' x_P).
+//
+// A pivot below 1e-12 of the un-eliminated diagonal of J'J (of the damped one when lambda > 0) marks a direction that
+// the observations do not determine: the scalar unknown is held (x = 0: a minimal constraint) and reported.
+//
+// Sign: b = -J'r, so x is the step. Right-hand side 0 is b; further ones (inner constraints of a free block) ride
+// along. Everything is a pure function of its inputs; children are added in their order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "merge/bytes.h"
+#include "merge/unknowns.h"
+
+namespace megablock {
+
+inline constexpr double kPivotTolerance = 1e-12;
+
+// A scalar unknown that was held because its pivot vanished.
+struct HeldUnknown {
+  UnknownId id;
+  std::int64_t component = 0;  // row inside the unknown
+  double ratio = 0;            // pivot / un-eliminated diagonal; 0 / 0 counts as 0
+};
+
+// What is summed up the tree besides the matrices.
+struct SubtreeSums {
+  double cost = 0;                // 1/2 sum rho(|r|^2)
+  double weighted_squares = 0;    // sum rho' |r|^2
+  double decrement_squared = 0;   // sum |L^-1 b|^2 over everything eliminated so far, points included
+  std::int64_t residuals = 0;     // scalar residuals
+  std::int64_t observations = 0;  // image observations among them
+  std::int64_t points = 0;
+  std::int64_t unknowns = 0;     // scalar unknowns eliminated, points included, held ones included
+  std::int64_t held_points = 0;  // scalar unknowns of points held for a vanishing pivot
+  std::vector<HeldUnknown> held;
+  void add(const SubtreeSums& other);  // in the order of the calls
+};
+
+// Condensed normal equations on the passed unknowns: what a child hands to its parent.
+struct UpdateMatrix {
+  UnknownList unknowns;  // passed, ascending
+  std::int64_t right_hand_sides = 1;
+  std::vector<double> matrix;    // lower triangle column by column, packed: n (n + 1) / 2
+  std::vector<double> rhs;       // [n x right_hand_sides], column-major
+  std::vector<double> diagonal;  // [n] of the un-eliminated J'J below here: what lambda multiplies
+  SubtreeSums sums;
+
+  Bytes to_bytes() const;
+  static UpdateMatrix from_bytes(const Bytes& bytes);  // throws StoreError
+};
+
+// What back-substitution and covariances need of an eliminated front.
+struct FrontFactor {
+  UnknownList eliminated, passed;  // each ascending
+  std::int64_t right_hand_sides = 1;
+  std::vector<double> factor;      // [(e + p) x e] column-major: L (lower triangle) above Y
+  std::vector<double> z;           // [e x right_hand_sides]
+  std::vector<std::int64_t> held;  // rows of E that are held
+
+  std::int64_t byte_count() const;
+  void write(ByteWriter& out) const;
+  static FrontFactor read(ByteReader& in);
+};
+
+// Values of a list of unknowns, e.g. a step.
+struct Step {
+  UnknownList unknowns;  // ascending
+  std::int64_t columns = 1;
+  std::vector<double> values;  // [n x columns], column-major
+
+  const double* find(const UnknownId& id, std::int64_t column = 0) const;  // nullptr when absent
+  Step restricted_to(const UnknownList& wanted) const;                     // throws ComputeError when one is missing
+  Bytes to_bytes() const;
+  static Step from_bytes(const Bytes& bytes);
+};
+
+// Dense symmetric matrix over a list of unknowns (covariances).
+struct CovarianceMatrix {
+  UnknownList unknowns;        // ascending
+  std::vector<double> matrix;  // [n x n], column-major, full
+
+  CovarianceMatrix restricted_to(const UnknownList& wanted) const;
+  // Block (row unknown, column unknown) copied into out (column-major, rows = its dimension).
+  bool block(const UnknownId& row, const UnknownId& column, double* out) const;
+  Bytes to_bytes() const;
+  static CovarianceMatrix from_bytes(const Bytes& bytes);
+};
+
+// A front being filled. Rows: eliminated unknowns first, then passed ones.
+class Front {
+ public:
+  Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1);
+
+  std::int64_t dimension() const { return dimension_; }
+  std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
+  double* matrix() { return matrix_.data(); }      // [n x n] column-major, only the lower triangle is used
+  double* rhs() { return rhs_.data(); }            // [n x right_hand_sides]
+  double* diagonal() { return diagonal_.data(); }  // [n] of J'J
+  SubtreeSums& sums() { return sums_; }
+
+  void add(const UpdateMatrix& child);  // extend-add
+
+  struct Result;
+  // Adds lambda * diagonal to the eliminated rows, factorises them, leaves the update matrix. Consumes the front.
+  Result eliminate(double lambda) &&;
+
+ private:
+  UnknownList eliminated_, passed_;
+  std::vector<std::int64_t> eliminated_rows_, passed_rows_;
+  std::int64_t dimension_ = 0, eliminated_dimension_ = 0, right_hand_sides_ = 1;
+  std::vector<double> matrix_, rhs_, diagonal_;
+  SubtreeSums sums_;
+};
+
+struct Front::Result {
+  UpdateMatrix update;
+  FrontFactor factor;
+};
+
+// x over E and P (ascending) from x over at least P.
+Step back_substitute(const FrontFactor& factor, const Step& passed);
+
+// Covariance over E and P from the parent's covariance, which holds at least P:
+// C_EE = K_EE^-1 + K_EE^-1 K_EP C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
+CovarianceMatrix covariance_down(const FrontFactor& factor, const CovarianceMatrix& parent);
+
+}  // namespace megablock

@@ -1,0 +1,22 @@
+// Inner nodes and the root of the merge tree. merge/ knows no MPI: these are pure functions, whoever calls them moves
+// the update matrices up and the steps down.
+#pragma once
+
+#include <vector>
+
+#include "merge/front.h"
+#include "merge/plan.h"
+
+namespace megablock {
+
+// Adds the children (in the order given: left, right), damps and eliminates what completes at `node`.
+Front::Result eliminate_node(const PlanNode& node, const std::vector<const UpdateMatrix*>& children, double lambda);
+
+// Step of the node's front (eliminated and passed unknowns) from the step of its parent's front; at the root `parent`
+// is empty. The child's boundary step is inside it.
+Step back_substitute_node(const FrontFactor& factor, const Step& parent);
+
+// As above for covariances.
+CovarianceMatrix covariance_node(const FrontFactor& factor, const CovarianceMatrix& parent);
+
+}  // namespace megablock

@@ -1,0 +1,53 @@
+// Seam check: do two halves of the block agree about the unknowns they share?
+//
+// For the condensed normal equations q_a, q_b of two children at a common linearisation point with lambda = 0,
+//
+//     T = 2 (min(q_a + q_b) - min q_a - min q_b) = s_a'S_a^+ s_a + s_b'S_b^+ s_b - (s_a + s_b)'(S_a + S_b)^+ (s_a +
+//     s_b)
+//
+// is chi-square distributed with rank S_a + rank S_b - rank(S_a + S_b) degrees of freedom; it holds for singular S too
+// (halves without a datum). Unknowns that only one half has are minimised over first.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "merge/front.h"
+
+namespace megablock {
+
+inline constexpr double kSeamAlarmProbability = 1e-3;  // of the whole block, divided by the number of seams
+
+struct SeamReport {
+  std::int64_t node = -1;    // of the merge tree
+  double statistic = 0;      // T
+  std::int64_t degrees = 0;  // of freedom; 0: nothing in common, no check
+  double threshold = 0;      // of T at the alarm probability
+  bool alarm() const { return degrees > 0 && statistic > threshold; }
+};
+
+// `probability`: of a false alarm at this seam. variance_factor: T is divided by it (1 = a priori).
+SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
+                      double variance_factor = 1);
+
+// A tile's own consistency and its agreement with the rest of the block, used to name the tile behind an alarm.
+struct TileCheck {
+  std::int64_t tile = -1;
+  double own_chi2 = 0;  // of the tile's residuals in its own adjustment
+  std::int64_t own_degrees = 0;
+  double statistic = 0;  // T of the tile against the rest
+  std::int64_t degrees = 0;
+  double threshold = 0;
+};
+// From the tile's condensed normal equations and the block's covariance of its boundary unknowns (lambda = 0, at the
+// optimum, where the rest's gradient is minus the tile's).
+TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
+                     double probability, double variance_factor = 1);
+
+// Upper quantile of the chi-square distribution: P(T > quantile) = probability.
+double chi_square_quantile(double probability, std::int64_t degrees);
+
+// One line per alarm: the seam, its figures, and the tile under it that disagrees most with the rest.
+std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles);
+
+}  // namespace megablock

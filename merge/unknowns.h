@@ -1,0 +1,48 @@
+// The unknowns of the reduced normal equations: frames, free cameras, free mounts. Points never appear here, they are
+// eliminated one by one inside their tile.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace megablock {
+
+enum class UnknownKind : std::int32_t { kFrame = 0, kCamera = 1, kMount = 2 };
+
+// Identity in the block: FrameIndex, CameraIndex, or (RigIndex, mount).
+struct UnknownId {
+  UnknownKind kind = UnknownKind::kFrame;
+  std::int32_t part = 0;  // mount in its rig, else 0
+  std::int64_t index = -1;
+  friend auto operator<=>(const UnknownId& a, const UnknownId& b) {
+    if (auto order = a.kind <=> b.kind; order != 0) return order;
+    if (auto order = a.index <=> b.index; order != 0) return order;
+    return a.part <=> b.part;
+  }
+  friend bool operator==(const UnknownId&, const UnknownId&) = default;
+};
+
+// A block of scalar unknowns: a frame or mount has 6 (PoseIncrement), a camera as many as it has free parameters
+// (ascending parameter number).
+struct Unknown {
+  UnknownId id;
+  std::int64_t dimension = 6;
+  friend auto operator<=>(const Unknown&, const Unknown&) = default;
+};
+
+// Lists of unknowns are ascending by id unless said otherwise.
+using UnknownList = std::vector<Unknown>;
+
+std::int64_t total_dimension(const UnknownList& unknowns);
+// First scalar row of every unknown and the total behind them: [unknowns + 1].
+std::vector<std::int64_t> row_offsets(const UnknownList& unknowns);
+// Position of an id in an ascending list, -1 when it is not there.
+std::int64_t find_unknown(const UnknownList& ascending, const UnknownId& id);
+// Ascending union of ascending lists. Throws ComputeError when an unknown has two dimensions.
+UnknownList unite(const std::vector<const UnknownList*>& lists);
+// "frame 12", "camera 3", "mount 2 of rig 0".
+std::string describe(const UnknownId& id);
+
+}  // namespace megablock
