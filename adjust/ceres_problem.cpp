@@ -5,6 +5,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "adjust/linearise.h"
 #include "io/error.h"
@@ -220,6 +221,11 @@ void CeresTile::hold_parameters(const TileProblem& problem, const std::vector<st
 
 bool CeresTile::unknown(double* block) const {
   return ceres_->HasParameterBlock(block) && !ceres_->IsParameterBlockConstant(block);
+}
+
+bool CeresTile::is_point(const double* block) const {
+  const std::less<const double*> before;
+  return !points_.empty() && !before(block, points_.front().data()) && !before(points_.back().data(), block);
 }
 
 std::vector<double*> CeresTile::unknown_blocks_without_points() {

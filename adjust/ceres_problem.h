@@ -34,6 +34,8 @@ class CeresTile {
   double* camera(std::int64_t row) { return cameras_[row].data(); }
   double* point(std::int64_t row) { return points_[row].data(); }
 
+  bool is_point(const double* block) const;
+
   // The blocks with unknowns: frames, cameras, mounts, points, each in the order of its table. Given to
   // ceres::Problem::EvaluateOptions they fix the order of the columns (tangent sizes: 6, free intrinsics, 6, 3).
   std::vector<double*> unknown_blocks();

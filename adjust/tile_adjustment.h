@@ -11,34 +11,46 @@ namespace megablock {
 
 struct AdjustOptions {
   ObservationOptions observations;
-  // Parameters estimated where the camera's prior sigma allows: all of them, or fewer on small blocks (the smallest
-  // set that the number of images supports is chosen when empty).
   double min_intersection_deg = 1.5;  // points below are held out of the adjustment and kept in the store
   double max_residual_sigmas = 4.0;   // screening threshold at the end; starts at 8 x and falls
   int screening_rounds = 3;           // re-tests every observation against the current solution, both ways
   int max_iterations = 50;            // of Ceres per round
-  void check() const;                 // throws InputError
+  // Images a camera needs in the tile before the tile's own adjustment estimates parameters without a prior sigma:
+  // focal length and k1; principal point, k2 and decentring; k3. Below, they stay at their values here and are left to
+  // the adjustment of the whole block (TileProblem::camera_free is never changed).
+  int min_images_focal = 3, min_images_principal = 10, min_images_radial3 = 20;
+  void check() const;  // throws InputError
 };
 
 // Intersects all rays of every active point (linear start, Gauss-Newton refinement); NaN where it fails.
 // Sets kept = 0 on the observations of points that fail, that are behind a camera, or below min_intersection_deg.
 void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options);
 
-// Re-tests every observation (also rejected ones) of every point against the current solution; returns how many changed.
-// Threshold in sigmas. A rejected observation comes back when it passes; a point whose observations split into
+// Re-tests every observation (also rejected ones) of every point against the current solution; returns how many
+// changed. Threshold in sigmas. A rejected observation comes back when it passes; a point whose observations split into
 // consistent parts keeps the larger one.
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
                                  const AdjustOptions& options);
 
 struct AdjustSummary {
-  double initial_cost = 0, final_cost = 0, sigma0 = 0;
+  double initial_cost = 0, final_cost = 0;
+  // Square root of the weighted squares of kept residuals / (residuals - unknowns + datum defect).
+  double sigma0 = 0;
+  int iterations = 0;
   std::int64_t observations = 0, points = 0, rejected = 0, restored = 0;
   bool usable = false;
   std::string text;  // one line
 };
 
-// One Ceres solve of the problem as it stands (one thread, deterministic). Free gauge: the pose of the first frame and
-// the distance to the farthest frame are held when no prior fixes the datum.
+struct SolveOptions {
+  int max_iterations = 50;
+  double function_tolerance = 1e-6;
+  std::vector<std::uint8_t> camera_free;  // estimated intrinsics per camera; empty = problem.camera_free
+};
+
+// One Ceres solve of the problem as it stands (one thread, deterministic). A datum that the observations leave free is
+// fixed by minimal constraints at the start values (datum.h). Every active point must be in front of its cameras.
+AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, const SolveOptions& options);
 AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, int max_iterations,
                                double function_tolerance = 1e-6);
 

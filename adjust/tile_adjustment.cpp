@@ -1,0 +1,149 @@
+#include "adjust/tile_adjustment.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "io/error.h"
+
+namespace megablock {
+
+void AdjustOptions::check() const {
+  observations.check();
+  if (!(min_intersection_deg >= 0 && min_intersection_deg < 90))
+    throw InputError("min_intersection_deg must lie in [0, 90)");
+  if (!(max_residual_sigmas > 0)) throw InputError("max_residual_sigmas must be positive");
+  if (screening_rounds < 1) throw InputError("screening_rounds must be at least 1");
+  if (max_iterations < 1) throw InputError("max_iterations must be at least 1");
+}
+
+namespace {
+
+// Sigma of the kept image residuals from their median (1.1774 is the median of a Rayleigh distribution), in a-priori
+// sigmas: untouched by outliers.
+double robust_sigma(const TileProblem& problem, const TileState& state) {
+  std::vector<double> lengths;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      const Eigen::Vector2d pixel =
+          project(state.cameras[image.camera.value],
+                  to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]));
+      const double length =
+          problem.inverse_sigma[row] * (pixel - Eigen::Vector2d(problem.x[row], problem.y[row])).norm();
+      lengths.push_back(std::isfinite(length) ? length : std::numeric_limits<double>::max());
+    }
+  }
+  if (lengths.empty()) throw ComputeError("the tile has no points that can be intersected");
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  return *middle / 1.1774;
+}
+
+class TileAdjuster {
+ public:
+  TileAdjuster(TileProblem& problem, TileState& state, const AdjustOptions& options)
+      : problem_(problem), state_(state), options_(options), images_(problem.cameras.size(), 0) {
+    for (const TileImage& image : problem.images) ++images_[image.camera.value];
+  }
+
+  AdjustSummary run() {
+    triangulate_points(problem_, state_, options_);
+    approach();
+    AdjustSummary summary;
+    const std::vector<std::uint8_t> before = problem_.kept;
+    for (int round = 0; round < options_.screening_rounds; ++round) {
+      // From 8 x to 1 x of the final threshold.
+      const double left =
+          options_.screening_rounds == 1 ? 0 : 1 - static_cast<double>(round) / (options_.screening_rounds - 1);
+      const bool last = round + 1 == options_.screening_rounds;
+      screen(options_.max_residual_sigmas * std::pow(8, left));
+      summary = solve(Stage::kAll, last ? 1e-9 : 1e-6, problem_.image_loss.scale);
+    }
+    // What the last solve moved across the threshold.
+    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / 10000)
+      summary = solve(Stage::kAll, 1e-9, problem_.image_loss.scale);
+    return count(summary);
+  }
+
+ private:
+  enum class Stage { kFocal, kAll };
+
+  // From rough start values to residuals of a few pixels: the loss is as wide as the residuals are, gross errors are
+  // left out, and only focal length and k1 are estimated.
+  void approach() {
+    constexpr int kMaxRounds = 6;
+    constexpr double kWide = 5;
+    double sigma = robust_sigma(problem_, state_);
+    for (int round = 0; round < kMaxRounds; ++round) {
+      screen(std::max(8 * options_.max_residual_sigmas, kWide * sigma));
+      solve(Stage::kFocal, 1e-3, std::max(problem_.image_loss.scale, sigma));
+      const double next = robust_sigma(problem_, state_);
+      const bool settled = next < 2 || next > 0.7 * sigma;
+      sigma = next;
+      if (settled) break;
+    }
+  }
+
+  // The a-priori sigma may be too small for the images at hand: the threshold follows the residuals upwards.
+  std::int64_t screen(double threshold) {
+    return screen_observations(problem_, state_, threshold * std::max(1.0, robust_sigma(problem_, state_)), options_);
+  }
+
+  AdjustSummary solve(Stage stage, double tolerance, double loss_scale) {
+    const double scale = problem_.image_loss.scale;
+    problem_.image_loss.scale = loss_scale;
+    const AdjustSummary summary =
+        solve_with_ceres(problem_, state_, SolveOptions{options_.max_iterations, tolerance, camera_free(stage)});
+    problem_.image_loss.scale = scale;
+    if (!summary.usable) throw ComputeError("the tile's adjustment does not converge: " + summary.text);
+    return summary;
+  }
+
+  // Parameters estimated here: those of the stage that have a prior or enough images.
+  std::vector<std::uint8_t> camera_free(Stage stage) const {
+    std::vector<std::uint8_t> result = problem_.camera_free;
+    for (std::size_t c = 0; c < result.size(); ++c) {
+      for (int k = 0; k < kIntrinsicCount; ++k) {
+        const bool first = k == kFocal || k == kRadial1;
+        const int needed = first           ? options_.min_images_focal
+                           : k == kRadial3 ? options_.min_images_radial3
+                                           : options_.min_images_principal;
+        const bool wanted = stage == Stage::kAll || first;
+        if (!wanted || (images_[c] < needed && !has_prior(c, k)))
+          result[c] = static_cast<std::uint8_t>(result[c] & ~(1u << k));
+      }
+    }
+    return result;
+  }
+  bool has_prior(std::size_t camera, int parameter) const {
+    for (const auto& term : problem_.intrinsic_priors)
+      if (term.camera.value == static_cast<std::int32_t>(camera)) return intrinsic_prior_weight(term, parameter) > 0;
+    return false;
+  }
+
+  AdjustSummary count(AdjustSummary summary) const {
+    for (std::int64_t row = 0; row < problem_.observation_count(); ++row)
+      if (problem_.image[row].valid()) summary.rejected += !problem_.kept[row];
+    summary.text += fmt::format(", {} rejected", summary.rejected);
+    return summary;
+  }
+
+  TileProblem& problem_;
+  TileState& state_;
+  const AdjustOptions& options_;
+  std::vector<std::int64_t> images_;  // of each camera
+};
+
+}  // namespace
+
+AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options) {
+  options.check();
+  return TileAdjuster(problem, state, options).run();
+}
+
+}  // namespace megablock

@@ -1,0 +1,63 @@
+// A simulated block as one tile, and how far its adjustment ends from the truth.
+#pragma once
+
+#include <limits>
+
+#include "adjust/tile_adjustment.h"
+#include "io/simulate/simulate.h"
+
+namespace megablock {
+
+inline Tiles single_tile(const Block& block) {
+  Tiles tiles;
+  tiles.tile_count = 1;
+  tiles.tile_of_frame.assign(block.frames.size(), TileIndex(0));
+  tiles.component.assign(block.frames.size(), 0);
+  tiles.tree.nodes.resize(1);
+  tiles.tree.nodes[0].tile = TileIndex(0);
+  return tiles;
+}
+
+inline std::vector<Eigen::Vector3d> no_points(const TileProblem& problem) {
+  return std::vector<Eigen::Vector3d>(problem.points.size(),
+                                      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+}
+
+struct SingleTile {
+  SimulatedBlock simulated;
+  AdjustOptions options;
+  TileProblem problem;
+  TileState state;
+
+  explicit SingleTile(const SimulationOptions& simulation, const AdjustOptions& adjust = {})
+      : SingleTile(simulate_block(simulation), adjust) {}
+  explicit SingleTile(SimulatedBlock block, const AdjustOptions& adjust = {})
+      : simulated(std::move(block)), options(adjust) {
+    const BlockState start = initial_state(simulated.block);
+    problem = make_tile_problem(simulated.block, start, single_tile(simulated.block), TileIndex(0), simulated.tracks,
+                                options.observations);
+    state = make_tile_state(problem, start, no_points(problem));
+  }
+
+  // The truth in the problem's tables; points of tracks and control points.
+  TileState truth() const {
+    std::vector<Eigen::Vector3d> points = simulated.points;
+    points.insert(points.end(), simulated.control_truth.begin(), simulated.control_truth.end());
+    return make_tile_state(problem, simulated.truth, points);
+  }
+
+  double position_rms() const {
+    double sum = 0;
+    for (std::size_t f = 0; f < problem.frames.size(); ++f)
+      sum += (state.frames[f].centre - simulated.truth.frames[problem.frames[f]].centre).squaredNorm();
+    return std::sqrt(sum / static_cast<double>(problem.frames.size()));
+  }
+  double rotation_rms() const {
+    double sum = 0;
+    for (std::size_t f = 0; f < problem.frames.size(); ++f)
+      sum += std::pow(rotation_angle(state.frames[f].rotation, simulated.truth.frames[problem.frames[f]].rotation), 2);
+    return std::sqrt(sum / static_cast<double>(problem.frames.size()));
+  }
+};
+
+}  // namespace megablock
