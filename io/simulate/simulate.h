@@ -11,42 +11,42 @@ namespace megablock {
 
 struct SimulationOptions {
   enum class Scene { kAerial, kStreet } scene = Scene::kAerial;
-  std::int64_t frames = 100;          // number of frames (aerial: single photos; street: rigs)
+  std::int64_t frames = 100;  // number of frames (aerial: single photos; street: rigs)
   std::uint64_t seed = 1;
   // Aerial: rows with overlaps over terrain.
   double forward_overlap = 0.8, side_overlap = 0.6;
-  double height_m = 100;              // above mean terrain
+  double height_m = 100;  // above mean terrain
   double terrain_relief_m = 15;
   // Street: grid of `street_spacing_m`, driven twice, a frame each `frame_distance_m`, `rig_cameras` cameras.
   double street_spacing_m = 100, frame_distance_m = 4;
   int rig_cameras = 4;
   // Observations.
-  int points_per_frame = 300;         // observations per frame
+  int points_per_frame = 300;  // observations per frame
   double mean_track = 5;
-  double image_noise_px = 0.5;        // sigma per axis
-  double outlier_share = 0;           // wrong matches
+  double image_noise_px = 0.5;  // sigma per axis
+  double outlier_share = 0;     // wrong matches
   // Priors.
-  double gps_sigma_m = 0.05;          // <= 0: no position priors. Stated sigma = true sigma
-  double gps_share = 1;               // share of frames with a position prior
-  double attitude_sigma_deg = 0;      // <= 0: no attitude priors
+  double gps_sigma_m = 0.05;      // <= 0: no position priors. Stated sigma = true sigma
+  double gps_share = 1;           // share of frames with a position prior
+  double attitude_sigma_deg = 0;  // <= 0: no attitude priors
   double relative_position_sigma_m = 0, relative_rotation_sigma_deg = 0.01;  // successive frames; <= 0: none
-  double start_position_error_m = 1, start_rotation_error_deg = 1;  // of given poses; < 0: no given poses
+  double start_position_error_m = 1, start_rotation_error_deg = 1;           // of given poses; < 0: no given poses
   int control_points = 0, check_points = 0;
   double control_sigma_m = 0.01;
   // Camera truth and what the block says of it.
   int image_width = 1920, image_height = 1280;
   double focal_px = 1400;
-  bool distortion = true;             // true camera has k1, k2, p1, p2; the block starts from zero
-  bool calibrate = true;              // camera parameters free (else held at the truth)
-  void check() const;                 // throws InputError
+  bool distortion = true;  // true camera has k1, k2, p1, p2; the block starts from zero
+  bool calibrate = true;   // camera parameters free (else held at the truth)
+  void check() const;      // throws InputError
 };
 
 struct SimulatedBlock {
-  Block block;                         // what a job is given
+  Block block;  // what a job is given
   BlockState truth;
-  TrackSet tracks;                     // noisy observations, all tracks
-  std::vector<Eigen::Vector3d> points; // true positions [tracks]
-  std::vector<std::uint8_t> outlier;   // [observations] 1 = replaced by a wrong position
+  TrackSet tracks;                             // noisy observations, all tracks
+  std::vector<Eigen::Vector3d> points;         // true positions [tracks]
+  std::vector<std::uint8_t> outlier;           // [observations] 1 = replaced by a wrong position
   std::vector<Eigen::Vector3d> control_truth;  // true positions [block.control_points]
 };
 

@@ -1,42 +1,27 @@
 // Street block: a grid of streets driven twice by a rig of cameras around the compass.
 //
-// Streets run along x = i S and y = j S for all integers i, j (S the spacing); the ground between them is built up to
-// kFacade metres from the axes. A drive follows the streets in serpentines, first those along x, then those along y.
+// A drive follows the streets in serpentines, first those along x, then those along y (street_grid.h).
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "io/simulate/scene.h"
-#include "io/simulate/terrain.h"
+#include "io/simulate/street_grid.h"
 
 namespace megablock {
 
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kFacade = 9;         // mean distance of the facades from the axis, metres
-constexpr double kFacadeDepth = 1.5;  // houses stand back or forward by up to this
 constexpr double kFacadeHeight = 12;
-constexpr double kHouse = 12;    // length of a house
 constexpr double kCamera = 2.5;  // height of the rig above the road
 constexpr double kRange = 40;
 constexpr double kLane = 1.75;  // a drive keeps to the right of the axis
 
-// Number of the nearest street axis in one coordinate, and the distance to it. (std::round is a slow call at the
-// baseline instruction set.)
-std::int64_t nearest_axis(double x, double spacing) {
-  return static_cast<std::int64_t>(x / spacing + (x < 0 ? -0.5 : 0.5));
-}
-double off_axis(double x, double spacing) {
-  return std::abs(x - spacing * static_cast<double>(nearest_axis(x, spacing)));
-}
-
 class StreetScene : public Scene {
  public:
   explicit StreetScene(const SimulationOptions& options)
-      : spacing_(options.street_spacing_m),
-        seed_(options.seed),
-        terrain_(options.seed, 0.2 * options.terrain_relief_m, 400) {}
+      : spacing_(options.street_spacing_m), seed_(options.seed), terrain_(street_terrain(options)) {}
 
   double ground(double x, double y) const { return terrain_.height(x, y); }
 
@@ -44,9 +29,10 @@ class StreetScene : public Scene {
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
     const bool street_along_x = off_axis(frame.centre.y(), spacing_) < off_axis(frame.centre.x(), spacing_);
     const int along = street_along_x ? 0 : 1, across = 1 - along;
-    const double axis = spacing_ * static_cast<double>(nearest_axis(frame.centre[across], spacing_));
+    const std::int64_t street = nearest_axis(frame.centre[across], spacing_);
+    const double axis = spacing_ * static_cast<double>(street);
     const double place = frame.centre[along] + random.uniform(-0.6, 0.6) * kRange;
-    const double side = random.uniform() < 0.5 ? -1 : 1;
+    const int side = random.uniform() < 0.5 ? -1 : 1;
     const bool road = random.uniform() < 0.3;
     SurfacePoint point;
     point.position[along] = place;
@@ -56,7 +42,7 @@ class StreetScene : public Scene {
       point.normal.z() = 1;
     } else {
       if (off_axis(place, spacing_) < kFacade + kFacadeDepth) return std::nullopt;  // a crossing
-      point.position[across] = axis + side * facade(street_along_x, axis, side, place);
+      point.position[across] = axis + side * facade_distance(seed_, street_along_x, street, side, place);
       point.normal[across] = -side;
     }
     point.position.z() = ground(point.position.x(), point.position.y());
@@ -85,15 +71,6 @@ class StreetScene : public Scene {
   bool along_passes() const override { return true; }
 
  private:
-  // Each house stands at its own distance from the axis.
-  double facade(bool street_along_x, double axis, double side, double place) const {
-    const auto house = static_cast<std::uint64_t>(std::llround(std::floor(place / kHouse)));
-    const auto street =
-        static_cast<std::uint64_t>(std::llround(axis / spacing_)) * 4 + (street_along_x ? 2 : 0) + (side > 0 ? 1 : 0);
-    const std::uint64_t bits = mix_bits(mix_bits(seed_ + house) + street);
-    return kFacade + kFacadeDepth * (static_cast<double>(bits >> 11) * 0x1p-52 - 1);
-  }
-
   double spacing_;
   std::uint64_t seed_;
   Terrain terrain_;
