@@ -112,24 +112,25 @@ PoseTable pose_table(const Block& block, const BlockState& state) {
     if (!state.oriented[frame]) continue;
     table.names.push_back(block.frames[frame].name);
     table.poses.push_back(state.frames[frame]);
+    table.passes.push_back(block.frames[frame].pass);
   }
   return table;
 }
 
-void write_pose_csv(const std::string& path, const Block& block, const BlockState& state) {
+void write_pose_csv(const std::string& path, const PoseTable& table) {
   std::ofstream stream(path);
   stream.precision(17);
-  const GroundFrame& ground = block.ground;
-  if (ground.georeferenced)
-    stream << "# origin: " << ground.latitude_deg << ' ' << ground.longitude_deg << ' ' << ground.height_m << '\n';
-  stream << "name,qw,qx,qy,qz,x,y,z,pass\n";
-  for (std::size_t f = 0; f < block.frames.size(); ++f) {
-    const FrameIndex frame(static_cast<std::int64_t>(f));
-    if (!state.oriented[frame]) continue;
-    const Eigen::Quaterniond& q = state.frames[frame].rotation;
-    const Eigen::Vector3d& c = state.frames[frame].centre;
-    stream << block.frames[frame].name << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << c.x()
-           << ',' << c.y() << ',' << c.z() << ',' << block.frames[frame].pass << '\n';
+  if (table.ground)
+    stream << "# origin: " << table.ground->latitude_deg << ' ' << table.ground->longitude_deg << ' '
+           << table.ground->height_m << '\n';
+  stream << "name,qw,qx,qy,qz,x,y,z" << (table.passes.empty() ? "\n" : ",pass\n");
+  for (std::size_t f = 0; f < table.names.size(); ++f) {
+    const Eigen::Quaterniond& q = table.poses[f].rotation;
+    const Eigen::Vector3d& c = table.poses[f].centre;
+    stream << table.names[f] << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << c.x() << ','
+           << c.y() << ',' << c.z();
+    if (!table.passes.empty()) stream << ',' << table.passes[f];
+    stream << '\n';
   }
   stream.close();
   if (!stream) throw InputError(path + ": cannot be written");

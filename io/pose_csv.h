@@ -20,13 +20,14 @@ namespace megablock {
 struct PoseTable {
   std::optional<GroundFrame> ground;  // of the file's origin comment
   std::vector<std::string> names;
-  std::vector<Pose> poses;  // [names]
+  std::vector<Pose> poses;           // [names]
+  std::vector<std::int64_t> passes;  // [names] or empty; written, not read
 };
 
 // Oriented frames of the state, by name.
 PoseTable pose_table(const Block& block, const BlockState& state);
 
-void write_pose_csv(const std::string& path, const Block& block, const BlockState& state);
+void write_pose_csv(const std::string& path, const PoseTable& table);
 
 // InputError with file:line for missing columns, numbers that are none, quaternions that are not unit (1e-3; they are
 // normalised), names that appear twice.

@@ -54,7 +54,8 @@ SimulatedBlock simulate_block(const SimulationOptions& options);
 
 // Renders the images of a small block (textured terrain and boxes, ray cast, Brown distortion) as JPEG with EXIF GPS
 // into folder/images, and writes the project files:
-//   folder/block.yaml, folder/truth.csv (poses), folder/control.csv, folder/images/*.jpg
+//   folder/block.yaml, folder/truth.csv and truth.h5 (poses), folder/gcp_list.txt (control), folder/images/*.jpg
+// The cameras of a rig become images of their own, each with its pose.
 void write_rendered_block(const SimulationOptions& options, const std::string& folder);
 // The tie-point level: folder/block.yaml (with `tie_points: tie_points.h5`, `block: given.h5`), truth.csv, truth.h5.
 void write_simulated_block(const SimulatedBlock& simulated, const std::string& folder);

@@ -19,7 +19,7 @@ void write_simulated_block(const SimulatedBlock& simulated, const std::string& f
   write_block((root / "given.h5").string(), simulated.block);
   write_tracks((root / "tie_points.h5").string(), simulated.tracks);
   write_state((root / "truth.h5").string(), simulated.truth);
-  write_pose_csv((root / "truth.csv").string(), simulated.block, simulated.truth);
+  write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
   std::ofstream yaml(root / "block.yaml");
   yaml << "# A simulated block: cameras, frames and priors in given.h5, tie points in tie_points.h5.\n"
        << "# The truth is in truth.csv (poses) and truth.h5 (poses and cameras).\n"
