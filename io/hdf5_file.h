@@ -5,10 +5,11 @@
 // are chunked, shuffled and deflated. Every file carries the root attributes `kind` and `format_version`.
 //
 // Errors: StoreError naming file and dataset; a full disk, quota or read-only directory while writing is an InputError.
+// One thread at a time.
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -66,13 +67,14 @@ struct DatasetNote {
   std::string units, description;
 };
 
+// The file is put together in memory (compressed) and written by close() in one go: HDF5 cannot recover from a disk
+// that fills up under it, and crashes when the process ends.
 class Hdf5Writer {
  public:
-  // Replaces a file that is there.
   Hdf5Writer(const std::string& path, const std::string& kind);
-  // Destroyed without close(), as by an exception, the file is left behind incomplete: the caller removes it.
-  ~Hdf5Writer() = default;
-  // Writes everything out; nothing may follow.
+  // Without close(), as after an exception, nothing is written.
+  ~Hdf5Writer();
+  // Writes the file, in place of one that is there; nothing may follow.
   void close();
 
   // Names are paths in the file, '/' between groups; a group must be made before what is in it.
@@ -118,7 +120,10 @@ class Hdf5Writer {
                      const std::vector<std::int64_t>& shape, const DatasetNote& note);
   std::int64_t checked(std::int64_t result, const std::string& name) const;  // throws when result < 0
 
+  struct Image;  // the file in memory
+
   std::string path_;
+  std::unique_ptr<Image> image_;
   Hdf5Handle file_;
 };
 

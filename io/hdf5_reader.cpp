@@ -29,8 +29,7 @@ Hdf5Reader::Hdf5Reader(const std::string& path, const std::string& kind) : path_
   const Hdf5Handle access = file_access();
   file_ = Hdf5Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), &H5Fclose);
   if (file_.id() < 0)
-    throw StoreError(path + ": cannot be opened as HDF5 (" + last_hdf5_failure().description +
-                     "); delete it and run again");
+    throw StoreError(path + ": cannot be opened as HDF5 (" + last_hdf5_failure() + "); delete it and run again");
   if (!has_attribute("/", "kind") || !has_attribute("/", "format_version"))
     throw StoreError(path + ": is no file of megablock (no attribute 'kind')");
   const auto version = attribute<std::uint32_t>("/", "format_version");
@@ -115,7 +114,7 @@ void Hdf5Reader::scalar_attribute(const std::string& object, const std::string& 
 }
 
 std::int64_t Hdf5Reader::checked(std::int64_t result, const std::string& name) const {
-  if (result < 0) fail(name, "cannot be read (" + last_hdf5_failure().description + ")");
+  if (result < 0) fail(name, "cannot be read (" + last_hdf5_failure() + ")");
   return result;
 }
 

@@ -1,7 +1,5 @@
 #include "io/hdf5_types.h"
 
-#include <cstdlib>
-
 namespace megablock {
 
 hid_t memory_type(ElementType type) {
@@ -58,19 +56,15 @@ hid_t file_type(ElementType type) {
 
 void silence_hdf5() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
-Hdf5Failure last_hdf5_failure() {
-  Hdf5Failure failure;
+std::string last_hdf5_failure() {
+  std::string description;
   const auto visit = [](unsigned, const H5E_error2_t* entry, void* data) -> herr_t {
-    auto& found = *static_cast<Hdf5Failure*>(data);
-    const std::string text = entry->desc ? entry->desc : "";
-    if (found.description.empty()) found.description = text;
-    // The system's error number appears in the text of the file driver's entry only.
-    const auto position = text.find("errno = ");
-    if (found.error == 0 && position != std::string::npos) found.error = std::atoi(text.c_str() + position + 8);
+    auto& found = *static_cast<std::string*>(data);
+    if (found.empty() && entry->desc) found = entry->desc;
     return 0;
   };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &failure);
-  return failure;
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &description);
+  return description;
 }
 
 Hdf5Handle file_access() {

@@ -16,12 +16,8 @@ hid_t file_type(ElementType type);
 // Turns off HDF5's printing of its error stack; errors are reported through exceptions.
 void silence_hdf5();
 
-// The innermost entry of HDF5's error stack, and the errno value mentioned there (0: none).
-struct Hdf5Failure {
-  std::string description;
-  int error = 0;
-};
-Hdf5Failure last_hdf5_failure();
+// The innermost entry of HDF5's error stack.
+std::string last_hdf5_failure();
 
 // File access properties of every file: libver latest, no file locking, closing takes open objects along.
 Hdf5Handle file_access();

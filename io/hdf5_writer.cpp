@@ -1,7 +1,12 @@
+#include <fcntl.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 
+#include "io/descriptor.h"
 #include "io/error.h"
 #include "io/file_error.h"
 #include "io/hdf5_types.h"
@@ -12,6 +17,7 @@ namespace {
 
 constexpr std::size_t kCompressFrom = 16384;  // bytes; smaller datasets are stored as they are
 constexpr hsize_t kChunkBytes = 1 << 19;      // of one chunk before compression
+constexpr std::size_t kMemoryStep = 1 << 20;  // bytes by which the file in memory grows
 constexpr unsigned kDeflateLevel = 1;         // higher levels gain a few per cent for several times the time
 
 Hdf5Handle without_times(hid_t property_class) {
@@ -47,18 +53,53 @@ bool fits(std::int64_t lowest, std::int64_t highest) {
 
 }  // namespace
 
-Hdf5Writer::Hdf5Writer(const std::string& path, const std::string& kind) : path_(path) {
+// HDF5's memory driver asks these callbacks for its buffer and hands it back when the file is closed.
+struct Hdf5Writer::Image {
+  void* data = nullptr;
+  ~Image() { std::free(data); }
+
+  static void* resize(void*, std::size_t size, H5FD_file_image_op_t, void* image) {
+    auto* self = static_cast<Image*>(image);
+    void* moved = std::realloc(self->data, size);
+    if (moved) self->data = moved;
+    return moved;
+  }
+  static void* allocate(std::size_t size, H5FD_file_image_op_t operation, void* image) {
+    return resize(nullptr, size, operation, image);
+  }
+  static herr_t keep(void*, H5FD_file_image_op_t, void*) { return 0; }
+  static void* share(void* image) { return image; }
+  static herr_t unshare(void*) { return 0; }
+
+  // End of the file, from its superblock (version 2 or 3, 8-byte addresses): the buffer itself is longer.
+  std::size_t size() const {
+    std::uint64_t end = 0;
+    if (data) std::memcpy(&end, static_cast<const char*>(data) + 28, sizeof end);
+    return end;
+  }
+};
+
+Hdf5Writer::Hdf5Writer(const std::string& path, const std::string& kind)
+    : path_(path), image_(std::make_unique<Image>()) {
   silence_hdf5();
   const Hdf5Handle creation = without_times(H5P_FILE_CREATE);
   const Hdf5Handle access = file_access();
+  checked(H5Pset_fapl_core(access.id(), kMemoryStep, false), "");
+  H5FD_file_image_callbacks_t callbacks = {&Image::allocate, nullptr,         &Image::resize, &Image::keep,
+                                           &Image::share,    &Image::unshare, image_.get()};
+  checked(H5Pset_file_image_callbacks(access.id(), &callbacks), "");
   file_ = Hdf5Handle(checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()), ""), &H5Fclose);
   attribute("/", "kind", kind);
   attribute("/", "format_version", kFormatVersion);
 }
 
+Hdf5Writer::~Hdf5Writer() { file_.reset(); }
+
 void Hdf5Writer::close() {
-  checked(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "");
   checked(H5Fclose(file_.release()), "");
+  const Descriptor file(path_, O_WRONLY | O_CREAT | O_TRUNC);
+  if (file.id() < 0) throw_file_error(path_, "created", errno);
+  write_fully(file.id(), path_, image_->data, image_->size());
 }
 
 void Hdf5Writer::group(const std::string& name, const std::string& description) {
@@ -138,10 +179,8 @@ void Hdf5Writer::scalar_attribute(const std::string& object, const std::string& 
 
 std::int64_t Hdf5Writer::checked(std::int64_t result, const std::string& name) const {
   if (result >= 0) return result;
-  const Hdf5Failure failure = last_hdf5_failure();
-  if (failure.error != 0) throw_file_error(path_, "written", failure.error);
-  throw StoreError(path_ + ": " + (name.empty() ? "" : name + ": ") + "cannot be written (" + failure.description +
-                   ")");
+  throw StoreError(path_ + ": " + (name.empty() ? "" : name + ": ") + "cannot be made (" + last_hdf5_failure() +
+                   "); is there memory enough for the file?");
 }
 
 }  // namespace megablock

@@ -21,6 +21,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "io/descriptor.h"
 #include "io/error.h"
 #include "io/file_error.h"
 #include "io/hash.h"
@@ -53,56 +54,6 @@ struct Trailer {
 };
 static_assert(sizeof(Trailer) == 64);
 
-// An open file, closed at the end of its scope.
-class Descriptor {
- public:
-  Descriptor(const std::string& path, int flags) : id_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
-  ~Descriptor() {
-    if (id_ >= 0) ::close(id_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int id() const { return id_; }
-
- private:
-  int id_;
-};
-
-std::int64_t file_size(int file) {
-  struct stat status {};
-  return ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) ? status.st_size : -1;
-}
-
-// Reads exactly `size` bytes; false at the end of the file or on an error.
-bool read_fully(int file, void* data, std::size_t size, std::int64_t offset) {
-  auto* bytes = static_cast<char*>(data);
-  while (size > 0) {
-    const ssize_t n = ::pread(file, bytes, size, offset);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes += n;
-    size -= static_cast<std::size_t>(n);
-    offset += n;
-  }
-  return true;
-}
-
-void write_fully(int file, const std::string& path, const void* data, std::size_t size) {
-  const auto* bytes = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t n = ::write(file, bytes, size);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw_file_error(path, "written", errno);
-    bytes += n;
-    size -= static_cast<std::size_t>(n);
-  }
-}
-
-void flush_to_disk(int file, const std::string& path) {
-  // Some network file systems cannot flush a directory and answer EINVAL: nothing is lost that they could keep.
-  if (::fsync(file) != 0 && errno != EINVAL) throw_file_error(path, "flushed to disk", errno);
-}
-
 void flush_directory(const std::string& path) {
   const Descriptor directory(path, O_RDONLY | O_DIRECTORY);
   if (directory.id() < 0) throw_file_error(path, "opened", errno);
@@ -111,7 +62,7 @@ void flush_directory(const std::string& path) {
 
 std::uint64_t hash_payload(int file, const std::string& path, std::uint64_t length) {
   Hasher hasher;
-  std::vector<char> buffer(1 << 20);
+  std::vector<char> buffer(static_cast<std::size_t>(std::min<std::uint64_t>(length, 1 << 20)));
   for (std::uint64_t done = 0; done < length;) {
     const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(buffer.size(), length - done));
     if (!read_fully(file, buffer.data(), size, static_cast<std::int64_t>(done)))
