@@ -33,6 +33,12 @@ Project read_project(const std::string& path);
 // The same in the ground frame of a running job, so that images added later cannot move the origin.
 Project read_project(const std::string& path, const std::optional<GroundFrame>& ground);
 
+// The block of a job that has grown: cameras, rigs, frames and images of `previous` keep their indices (matched by
+// name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
+// `previous` that are gone stay, so the caller sees that by the count. The ground frame stays the previous one:
+// positions, attitudes and control of `now` are turned into it when it has another origin.
+Block append_to(const Block& previous, const Block& now);
+
 struct InitOptions {
   std::string images;  // folder, searched recursively, names sorted
   std::string output = "block.yaml";

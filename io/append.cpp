@@ -1,0 +1,99 @@
+#include <map>
+#include <optional>
+
+#include "io/crs.h"
+#include "io/project.h"
+
+namespace megablock {
+
+namespace {
+
+// Union of two lists of named items: where each item of `now` comes to stand.
+template <typename Index, typename Item>
+IndexedVector<Index, Index> places_by_name(const IndexedVector<Index, Item>& previous,
+                                           const IndexedVector<Index, Item>& now, IndexedVector<Index, Item>& merged) {
+  std::map<std::string, Index> place;
+  for (const Item& item : previous) {
+    place.emplace(item.name, merged.next_index());
+    merged.push_back(item);
+  }
+  IndexedVector<Index, Index> places;
+  for (const Item& item : now) {
+    const auto [found, inserted] = place.emplace(item.name, merged.next_index());
+    if (inserted) merged.push_back(item);
+    places.push_back(found->second);
+  }
+  return places;
+}
+
+// Moves what refers to the ground frame of one block into another with its own origin.
+class GroundChange {
+ public:
+  GroundChange(const GroundFrame& from, const GroundFrame& to)
+      : from_(from), to_(to), turn_(to_.own_from_block({from.latitude_deg, from.longitude_deg, from.height_m})) {}
+
+  Eigen::Vector3d position(const Eigen::Vector3d& p) const { return to_.to_local(from_.to_geodetic(p)); }
+  // turn_ takes directions of the new frame into the old one.
+  Eigen::Quaterniond rotation(const Eigen::Quaterniond& r) const { return (r * turn_).normalized(); }
+
+  void apply(Block& block) const {
+    for (Frame& frame : block.frames) {
+      if (frame.position_prior) frame.position_prior->position = position(frame.position_prior->position);
+      if (frame.attitude_prior) frame.attitude_prior->rotation_cw = rotation(frame.attitude_prior->rotation_cw);
+      if (frame.given_pose)
+        *frame.given_pose = {rotation(frame.given_pose->rotation), position(frame.given_pose->centre)};
+    }
+    for (ControlPoint& point : block.control_points)
+      if (point.position.allFinite()) point.position = position(point.position);
+  }
+
+ private:
+  Georeference from_, to_;
+  Eigen::Quaterniond turn_;
+};
+
+bool same_origin(const GroundFrame& a, const GroundFrame& b) {
+  return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
+}
+
+}  // namespace
+
+Block append_to(const Block& previous, const Block& now) {
+  Block moved = now;
+  if (previous.ground.georeferenced && now.ground.georeferenced && !same_origin(previous.ground, now.ground))
+    GroundChange(now.ground, previous.ground).apply(moved);
+  Block merged;
+  merged.ground = previous.ground.georeferenced ? previous.ground : now.ground;
+  const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
+  const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
+  const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);
+  const auto images = places_by_name(previous.images, moved.images, merged.images);
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    merged.cameras[cameras.Base::operator[](i)] = moved.cameras.Base::operator[](i);
+  for (std::size_t i = 0; i < rigs.size(); ++i) {
+    Rig rig = moved.rigs.Base::operator[](i);
+    for (Mount& mount : rig.mounts) mount.camera = cameras[mount.camera];
+    merged.rigs[rigs.Base::operator[](i)] = std::move(rig);
+  }
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Frame frame = moved.frames.Base::operator[](i);
+    frame.rig = rigs[frame.rig];
+    merged.frames[frames.Base::operator[](i)] = std::move(frame);
+  }
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    Image image = moved.images.Base::operator[](i);
+    image.frame = frames[image.frame];
+    merged.images[images.Base::operator[](i)] = std::move(image);
+  }
+  merged.relative_poses = moved.relative_poses;
+  for (RelativePose& relative : merged.relative_poses) {
+    relative.from = frames[relative.from];
+    relative.to = frames[relative.to];
+  }
+  merged.control_points = moved.control_points;
+  for (ControlPoint& point : merged.control_points)
+    for (ImageMeasurement& measurement : point.measurements) measurement.image = images[measurement.image];
+  return merged;
+}
+
+}  // namespace megablock

@@ -1,0 +1,64 @@
+#include "io/export.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "io/error.h"
+#include "io/export_bal.h"
+#include "io/export_colmap.h"
+#include "io/export_tables.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Format {
+  std::string name;
+  bool folder;  // else one file
+  void (*write)(const BlockResult&, const std::string&);
+};
+
+void export_h5(const BlockResult& result, const std::string& path) { write_result(path, result); }
+
+const std::vector<Format>& formats() {
+  static const std::vector<Format> all = {{"colmap-text", true, export_colmap_text},
+                                          {"colmap-bin", true, export_colmap_binary},
+                                          {"bal", false, export_bal},
+                                          {"bundler", false, export_bundler},
+                                          {"ply", false, export_ply},
+                                          {"geojson", false, export_geojson},
+                                          {"csv", true, export_csv},
+                                          {"h5", false, export_h5}};
+  return all;
+}
+
+}  // namespace
+
+const std::vector<std::string>& export_formats() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> list;
+    for (const Format& format : formats()) list.push_back(format.name);
+    return list;
+  }();
+  return names;
+}
+
+void export_result(const BlockResult& result, const std::string& format, const std::string& out) {
+  const auto found =
+      std::find_if(formats().begin(), formats().end(), [&](const Format& f) { return f.name == format; });
+  if (found == formats().end()) {
+    std::string list;
+    for (const std::string& name : export_formats()) list += (list.empty() ? "" : ", ") + name;
+    throw InputError("'" + format + "' is no export format; they are " + list);
+  }
+  const fs::path folder = found->folder ? fs::path(out) : fs::absolute(out).parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder))
+    throw InputError(folder.string() + ": the folder cannot be made; check the path and its permissions");
+  found->write(result, out);
+}
+
+}  // namespace megablock

@@ -1,0 +1,22 @@
+// Exports of a result: one entry for all formats. What each file holds: docs/export.md and the writers' headers.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/result.h"
+
+namespace megablock {
+
+// colmap-text, colmap-bin: folder with cameras, images, points3D       (io/export_colmap.h)
+// bal:             one file                                            (io/export_bal.h)
+// bundler:         one file and its image list, <out>.list.txt         (io/export_bal.h)
+// ply, geojson:    one file                                            (io/export_tables.h)
+// csv:             folder with frames.csv, images_local.csv, images_wgs84.csv, cameras.csv   (io/export_tables.h)
+// h5:              one self-contained file (write_result)
+const std::vector<std::string>& export_formats();
+
+// Makes folders as needed. InputError for an unknown format, or when it cannot be written.
+void export_result(const BlockResult& result, const std::string& format, const std::string& out);
+
+}  // namespace megablock

@@ -1,0 +1,93 @@
+#include <filesystem>
+#include <numbers>
+
+#include "io/crs.h"
+#include "io/export_tables.h"
+#include "io/export_view.h"
+#include "io/pose_csv.h"
+#include "io/text_writer.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+
+void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
+  const OmegaPhiKappa o = omega_phi_kappa(rotation);
+  const YawPitchRoll y = yaw_pitch_roll(rotation);
+  for (const double angle : {o.omega, o.phi, o.kappa, y.yaw, y.pitch, y.roll})
+    writer.print(",{:.12g}", angle * kDegreesPerRadian);
+}
+
+void write_local(const ExportView& view, const std::string& path) {
+  const auto& covariance = view.result.frame_covariance;
+  TextWriter writer(path);
+  writer.print("image,frame,camera,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
+  writer.print("{}\n", covariance.empty() ? "" : ",sigma_x_m,sigma_y_m,sigma_z_m,sigma_rotation_deg");
+  for (std::int64_t i = 0; i < view.image_count(); ++i) {
+    const Image& image = view.image(i);
+    const Pose pose = view.pose(i);
+    writer.print("{},{},{},{},{},{}", image.name, view.result.block.frames[image.frame].name,
+                 view.result.block.cameras[view.camera_index(i)].name, pose.centre.x(), pose.centre.y(),
+                 pose.centre.z());
+    print_angles(writer, pose.rotation);
+    if (!covariance.empty()) {
+      const Eigen::Matrix<double, 6, 1> variance = covariance[image.frame].diagonal();
+      for (int a = 3; a < 6; ++a) writer.print(",{:.6g}", std::sqrt(variance[a]));
+      writer.print(",{:.6g}", std::sqrt(variance.head<3>().mean()) * kDegreesPerRadian);
+    }
+    writer.print("\n");
+  }
+  writer.close();
+}
+
+void write_wgs84(const ExportView& view, const std::string& path) {
+  const Georeference georeference(view.result.block.ground);
+  TextWriter writer(path);
+  writer.print("image,latitude_deg,longitude_deg,height_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg\n");
+  for (std::int64_t i = 0; i < view.image_count(); ++i) {
+    const Pose pose = view.pose(i);
+    const Geodetic position = georeference.to_geodetic(pose.centre);
+    writer.print("{},{:.11f},{:.11f},{:.5f}", view.image(i).name, position.latitude_deg, position.longitude_deg,
+                 position.height_m);
+    print_angles(writer, pose.rotation * georeference.own_from_block(position).conjugate());
+    writer.print("\n");
+  }
+  writer.close();
+}
+
+void write_cameras(const BlockResult& result, const std::string& path) {
+  TextWriter writer(path);
+  writer.print("name,width,height");
+  for (const char* name : kIntrinsicNames) writer.print(",{}", name);
+  if (!result.camera_covariance.empty())
+    for (const char* name : kIntrinsicNames) writer.print(",sigma_{}", name);
+  writer.print("\n");
+  for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
+    const CameraIndex index(static_cast<std::int64_t>(c));
+    const Camera& camera = result.block.cameras[index];
+    writer.print("{},{},{}", camera.name, camera.width, camera.height);
+    for (const double value : result.state.cameras[index]) writer.print(",{}", value);
+    if (!result.camera_covariance.empty())
+      for (int p = 0; p < kIntrinsicCount; ++p)
+        writer.print(",{:.6g}", std::sqrt(result.camera_covariance[index](p, p)));
+    writer.print("\n");
+  }
+  writer.close();
+}
+
+}  // namespace
+
+void export_csv(const BlockResult& result, const std::string& folder) {
+  const ExportView view = make_export_view(result);
+  const fs::path root(folder);
+  write_pose_csv((root / "frames.csv").string(), result.block, result.state);
+  write_local(view, (root / "images_local.csv").string());
+  if (result.block.ground.georeferenced) write_wgs84(view, (root / "images_wgs84.csv").string());
+  write_cameras(result, (root / "cameras.csv").string());
+}
+
+}  // namespace megablock

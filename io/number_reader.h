@@ -1,0 +1,31 @@
+// Reads the words of a large text file one after the other, with line numbers for messages. Internal to io/.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace megablock {
+
+class NumberReader {
+ public:
+  explicit NumberReader(const std::string& path);  // InputError when it cannot be read
+
+  // Next word behind white space; InputError "file:line: ends before <what>" at the end of the file.
+  std::string_view word(const char* what);
+  double number(const char* what);  // finite
+  // Whole number in [low, high].
+  std::int64_t integer(const char* what, std::int64_t low, std::int64_t high);
+  // The rest of the line without blanks at its ends; the next word is on the next line.
+  std::string_view rest_of_line();
+  bool line_has_more();  // another word before the end of the line
+  bool at_end();         // nothing but white space is left
+  [[noreturn]] void fail(const std::string& message) const;
+
+ private:
+  std::string path_, text_;
+  std::size_t at_ = 0;
+  std::int64_t line_ = 1;
+};
+
+}  // namespace megablock

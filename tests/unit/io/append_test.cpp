@@ -1,0 +1,103 @@
+#include <gmock/gmock.h>
+
+#include "io/crs.h"
+#include "io/project.h"
+
+namespace megablock {
+namespace {
+
+// One photo per name, all of one camera per first letter; position priors east of the origin.
+Block block_of(const std::vector<std::string>& names, const GroundFrame& ground) {
+  Block block;
+  block.ground = ground;
+  std::vector<std::string> cameras;
+  for (const std::string& name : names) {
+    const std::string camera_name = name.substr(0, 1);
+    auto found = std::find(cameras.begin(), cameras.end(), camera_name);
+    if (found == cameras.end()) {
+      Camera camera;
+      camera.name = camera_name;
+      camera.width = camera.height = 100;
+      camera.intrinsics[kFocal] = 100;
+      block.rigs.push_back({camera_name, {Mount{block.cameras.next_index(), {}}}});
+      block.cameras.push_back(camera);
+      cameras.push_back(camera_name);
+      found = cameras.end() - 1;
+    }
+    Frame frame;
+    frame.name = name;
+    frame.rig = RigIndex(found - cameras.begin());
+    frame.position_prior = PositionPrior{{static_cast<double>(name.back()), 2, 3}};
+    frame.attitude_prior = AttitudePrior{};
+    frame.given_pose = Pose{Eigen::Quaterniond::Identity(), {1, 2, static_cast<double>(name.back())}};
+    block.images.push_back({name, "", block.frames.next_index(), 0, 0});
+    block.frames.push_back(frame);
+  }
+  ControlPoint point;
+  point.name = "p";
+  point.position = {5, 6, 7};
+  point.measurements.push_back({ImageIndex(static_cast<std::int64_t>(names.size()) - 1), {1, 2}, 0.5});
+  block.control_points.push_back(point);
+  return block;
+}
+
+const GroundFrame kHere{true, 46.84, -91.99, 200, "EPSG:4979"};
+const GroundFrame kThere{true, 46.93, -91.9, 250, "EPSG:4979"};
+
+std::vector<std::string> image_names(const Block& block) {
+  std::vector<std::string> names;
+  for (const Image& image : block.images) names.push_back(image.name);
+  return names;
+}
+
+TEST(AppendTo, OldIndicesStayNewImagesFollow) {
+  const Block previous = block_of({"b1", "b2", "c1"}, kHere);
+  const Block merged = append_to(previous, block_of({"a1", "b1", "b15", "b2", "c1"}, kHere));
+  EXPECT_THAT(image_names(merged), ::testing::ElementsAre("b1", "b2", "c1", "a1", "b15"));
+  EXPECT_NO_THROW(check(merged));
+  for (std::size_t i = 0; i < merged.images.size(); ++i) {
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    EXPECT_EQ(merged.frames[merged.images[image].frame].name, merged.images[image].name);
+    EXPECT_EQ(merged.cameras[merged.camera_of(image)].name, merged.images[image].name.substr(0, 1));
+  }
+  EXPECT_EQ(merged.cameras[CameraIndex(2)].name, "a");
+  EXPECT_EQ(merged.images[merged.control_points[0].measurements[0].image].name, "c1");
+}
+
+TEST(AppendTo, ContentsAreTheNewOnes) {
+  Block now = block_of({"b1", "b2"}, kHere);
+  now.cameras[CameraIndex(0)].intrinsics[kFocal] = 123;
+  now.frames[FrameIndex(1)].position_prior.reset();
+  const Block merged = append_to(block_of({"b1", "b2"}, kHere), now);
+  EXPECT_EQ(merged.cameras[CameraIndex(0)].intrinsics[kFocal], 123);
+  EXPECT_FALSE(merged.frames[FrameIndex(1)].position_prior);
+}
+
+TEST(AppendTo, RemovedImagesStaySoThatTheyAreNoticed) {
+  const Block merged = append_to(block_of({"b1", "b2"}, kHere), block_of({"b2"}, kHere));
+  EXPECT_THAT(image_names(merged), ::testing::ElementsAre("b1", "b2"));
+}
+
+TEST(AppendTo, TheGroundFrameStaysThePreviousOne) {
+  const Block now = block_of({"b1", "b2"}, kThere);
+  const Block merged = append_to(block_of({"b1"}, kHere), now);
+  EXPECT_EQ(merged.ground.latitude_deg, kHere.latitude_deg);
+  const Georeference here(kHere), there(kThere);
+  const FrameIndex frame(1);
+  const auto difference = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return (a - here.to_local(there.to_geodetic(b))).norm();
+  };
+  EXPECT_LT(difference(merged.frames[frame].position_prior->position, now.frames[frame].position_prior->position),
+            1e-6);
+  EXPECT_LT(difference(merged.frames[frame].given_pose->centre, now.frames[frame].given_pose->centre), 1e-6);
+  EXPECT_LT(difference(merged.control_points[0].position, now.control_points[0].position), 1e-6);
+  // A point 50 m along the camera's axis keeps its camera coordinates.
+  const Pose &before = *now.frames[frame].given_pose, &after = *merged.frames[frame].given_pose;
+  const Eigen::Vector3d point(20, -10, 50);
+  const Eigen::Vector3d moved = here.to_local(there.to_geodetic(point));
+  EXPECT_LT((to_inside(after, moved) - to_inside(before, point)).norm(), 1e-6);
+  EXPECT_LT(rotation_angle(after.rotation, merged.frames[frame].attitude_prior->rotation_cw), 1e-12);
+}
+
+}  // namespace
+}  // namespace megablock
