@@ -228,10 +228,17 @@ void triangulate_points(TileProblem& problem, TileState& state, const AdjustOpti
 
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
                                  const AdjustOptions& options) {
+  return screen_observations(problem, state, threshold_sigmas, options,
+                             std::vector<std::uint8_t>(problem.points.size(), 1));
+}
+
+std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
+                                 const AdjustOptions& options, const std::vector<std::uint8_t>& which) {
   if (!(threshold_sigmas > 0)) throw InputError("the screening threshold must be positive (sigmas)");
   const std::vector<std::uint8_t> before = problem.kept;
   PointSettler settler(problem, state, options.min_intersection_deg);
-  for (std::int64_t p = 0; p < problem.point_count(); ++p) settler.screen(p, threshold_sigmas);
+  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+    if (which[p]) settler.screen(p, threshold_sigmas);
   std::int64_t changed = 0;
   for (std::size_t row = 0; row < before.size(); ++row) changed += before[row] != problem.kept[row];
   return changed;

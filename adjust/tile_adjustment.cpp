@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "io/error.h"
 
@@ -52,41 +53,75 @@ class TileAdjuster {
   }
 
   AdjustSummary run() {
-    triangulate_points(problem_, state_, options_);
     approach();
     AdjustSummary summary;
-    const std::vector<std::uint8_t> before = problem_.kept;
-    for (int round = 0; round < options_.screening_rounds; ++round) {
+    for (int round = 0; round + 1 < options_.screening_rounds; ++round) {
       // From 8 x to 1 x of the final threshold.
-      const double left =
-          options_.screening_rounds == 1 ? 0 : 1 - static_cast<double>(round) / (options_.screening_rounds - 1);
-      const bool last = round + 1 == options_.screening_rounds;
+      const double left = 1 - static_cast<double>(round) / (options_.screening_rounds - 1);
       screen(options_.max_residual_sigmas * std::pow(8, left));
-      summary = solve(Stage::kAll, last ? 1e-9 : 1e-6, problem_.image_loss.scale);
+      solve_rough(Stage::kAll);
     }
+    screen(options_.max_residual_sigmas);
+    summary = solve_fine();
     // What the last solve moved across the threshold.
-    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / 10000)
-      summary = solve(Stage::kAll, 1e-9, problem_.image_loss.scale);
+    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / 10000) summary = solve_fine();
     return count(summary);
   }
 
  private:
   enum class Stage { kFocal, kAll };
 
-  // From rough start values to residuals of a few pixels: the loss is as wide as the residuals are, gross errors are
-  // left out, and only focal length and k1 are estimated.
+  // From rough start values to residuals of a few pixels: gross errors are left out, only focal length and k1 are
+  // estimated, and of dense tiles only the longest tracks take part.
   void approach() {
     constexpr int kMaxRounds = 6;
-    constexpr double kWide = 5;
-    double sigma = robust_sigma(problem_, state_);
+    constexpr double kWide = 4;
+    const std::vector<std::uint8_t> all = problem_.kept;
+    select_long_tracks();
+    triangulate_points(problem_, state_, options_);
+    const std::vector<std::uint8_t> chosen = active_points();
     for (int round = 0; round < kMaxRounds; ++round) {
-      screen(std::max(8 * options_.max_residual_sigmas, kWide * sigma));
-      solve(Stage::kFocal, 1e-3, std::max(problem_.image_loss.scale, sigma));
+      const double sigma = robust_sigma(problem_, state_);
+      screen_observations(problem_, state_, std::max(8 * options_.max_residual_sigmas, kWide * sigma), options_,
+                          chosen);
+      solve_rough(Stage::kFocal);
       const double next = robust_sigma(problem_, state_);
-      const bool settled = next < 2 || next > 0.7 * sigma;
-      sigma = next;
-      if (settled) break;
+      if (next < 2 || next > 0.7 * sigma) break;
     }
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p)
+      if (!chosen[p])
+        std::copy(all.begin() + problem_.begin[p], all.begin() + problem_.begin[p + 1],
+                  problem_.kept.begin() + problem_.begin[p]);
+    triangulate_points(problem_, state_, options_);
+  }
+
+  // Enough tracks for each image, the longest first.
+  void select_long_tracks() {
+    constexpr int kEnough = 200;
+    if (problem_.observation_count() < 2 * kEnough * static_cast<std::int64_t>(problem_.images.size())) return;
+    std::vector<std::int64_t> order(problem_.points.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
+      return problem_.begin[a + 1] - problem_.begin[a] > problem_.begin[b + 1] - problem_.begin[b];
+    });
+    std::vector<int> covered(problem_.images.size(), 0);
+    for (std::int64_t p : order) {
+      bool needed = problem_.points[p].role == PointRole::kControl;
+      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row)
+        needed = needed || (problem_.kept[row] && covered[problem_.image[row].value] < kEnough);
+      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
+        if (!needed)
+          problem_.kept[row] = 0;
+        else if (problem_.kept[row])
+          ++covered[problem_.image[row].value];
+      }
+    }
+  }
+
+  std::vector<std::uint8_t> active_points() const {
+    std::vector<std::uint8_t> result(problem_.points.size());
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p) result[p] = problem_.active(p);
+    return result;
   }
 
   // The a-priori sigma may be too small for the images at hand: the threshold follows the residuals upwards.
@@ -94,12 +129,24 @@ class TileAdjuster {
     return screen_observations(problem_, state_, threshold * std::max(1.0, robust_sigma(problem_, state_)), options_);
   }
 
-  AdjustSummary solve(Stage stage, double tolerance, double loss_scale) {
-    const double scale = problem_.image_loss.scale;
-    problem_.image_loss.scale = loss_scale;
-    const AdjustSummary summary =
-        solve_with_ceres(problem_, state_, SolveOptions{options_.max_iterations, tolerance, camera_free(stage)});
-    problem_.image_loss.scale = scale;
+  // A few iterations with a loss that forgets gross errors and is as wide as the residuals are.
+  void solve_rough(Stage stage) {
+    constexpr int kIterations = 10;
+    const RobustLoss loss = problem_.image_loss;
+    problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_))};
+    solve({std::min(kIterations, options_.max_iterations), 1e-3, camera_free(stage)});
+    problem_.image_loss = loss;
+  }
+
+  // To where another iteration would lower the cost by less than kResolved, a small fraction of a sigma.
+  AdjustSummary solve_fine() {
+    constexpr double kResolved = 0.01;
+    const double cost = static_cast<double>(std::max<std::int64_t>(1, problem_.observation_count()));
+    return solve({options_.max_iterations, std::min(1e-6, kResolved / cost), camera_free(Stage::kAll)});
+  }
+
+  AdjustSummary solve(const SolveOptions& solve_options) {
+    const AdjustSummary summary = solve_with_ceres(problem_, state_, solve_options);
     if (!summary.usable) throw ComputeError("the tile's adjustment does not converge: " + summary.text);
     return summary;
   }

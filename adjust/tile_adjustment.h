@@ -31,6 +31,9 @@ void triangulate_points(TileProblem& problem, TileState& state, const AdjustOpti
 // consistent parts keeps the larger one.
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
                                  const AdjustOptions& options);
+// The same for the points marked in `which` [points]; the others are left as they are.
+std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
+                                 const AdjustOptions& options, const std::vector<std::uint8_t>& which);
 
 struct AdjustSummary {
   double initial_cost = 0, final_cost = 0;

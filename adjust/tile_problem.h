@@ -108,7 +108,7 @@ struct TileState {
 
 struct ObservationOptions {
   double image_sigma_px = 0.5;    // a-priori sigma of a tie point measurement per axis, px
-  RobustLoss image_loss{RobustLoss::Kind::kHuber, 2.0};
+  RobustLoss image_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
   bool use_position_priors = true;
