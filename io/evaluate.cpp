@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "geometry/similarity.h"
+#include "io/crs.h"
 #include "io/error.h"
 #include "io/unit_files.h"
 
@@ -100,15 +101,22 @@ Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
   return *similarity;
 }
 
-void check_ground(const GroundFrame& of_result, const std::optional<GroundFrame>& of_truth) {
-  if (!of_truth || !of_result.georeferenced) return;
-  const auto differs = [](double a, double b, double tolerance) { return std::abs(a - b) > tolerance; };
-  if (differs(of_result.latitude_deg, of_truth->latitude_deg, 1e-10) ||
-      differs(of_result.longitude_deg, of_truth->longitude_deg, 1e-10) ||
-      differs(of_result.height_m, of_truth->height_m, 1e-5))
-    throw InputError("the truth refers to another origin than the job; write 'origin: [" +
-                     std::to_string(of_truth->latitude_deg) + ", " + std::to_string(of_truth->longitude_deg) + ", " +
-                     std::to_string(of_truth->height_m) + "]' into the project file");
+// The truth in the result's ground frame, where both say which theirs is.
+PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
+  const auto same = [](double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; };
+  if (!truth.ground || !truth.ground->georeferenced || !ground.georeferenced) return truth;
+  if (same(ground.latitude_deg, truth.ground->latitude_deg, 1e-12) &&
+      same(ground.longitude_deg, truth.ground->longitude_deg, 1e-12) &&
+      same(ground.height_m, truth.ground->height_m, 1e-9))
+    return truth;
+  const Georeference of_result(ground), of_truth(*truth.ground);
+  const Eigen::Quaterniond turn =
+      of_result.own_from_block({truth.ground->latitude_deg, truth.ground->longitude_deg, truth.ground->height_m});
+  PoseTable moved = truth;
+  moved.ground = ground;
+  for (Pose& pose : moved.poses)
+    pose = {(pose.rotation * turn).normalized(), of_result.to_local(of_truth.to_geodetic(pose.centre))};
+  return moved;
 }
 
 void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Similarity& similarity,
@@ -169,12 +177,11 @@ void evaluate_control(const BlockResult& result, Evaluation& evaluation) {
 }  // namespace
 
 Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const EvaluateOptions& options) {
-  const std::vector<Match> matches = match_by_name(result, truth);
+  const std::vector<Match> matches = match_by_name(result, in_ground_of(result.block.ground, truth));
   Evaluation evaluation;
   evaluation.frames_missing = static_cast<std::int64_t>(truth.names.size() - matches.size());
   evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
                        (options.align == EvaluateOptions::Align::kAuto && is_free(result));
-  if (!evaluation.aligned) check_ground(result.block.ground, truth.ground);
   const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
   const double variance_factor = options.scale_sigma ? result.variance_factor : 1;
   evaluate_frames(result, matches, similarity, variance_factor, evaluation);

@@ -35,8 +35,9 @@ struct Evaluation {
   double control_rms_m = kNone;
 };
 
-// Frames are matched by name (a frame's own, else the name of its first image). Check points are compared with the
-// positions stated in the block. InputError when no frame matches, or fewer than three where a similarity is needed.
+// Frames are matched by name (a frame's own, else the name of its first image). A truth with another origin is brought
+// into the result's ground frame. Check points are compared with the positions stated in the block. InputError when no
+// frame matches, or fewer than three where a similarity is needed.
 Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const EvaluateOptions& options = {});
 Evaluation evaluate(const BlockResult& result, const BlockState& truth, const EvaluateOptions& options = {});
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "io/crs.h"
 #include "io/error.h"
 #include "io/simulate/random.h"
 #include "io/simulate/simulate.h"
@@ -128,10 +129,32 @@ TEST_F(EvaluateTest, FramesAreMatchedByName) {
   EXPECT_THROW(evaluate(result_, truth), InputError);
 }
 
-TEST_F(EvaluateTest, AnotherOriginIsRefused) {
+// The same truth about another origin: the figures stay.
+TEST_F(EvaluateTest, TheTruthMayHaveAnotherOrigin) {
   PoseTable truth = pose_table(simulated_.block, simulated_.truth);
-  truth.ground->height_m += 50;
-  EXPECT_THROW(evaluate(result_, truth), InputError);
+  const Evaluation before = evaluate(result_, truth);
+  const Georeference old_ground(*truth.ground);
+  GroundFrame other = *truth.ground;
+  other.latitude_deg += 0.02;
+  other.longitude_deg -= 0.03;
+  other.height_m += 50;
+  const Georeference new_ground(other);
+  const Geodetic old_origin{truth.ground->latitude_deg, truth.ground->longitude_deg, truth.ground->height_m};
+  const Eigen::Vector3d moved_origin = new_ground.to_local(old_origin);
+  // Axes of the old frame in the new one, by differences.
+  Eigen::Matrix3d axes;
+  for (int k = 0; k < 3; ++k)
+    axes.col(k) = (new_ground.to_local(old_ground.to_geodetic(1000 * Eigen::Vector3d::Unit(k))) - moved_origin) / 1000;
+  for (Pose& pose : truth.poses) {
+    pose.centre = new_ground.to_local(old_ground.to_geodetic(pose.centre));
+    pose.rotation = (pose.rotation * Eigen::Quaterniond(axes).conjugate()).normalized();
+  }
+  truth.ground = other;
+  const Evaluation after = evaluate(result_, truth);
+  EXPECT_GT(moved_origin.norm(), 2000);
+  EXPECT_NEAR(after.position_rms_m, before.position_rms_m, 1e-6);
+  EXPECT_NEAR(after.rotation_rms_deg, before.rotation_rms_deg, 1e-6);
+  EXPECT_NEAR(after.normalised_error_rotation, before.normalised_error_rotation, 1e-4);
 }
 
 TEST_F(EvaluateTest, CheckPointsAreCompared) {

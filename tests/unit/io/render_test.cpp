@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 SimulationOptions small_options(SimulationOptions::Scene scene) {
   SimulationOptions options;
   options.scene = scene;
-  options.frames = 6;
+  options.frames = 4;
   options.image_width = 240;
   options.image_height = 180;
   options.focal_px = 200;
