@@ -1,0 +1,16 @@
+// The report of a job: one self-contained HTML page (inline styles, drawings as SVG, a few lines of script; nothing is
+// fetched), for the screen, a phone and paper.
+#pragma once
+
+#include <string>
+
+#include "io/result.h"
+
+namespace megablock {
+
+// Works for any result, however incomplete: what was not computed is left out or said to be missing, and no figure that
+// is not a number is printed. The page carries its figures as JSON in <script type="application/json" id="figures">
+// (keys as `status --json` where they are the same; metres, radians as named, pixels; null where unknown).
+std::string report_html(const BlockResult& result);
+
+}  // namespace megablock

@@ -1,0 +1,41 @@
+// Drawings of the report, as SVG text.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/report/figures.h"
+
+namespace megablock::report {
+
+// Vertical bars over equal bins. `bell_sigma` > 0: the normal curve of that sigma and the same area over it.
+struct BarChart {
+  const Histogram& histogram;
+  std::string x_title, y_title;
+  int decimals = 0;             // of the bins' labels
+  bool open_ended = true;       // the last bin holds all beyond it
+  bool centred_labels = false;  // label bins by their lower value (counts) instead of their limits
+  double bell_sigma = 0;
+};
+std::string draw(const BarChart& chart);
+
+// Mean residual of each part of the sensor as arrows, exaggerated; the number of observations as shade.
+// The caption says the scale.
+struct FieldDrawing {
+  std::string svg, caption;
+};
+FieldDrawing draw(const ResidualField& field, const Camera& camera);
+
+// Horizontal GNSS residuals in plan, and the vertical ones in block order.
+std::string draw_horizontal(const std::vector<PositionResidual>& residuals);
+std::string draw_vertical(const std::vector<PositionResidual>& residuals);
+
+// Images coloured by tile, boundary frames ringed, images not oriented, control and check points, tie points as a
+// background, links between frames. Layers carry classes that the page's script shows and hides.
+std::string draw_map(const BlockResult& result, const Figures& figures);
+std::string map_legend(const BlockResult& result, const Figures& figures);
+
+// A step of 1, 2 or 5 times a power of ten that divides `range` into at most `parts`.
+double round_step(double range, int parts);
+
+}  // namespace megablock::report

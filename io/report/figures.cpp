@@ -1,0 +1,293 @@
+#include "io/report/figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+namespace megablock::report {
+
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr std::size_t kSampleLimit = 500000;  // values a median is taken from
+constexpr std::int64_t kRayLimit = 24;        // rays of a track compared for its intersection angle
+constexpr int kFieldCells = 24;               // along the longer side of a sensor
+
+// The observations of one triangulated point that count.
+struct Track {
+  std::vector<std::size_t> kept;
+  std::int64_t all = 0;
+};
+
+Track track_of(const BlockResult& result, std::size_t row) {
+  Track track;
+  for (std::int64_t o = result.tracks.begin[row]; o < result.tracks.begin[row + 1]; ++o) {
+    const auto i = static_cast<std::size_t>(o);
+    ++track.all;
+    if (result.kept[i] && std::isfinite(result.residual_x[i]) && std::isfinite(result.residual_y[i]))
+      track.kept.push_back(i);
+  }
+  return track;
+}
+
+Eigen::Vector3d projection_centre(const BlockResult& result, ImageIndex image) {
+  const Image& i = result.block.images[image];
+  const std::vector<Pose>& mounts = result.state.mounts[result.block.frames[i.frame].rig];
+  return camera_pose(result.state.frames[i.frame], mounts[static_cast<std::size_t>(i.mount)]).centre;
+}
+
+class Gatherer {
+ public:
+  explicit Gatherer(const BlockResult& result) : result_(result), block_(result.block) {}
+
+  Figures run() {
+    const bool sound = complete();
+    if (sound) f_.reprojection = reprojection_statistics(result_);
+    prepare();
+    frames();
+    if (sound) observations();
+    positions();
+    points();
+    accuracy();
+    return std::move(f_);
+  }
+
+ private:
+  // State and observations are there for all that the block and the tracks name.
+  bool complete() const {
+    const std::size_t rows = result_.tracks.image.size();
+    return result_.state.oriented.size() == block_.frames.size() &&
+           result_.state.frames.size() == block_.frames.size() &&
+           result_.state.cameras.size() == block_.cameras.size() && result_.state.mounts.size() == block_.rigs.size() &&
+           result_.points.size() == result_.tracks.id.size() && result_.kept.size() == rows &&
+           result_.residual_x.size() == rows && result_.residual_y.size() == rows;
+  }
+  void prepare() {
+    f_.track_length = {2, 1, std::vector<std::int64_t>(14, 0)};
+    f_.intersection_deg = {0, 5, std::vector<std::int64_t>(19, 0)};
+    const double rms = f_.reprojection.rms_px > 0 ? f_.reprojection.rms_px : 1;
+    f_.residual_px = {-4 * rms / std::sqrt(2.0), 8 * rms / std::sqrt(2.0) / 41, std::vector<std::int64_t>(41, 0)};
+    f_.observations.assign(block_.images.size(), 0);
+    f_.camera_images.assign(block_.cameras.size(), 0);
+    for (const Camera& camera : block_.cameras) {
+      ResidualField field;
+      const double cell = std::max(camera.width, camera.height) / static_cast<double>(kFieldCells);
+      field.columns = std::clamp(static_cast<int>(std::lround(camera.width / cell)), 1, kFieldCells);
+      field.rows = std::clamp(static_cast<int>(std::lround(camera.height / cell)), 1, kFieldCells);
+      const auto cells = static_cast<std::size_t>(field.columns * field.rows);
+      field.sum.assign(cells, Eigen::Vector2d::Zero());
+      field.count.assign(cells, 0);
+      f_.fields.push_back(std::move(field));
+    }
+    const auto tiles = static_cast<std::size_t>(result_.tiles.tile_count);
+    f_.tile_frames.assign(tiles, 0);
+    f_.tile_boundary.assign(tiles, 0);
+    f_.tile_observations.assign(tiles, 0);
+    f_.tile_rms_px.assign(tiles, 0);
+  }
+
+  TileIndex tile_of(FrameIndex frame) const {
+    const auto& tiles = result_.tiles.tile_of_frame;
+    return tiles.contains(frame) && tiles[frame].value < result_.tiles.tile_count ? tiles[frame] : TileIndex();
+  }
+
+  void frames() {
+    f_.frames = static_cast<std::int64_t>(block_.frames.size());
+    std::set<std::int32_t> components;
+    for (FrameIndex frame(0); frame.value < f_.frames; ++frame.value) {
+      const bool boundary = result_.boundary.contains(frame) && result_.boundary[frame];
+      f_.oriented_frames += oriented(result_, frame);
+      f_.boundary_frames += boundary;
+      if (result_.tiles.component.contains(frame) && result_.tiles.component[frame] >= 0)
+        components.insert(result_.tiles.component[frame]);
+      if (!tile_of(frame).valid()) continue;
+      const auto tile = static_cast<std::size_t>(tile_of(frame).value);
+      ++f_.tile_frames[tile];
+      f_.tile_boundary[tile] += boundary;
+    }
+    f_.components = static_cast<std::int64_t>(components.size());
+    for (ImageIndex image(0); block_.images.contains(image); ++image.value) {
+      if (oriented(result_, block_.images[image].frame))
+        ++f_.camera_images[block_.camera_of(image)];
+      else
+        f_.not_oriented.push_back(image);
+    }
+  }
+
+  void observations() {
+    const std::size_t step = 1 + result_.points.size() / kSampleLimit;
+    std::vector<double> resolution;
+    for (std::size_t row = 0; row < result_.points.size(); ++row) {
+      if (!result_.points[row].allFinite()) continue;
+      const Track track = track_of(result_, row);
+      f_.all_observations += track.all;
+      if (track.kept.empty()) continue;
+      f_.track_length.add(static_cast<double>(track.kept.size()));
+      for (std::size_t o : track.kept) observation(o);
+      if (row % step == 0) intersection(row, track, resolution);
+    }
+    f_.ground_resolution_m = spread(std::move(resolution)).median;
+    for (std::size_t t = 0; t < f_.tile_rms_px.size(); ++t)
+      f_.tile_rms_px[t] = f_.tile_observations[t]
+                              ? std::sqrt(f_.tile_rms_px[t] / static_cast<double>(f_.tile_observations[t]))
+                              : kUnknown;
+    std::int64_t most = 1;
+    for (std::int64_t n : f_.observations) most = std::max(most, n);
+    f_.observations_per_image = {0, std::max(1.0, std::ceil(static_cast<double>(most + 1) / 25)),
+                                 std::vector<std::int64_t>(25, 0)};
+    for (ImageIndex image(0); block_.images.contains(image); ++image.value)
+      if (oriented(result_, block_.images[image].frame))
+        f_.observations_per_image.add(static_cast<double>(f_.observations[image]));
+  }
+
+  void observation(std::size_t o) {
+    const ImageIndex image = result_.tracks.image[o];
+    const Eigen::Vector2d residual(result_.residual_x[o], result_.residual_y[o]);
+    ++f_.observations[image];
+    f_.residual_px.add(residual.x());
+    f_.residual_px.add(residual.y());
+    const CameraIndex camera = block_.camera_of(image);
+    ResidualField& field = f_.fields[camera];
+    const auto cell = [](std::int32_t position, int size, int cells) {
+      return std::clamp(static_cast<int>(from_fixed_pixel(position) / size * cells), 0, cells - 1);
+    };
+    const int column = cell(result_.tracks.x[o], block_.cameras[camera].width, field.columns);
+    const int row = cell(result_.tracks.y[o], block_.cameras[camera].height, field.rows);
+    field.sum[static_cast<std::size_t>(row * field.columns + column)] += residual;
+    ++field.count[static_cast<std::size_t>(row * field.columns + column)];
+    field.squares += residual.squaredNorm();
+    ++field.observations;
+    const TileIndex tile = tile_of(block_.images[image].frame);
+    if (!tile.valid()) return;
+    ++f_.tile_observations[static_cast<std::size_t>(tile.value)];
+    f_.tile_rms_px[static_cast<std::size_t>(tile.value)] += residual.squaredNorm();
+  }
+
+  void intersection(std::size_t row, const Track& track, std::vector<double>& resolution) {
+    std::vector<Eigen::Vector3d> rays;
+    for (std::size_t o : track.kept) {
+      if (static_cast<std::int64_t>(rays.size()) == kRayLimit) break;
+      const ImageIndex image = result_.tracks.image[o];
+      const Eigen::Vector3d ray = result_.points[row] - projection_centre(result_, image);
+      resolution.push_back(ray.norm() / result_.state.cameras[block_.camera_of(image)][kFocal]);
+      rays.push_back(ray.normalized());
+    }
+    double least = 1;
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      for (std::size_t j = i + 1; j < rays.size(); ++j) least = std::min(least, rays[i].dot(rays[j]));
+    if (rays.size() > 1) f_.intersection_deg.add(std::acos(std::clamp(least, -1.0, 1.0)) * kDegrees);
+  }
+
+  void positions() {
+    for (FrameIndex frame(0); frame.value < f_.frames; ++frame.value) {
+      if (!oriented(result_, frame)) continue;
+      const Pose& pose = result_.state.frames[frame];
+      if (const auto& prior = block_.frames[frame].position_prior) {
+        const Eigen::Vector3d antenna = pose.centre + pose.rotation.conjugate() * prior->lever_arm;
+        f_.positions.push_back({frame, antenna - prior->position, prior->sigma});
+      }
+      if (const auto& prior = block_.frames[frame].attitude_prior)
+        f_.attitude_deg.push_back(pose.rotation.angularDistance(prior->rotation_cw) * kDegrees);
+    }
+  }
+
+  void points() {
+    for (std::size_t p = 0; p < block_.control_points.size() && p < result_.control.size(); ++p) {
+      const BlockResult::ControlResult& control = result_.control[p];
+      PointResidual residual;
+      residual.point = p;
+      residual.difference = control.adjusted - block_.control_points[p].position;
+      double squares = 0;
+      for (const Eigen::Vector2d& r : control.residual_px) {
+        if (!r.allFinite()) continue;
+        ++residual.images;
+        squares += r.squaredNorm();
+      }
+      if (residual.images) residual.rms_px = std::sqrt(squares / residual.images);
+      f_.points.push_back(residual);
+    }
+  }
+
+  void accuracy() {
+    std::array<std::vector<double>, 4> frame;
+    for (FrameIndex i(0); i.value < f_.frames && result_.frame_covariance.contains(i); ++i.value) {
+      if (!oriented(result_, i)) continue;
+      const auto sigma = result_.frame_covariance[i].diagonal().cwiseMax(0).cwiseSqrt().eval();
+      for (int k = 0; k < 3; ++k) frame[static_cast<std::size_t>(k)].push_back(sigma[3 + k]);
+      frame[3].push_back(sigma.head<3>().maxCoeff());
+    }
+    f_.sigma_east = spread(std::move(frame[0]));
+    f_.sigma_north = spread(std::move(frame[1]));
+    f_.sigma_up = spread(std::move(frame[2]));
+    f_.sigma_rotation = spread(std::move(frame[3]));
+    std::vector<double> horizontal, up;
+    const std::size_t step = 1 + result_.point_covariance.size() / kSampleLimit;
+    for (std::size_t p = 0; p < result_.point_covariance.size(); p += step) {
+      const Eigen::Matrix3d& c = result_.point_covariance[p];
+      if (!c.allFinite() || !result_.points[p].allFinite()) continue;
+      horizontal.push_back(std::sqrt(std::max(0.0, c(0, 0) + c(1, 1))));
+      up.push_back(std::sqrt(std::max(0.0, c(2, 2))));
+    }
+    f_.point_sigma_horizontal = spread(std::move(horizontal));
+    f_.point_sigma_up = spread(std::move(up));
+  }
+
+  const BlockResult& result_;
+  const Block& block_;
+  Figures f_;
+};
+
+}  // namespace
+
+void Histogram::add(double value) {
+  if (!std::isfinite(value) || bins.empty()) return;
+  const double bin = std::clamp(std::floor((value - low) / width), 0.0, static_cast<double>(bins.size() - 1));
+  ++bins[static_cast<std::size_t>(bin)];
+}
+
+std::int64_t Histogram::total() const {
+  std::int64_t sum = 0;
+  for (std::int64_t bin : bins) sum += bin;
+  return sum;
+}
+
+Spread spread(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
+  if (values.empty()) return {};
+  const auto at = [&](double share) {
+    const auto n = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), n, values.end());
+    return *n;
+  };
+  return {at(0.5), at(0.95), at(1)};
+}
+
+Eigen::Vector2d ResidualField::mean(int row, int column) const {
+  const auto cell = static_cast<std::size_t>(row * columns + column);
+  return count[cell] ? Eigen::Vector2d(sum[cell] / static_cast<double>(count[cell])) : Eigen::Vector2d::Zero();
+}
+
+bool oriented(const BlockResult& result, FrameIndex frame) {
+  return result.state.oriented.contains(frame) && result.state.oriented[frame] != 0;
+}
+
+Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values) {
+  Eigen::Vector3d result;
+  for (int k = 0; k < 3; ++k) {
+    double squares = 0;
+    std::int64_t n = 0;
+    for (const Eigen::Vector3d& v : values) {
+      if (!std::isfinite(v[k])) continue;
+      squares += v[k] * v[k];
+      ++n;
+    }
+    result[k] = n ? std::sqrt(squares / static_cast<double>(n)) : kUnknown;
+  }
+  return result;
+}
+
+Figures figures_of(const BlockResult& result) { return Gatherer(result).run(); }
+
+}  // namespace megablock::report

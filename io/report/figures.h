@@ -1,0 +1,77 @@
+// The figures the report prints and draws, gathered in one pass over the result.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "io/result.h"
+
+namespace megablock::report {
+
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+// Equal bins from `low`; what lies outside goes to the first or last bin.
+struct Histogram {
+  double low = 0, width = 1;
+  std::vector<std::int64_t> bins;
+  void add(double value);
+  std::int64_t total() const;
+};
+
+// Middle, 95 % and largest of some values; unknown without values.
+struct Spread {
+  double median = kUnknown, p95 = kUnknown, largest = kUnknown;
+};
+Spread spread(std::vector<double> values);
+
+// Kept residuals binned over the sensor of a camera.
+struct ResidualField {
+  int columns = 0, rows = 0;
+  std::vector<Eigen::Vector2d> sum;  // adjusted minus measured, px
+  std::vector<std::int64_t> count;
+  double squares = 0;
+  std::int64_t observations = 0;
+  Eigen::Vector2d mean(int row, int column) const;
+};
+
+struct PositionResidual {
+  FrameIndex frame;
+  Eigen::Vector3d difference;  // adjusted antenna minus GNSS, east north up, metres
+  Eigen::Vector3d sigma;       // stated
+};
+
+struct PointResidual {
+  std::size_t point;           // in block.control_points
+  Eigen::Vector3d difference;  // adjusted minus given, metres; NaN where unknown
+  int images = 0;              // with a residual
+  double rms_px = kUnknown;
+};
+
+struct Figures {
+  ReprojectionStatistics reprojection;
+  std::int64_t frames = 0, oriented_frames = 0, boundary_frames = 0, components = 0;
+  std::int64_t all_observations = 0;  // of triangulated points, rejected ones included
+  Histogram track_length, intersection_deg, residual_px, observations_per_image;
+  IndexedVector<ImageIndex, std::int64_t> observations;  // kept, per image
+  IndexedVector<CameraIndex, ResidualField> fields;
+  IndexedVector<CameraIndex, std::int64_t> camera_images;    // oriented
+  double ground_resolution_m = kUnknown;                     // median of distance over focal length
+  std::vector<PositionResidual> positions;                   // frames with GNSS and pose, block order
+  std::vector<PointResidual> points;                         // control and check points seen
+  std::vector<double> attitude_deg;                          // angle between adjusted and observed attitude
+  Spread sigma_east, sigma_north, sigma_up, sigma_rotation;  // frames; metres, radians (largest of the three axes)
+  Spread point_sigma_horizontal, point_sigma_up;
+  std::vector<std::int64_t> tile_frames, tile_boundary, tile_observations;
+  std::vector<double> tile_rms_px;
+  std::vector<ImageIndex> not_oriented;
+};
+
+Figures figures_of(const BlockResult& result);
+
+bool oriented(const BlockResult& result, FrameIndex frame);
+
+// Root mean square of the components, each over its finite values; unknown without any.
+Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values);
+
+}  // namespace megablock::report

@@ -1,0 +1,112 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "io/report/sections.h"
+
+namespace megablock::report {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json vector(const Eigen::Vector3d& v) { return Json{number(v.x()), number(v.y()), number(v.z())}; }
+
+Json histogram(const Histogram& h) { return {{"low", h.low}, {"width", h.width}, {"counts", h.bins}}; }
+
+Json spread_of(const Spread& s) {
+  return {{"median", number(s.median)}, {"p95", number(s.p95)}, {"largest", number(s.largest)}};
+}
+
+Json stages(const BlockResult& result) {
+  Json list = Json::array();
+  for (const StageStatistics& stage : result.stages)
+    list.push_back({{"name", stage.name},
+                    {"seconds", number(stage.seconds)},
+                    {"peak_rss_mib", number(stage.peak_rss_mib)},
+                    {"units", stage.units},
+                    {"failed", stage.failed}});
+  return list;
+}
+
+Json points(const BlockResult& result, const Figures& f) {
+  Json list = Json::array();
+  for (const PointResidual& r : f.points) {
+    const ControlPoint& point = result.block.control_points[r.point];
+    list.push_back({{"name", point.name},
+                    {"role", point.role == PointRole::kCheck ? "check" : "control"},
+                    {"difference_m", vector(r.difference)},
+                    {"images", r.images},
+                    {"rms_px", number(r.rms_px)}});
+  }
+  return list;
+}
+
+Json failures(const BlockResult& result) {
+  Json list = Json::array();
+  for (const FailedUnit& failure : result.failures)
+    list.push_back({{"stage", failure.stage}, {"unit", failure.unit}, {"reason", failure.reason}});
+  return list;
+}
+
+Json cameras(const BlockResult& result) {
+  Json list = Json::array();
+  for (CameraIndex c(0); result.block.cameras.contains(c); ++c.value) {
+    Json parameters;
+    for (int k = 0; k < kIntrinsicCount; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      const bool sigmas = result.camera_covariance.contains(c);
+      parameters[kIntrinsicNames[at]] = {
+          {"value", number(result.state.cameras.contains(c) ? result.state.cameras[c][at] : kUnknown)},
+          {"sigma", number(sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[c](k, k))) : kUnknown)}};
+    }
+    list.push_back({{"name", result.block.cameras[c].name}, {"parameters", parameters}});
+  }
+  return list;
+}
+
+}  // namespace
+
+std::string figures_json(const BlockResult& result, const Figures& f) {
+  std::vector<Eigen::Vector3d> differences;
+  for (const PositionResidual& r : f.positions) differences.push_back(r.difference);
+  Json json = {{"images", result.block.images.size()},
+               {"oriented", f.reprojection.oriented_images},
+               {"points", f.reprojection.points},
+               {"observations", f.reprojection.observations},
+               {"mean_reprojection_px", number(f.reprojection.mean_px)},
+               {"rms_reprojection_px", number(f.reprojection.rms_px)},
+               {"mean_track_length", number(f.reprojection.mean_track_length)},
+               {"chi2_per_dof", result.degrees_of_freedom > 0 ? number(result.variance_factor) : Json(nullptr)},
+               {"degrees_of_freedom", result.degrees_of_freedom},
+               {"tiles", result.tiles.tile_count},
+               {"components", f.components},
+               {"boundary_frames", f.boundary_frames},
+               {"global_iterations", result.global_iterations},
+               {"newton_decrement", number(result.newton_decrement)},
+               {"ground_resolution_m", number(f.ground_resolution_m)},
+               {"gauge", result.gauge},
+               {"digest", result.digest},
+               {"gnss_frames", f.positions.size()},
+               {"gnss_rms_m", vector(root_mean_square(differences))},
+               {"sigma_east_m", spread_of(f.sigma_east)},
+               {"sigma_north_m", spread_of(f.sigma_north)},
+               {"sigma_up_m", spread_of(f.sigma_up)},
+               {"sigma_rotation_rad", spread_of(f.sigma_rotation)},
+               {"track_length", histogram(f.track_length)},
+               {"intersection_angle_deg", histogram(f.intersection_deg)},
+               {"residual_px", histogram(f.residual_px)},
+               {"control_points", points(result, f)},
+               {"cameras", cameras(result)},
+               {"failures", failures(result)},
+               {"stages", stages(result)},
+               {"notes", result.notes}};
+  // Names may hold anything: bytes that are no UTF-8 are replaced, and no text can end the script element.
+  const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace);
+  std::string safe;
+  for (char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
+  return safe;
+}
+
+}  // namespace megablock::report

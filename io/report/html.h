@@ -1,0 +1,51 @@
+// Text and numbers for the report's HTML.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace megablock::report {
+
+std::string escape(std::string_view text);  // for HTML text and attribute values
+
+inline constexpr const char* kMissing = "–";  // printed for what is not a finite number
+
+std::string count(std::int64_t value);                  // 27 503, grouped by narrow spaces
+std::string fixed(double value, int decimals);          // kMissing when not finite
+std::string significant(double value, int digits = 3);  // plain decimals, or a power of ten for extremes
+std::string with_sign(double value, int decimals);      // +0.012, −0.003
+std::string percent(double part, double whole);         // 99.4 %; never rounded up to 100 %
+std::string duration(double seconds);                   // 0.4 s, 12 s, 3 min 05 s, 2 h 10 min
+std::string memory(double mebibytes);                   // 412 MiB, 2.1 GiB
+
+// A unit of length in which values up to `largest` metres read well.
+struct LengthUnit {
+  double factor;     // values in metres times this
+  const char* name;  // mm, cm, m
+  int decimals;
+};
+LengthUnit length_unit(double largest_m);
+
+// Rows of cells under headings. The first column is text, the others are aligned as numbers unless said otherwise.
+class Table {
+ public:
+  explicit Table(std::vector<std::string> headings, std::size_t text_columns = 1);
+  void add(std::vector<std::string> cells, const std::string& row_class = "");  // cells are HTML
+  bool empty() const { return rows_ == 0; }
+  std::string html(const std::string& table_class = "") const;
+
+ private:
+  std::string cell(const char* tag, const std::string& text, std::size_t column) const;
+  std::vector<std::string> headings_;
+  std::size_t text_columns_, rows_ = 0;
+  std::string body_;
+};
+
+// A titled part of the page.
+std::string section(const std::string& id, const std::string& title, const std::string& body);
+std::string figure(const std::string& drawing, const std::string& caption);
+std::string paragraph(const std::string& text, const std::string& style = "");
+
+}  // namespace megablock::report

@@ -1,0 +1,11 @@
+// The frame of the report's page: styles and script.
+#pragma once
+
+#include <string>
+
+namespace megablock::report {
+
+std::string page(const std::string& title, const std::string& subtitle, const std::string& body,
+                 const std::string& json);
+
+}  // namespace megablock::report
