@@ -1,0 +1,168 @@
+#include "cluster/communicator.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <stdexcept>
+#include <thread>
+
+namespace megablock {
+
+namespace {
+
+bool started_by_launcher() {
+  return std::getenv("OMPI_COMM_WORLD_SIZE") != nullptr || std::getenv("PMIX_RANK") != nullptr ||
+         std::getenv("PMI_RANK") != nullptr;
+}
+
+// Completes a request without spinning: other ranks and our own progress thread need the core.
+void wait_politely(MPI_Request& request) {
+  int done = 0;
+  auto pause = std::chrono::microseconds(20);
+  constexpr auto kLongestPause = std::chrono::microseconds(2000);
+  for (MPI_Test(&request, &done, MPI_STATUS_IGNORE); !done; MPI_Test(&request, &done, MPI_STATUS_IGNORE)) {
+    std::this_thread::sleep_for(pause);
+    pause = std::min(pause * 2, kLongestPause);
+  }
+}
+
+constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // counts of MPI 3 are int
+
+}  // namespace
+
+struct Communicator::Mpi {
+  MPI_Comm world = MPI_COMM_NULL;
+  MPI_Comm progress_world = MPI_COMM_NULL;
+  MPI_Win window = MPI_WIN_NULL;
+  std::int64_t* counter = nullptr;  // memory of the window, significant on rank 0
+  std::atomic<bool> stop{false};
+  std::thread progress;
+};
+
+Communicator::Communicator(int* argc, char*** argv) {
+  if (!started_by_launcher()) return;
+  int provided = 0;
+  MPI_Init_thread(argc, argv, MPI_THREAD_MULTIPLE, &provided);
+  if (provided < MPI_THREAD_MULTIPLE) throw std::runtime_error("MPI library lacks MPI_THREAD_MULTIPLE");
+  mpi_ = std::make_unique<Mpi>();
+  MPI_Comm_dup(MPI_COMM_WORLD, &mpi_->world);
+  MPI_Comm_dup(MPI_COMM_WORLD, &mpi_->progress_world);
+  MPI_Comm_rank(mpi_->world, &rank_);
+  MPI_Comm_size(mpi_->world, &size_);
+
+  MPI_Comm host;
+  MPI_Comm_split_type(mpi_->world, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host);
+  MPI_Comm_size(host, &ranks_on_host_);
+  MPI_Comm_free(&host);
+
+  const MPI_Aint bytes = rank_ == 0 ? sizeof(std::int64_t) : 0;
+  MPI_Win_allocate(bytes, sizeof(std::int64_t), MPI_INFO_NULL, mpi_->world, &mpi_->counter, &mpi_->window);
+  if (rank_ == 0) *mpi_->counter = 0;
+  MPI_Win_lock_all(0, mpi_->window);
+  barrier();
+
+  // Over TCP the counter's rank must enter the library for others' claims to be served: this thread does while the
+  // main thread computes.
+  if (rank_ == 0 && size_ > 1) {
+    mpi_->progress = std::thread([this] {
+      while (!mpi_->stop) {
+        int flag = 0;
+        MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, mpi_->progress_world, &flag, MPI_STATUS_IGNORE);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    });
+  }
+}
+
+Communicator::~Communicator() {
+  if (!mpi_) return;
+  barrier();
+  mpi_->stop = true;
+  if (mpi_->progress.joinable()) mpi_->progress.join();
+  MPI_Win_unlock_all(mpi_->window);
+  MPI_Win_free(&mpi_->window);
+  MPI_Comm_free(&mpi_->progress_world);
+  MPI_Comm_free(&mpi_->world);
+  MPI_Finalize();
+}
+
+void Communicator::barrier() {
+  if (!mpi_) return;
+  MPI_Request request;
+  MPI_Ibarrier(mpi_->world, &request);
+  wait_politely(request);
+}
+
+std::string Communicator::broadcast(const std::string& bytes, int root) {
+  if (!mpi_) return bytes;
+  std::uint64_t size = bytes.size();
+  MPI_Request request;
+  MPI_Ibcast(&size, 1, MPI_UINT64_T, root, mpi_->world, &request);
+  wait_politely(request);
+  std::string result = rank_ == root ? bytes : std::string(size, '\0');
+  for (std::size_t at = 0; at < size; at += kLargestMessage) {
+    const int count = static_cast<int>(std::min<std::size_t>(kLargestMessage, size - at));
+    MPI_Ibcast(result.data() + at, count, MPI_BYTE, root, mpi_->world, &request);
+    wait_politely(request);
+  }
+  return result;
+}
+
+std::vector<std::string> Communicator::gather_all(const std::string& bytes) {
+  if (!mpi_) return {bytes};
+  std::vector<std::string> all(static_cast<std::size_t>(size_));
+  for (int r = 0; r < size_; ++r) all[static_cast<std::size_t>(r)] = broadcast(r == rank_ ? bytes : std::string(), r);
+  return all;
+}
+
+bool Communicator::any(bool value) {
+  if (!mpi_) return value;
+  int in = value ? 1 : 0, out = 0;
+  MPI_Request request;
+  MPI_Iallreduce(&in, &out, 1, MPI_INT, MPI_MAX, mpi_->world, &request);
+  wait_politely(request);
+  return out != 0;
+}
+
+void Communicator::reset_counter() {
+  if (!mpi_) {
+    local_counter_ = 0;
+    return;
+  }
+  barrier();
+  if (rank_ == 0) {
+    const std::int64_t zero = 0;
+    std::int64_t before = 0;
+    MPI_Fetch_and_op(&zero, &before, MPI_INT64_T, 0, 0, MPI_REPLACE, mpi_->window);
+    MPI_Win_flush(0, mpi_->window);
+  }
+  barrier();
+}
+
+std::int64_t Communicator::claim() {
+  if (!mpi_) return local_counter_++;
+  const std::int64_t one = 1;
+  std::int64_t number = 0;
+  MPI_Fetch_and_op(&one, &number, MPI_INT64_T, 0, 0, MPI_SUM, mpi_->window);
+  MPI_Win_flush(0, mpi_->window);
+  return number;
+}
+
+std::int64_t Communicator::counter() const {
+  if (!mpi_) return local_counter_;
+  const std::int64_t unused = 0;
+  std::int64_t number = 0;
+  MPI_Fetch_and_op(&unused, &number, MPI_INT64_T, 0, 0, MPI_NO_OP, mpi_->window);
+  MPI_Win_flush(0, mpi_->window);
+  return number;
+}
+
+void Communicator::abort(int exit_code) {
+  if (mpi_) MPI_Abort(mpi_->world, exit_code);
+  std::_Exit(exit_code);
+}
+
+}  // namespace megablock

@@ -1,0 +1,51 @@
+// The ranks of a run: the only place that talks to MPI.
+//
+// Without mpirun there is one rank and MPI is never initialised. Waits poll with short sleeps instead of spinning, so
+// that more ranks than cores, and a rank in the middle of a unit, do not starve one another.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace megablock {
+
+class Communicator {
+ public:
+  // Initialises MPI (MPI_THREAD_MULTIPLE) when the program was started by mpirun or srun.
+  Communicator(int* argc, char*** argv);
+  ~Communicator();
+  Communicator(const Communicator&) = delete;
+  Communicator& operator=(const Communicator&) = delete;
+
+  int rank() const { return rank_; }
+  int size() const { return size_; }
+  // Ranks on this rank's host, for sharing its cores.
+  int ranks_on_host() const { return ranks_on_host_; }
+
+  void barrier();
+  // The root's bytes on every rank.
+  std::string broadcast(const std::string& bytes, int root = 0);
+  // Every rank's bytes, in rank order, on every rank.
+  std::vector<std::string> gather_all(const std::string& bytes);
+  // True everywhere when it is true on any rank.
+  bool any(bool value);
+
+  // The shared counter from which units are claimed. reset() is collective.
+  void reset_counter();
+  std::int64_t claim();           // next number, from 0; never given twice between resets
+  std::int64_t counter() const;   // numbers given so far (no claim)
+
+  // Ends all ranks at once with this exit code (a rank that fails alone must not leave the others waiting).
+  [[noreturn]] void abort(int exit_code);
+
+ private:
+  struct Mpi;
+  std::unique_ptr<Mpi> mpi_;  // null: one rank without MPI
+  int rank_ = 0, size_ = 1, ranks_on_host_ = 1;
+  std::int64_t local_counter_ = 0;
+};
+
+}  // namespace megablock

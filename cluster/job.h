@@ -1,0 +1,42 @@
+// What every stage of a run shares: the store, the ranks, the options, the record of what happened.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cluster/communicator.h"
+#include "cluster/job_options.h"
+#include "io/block.h"
+#include "io/events.h"
+#include "io/job_store.h"
+#include "io/result.h"
+
+namespace megablock {
+
+struct RunOptions {
+  std::string project;      // block.yaml
+  std::string directory;    // of the job
+  int threads = 0;          // per rank; 0 = cores of the host / ranks on it
+  double memory_mib = 0;    // per rank for factors of the merge; 0 = half of the host's memory / ranks on it
+  bool strict = false;      // a failed unit ends the run
+  bool quiet = false;       // no progress
+  std::string last_stage;   // stop after this stage; empty = all
+};
+
+struct Job {
+  RunOptions options;
+  Communicator& ranks;
+  JobStore store;
+  JobOptions settings;
+  EventLog events;
+  Block block;
+  std::vector<std::int64_t> generations;    // image counts at which the block grew; the last is its size
+  std::vector<StageStatistics> statistics;  // of this run, in order
+  std::vector<FailedUnit> failures;         // of all stages so far
+  std::vector<std::string> notes;           // warnings for the report
+
+  bool is_first_rank() const { return ranks.rank() == 0; }
+};
+
+}  // namespace megablock

@@ -1,0 +1,73 @@
+#include "cluster/progress.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+
+namespace megablock {
+
+double monotonic_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string duration_text(double seconds) {
+  const auto whole = static_cast<long long>(seconds + 0.5);
+  if (whole < 60) return std::to_string(whole) + " s";
+  if (whole < 3600) return std::to_string(whole / 60) + " min " + std::to_string(whole % 60) + " s";
+  return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
+}
+
+Progress::Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_begun, bool quiet)
+    : stage_(std::move(stage)),
+      units_(units),
+      units_begun_(std::move(units_begun)),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      start_s_(monotonic_seconds()) {
+  if (quiet || units == 0) return;
+  thread_ = std::thread([this] {
+    const double interval_s = terminal_ ? 0.25 : 5;
+    double next_s = start_s_ + interval_s;
+    while (!stop_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      if (monotonic_seconds() < next_s) continue;
+      print(units_begun_(), false);
+      next_s = monotonic_seconds() + interval_s;
+    }
+  });
+}
+
+Progress::~Progress() {
+  stop_ = true;
+  if (!thread_.joinable()) return;
+  thread_.join();
+  if (terminal_) print(units_, true);
+}
+
+void Progress::print(std::int64_t begun, bool last) {
+  const std::int64_t done = std::clamp<std::int64_t>(last ? units_ : begun - 1, 0, units_);
+  const double elapsed = monotonic_seconds() - start_s_;
+  std::string line = stage_;
+  line.resize(std::max<std::size_t>(line.size(), 12), ' ');
+  if (terminal_) {
+    winsize size{};
+    const int columns = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+    const int width = std::clamp(columns - 58, 0, 40);
+    const int filled = units_ > 0 ? static_cast<int>(width * done / units_) : width;
+    if (width > 4) line += " [" + std::string(filled, '#') + std::string(width - filled, '.') + "]";
+  }
+  line += " " + std::to_string(done) + "/" + std::to_string(units_) + " units, " + duration_text(elapsed);
+  if (!last && done > 0) line += ", " + duration_text(elapsed / double(done) * double(units_ - done)) + " left";
+  if (terminal_) {
+    const std::string padding(printed_width_ > line.size() ? printed_width_ - line.size() : 0, ' ');
+    printed_width_ = line.size();
+    std::fprintf(stderr, "\r%s%s%s", line.c_str(), padding.c_str(), last ? "\n" : "");
+  } else {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  }
+  std::fflush(stderr);
+}
+
+}  // namespace megablock

@@ -1,0 +1,38 @@
+// Progress of a stage on rank 0: a bar with rate and time left on a terminal, a plain line every few seconds otherwise.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <thread>
+
+namespace megablock {
+
+class Progress {
+ public:
+  // `units_begun` is polled from a thread of its own; quiet: prints nothing at all.
+  Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_begun, bool quiet);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+ private:
+  void print(std::int64_t begun, bool last);
+
+  std::string stage_;
+  std::int64_t units_;
+  std::function<std::int64_t()> units_begun_;
+  bool terminal_ = false;
+  double start_s_ = 0;
+  std::size_t printed_width_ = 0;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+// Seconds on a clock that only goes forward.
+double monotonic_seconds();
+// "42 s", "3 min 20 s", "5 h 12 min".
+std::string duration_text(double seconds);
+
+}  // namespace megablock

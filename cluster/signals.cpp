@@ -1,0 +1,51 @@
+#include "cluster/signals.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <thread>
+
+#include "cluster/exit_codes.h"
+
+namespace megablock {
+
+namespace {
+
+std::atomic<bool>& stop_flag() {
+  static std::atomic<bool> flag{false};  // a signal belongs to the process: the one piece of state it can have
+  return flag;
+}
+
+void write_line(const char* text, std::size_t size) {
+  if (::write(STDERR_FILENO, text, size) < 0) {
+    // Nothing to do: the terminal is gone and we are leaving.
+  }
+}
+
+}  // namespace
+
+void watch_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (int signal : {SIGUSR1, SIGTERM, SIGINT}) sigaddset(&signals, signal);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::thread([signals] {
+    for (;;) {
+      int signal = 0;
+      if (sigwait(&signals, &signal) != 0) continue;
+      if (signal == SIGUSR1) {
+        stop_flag() = true;
+        continue;
+      }
+      constexpr char kText[] = "megablock: stopped; the units in hand are abandoned, run the same command to resume\n";
+      write_line(kText, sizeof kText - 1);
+      std::_Exit(kExitInterrupted);
+    }
+  }).detach();
+}
+
+bool stop_requested() { return stop_flag(); }
+
+}  // namespace megablock

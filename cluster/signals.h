@@ -1,0 +1,16 @@
+// Stopping (architecture.md section 5).
+//
+// SIGUSR1: graceful; the work queue hands out no further units, all ranks finish the one in hand and return 75.
+// SIGTERM, SIGINT: the units in hand are abandoned at once and the process leaves with 75. The store is valid either
+// way: units appear whole or not at all.
+#pragma once
+
+namespace megablock {
+
+// Blocks the three signals in this and all later threads and starts the thread that waits for them. Call first in main.
+void watch_signals();
+
+// True once a graceful stop was asked for.
+bool stop_requested();
+
+}  // namespace megablock

@@ -1,0 +1,34 @@
+// A stage = a list of units; ranks claim them from the shared counter (architecture.md section 5).
+//
+// A unit is skipped when its file is up to date and whole, else computed by the rank that claimed it. An error in one
+// unit is recorded with its reason and the stage goes on. The list must be the same on every rank; a unit's result
+// depends on its inputs alone, so it does not matter who computes it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cluster/job.h"
+#include "io/result.h"
+
+namespace megablock {
+
+struct Unit {
+  std::string name;               // its file in the job: "features/000003.h5"
+  std::uint64_t fingerprint = 0;  // of everything it is computed from
+  double cost = 0;                // any scale; units are claimed by decreasing cost, then in list order
+  std::function<void(const std::string& path)> write;  // computes and writes the payload
+};
+
+struct StageOutcome {
+  std::vector<FailedUnit> failures;  // the same on every rank, in unit order
+  std::int64_t computed = 0;         // by all ranks
+};
+
+// Collective. Throws Interrupted (on every rank) after a graceful stop. With job.options.strict a failed unit ends the
+// run with ComputeError.
+StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units);
+
+}  // namespace megablock
