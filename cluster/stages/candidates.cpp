@@ -1,0 +1,74 @@
+#include <algorithm>
+
+#include "cluster/stages/stages.h"
+#include "io/hash.h"
+#include "io/unit_files.h"
+#include "partition/candidates.h"
+
+namespace megablock {
+
+namespace {
+
+using GlobalDescriptors = IndexedVector<ImageIndex, std::array<float, 128>>;
+
+GlobalDescriptors read_descriptors(const Job& job, const FeatureStage& features) {
+  GlobalDescriptors all;
+  for (const std::string& shard : features.shards)
+    for (const ImageFeatures& image : read_features(job.store.verified_path(shard))) all.push_back(image.global_descriptor);
+  return all;
+}
+
+std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& features) {
+  Hasher hasher;
+  hasher.add(algorithm::kCandidates);
+  add_to_hash(hasher, job.settings.candidates);
+  hasher.add(features.image_fingerprint).add(job.generations);
+  for (const Image& image : job.block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
+  for (const Frame& frame : job.block.frames) {
+    hasher.add(frame.name).add(frame.pass).add(frame.time_s);
+    if (frame.position_prior)
+      for (int i = 0; i < 3; ++i) hasher.add(frame.position_prior->position[i]).add(frame.position_prior->sigma[i]);
+    if (frame.attitude_prior) hasher.add(frame.attitude_prior->rotation_cw.w()).add(frame.attitude_prior->rotation_cw.z());
+    if (frame.given_pose)
+      for (int i = 0; i < 3; ++i) hasher.add(frame.given_pose->centre[i]);
+  }
+  return hasher.value();
+}
+
+// The first n images of the block and the frames they belong to (frames are in order of their first image).
+Block first_images(const Block& block, std::int64_t n) {
+  Block part = block;
+  part.images.resize(static_cast<std::size_t>(n));
+  std::int64_t frames = 0;
+  for (const Image& image : part.images) frames = std::max(frames, image.frame.value + 1);
+  part.frames.resize(static_cast<std::size_t>(frames));
+  part.relative_poses.clear();
+  part.control_points.clear();
+  return part;
+}
+
+}  // namespace
+
+CandidateGraph run_candidates(Job& job, const FeatureStage& features) {
+  Unit unit;
+  unit.name = "graph.h5";
+  unit.fingerprint = candidates_fingerprint(job, features);
+  unit.write = [&](const std::string& path) {
+    const GlobalDescriptors descriptors = read_descriptors(job, features);
+    // Grown as the block grew, so that pairs and cells of earlier images stay what they were.
+    CandidateGraph graph;
+    std::int64_t before = 0;
+    for (const std::int64_t n : job.generations) {
+      const Block part = first_images(job.block, n);
+      GlobalDescriptors some(descriptors.begin(), descriptors.begin() + n);
+      graph = before == 0 ? candidate_pairs(part, some, job.settings.candidates)
+                          : extend_candidates(graph, part, some, ImageIndex(before), job.settings.candidates);
+      before = n;
+    }
+    write_candidates(path, graph);
+  };
+  run_stage(job, "candidates", {unit});
+  return read_candidates(job.store.verified_path(unit.name));
+}
+
+}  // namespace megablock

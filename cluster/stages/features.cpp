@@ -1,0 +1,95 @@
+#include <algorithm>
+#include <cstdio>
+
+#include "cluster/stages/stages.h"
+#include "io/hash.h"
+#include "io/unit_files.h"
+#include "match/features.h"
+
+namespace megablock {
+
+std::string unit_name(const std::string& folder, std::int64_t number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "/%06lld.h5", static_cast<long long>(number));
+  return folder + text;
+}
+
+namespace {
+
+std::uint64_t mask_hash(const std::string& path) { return path.empty() ? 0 : hash_file(path); }
+
+std::vector<std::uint64_t> image_fingerprints(const Job& job) {
+  IndexedVector<CameraIndex, std::uint64_t> masks;
+  for (const Camera& camera : job.block.cameras) masks.push_back(mask_hash(camera.mask_path));
+  std::vector<std::uint64_t> fingerprints;
+  for (std::size_t i = 0; i < job.block.images.size(); ++i) {
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    Hasher hasher;
+    hasher.add(algorithm::kFeatures);
+    add_to_hash(hasher, job.settings.features);
+    hasher.add(job.block.images[image].file_hash).add(masks[job.block.camera_of(image)]);
+    fingerprints.push_back(hasher.value());
+  }
+  return fingerprints;
+}
+
+void write_shard(const Job& job, std::int64_t first, std::int64_t end, const std::string& path) {
+  std::vector<ImageFeatures> shard(static_cast<std::size_t>(end - first));
+#pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
+  for (std::int64_t i = first; i < end; ++i) {
+    const ImageIndex image(i);
+    const std::string& mask = job.block.cameras[job.block.camera_of(image)].mask_path;
+    shard[static_cast<std::size_t>(i - first)] =
+        detect_features(job.block.images[image].path, mask, image, job.settings.features);
+  }
+  write_features(path, shard);
+}
+
+}  // namespace
+
+FeatureStage run_features(Job& job) {
+  FeatureStage stage;
+  stage.image_fingerprint = image_fingerprints(job);
+  const auto images = static_cast<std::int64_t>(job.block.images.size());
+  std::vector<Unit> units;
+  for (std::int64_t first = 0; first < images; first += kShardImages) {
+    const std::int64_t end = std::min(images, first + kShardImages);
+    Hasher hasher;
+    for (std::int64_t i = first; i < end; ++i) hasher.add(stage.image_fingerprint[static_cast<std::size_t>(i)]);
+    Unit unit;
+    unit.name = unit_name("features", first / kShardImages);
+    unit.fingerprint = hasher.value();
+    unit.cost = static_cast<double>(end - first);
+    unit.write = [&job, first, end](const std::string& path) { write_shard(job, first, end, path); };
+    stage.shards.push_back(unit.name);
+    units.push_back(std::move(unit));
+  }
+  run_stage(job, "features", units);
+  return stage;
+}
+
+const FeatureCache::Shard& FeatureCache::shard(std::int64_t number) {
+  auto found = std::find_if(shards_.begin(), shards_.end(), [&](const Shard& s) { return s.number == number; });
+  if (found == shards_.end()) {
+    if (shards_.size() >= capacity_) shards_.erase(shards_.begin());
+    shards_.push_back({number, read_features(store_.verified_path(unit_name("features", number)))});
+    return shards_.back();
+  }
+  std::rotate(found, found + 1, shards_.end());
+  return shards_.back();
+}
+
+const ImageFeatures& FeatureCache::features(ImageIndex image) {
+  return shard(image.value / kShardImages).images[static_cast<std::size_t>(image.value % kShardImages)];
+}
+
+void FeatureCache::load(const std::vector<ImageIndex>& images) {
+  std::vector<std::int64_t> numbers;
+  for (const ImageIndex image : images) numbers.push_back(image.value / kShardImages);
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  capacity_ = std::max(capacity_, numbers.size());
+  for (const std::int64_t number : numbers) shard(number);
+}
+
+}  // namespace megablock

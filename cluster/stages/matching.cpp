@@ -1,0 +1,87 @@
+#include <algorithm>
+
+#include "cluster/stages/stages.h"
+#include "io/hash.h"
+#include "io/unit_files.h"
+#include "match/pair_matching.h"
+
+namespace megablock {
+
+namespace {
+
+std::vector<ImagePair> cell_pairs(const CandidateGraph& graph, std::size_t cell) {
+  std::vector<ImagePair> pairs;
+  for (std::int64_t row = graph.cell_begin[cell]; row < graph.cell_begin[cell + 1]; ++row)
+    pairs.push_back(graph.pairs[static_cast<std::size_t>(graph.cell_pairs[static_cast<std::size_t>(row)])]);
+  return pairs;
+}
+
+void add_camera(Hasher& hasher, const Camera& camera) {
+  hasher.add(camera.width).add(camera.height).add(camera.focal_known);
+  for (const double value : camera.intrinsics) hasher.add(value);
+}
+
+std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs) {
+  Hasher hasher;
+  hasher.add(algorithm::kMatching);
+  add_to_hash(hasher, job.settings.matching);
+  for (const ImagePair& pair : pairs) {
+    for (const ImageIndex image : {pair.a, pair.b}) {
+      hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
+      add_camera(hasher, job.block.cameras[job.block.camera_of(image)]);
+    }
+  }
+  return hasher.value();
+}
+
+std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const std::vector<ImagePair>& pairs) {
+  std::vector<ImageIndex> images;
+  for (const ImagePair& pair : pairs) images.insert(images.end(), {pair.a, pair.b});
+  cache.load(images);
+  std::vector<const ImageFeatures*> a(pairs.size()), b(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    a[i] = &cache.features(pairs[i].a);
+    b[i] = &cache.features(pairs[i].b);
+  }
+  std::vector<VerifiedPair> verified(pairs.size());
+  const Block& block = job.block;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    verified[i] = match_pair(*a[i], *b[i], block.cameras[block.camera_of(pairs[i].a)],
+                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching);
+  std::erase_if(verified, [](const VerifiedPair& pair) { return pair.model == PairModel::kNone; });
+  return verified;
+}
+
+}  // namespace
+
+std::vector<std::string> run_matching(Job& job, const FeatureStage& features, const CandidateGraph& graph) {
+  constexpr std::size_t kResidentShards = 16;
+  FeatureCache cache(job.store, kResidentShards);
+  std::vector<Unit> units;
+  std::vector<std::string> names;
+  for (std::size_t cell = 0; cell + 1 < graph.cell_begin.size(); ++cell) {
+    const std::vector<ImagePair> pairs = cell_pairs(graph, cell);
+    Unit unit;
+    unit.name = unit_name("matches", static_cast<std::int64_t>(cell));
+    unit.fingerprint = cell_fingerprint(job, features, pairs);
+    unit.cost = static_cast<double>(pairs.size());
+    unit.write = [&job, &cache, pairs](const std::string& path) { write_matches(path, match_cell(job, cache, pairs)); };
+    names.push_back(unit.name);
+    units.push_back(std::move(unit));
+  }
+  run_stage(job, "matching", units);
+  std::erase_if(names, [&](const std::string& name) { return !job.store.seal(name); });
+  return names;
+}
+
+std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches) {
+  std::vector<VerifiedPair> all;
+  for (const std::string& name : matches) {
+    std::vector<VerifiedPair> cell = read_matches(job.store.verified_path(name));
+    std::move(cell.begin(), cell.end(), std::back_inserter(all));
+  }
+  return all;
+}
+
+}  // namespace megablock
