@@ -4,6 +4,7 @@
 #include <numeric>
 #include <nlohmann/json.hpp>
 
+#include "cluster/collective.h"
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"
 #include "cluster/signals.h"
@@ -74,6 +75,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   reset_peak_rss();
   job.ranks.reset_counter();
   RankRecord mine;
+  std::string fatal;  // concerns the run, not the unit: a full disk, a read-only job
   {
     Progress progress(stage, static_cast<std::int64_t>(units.size()), [&] { return job.ranks.counter(); },
                       job.options.quiet || !job.is_first_rank());
@@ -89,8 +91,9 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       try {
         compute_unit(job, stage, unit, claim_s);
         ++mine.computed;
-      } catch (const InputError&) {
-        throw;  // a full disk or a read-only job concerns the run, not the unit
+      } catch (const InputError& error) {
+        fatal = error.what();
+        break;
       } catch (const std::exception& error) {
         mine.failures.emplace_back(index, error.what());
         if (job.options.strict) break;
@@ -98,6 +101,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
     }
     mine.peak_rss_mib = peak_rss_mib();
   }
+  share_error(job.ranks, 'i', fatal);
   if (job.ranks.any(stop_requested()))
     throw Interrupted("stopped in stage '" + stage + "' as asked; run the same command to resume");
 

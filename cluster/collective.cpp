@@ -1,0 +1,38 @@
+#include "cluster/collective.h"
+
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+[[noreturn]] void throw_error(char kind, const std::string& text) {
+  if (kind == 'i') throw InputError(text);
+  throw Error(text);
+}
+
+}  // namespace
+
+std::string on_first_rank(Communicator& ranks, const std::function<std::string()>& work) {
+  std::string message = " ";
+  if (ranks.rank() == 0) {
+    try {
+      message += work();
+    } catch (const InputError& error) {
+      message = std::string("i") + error.what();
+    } catch (const std::exception& error) {
+      message = std::string("c") + error.what();
+    }
+  }
+  message = ranks.broadcast(message);
+  if (message.front() != ' ') throw_error(message.front(), message.substr(1));
+  return message.substr(1);
+}
+
+void share_error(Communicator& ranks, char kind, const std::string& text) {
+  if (!ranks.any(!text.empty())) return;
+  for (const std::string& message : ranks.gather_all(text.empty() ? std::string() : kind + text))
+    if (!message.empty()) throw_error(message.front(), message.substr(1));
+}
+
+}  // namespace megablock

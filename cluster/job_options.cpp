@@ -1,0 +1,162 @@
+// One description of each option struct serves both the project file and the fingerprints, so that no option can be
+// read without being hashed.
+
+#include "cluster/job_options.h"
+
+#include "io/error.h"
+#include "io/settings_reader.h"
+
+namespace megablock {
+
+namespace {
+
+template <typename Visitor>
+void describe(Visitor& visit, FeatureOptions& o) {
+  visit.integer("max_features", o.max_features);
+  visit.number("max_megapixels", o.max_megapixels);
+  visit.number("contrast_threshold", o.contrast_threshold);
+  visit.flag("root_sift", o.root_sift);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, CandidateOptions& o) {
+  visit.integer("neighbours", o.neighbours);
+  visit.number("max_pair_distance_m", o.max_pair_distance_m);
+  visit.integer("order_neighbours", o.order_neighbours);
+  visit.integer("descriptor_neighbours", o.descriptor_neighbours);
+  visit.integer("exhaustive_below", o.exhaustive_below);
+  visit.integer("cell_pairs", o.cell_pairs);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, MatchOptions& o) {
+  visit.integer("k_best", o.k_best);
+  visit.number("ratio", o.ratio);
+  visit.number("max_residual_px", o.max_residual_px);
+  visit.integer("min_inliers", o.min_inliers);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, TrackOptions& o) {
+  visit.integer("min_track_length", o.min_length);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, TileOptions& o) {
+  visit.integer("tile_max_frames", o.tile_max_frames);
+  visit.integer("min_tiles", o.min_tiles);
+  visit.integer("min_tiles_from", o.min_tiles_from);
+  visit.integer("weak_link_tracks", o.weak_link_tracks);
+}
+
+template <typename Visitor>
+void describe_loss(Visitor& visit, const std::string& name, RobustLoss& loss) {
+  int kind = static_cast<int>(loss.kind);
+  visit.choice(name, {"none", "huber", "cauchy"}, kind);
+  loss.kind = static_cast<RobustLoss::Kind>(kind);
+  visit.number(name + "_scale", loss.scale);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, ObservationOptions& o) {
+  visit.number("image_sigma_px", o.image_sigma_px);
+  describe_loss(visit, "image_loss", o.image_loss);
+  describe_loss(visit, "position_loss", o.position_loss);
+  describe_loss(visit, "relative_loss", o.relative_loss);
+  visit.flag("use_position_priors", o.use_position_priors);
+  visit.flag("use_attitude_priors", o.use_attitude_priors);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, OrientationOptions& o) {
+  visit.number("max_rotation_error_deg", o.max_rotation_error_deg);
+  visit.integer("min_points_per_image", o.min_points_per_image);
+  visit.integer("tracks_per_pair", o.tracks_per_pair);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, AdjustOptions& o) {
+  describe(visit, o.observations);
+  visit.number("min_intersection_deg", o.min_intersection_deg);
+  visit.number("max_residual_sigmas", o.max_residual_sigmas);
+  visit.integer("screening_rounds", o.screening_rounds);
+  visit.integer("max_iterations", o.max_iterations);
+}
+
+template <typename Visitor>
+void describe(Visitor& visit, MergeSettings& o) {
+  visit.integer("max_iterations", o.max_iterations);
+  visit.number("decrement", o.decrement);
+  visit.integer("screening_rounds", o.screening_rounds);
+  visit.flag("scale_sigma", o.scale_sigma);
+}
+
+template <typename Options>
+void read_section(const StageSettings& settings, const std::string& section, Options& options) {
+  SettingsReader reader(settings, section);
+  describe(reader, options);
+  reader.finish();
+}
+
+// Visitor that feeds every described value to a hash.
+class HashVisitor {
+ public:
+  explicit HashVisitor(Hasher& hasher) : hasher_(hasher) {}
+  void number(const std::string& key, double value) { hasher_.add(key).add(value); }
+  void integer(const std::string& key, std::int64_t value) { hasher_.add(key).add(value); }
+  void flag(const std::string& key, bool value) { hasher_.add(key).add(value); }
+  void choice(const std::string& key, const std::vector<std::string>&, int value) { hasher_.add(key).add(value); }
+
+ private:
+  Hasher& hasher_;
+};
+
+template <typename Options>
+void hash_options(Hasher& hasher, Options options) {
+  HashVisitor visitor(hasher);
+  describe(visitor, options);
+}
+
+}  // namespace
+
+void MergeSettings::check() const {
+  if (max_iterations < 1) throw InputError("merge: max_iterations must be at least 1");
+  if (!(decrement > 0)) throw InputError("merge: decrement must be positive");
+  if (screening_rounds < 0) throw InputError("merge: screening_rounds must not be negative");
+}
+
+JobOptions read_options(const StageSettings& settings) {
+  JobOptions o;
+  read_section(settings, "features", o.features);
+  read_section(settings, "candidates", o.candidates);
+  SettingsReader matching(settings, "matching");
+  describe(matching, o.matching);
+  describe(matching, o.tracks);
+  matching.finish();
+  read_section(settings, "tiles", o.tiles);
+  read_section(settings, "orientation", o.orientation);
+  read_section(settings, "adjustment", o.adjustment);
+  read_section(settings, "merge", o.merge);
+  o.orientation.observations = o.adjustment.observations;  // one description of the observations for all stages
+  o.features.check();
+  o.candidates.check();
+  o.matching.check();
+  o.tiles.check();
+  o.orientation.check();
+  o.adjustment.check();
+  o.merge.check();
+  return o;
+}
+
+void add_to_hash(Hasher& hasher, const FeatureOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const CandidateOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const MatchOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const TileOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const OrientationOptions& options) {
+  hash_options(hasher, options);
+  hash_options(hasher, options.observations);
+}
+void add_to_hash(Hasher& hasher, const AdjustOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const MergeSettings& options) { hash_options(hasher, options); }
+
+}  // namespace megablock

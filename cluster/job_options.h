@@ -1,0 +1,50 @@
+// The options of all stages: read from the project file's sections, hashed into the fingerprints of the units.
+#pragma once
+
+#include <cstdint>
+
+#include "adjust/orientation.h"
+#include "adjust/tile_adjustment.h"
+#include "io/hash.h"
+#include "io/project.h"
+#include "match/features.h"
+#include "match/pair_matching.h"
+#include "match/tracks.h"
+#include "partition/candidates.h"
+#include "partition/tiles.h"
+
+namespace megablock {
+
+// Options of the merge that a project file can set.
+struct MergeSettings {
+  int max_iterations = 50;           // global Levenberg-Marquardt steps per round
+  double decrement = 1e-2;           // Newton decrement at which the block is adjusted (merge.md, 5)
+  int screening_rounds = 2;          // re-tests of kept/rejected after convergence
+  bool scale_sigma = false;          // posterior sigmas multiplied by the a-posteriori sigma
+  void check() const;                // throws InputError
+};
+
+struct JobOptions {
+  FeatureOptions features;
+  CandidateOptions candidates;
+  MatchOptions matching;
+  TrackOptions tracks;
+  TileOptions tiles;
+  OrientationOptions orientation;
+  AdjustOptions adjustment;
+  MergeSettings merge;
+};
+
+// Defaults, overridden by the project file; InputError with file:line for unknown keys and bad values.
+JobOptions read_options(const StageSettings& settings);
+
+// The values that matter to a stage's results.
+void add_to_hash(Hasher& hasher, const FeatureOptions& options);
+void add_to_hash(Hasher& hasher, const CandidateOptions& options);
+void add_to_hash(Hasher& hasher, const MatchOptions& options);
+void add_to_hash(Hasher& hasher, const TileOptions& options);
+void add_to_hash(Hasher& hasher, const OrientationOptions& options);
+void add_to_hash(Hasher& hasher, const AdjustOptions& options);
+void add_to_hash(Hasher& hasher, const MergeSettings& options);
+
+}  // namespace megablock

@@ -1,0 +1,14 @@
+// megablock: orients blocks of images, tile by tile, on any number of ranks.
+// Sample runs:
+//   megablock init photos -o block.yaml
+//   megablock run block.yaml -j job
+//   mpirun --bind-to none -n 2 megablock run block.yaml -j job
+
+#include "cluster/arithmetic.h"
+#include "cluster/command_line.h"
+#include "cluster/signals.h"
+
+int main(int argc, char** argv) {
+  megablock::watch_signals();
+  return megablock::command_line(argc, argv);
+}

@@ -1,0 +1,160 @@
+#include "cluster/pipeline.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "cluster/arithmetic.h"
+#include "cluster/collective.h"
+#include "cluster/exit_codes.h"
+#include "cluster/process_memory.h"
+#include "cluster/stages/stages.h"
+#include "io/error.h"
+#include "io/hash.h"
+#include "io/project.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kJobVersion = 1;
+
+std::optional<Json> read_job_json(const JobStore& store) {
+  std::ifstream in(store.path("job.json"));
+  if (!in) return std::nullopt;
+  try {
+    return Json::parse(in);
+  } catch (const Json::exception&) {
+    throw InputError(store.path("job.json") + ": is not readable; restore it or start a new job directory");
+  }
+}
+
+void check_job_json(const JobStore& store, const Json& json) {
+  const int version = json.value("version", 0);
+  if (version != kJobVersion)
+    throw InputError(store.path("job.json") + ": job of version " + std::to_string(version) +
+                     ", this program writes version " + std::to_string(kJobVersion) + "; start a new job directory");
+  const std::string level = json.value("arithmetic", "");
+  if (level != kArithmeticLevel)
+    throw InputError(store.path("job.json") + ": job of arithmetic level '" + level + "', this program computes '" +
+                     kArithmeticLevel + "'; run it where it was begun or start a new job directory");
+}
+
+// The images of an earlier run keep their indices; new ones follow. Records when the block grew.
+std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<Json>& json, Block& block) {
+  std::vector<std::int64_t> generations;
+  if (json && store.seal("block.h5")) {
+    const Block previous = read_block(store.verified_path("block.h5"));
+    Block merged = append_to(previous, block);
+    // Images taken away or changed start a new block; growing keeps what is there.
+    const bool grown = merged.images.size() == block.images.size();
+    if (grown) {
+      block = std::move(merged);
+      json->at("generations").get_to(generations);
+    }
+  }
+  const auto images = static_cast<std::int64_t>(block.images.size());
+  if (generations.empty() || generations.back() > images) generations = {images};
+  if (generations.back() < images) generations.push_back(images);
+  return generations;
+}
+
+// Rank 0 reads the project and leaves block.h5 and job.json; returns what the other ranks need to know besides.
+std::string prepare(const RunOptions& options, const JobStore& store) {
+  Project project = read_project(options.project);
+  store.create();
+  store.remove_temporaries();
+  const std::optional<Json> before = read_job_json(store);
+  if (before) check_job_json(store, *before);
+  if (project.block.images.empty())
+    throw InputError(options.project + ": no readable image in the block; check the images folder");
+  const std::vector<std::int64_t> generations = merge_with_previous(store, before, project.block);
+  check(project.block);
+  Hasher fingerprint;
+  fingerprint.add(hash_file(options.project)).add(generations);
+  store.write("block.h5", fingerprint.value(), [&](const std::string& path) { write_block(path, project.block); });
+
+  Json settings = Json::array();
+  for (const auto& e : project.settings.entries) settings.push_back({e.section, e.key, e.value, e.where});
+  Json job{{"version", kJobVersion},
+           {"program", "megablock 0.1.0"},
+           {"arithmetic", kArithmeticLevel},
+           {"project", project.file},
+           {"generations", generations},
+           {"settings", settings},
+           {"tie_points", project.tie_points},
+           {"unreadable", project.unreadable},
+           {"warnings", project.warnings}};
+  const std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
+  store.write_text("job.json", text);
+  return text;
+}
+
+StageSettings settings_of(const Json& json) {
+  StageSettings settings;
+  for (const Json& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
+  return settings;
+}
+
+int default_threads(const Communicator& ranks) { return std::max(1, host_cores() / ranks.ranks_on_host()); }
+
+void run_stages(Job& job, const std::string& tie_points) {
+  const std::string& last = job.options.last_stage;
+  std::vector<std::string> matches;
+  Tiles tiles;
+  std::vector<std::string> tracks;
+  if (tie_points.empty()) {
+    const FeatureStage features = run_features(job);
+    const CandidateGraph graph = run_candidates(job, features);
+    if (last == "partition") return;
+    matches = run_matching(job, features, graph);
+    tiles = run_tiles(job, matches);
+    tracks = run_tracks(job, matches, tiles);
+  } else {
+    tiles = run_tiles_of_tracks(job, tie_points);
+    if (last == "partition") return;
+    tracks = run_given_tracks(job, tie_points, tiles);
+  }
+  if (tiles.tile_count == 0)
+    throw ComputeError("no two images could be matched: nothing to orient; check overlap, masks and the match options");
+  if (last == "match") return;
+  const BlockState oriented = run_orientation(job, matches);
+  if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
+    throw ComputeError("no image could be oriented; see the matches in the report of stage 'match'");
+  if (last == "orient") return;
+  const std::vector<std::string> adjusted = run_adjustment(job, oriented, tiles, tracks);
+  if (last == "adjust") return;
+  run_merge(job, oriented, tiles, tracks, adjusted);
+}
+
+}  // namespace
+
+int run_job(const RunOptions& run_options, Communicator& ranks) {
+  JobStore store(run_options.directory);
+  std::optional<JobLock> lock;
+  const std::string text = on_first_rank(ranks, [&] {
+    if (!std::filesystem::exists(run_options.project))
+      throw InputError(run_options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
+    store.create();
+    lock.emplace(store);
+    return prepare(run_options, store);
+  });
+  const Json json = Json::parse(text);
+  Job job{.options = run_options, .ranks = ranks, .store = store, .settings = read_options(settings_of(json)),
+          .events = EventLog(store, ranks.rank()), .block = read_block(store.verified_path("block.h5")),
+          .generations = json.at("generations"), .statistics = {}, .failures = {}, .notes = json.at("warnings")};
+  if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
+  if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
+  for (const auto& [file, reason] : json.at("unreadable").get<std::vector<std::pair<std::string, std::string>>>())
+    job.failures.push_back({"init", file, reason});
+  run_stages(job, json.at("tie_points"));
+  ranks.barrier();  // the lock is held until everybody is done
+  return job.failures.empty() ? kExitDone : kExitFailedUnits;
+}
+
+}  // namespace megablock

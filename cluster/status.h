@@ -1,0 +1,15 @@
+// What a job says of itself: `megablock status`, derived from the unit files and the result, never from the events.
+#pragma once
+
+#include <string>
+
+#include "io/job_store.h"
+
+namespace megablock {
+
+std::string status_json(const JobStore& store);
+std::string status_text(const JobStore& store);
+// The digest of the finished result; InputError when the job has none yet.
+std::string status_digest(const JobStore& store);
+
+}  // namespace megablock
