@@ -1,0 +1,309 @@
+#include "cluster/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+
+#include "cluster/arithmetic.h"
+#include "cluster/communicator.h"
+#include "cluster/exit_codes.h"
+#include "cluster/pipeline.h"
+#include "cluster/status.h"
+#include "io/check.h"
+#include "io/error.h"
+#include "io/evaluate.h"
+#include "io/export.h"
+#include "io/import.h"
+#include "io/project.h"
+#include "io/report.h"
+#include "io/simulate/simulate.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+// A command fills this in when it was chosen; it is run after parsing, so that all errors leave by one door.
+using Action = std::function<int()>;
+
+constexpr const char* kResult = "result/block.h5";
+
+BlockResult finished_result(const std::string& job) {
+  const JobStore store(job);
+  if (!std::filesystem::exists(store.path("job.json")))
+    throw InputError(job + ": is not a job directory (no job.json); name the folder given to 'run -j'");
+  if (!store.seal(kResult)) throw InputError(job + ": the job has no result yet; run it to the end first");
+  return read_result(store.verified_path(kResult));
+}
+
+void add_init(CLI::App& app, Action& action) {
+  auto options = std::make_shared<InitOptions>();
+  CLI::App* command = app.add_subcommand("init", "Scan images (EXIF, XMP) and write the project file");
+  command->footer("Example: megablock init photos -o block.yaml");
+  command->add_option("images", options->images, "Folder of images, searched recursively")->required();
+  command->add_option("-o,--output", options->output, "Project file to write")->capture_default_str();
+  command->add_option("--control", options->gcp_file, "Control points: gcp_list.txt, OpenSfM JSON or CSV");
+  command->add_option("--masks", options->mask_folder, "Folder of PNG masks, one per camera or image");
+  command->add_option("--cameras", options->camera_grouping, "How images share a camera")
+      ->check(CLI::IsMember({"exif", "folder", "one"}))
+      ->capture_default_str();
+  command->callback([=, &action] {
+    action = [options] {
+      std::printf("%s\n", init_project(*options).c_str());
+      return kExitDone;
+    };
+  });
+}
+
+void print_result(const RunOptions& options) {
+  const JobStore store(options.directory);
+  std::printf("%s", status_text(store).c_str());
+  if (store.seal(kResult)) std::printf("report: %s\n", store.path("result/report.html").c_str());
+}
+
+void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::string& name, const std::string& stage,
+             const std::string& help) {
+  auto options = std::make_shared<RunOptions>();
+  options->last_stage = stage;
+  CLI::App* command = app.add_subcommand(name, help);
+  command->footer("Example: megablock " + name + " block.yaml -j job\n         mpirun --bind-to none -n 2 megablock " +
+                  name + " block.yaml -j job");
+  command->add_option("project", options->project, "Project file")->required();
+  command->add_option("-j,--job", options->directory, "Job directory; an unfinished one is resumed")->required();
+  command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--memory", options->memory_mib,
+                      "Memory per rank for factors of the merge, MiB; beyond it they are spilled or recomputed")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--strict", options->strict, "End at the first failed unit");
+  command->add_flag("-q,--quiet", options->quiet, "No progress");
+  command->callback([=, &action, &ranks] {
+    action = [options, &ranks] {
+      const int code = run_job(*options, ranks);
+      if (ranks.rank() == 0) print_result(*options);
+      return code;
+    };
+  });
+}
+
+void add_status(CLI::App& app, Action& action) {
+  struct Options {
+    std::string job;
+    bool json = false, digest = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("status", "What a job has done, and its figures");
+  command->footer("Example: megablock status job --json");
+  command->add_option("job", options->job, "Job directory")->required();
+  command->add_flag("--json", options->json, "All figures as JSON");
+  command->add_flag("--digest", options->digest, "Hash of the exact bits of the result");
+  command->callback([=, &action] {
+    action = [options] {
+      const JobStore store(options->job);
+      const std::string text = options->digest  ? status_digest(store) + "\n"
+                               : options->json ? status_json(store) + "\n"
+                                               : status_text(store);
+      std::printf("%s", text.c_str());
+      return kExitDone;
+    };
+  });
+}
+
+void add_check(CLI::App& app, Action& action) {
+  auto job = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand("check", "Verify every file of a job");
+  command->footer("Example: megablock check job");
+  command->add_option("job", *job, "Job directory")->required();
+  command->callback([=, &action] {
+    action = [job] {
+      const std::vector<std::string> problems = check_job(JobStore(*job));
+      for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
+      if (problems.empty()) std::printf("%s: every file is whole\n", job->c_str());
+      return problems.empty() ? kExitDone : kExitFailedUnits;
+    };
+  });
+}
+
+void add_export(CLI::App& app, Action& action) {
+  struct Options {
+    std::string job, format, output;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("export", "Write the result in another format");
+  command->footer("Example: megablock export job --format colmap-text -o model");
+  command->add_option("job", options->job, "Job directory")->required();
+  command->add_option("--format", options->format, "Format")
+      ->required()
+      ->check(CLI::IsMember({"colmap-text", "colmap-bin", "bal", "bundler", "ply", "geojson", "csv", "h5"}));
+  command->add_option("-o,--output", options->output, "File or folder to write")->required();
+  command->callback([=, &action] {
+    action = [options] {
+      export_result(finished_result(options->job), options->format, options->output);
+      return kExitDone;
+    };
+  });
+}
+
+void add_report(CLI::App& app, Action& action) {
+  struct Options {
+    std::string job, output;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("report", "Write the report page of a finished job again");
+  command->footer("Example: megablock report job");
+  command->add_option("job", options->job, "Job directory")->required();
+  command->add_option("-o,--output", options->output, "Page to write; default: result/report.html of the job");
+  command->callback([=, &action] {
+    action = [options] {
+      const std::string page = report_html(finished_result(options->job));
+      const JobStore store(options->job);
+      if (options->output.empty()) {
+        store.write_text("result/report.html", page);
+      } else {
+        JobStore(std::filesystem::absolute(options->output).parent_path().string())
+            .write_text(std::filesystem::path(options->output).filename().string(), page);
+      }
+      std::printf("%s\n", (options->output.empty() ? store.path("result/report.html") : options->output).c_str());
+      return kExitDone;
+    };
+  });
+}
+
+void add_evaluate(CLI::App& app, Action& action) {
+  struct Options {
+    std::string job, truth;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("evaluate", "Compare a job with known poses");
+  command->footer("Example: megablock evaluate job truth.csv --json");
+  command->add_option("job", options->job, "Job directory")->required();
+  command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV")->required();
+  command->add_flag("--json", options->json, "Figures as JSON");
+  command->callback([=, &action] {
+    action = [options] {
+      const Evaluation evaluation = evaluate(finished_result(options->job), options->truth);
+      std::printf("%s\n", (options->json ? to_json(evaluation) : to_text(evaluation)).c_str());
+      return kExitDone;
+    };
+  });
+}
+
+void add_simulate(CLI::App& app, Action& action) {
+  struct Options {
+    SimulationOptions simulation;
+    std::string scene = "aerial", output;
+    bool rendered = false;
+  };
+  auto options = std::make_shared<Options>();
+  SimulationOptions& s = options->simulation;
+  CLI::App* command = app.add_subcommand("simulate", "Make a block with known truth: tie points or rendered pictures");
+  command->footer("Example: megablock simulate --scene aerial --frames 500 -o simulated\n"
+                  "         megablock simulate --rendered --frames 24 -o rendered");
+  command->add_option("--scene", options->scene, "aerial | street")->check(CLI::IsMember({"aerial", "street"}))->capture_default_str();
+  command->add_flag("--rendered", options->rendered, "Render pictures (small blocks) instead of tie points");
+  command->add_option("--frames", s.frames, "Frames")->capture_default_str();
+  command->add_option("--seed", s.seed, "Seed")->capture_default_str();
+  command->add_option("--forward-overlap", s.forward_overlap, "Aerial: along the row, 0..1")->capture_default_str();
+  command->add_option("--side-overlap", s.side_overlap, "Aerial: between rows, 0..1")->capture_default_str();
+  command->add_option("--height", s.height_m, "Aerial: above mean terrain, m")->capture_default_str();
+  command->add_option("--relief", s.terrain_relief_m, "Aerial: terrain relief, m")->capture_default_str();
+  command->add_option("--street-spacing", s.street_spacing_m, "Street: between streets, m")->capture_default_str();
+  command->add_option("--frame-distance", s.frame_distance_m, "Street: between frames, m")->capture_default_str();
+  command->add_option("--rig-cameras", s.rig_cameras, "Street: cameras of the rig")->capture_default_str();
+  command->add_option("--points-per-frame", s.points_per_frame, "Observations per frame")->capture_default_str();
+  command->add_option("--mean-track", s.mean_track, "Observations per point")->capture_default_str();
+  command->add_option("--noise", s.image_noise_px, "Image noise per axis, px")->capture_default_str();
+  command->add_option("--outliers", s.outlier_share, "Share of wrong observations, 0..1")->capture_default_str();
+  command->add_option("--gps-sigma", s.gps_sigma_m, "Position priors, m; 0 = none")->capture_default_str();
+  command->add_option("--gps-share", s.gps_share, "Share of frames with a position prior")->capture_default_str();
+  command->add_option("--attitude-sigma", s.attitude_sigma_deg, "Attitude priors, degrees; 0 = none")->capture_default_str();
+  command->add_option("--relative-position-sigma", s.relative_position_sigma_m, "Relative poses, m; 0 = none")->capture_default_str();
+  command->add_option("--relative-rotation-sigma", s.relative_rotation_sigma_deg, "Relative poses, degrees")->capture_default_str();
+  command->add_option("--control-points", s.control_points, "Control points")->capture_default_str();
+  command->add_option("--check-points", s.check_points, "Check points")->capture_default_str();
+  command->add_option("--control-sigma", s.control_sigma_m, "Sigma of control points, m")->capture_default_str();
+  command->add_option("--width", s.image_width, "Image width, px")->capture_default_str();
+  command->add_option("--image-height", s.image_height, "Image height, px")->capture_default_str();
+  command->add_option("--focal", s.focal_px, "Focal length, px")->capture_default_str();
+  command->add_flag("!--no-calibration", s.calibrate, "Hold the camera at the truth");
+  command->add_option("-o,--output", options->output, "Folder to write")->required();
+  command->callback([=, &action] {
+    action = [options] {
+      options->simulation.scene =
+          options->scene == "street" ? SimulationOptions::Scene::kStreet : SimulationOptions::Scene::kAerial;
+      options->simulation.check();
+      if (options->rendered)
+        write_rendered_block(options->simulation, options->output);
+      else
+        write_simulated_block(simulate_block(options->simulation), options->output);
+      std::printf("%s/block.yaml\n", options->output.c_str());
+      return kExitDone;
+    };
+  });
+}
+
+int run_action(const Action& action, const Communicator& ranks) {
+  const auto say = [&](const char* text) {
+    if (ranks.rank() == 0) std::fprintf(stderr, "megablock: %s\n", text);
+  };
+  try {
+    return action();
+  } catch (const Interrupted& error) {
+    say(error.what());
+    return kExitInterrupted;
+  } catch (const InputError& error) {
+    say(error.what());
+    return kExitBadInput;
+  } catch (const Error& error) {
+    say(error.what());
+    return kExitFailedUnits;
+  }
+}
+
+}  // namespace
+
+int command_line(int argc, char** argv) {
+  CLI::App app{"megablock orients image blocks of any size: tiles on ranks, exact block-wise compensation, resumable."};
+  app.name("megablock");
+  app.set_version_flag("--version", "megablock 0.1.0 (arithmetic level avx2)");
+  app.require_subcommand(1);
+  app.footer("Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input, 75 interrupted and resumable.\n"
+             "Forms:\n  megablock init IMAGES -o block.yaml\n  megablock run block.yaml -j JOB      (again = resume)\n"
+             "  mpirun --bind-to none -n N megablock run block.yaml -j JOB\n  megablock status JOB [--json|--digest]\n");
+  try {
+    pin_arithmetic(argv);
+    limit_libraries_to_one_thread();
+    Communicator ranks(&argc, &argv);
+    Action action;
+    add_init(app, action);
+    add_run(app, action, ranks, "run", "", "Run all stages; the same command again resumes");
+    add_run(app, action, ranks, "partition", "partition", "Run as far as the candidate pairs and cells");
+    add_run(app, action, ranks, "match", "match", "Run as far as matches, tiles and tracks");
+    add_run(app, action, ranks, "orient", "orient", "Run as far as the initial orientation");
+    add_run(app, action, ranks, "adjust", "adjust", "Run as far as the adjustment of the tiles");
+    add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
+    add_status(app, action);
+    add_report(app, action);
+    add_export(app, action);
+    add_evaluate(app, action);
+    add_simulate(app, action);
+    add_check(app, action);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      const int code = ranks.rank() == 0 ? app.exit(error) : error.get_exit_code();
+      return code == 0 ? kExitDone : kExitBadInput;
+    }
+    return run_action(action, ranks);
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "megablock: %s\n", error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "megablock: %s\n", error.what());
+    return kExitFailedUnits;
+  }
+}
+
+}  // namespace megablock
