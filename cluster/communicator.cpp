@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
+#include <list>
 #include <stdexcept>
 #include <thread>
 
@@ -40,6 +41,11 @@ struct Communicator::Mpi {
   std::int64_t* counter = nullptr;  // memory of the window, significant on rank 0
   std::atomic<bool> stop{false};
   std::thread progress;
+  struct Sent {
+    std::string bytes;
+    std::vector<MPI_Request> requests;
+  };
+  std::list<Sent> sent;  // buffers of sends under way
 };
 
 Communicator::Communicator(int* argc, char*** argv) {
@@ -125,6 +131,54 @@ bool Communicator::any(bool value) {
   MPI_Iallreduce(&in, &out, 1, MPI_INT, MPI_MAX, mpi_->world, &request);
   wait_politely(request);
   return out != 0;
+}
+
+void Communicator::send(int to, int tag, std::string bytes) {
+  if (to == rank_) {
+    to_self_[tag] = std::move(bytes);
+    return;
+  }
+  Mpi::Sent& sent = mpi_->sent.emplace_back(Mpi::Sent{std::move(bytes), {}});
+  // In parts; one shorter than the largest (perhaps empty) is the last.
+  std::size_t count = kLargestMessage;
+  for (std::size_t at = 0; count == kLargestMessage; at += count) {
+    count = std::min(kLargestMessage, sent.bytes.size() - at);
+    MPI_Isend(sent.bytes.data() + at, static_cast<int>(count), MPI_BYTE, to, tag, mpi_->world,
+              &sent.requests.emplace_back());
+  }
+}
+
+std::string Communicator::receive(int from, int tag) {
+  if (from == rank_) {
+    const auto found = to_self_.find(tag);
+    if (found == to_self_.end()) throw std::logic_error("a rank waits for a message to itself that was never sent");
+    std::string bytes = std::move(found->second);
+    to_self_.erase(found);
+    return bytes;
+  }
+  std::string bytes;
+  int count = static_cast<int>(kLargestMessage);
+  while (static_cast<std::size_t>(count) == kLargestMessage) {
+    MPI_Message message;
+    MPI_Status status;
+    int there = 0;
+    while (MPI_Improbe(from, tag, mpi_->world, &there, &message, &status), !there)
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    MPI_Get_count(&status, MPI_BYTE, &count);
+    const std::size_t at = bytes.size();
+    bytes.resize(at + static_cast<std::size_t>(count));
+    MPI_Request request;
+    MPI_Imrecv(bytes.data() + at, count, MPI_BYTE, &message, &request);
+    wait_politely(request);
+  }
+  return bytes;
+}
+
+void Communicator::flush_sends() {
+  if (!mpi_) return;
+  for (Mpi::Sent& sent : mpi_->sent)
+    for (MPI_Request& request : sent.requests) wait_politely(request);
+  mpi_->sent.clear();
 }
 
 void Communicator::reset_counter() {

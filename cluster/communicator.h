@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,6 +34,12 @@ class Communicator {
   // True everywhere when it is true on any rank.
   bool any(bool value);
 
+  // Point to point, for the merge tree: messages between two ranks are told apart by their tag (>= 0). A message to the
+  // own rank is kept until it is received. send() returns at once; flush_sends() waits for all of them.
+  void send(int to, int tag, std::string bytes);
+  std::string receive(int from, int tag);
+  void flush_sends();
+
   // The shared counter from which units are claimed. reset() is collective.
   void reset_counter();
   std::int64_t claim();           // next number, from 0; never given twice between resets
@@ -46,6 +53,7 @@ class Communicator {
   std::unique_ptr<Mpi> mpi_;  // null: one rank without MPI
   int rank_ = 0, size_ = 1, ranks_on_host_ = 1;
   std::int64_t local_counter_ = 0;
+  std::map<int, std::string> to_self_;  // by tag
 };
 
 }  // namespace megablock
