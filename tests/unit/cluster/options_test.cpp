@@ -1,0 +1,62 @@
+#include "cluster/job_options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/error.h"
+
+namespace megablock {
+namespace {
+
+StageSettings setting(const std::string& section, const std::string& key, const std::string& value) {
+  return {{{section, key, value, "block.yaml:7"}}};
+}
+
+std::uint64_t hash_of(const auto& options) {
+  Hasher hasher;
+  add_to_hash(hasher, options);
+  return hasher.value();
+}
+
+TEST(JobOptions, DefaultsAreValidAndUnsetOptionsKeepThem) {
+  const JobOptions options = read_options({});
+  EXPECT_EQ(options.features.max_features, FeatureOptions().max_features);
+  EXPECT_EQ(options.merge.decrement, MergeSettings().decrement);
+}
+
+TEST(JobOptions, ReadsEverySectionOfTheProjectFile) {
+  EXPECT_EQ(read_options(setting("features", "max_features", "1234")).features.max_features, 1234);
+  EXPECT_EQ(read_options(setting("matching", "ratio", "0.7")).matching.ratio, 0.7);
+  EXPECT_EQ(read_options(setting("matching", "min_track_length", "3")).tracks.min_length, 3);
+  EXPECT_EQ(read_options(setting("tiles", "tile_max_frames", "42")).tiles.tile_max_frames, 42);
+  const JobOptions cauchy = read_options(setting("adjustment", "image_loss", "cauchy"));
+  EXPECT_EQ(cauchy.adjustment.observations.image_loss.kind, RobustLoss::Kind::kCauchy);
+  EXPECT_EQ(cauchy.orientation.observations.image_loss.kind, RobustLoss::Kind::kCauchy);
+  EXPECT_EQ(read_options(setting("merge", "scale_sigma", "true")).merge.scale_sigma, true);
+}
+
+TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
+  const auto message = [](const StageSettings& settings) -> std::string {
+    try {
+      read_options(settings);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("block.yaml:7"));
+  EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("ratio"));
+  EXPECT_THAT(message(setting("adjustment", "image_sigma_px", "0.5 mm")), testing::HasSubstr("block.yaml:7"));
+  EXPECT_NE(message(setting("merge", "decrement", "-1")), "");
+}
+
+TEST(JobOptions, EveryOptionReachesItsStagesFingerprintAndNoOther) {
+  const JobOptions defaults = read_options({});
+  const JobOptions changed = read_options(setting("matching", "ratio", "0.7"));
+  EXPECT_NE(hash_of(defaults.matching), hash_of(changed.matching));
+  EXPECT_EQ(hash_of(defaults.features), hash_of(changed.features));
+  EXPECT_EQ(hash_of(defaults.adjustment), hash_of(changed.adjustment));
+}
+
+}  // namespace
+}  // namespace megablock
