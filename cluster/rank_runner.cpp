@@ -1,0 +1,255 @@
+#include "cluster/rank_runner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "adjust/linearise.h"
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+std::string text_of(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
+Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
+
+// One value per tile from the ranks that hold them, in tile order, on every rank.
+template <typename Value>
+std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<RankTile>& own,
+                                  const std::vector<Value>& values) {
+  ByteWriter writer;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    writer.value(own[i].tile);
+    writer.value(values[i]);
+  }
+  std::vector<Value> all(tiles);
+  for (const std::string& text : ranks.gather_all(text_of(writer.take()))) {
+    const Bytes bytes = bytes_of(text);
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      const auto tile = reader.value<std::int64_t>();
+      all[static_cast<std::size_t>(tile)] = reader.value<Value>();
+    }
+  }
+  return all;
+}
+
+void write_unknowns(ByteWriter& writer, std::int64_t tile, const UnknownList& unknowns) {
+  writer.value(tile);
+  writer.values(unknowns);
+}
+
+}  // namespace
+
+std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks) {
+  std::int64_t total = 0;
+  for (const std::int64_t count : observations) total += count + 1;
+  std::vector<int> rank_of_tile(observations.size(), 0);
+  std::int64_t before = 0;
+  for (const MergeTree::Node& node : tree.nodes) {
+    if (!node.tile.valid()) continue;
+    const auto tile = static_cast<std::size_t>(node.tile.value);
+    const std::int64_t middle = before + (observations[tile] + 1) / 2;
+    rank_of_tile[tile] = static_cast<int>(std::min<std::int64_t>(ranks - 1, middle * ranks / total));
+    before += observations[tile] + 1;
+  }
+  return rank_of_tile;
+}
+
+RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile,
+                       std::vector<RankTile> tiles, const MemoryOptions& memory)
+    : ranks_(ranks), tiles_(std::move(tiles)), memory_(memory) {
+  rank_of_node_.assign(tree.nodes.size(), 0);
+  own_tile_of_node_.assign(tree.nodes.size(), -1);
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    const MergeTree::Node& node = tree.nodes[n];
+    rank_of_node_[n] = node.tile.valid() ? rank_of_tile[static_cast<std::size_t>(node.tile.value)]
+                                         : rank_of_node_[static_cast<std::size_t>(node.left)];
+    for (std::size_t i = 0; i < tiles_.size(); ++i)
+      if (node.tile.valid() && tiles_[i].tile == node.tile.value) own_tile_of_node_[n] = static_cast<std::int64_t>(i);
+  }
+  make_plans(tree, rank_of_tile.size());
+}
+
+RankRunner::~RankRunner() = default;
+
+void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
+  ByteWriter writer;
+  for (const RankTile& tile : tiles_) write_unknowns(writer, tile.tile, tile_unknowns(tile.problem));
+  std::vector<UnknownList> unknowns(tile_count);
+  for (const std::string& text : ranks_.gather_all(text_of(writer.take()))) {
+    const Bytes bytes = bytes_of(text);
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      const auto tile = reader.value<std::int64_t>();
+      unknowns[static_cast<std::size_t>(tile)] = reader.values<Unknown>();
+    }
+  }
+  plan_ = make_plan(tree, unknowns);
+  node_factors_.assign(plan_.nodes.size(), {});
+  tile_factors_.assign(tiles_.size(), {});
+  for (const RankTile& tile : tiles_)
+    tile_plans_.push_back(make_tile_plan(
+        tile.problem, plan_.nodes[static_cast<std::size_t>(plan_.node_of_leaf[static_cast<std::size_t>(tile.tile)])]));
+}
+
+bool RankRunner::mine(std::int64_t node) const {
+  return rank_of_node_[static_cast<std::size_t>(node)] == ranks_.rank();
+}
+
+void RankRunner::pass_up(std::int64_t node, UpdateMatrix update) {
+  const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(node)].parent;
+  if (parent < 0 || mine(parent)) {
+    updates_[node] = std::move(update);
+  } else {
+    ranks_.send(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(node), text_of(update.to_bytes()));
+  }
+}
+
+UpdateMatrix RankRunner::child_update(std::int64_t child) {
+  if (!mine(child))
+    return UpdateMatrix::from_bytes(
+        bytes_of(ranks_.receive(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child))));
+  UpdateMatrix update = std::move(updates_.at(child));
+  updates_.erase(child);
+  return update;
+}
+
+UpdateMatrix RankRunner::condense_own(std::int64_t node, double lambda) {
+  const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
+  TileCondensation condensation = condense_tile(tiles_[row].problem, tile_plans_[row], tiles_[row].state, lambda);
+  tile_factors_[row] = std::move(condensation.factor);
+  if (check_seams_) condensed_[tiles_[row].tile] = condensation.update;
+  return std::move(condensation.update);
+}
+
+UpReport RankRunner::up(double lambda) {
+  updates_.clear();
+  seams_.clear();
+  condensed_.clear();
+  for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
+    if (!mine(n)) continue;
+    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    if (node.leaf >= 0) {
+      pass_up(n, condense_own(n, lambda));
+      continue;
+    }
+    const UpdateMatrix left = child_update(node.left), right = child_update(node.right);
+    if (check_seams_) seams_.push_back(check_seam(n, left, right, seam_probability_));
+    Front::Result result = eliminate_node(node, {&left, &right}, lambda);
+    node_factors_[static_cast<std::size_t>(n)] = std::move(result.factor);
+    pass_up(n, std::move(result.update));
+  }
+  ranks_.flush_sends();
+  const std::int64_t root = plan_.root();
+  const std::string at_root = mine(root) ? text_of(updates_.at(root).to_bytes()) : std::string();
+  updates_.clear();
+  return {UpdateMatrix::from_bytes(bytes_of(ranks_.broadcast(at_root, rank_of_node_[static_cast<std::size_t>(root)])))
+              .sums};
+}
+
+// Messages of the two directions never mix: an upward pass has ended everywhere (its root is broadcast) before a
+// downward one begins, and the other way round (its sums are gathered).
+template <typename Values>
+void RankRunner::pass_down(std::int64_t n, const Values& front) {
+  const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+  for (const std::int64_t child : {node.left, node.right}) {
+    Bytes bytes = front.restricted_to(plan_.nodes[static_cast<std::size_t>(child)].passed).to_bytes();
+    if (mine(child))
+      downward_[child] = std::move(bytes);
+    else
+      ranks_.send(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child), text_of(bytes));
+  }
+}
+
+template <typename Values>
+Values RankRunner::from_parent(std::int64_t n) {
+  const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(n)].parent;
+  if (parent < 0) return {};
+  if (!mine(parent))
+    return Values::from_bytes(bytes_of(ranks_.receive(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(n))));
+  const Bytes bytes = std::move(downward_.at(n));
+  downward_.erase(n);
+  return Values::from_bytes(bytes);
+}
+
+DownReport RankRunner::down(double lambda) {
+  struct Sums {
+    double damping_norm = 0, trial_cost = 0;
+  };
+  std::vector<Sums> sums(tiles_.size());
+  trial_.assign(tiles_.size(), {});
+  for (std::int64_t n = plan_.root(); n >= 0; --n) {
+    if (!mine(n)) continue;
+    const Step passed = from_parent<Step>(n);
+    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    if (node.leaf < 0) {
+      pass_down(n, back_substitute_node(node_factors_[static_cast<std::size_t>(n)], passed));
+      continue;
+    }
+    const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
+    const RankTile& tile = tiles_[row];
+    const TileStep step =
+        solve_tile_down(tile.problem, tile_plans_[row], tile.state, lambda, tile_factors_[row], passed);
+    trial_[row] = apply_step(tile.problem, tile.state, step);
+    sums[row] = {step.damping_norm, evaluate_cost(tile.problem, trial_[row])};
+  }
+  ranks_.flush_sends();
+  DownReport report;
+  for (const Sums& tile : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, sums)) {
+    report.damping_norm += tile.damping_norm;
+    report.trial_cost += tile.trial_cost;
+  }
+  return report;
+}
+
+void RankRunner::accept() {
+  for (std::size_t i = 0; i < tiles_.size(); ++i) tiles_[i].state = std::move(trial_[i]);
+  trial_.clear();
+}
+
+void RankRunner::reject() { trial_.clear(); }
+
+RankRunner::Posterior RankRunner::posterior() {
+  Posterior posterior;
+  check_seams_ = true;
+  const auto inner = std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
+  seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
+  posterior.sums = up(0).sums;
+  posterior.gauge = judge_gauge(posterior.sums);
+  check_seams_ = false;
+
+  posterior.covariances.resize(tiles_.size());
+  std::vector<TileCheck> checks(tiles_.size());
+  for (std::int64_t n = plan_.root(); n >= 0; --n) {
+    if (!mine(n)) continue;
+    const CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
+    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    if (node.leaf < 0) {
+      pass_down(n, covariance_node(node_factors_[static_cast<std::size_t>(n)], passed));
+      continue;
+    }
+    const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
+    const RankTile& tile = tiles_[row];
+    posterior.covariances[row] =
+        covariance_tile(tile.problem, tile_plans_[row], tile.state, tile_factors_[row], passed);
+    checks[row] = check_tile(tile.tile, condensed_.at(tile.tile), passed, seam_probability_);
+  }
+  ranks_.flush_sends();
+  posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
+
+  ByteWriter writer;
+  writer.values(seams_);
+  for (const std::string& text : ranks_.gather_all(text_of(writer.take()))) {
+    const Bytes bytes = bytes_of(text);
+    ByteReader reader(bytes);
+    const std::vector<SeamReport> some = reader.values<SeamReport>();
+    posterior.seams.insert(posterior.seams.end(), some.begin(), some.end());
+  }
+  std::sort(posterior.seams.begin(), posterior.seams.end(),
+            [](const SeamReport& a, const SeamReport& b) { return a.node < b.node; });
+  return posterior;
+}
+
+}  // namespace megablock

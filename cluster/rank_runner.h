@@ -1,0 +1,85 @@
+// The merge tree over ranks: each rank condenses its own tiles; an inner node is eliminated by the rank of its left
+// child; update matrices go up and steps, covariances come down as messages. All sums are formed in tile or child
+// order, so that the bits do not depend on the ranks.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "cluster/communicator.h"
+#include "merge/condense.h"
+#include "merge/gauge.h"
+#include "merge/global_adjustment.h"
+#include "merge/memory.h"
+#include "merge/node.h"
+#include "merge/seam_check.h"
+
+namespace megablock {
+
+// One tile as its rank holds it.
+struct RankTile {
+  std::int64_t tile = -1;
+  TileProblem problem;
+  TileState state;
+};
+
+// Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
+std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
+
+class RankRunner : public TreeRunner {
+ public:
+  // `tiles`: this rank's, ascending; rank_of_tile: of all tiles. Collective.
+  RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, std::vector<RankTile> tiles,
+             const MemoryOptions& memory);
+  ~RankRunner() override;
+
+  UpReport up(double lambda) override;
+  DownReport down(double lambda) override;
+  void accept() override;
+  void reject() override;
+
+  // Collective, at the solution: an upward pass with lambda = 0, seams and gauge, then covariances.
+  struct Posterior {
+    SubtreeSums sums;                        // of the whole block
+    GaugeReport gauge;
+    std::vector<SeamReport> seams;           // of all inner nodes, in node order; on every rank
+    std::vector<TileCheck> tile_checks;      // of all tiles, in tile order; on every rank
+    std::vector<TileCovariance> covariances; // of this rank's tiles
+  };
+  Posterior posterior();
+
+  std::vector<RankTile>& tiles() { return tiles_; }
+  const std::vector<RankTile>& tiles() const { return tiles_; }
+
+ private:
+  bool mine(std::int64_t node) const;
+  UpdateMatrix child_update(std::int64_t child);
+  void pass_up(std::int64_t node, UpdateMatrix update);
+  // The part of a front's values that each child needs, and a node's from its parent.
+  template <typename Values>
+  void pass_down(std::int64_t node, const Values& front);
+  template <typename Values>
+  Values from_parent(std::int64_t node);
+  UpdateMatrix condense_own(std::int64_t node, double lambda);
+  void make_plans(const MergeTree& tree, std::size_t tile_count);
+
+  Communicator& ranks_;
+  std::vector<RankTile> tiles_;
+  MemoryOptions memory_;
+  std::vector<TilePlan> tile_plans_;     // of tiles_
+  std::vector<TileState> trial_;         // of tiles_
+  std::vector<int> rank_of_node_;
+  std::vector<std::int64_t> own_tile_of_node_;  // row of tiles_, -1
+  EliminationPlan plan_;
+  std::vector<FrontFactor> node_factors_;        // [nodes], of this rank's inner nodes
+  std::vector<TileFactor> tile_factors_;         // of tiles_; empty: recomputed on the way down
+  std::map<std::int64_t, UpdateMatrix> updates_;      // waiting for their parent on this rank
+  bool check_seams_ = false;
+  double seam_probability_ = 0;
+  std::vector<SeamReport> seams_;
+  std::map<std::int64_t, UpdateMatrix> condensed_;    // of this rank's tiles, while seams are checked
+  std::map<std::int64_t, Bytes> downward_;            // what a parent on this rank left for its child
+};
+
+}  // namespace megablock
