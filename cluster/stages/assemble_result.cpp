@@ -6,6 +6,7 @@
 
 #include "geometry/camera.h"
 #include "geometry/pose.h"
+#include "merge/bytes.h"
 
 namespace megablock {
 
@@ -115,6 +116,50 @@ void list_failures(const Job& job, BlockResult& result) {
 }
 
 }  // namespace
+
+std::string to_bytes(const TileResult& part) {
+  ByteWriter writer;
+  writer.values(part.tracks.id);
+  writer.values(part.tracks.begin);
+  writer.values(part.tracks.image);
+  writer.values(part.tracks.x);
+  writer.values(part.tracks.y);
+  writer.values(part.tracks.feature);
+  writer.values(part.points);
+  writer.values(part.positions);
+  writer.values(part.covariances);
+  writer.values(part.kept);
+  writer.values(part.residual_x);
+  writer.values(part.residual_y);
+  writer.values(part.begin);
+  writer.values(part.frames);
+  const Bytes bytes = writer.take();
+  return {bytes.begin(), bytes.end()};
+}
+
+TileResult tile_result_from_bytes(const std::string& text) {
+  const Bytes bytes(text.begin(), text.end());
+  ByteReader reader(bytes);
+  const auto read = [&](auto& values) {
+    values = reader.values<typename std::decay_t<decltype(values)>::value_type>();
+  };
+  TileResult part;
+  read(part.tracks.id);
+  read(part.tracks.begin);
+  read(part.tracks.image);
+  read(part.tracks.x);
+  read(part.tracks.y);
+  read(part.tracks.feature);
+  read(part.points);
+  read(part.positions);
+  read(part.covariances);
+  read(part.kept);
+  read(part.residual_x);
+  read(part.residual_y);
+  read(part.begin);
+  read(part.frames);
+  return part;
+}
 
 TileResult make_tile_result(const MergeTile& tile, std::vector<Eigen::Matrix3d> covariances) {
   TileResult result;

@@ -32,6 +32,9 @@ struct TileResult {
   std::vector<std::int64_t> begin;              // [points + 1]
   std::vector<FrameIndex> frames;               // touched
 };
+std::string to_bytes(const TileResult& part);
+TileResult tile_result_from_bytes(const std::string& bytes);
+
 TileResult make_tile_result(const MergeTile& tile, std::vector<Eigen::Matrix3d> covariances);
 
 // Joins the tiles in global track order and gives the tracks their dense indices.

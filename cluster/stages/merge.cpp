@@ -1,0 +1,314 @@
+// The merge: exact block-wise compensation of all tiles over all ranks (design: merge.md), then the result.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "adjust/tile_adjustment.h"
+#include "cluster/collective.h"
+#include "cluster/process_memory.h"
+#include "cluster/progress.h"
+#include "cluster/rank_runner.h"
+#include "cluster/signals.h"
+#include "cluster/stages/assemble_result.h"
+#include "cluster/stages/merge_checkpoint.h"
+#include "cluster/stages/merge_start.h"
+#include "cluster/stages/stages.h"
+#include "io/error.h"
+#include "io/hash.h"
+#include "io/report.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kResult = "result/block.h5";
+
+struct MergeInputs {
+  const BlockState& oriented;
+  const Tiles& tiles;
+  const std::vector<std::string>& tracks;
+  const std::vector<std::string>& adjusted;
+};
+
+std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
+  Hasher hasher;
+  hasher.add(algorithm::kMerge);
+  add_to_hash(hasher, job.settings.merge);
+  add_to_hash(hasher, job.settings.adjustment);
+  hasher.add(job.store.seal("block.h5")->content_hash).add(job.store.seal("tiles.h5")->content_hash);
+  for (const std::string& name : inputs.tracks) hasher.add(job.store.seal(name)->content_hash);
+  for (const std::string& name : inputs.adjusted)
+    hasher.add(name.empty() ? std::uint64_t{0} : job.store.seal(name)->content_hash);
+  return hasher.value();
+}
+
+// Writes what this rank's tiles know into the block's state, then takes the lowest tile's word from every rank. Tiles
+// agree on what they share, so the order only matters for frames that nothing depends on.
+BlockState gather_state(Job& job, const BlockState& start, const std::vector<RankTile>& tiles) {
+  ByteWriter writer;
+  for (const RankTile& tile : tiles) {
+    writer.values(tile.problem.frames);
+    for (const Pose& pose : tile.state.frames) {
+      writer.value(pose.rotation.coeffs().eval());
+      writer.value(pose.centre);
+    }
+    writer.values(tile.problem.cameras);
+    writer.values(tile.state.cameras);
+    writer.values(tile.problem.mounts);
+    for (const Pose& pose : tile.state.mounts) {
+      writer.value(pose.rotation.coeffs().eval());
+      writer.value(pose.centre);
+    }
+  }
+  const Bytes mine = writer.take();
+  BlockState state = start;
+  const auto read_pose = [](ByteReader& reader) {
+    Pose pose;
+    pose.rotation.coeffs() = reader.value<Eigen::Vector4d>();
+    pose.centre = reader.value<Eigen::Vector3d>();
+    return pose;
+  };
+  std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
+  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
+    const Bytes bytes(text.begin(), text.end());
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      for (const FrameIndex frame : reader.values<FrameIndex>()) {
+        state.frames[frame] = read_pose(reader);
+        state.oriented[frame] = start.oriented[frame];
+      }
+      const auto cameras = reader.values<CameraIndex>();
+      const auto intrinsics = reader.values<Intrinsics>();
+      for (std::size_t c = 0; c < cameras.size(); ++c) state.cameras[cameras[c]] = intrinsics[c];
+      for (const MountId& id : reader.values<MountId>())
+        state.mounts[id.rig][static_cast<std::size_t>(id.mount)] = read_pose(reader);
+    }
+  }
+  return state;
+}
+
+std::vector<RankTile> load_own_tiles(const Job& job, const MergeInputs& inputs, const BlockState& start,
+                                     const std::vector<int>& rank_of_tile) {
+  std::vector<RankTile> own;
+  for (std::size_t t = 0; t < rank_of_tile.size(); ++t) {
+    if (rank_of_tile[t] != job.ranks.rank()) continue;
+    MergeTile tile = load_merge_tile(job, start, inputs.tiles, TileIndex(static_cast<std::int64_t>(t)),
+                                     inputs.tracks[t], inputs.adjusted[t]);
+    own.push_back({static_cast<std::int64_t>(t), std::move(tile.problem), std::move(tile.state)});
+  }
+  return own;
+}
+
+std::vector<std::int64_t> observation_counts(const Job& job, const MergeInputs& inputs) {
+  std::vector<std::int64_t> counts;
+  for (const std::string& name : inputs.tracks)
+    counts.push_back(static_cast<std::int64_t>(job.store.seal(name)->length));
+  return counts;
+}
+
+// Re-tests every observation at the solution; how many verdicts changed in the whole block.
+std::int64_t screen(Job& job, RankRunner& runner) {
+  std::int64_t changed = 0;
+  for (RankTile& tile : runner.tiles())
+    changed += screen_observations(tile.problem, tile.state, job.settings.adjustment.max_residual_sigmas,
+                                   job.settings.adjustment);
+  std::int64_t total = 0;
+  for (const std::string& text : job.ranks.gather_all(std::to_string(changed))) total += std::stoll(text);
+  return total;
+}
+
+MemoryOptions memory_options(const Job& job) {
+  MemoryOptions memory;
+  memory.factor_bytes = static_cast<std::int64_t>(job.options.memory_mib * 1024 * 1024);
+  memory.scratch_directory = job.store.path("scratch");
+  return memory;
+}
+
+struct Adjusted {
+  std::vector<RankTile> tiles;
+  RankRunner::Posterior posterior;
+  MergePosition position;
+  BlockState state;
+  bool converged = false;
+};
+
+void say_iteration(const Job& job, const GlobalState& state) {
+  if (!job.is_first_rank() || job.options.quiet) return;
+  std::fprintf(stderr, "merge        %s\n", describe(state).c_str());
+}
+
+Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& checkpoint) {
+  const std::vector<int> rank_of_tile = distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
+  GlobalOptions options;
+  options.max_decrement = job.settings.merge.decrement;
+  options.max_iterations = job.settings.merge.max_iterations;
+
+  std::optional<MergePosition> found = checkpoint.find();
+  const BlockState start = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
+  std::vector<RankTile> tiles = load_own_tiles(job, inputs, start, rank_of_tile);
+  if (found)
+    for (RankTile& tile : tiles) checkpoint.load_tile(tile);
+
+  Adjusted adjusted;
+  MergePosition& position = adjusted.position;
+  position = found ? *found : MergePosition{0, start_global(options)};
+  std::int32_t saved = position.global.accepted;
+  for (;;) {
+    RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, std::move(tiles), memory_options(job));
+    adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
+      say_iteration(job, state);
+      if (state.accepted != saved) {
+        saved = state.accepted;
+        position.global = state;
+        checkpoint.write(position, runner.tiles(), gather_state(job, start, runner.tiles()));
+      }
+      if (job.ranks.any(stop_requested()))
+        throw Interrupted("stopped in stage 'merge' as asked; run the same command to resume");
+    });
+    adjusted.converged = position.global.outcome == GlobalOutcome::kConverged ||
+                         position.global.outcome == GlobalOutcome::kRoundingFloor;
+    const bool last = position.round >= job.settings.merge.screening_rounds;
+    if (last || screen(job, runner) == 0) {
+      adjusted.posterior = runner.posterior();
+      adjusted.tiles = std::move(runner.tiles());
+      break;
+    }
+    tiles = std::move(runner.tiles());
+    ++position.round;
+    const std::int32_t accepted = position.global.accepted;
+    position.global = start_global(options);
+    position.global.accepted = accepted;
+    checkpoint.write(position, tiles, gather_state(job, start, tiles));
+  }
+  adjusted.state = gather_state(job, start, adjusted.tiles);
+  return adjusted;
+}
+
+// The block's covariances of frames and cameras, from the tiles that hold them (all hold the same bits).
+void add_covariances(const Adjusted& adjusted, MergeOutcome& outcome, const Block& block) {
+  outcome.frame_covariance.assign(block.frames.size(), BlockResult::Matrix6::Zero());
+  outcome.camera_covariance.assign(block.cameras.size(), BlockResult::Matrix8::Zero());
+  for (std::size_t t = 0; t < adjusted.tiles.size(); ++t) {
+    const TileProblem& problem = adjusted.tiles[t].problem;
+    const TileCovariance& covariance = adjusted.posterior.covariances[t];
+    for (std::size_t f = 0; f < problem.frames.size(); ++f)
+      if (!covariance.frames[f].isZero(0)) outcome.frame_covariance[problem.frames[f]] = covariance.frames[f];
+    for (std::size_t c = 0; c < problem.cameras.size(); ++c)
+      if (!covariance.cameras[c].isZero(0)) outcome.camera_covariance[problem.cameras[c]] = covariance.cameras[c];
+  }
+}
+
+std::vector<SeamCheck> seam_checks(const RankRunner::Posterior& posterior) {
+  const std::vector<std::string> alarms = describe_seams(posterior.seams, posterior.tile_checks);
+  std::vector<SeamCheck> checks;
+  std::size_t alarm = 0;
+  for (const SeamReport& seam : posterior.seams) {
+    SeamCheck check{seam.node, seam.statistic, seam.degrees, seam.threshold, ""};
+    if (seam.alarm() && alarm < alarms.size()) check.note = alarms[alarm++];
+    checks.push_back(check);
+  }
+  return checks;
+}
+
+// What rank 0 needs of the other ranks' tiles for the result.
+std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjusted& adjusted, MergeOutcome& outcome) {
+  add_covariances(adjusted, outcome, job.block);
+  constexpr int kTag = 1 << 20;
+  std::vector<TileResult> parts(inputs.tracks.size());
+  const auto part_of = [&](std::size_t row) {
+    const RankTile& tile = adjusted.tiles[row];
+    MergeTile merge{TileIndex(tile.tile), read_tracks(job.store.verified_path(inputs.tracks[static_cast<std::size_t>(tile.tile)])),
+                    tile.problem, tile.state};
+    return make_tile_result(merge, adjusted.posterior.covariances[row].points);
+  };
+  if (!job.is_first_rank()) {
+    for (std::size_t row = 0; row < adjusted.tiles.size(); ++row)
+      job.ranks.send(0, kTag + static_cast<int>(adjusted.tiles[row].tile), to_bytes(part_of(row)));
+    ByteWriter writer;
+    writer.values(static_cast<const std::vector<BlockResult::Matrix6>&>(outcome.frame_covariance));
+    writer.values(static_cast<const std::vector<BlockResult::Matrix8>&>(outcome.camera_covariance));
+    const Bytes bytes = writer.take();
+    job.ranks.send(0, kTag - 1, std::string(bytes.begin(), bytes.end()));
+    job.ranks.flush_sends();
+    return parts;
+  }
+  const std::vector<int> rank_of_tile = distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
+  for (std::size_t t = 0, own = 0; t < parts.size(); ++t)
+    parts[t] = rank_of_tile[t] == 0 ? part_of(own++)
+                                    : tile_result_from_bytes(job.ranks.receive(rank_of_tile[t], kTag + static_cast<int>(t)));
+  for (int r = 1; r < job.ranks.size(); ++r) {
+    const std::string text = job.ranks.receive(r, kTag - 1);
+    const Bytes bytes(text.begin(), text.end());
+    ByteReader reader(bytes);
+    const auto frames = reader.values<BlockResult::Matrix6>();
+    const auto cameras = reader.values<BlockResult::Matrix8>();
+    for (std::size_t f = 0; f < frames.size(); ++f)
+      if (!frames[f].isZero(0)) outcome.frame_covariance[FrameIndex(static_cast<std::int64_t>(f))] = frames[f];
+    for (std::size_t c = 0; c < cameras.size(); ++c)
+      if (!cameras[c].isZero(0)) outcome.camera_covariance[CameraIndex(static_cast<std::int64_t>(c))] = cameras[c];
+  }
+  return parts;
+}
+
+MergeOutcome make_outcome(const Adjusted& adjusted) {
+  MergeOutcome outcome;
+  outcome.state = adjusted.state;
+  const SubtreeSums& sums = adjusted.posterior.sums;
+  outcome.chi2 = sums.weighted_squares;
+  outcome.degrees_of_freedom = sums.residuals - sums.unknowns + static_cast<std::int64_t>(sums.held.size()) + sums.held_points;
+  outcome.global_iterations = adjusted.position.global.accepted;
+  outcome.newton_decrement = std::sqrt(sums.decrement_squared);
+  outcome.gauge = adjusted.posterior.gauge.text;
+  outcome.seams = seam_checks(adjusted.posterior);
+  return outcome;
+}
+
+void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
+                 const MergeOutcome& outcome, const std::vector<TileResult>& parts) {
+  if (!adjusted.converged)
+    job.notes.push_back("the global adjustment did not converge: " + describe(adjusted.position.global));
+  for (const SeamCheck& seam : outcome.seams)
+    if (!seam.note.empty()) job.notes.push_back(seam.note);
+  const BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
+  std::filesystem::create_directories(job.store.path("result"));
+  job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result); });
+  job.store.write_text("result/report.html", report_html(result));
+}
+
+}  // namespace
+
+void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
+               const std::vector<std::string>& adjusted_units) {
+  const double start = monotonic_seconds();
+  reset_peak_rss();
+  const MergeInputs inputs{oriented, tiles, tracks, adjusted_units};
+  const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
+  const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
+    if (!job.store.up_to_date(kResult, fingerprint)) return "";
+    try {
+      job.store.verify(kResult);
+    } catch (const StoreError&) {
+      return "";
+    }
+    return std::filesystem::exists(job.store.path("result/report.html")) ? "current" : "";
+  });
+  if (!current.empty()) return;
+
+  MergeCheckpoint checkpoint(job, fingerprint);
+  Adjusted adjusted = adjust_block(job, inputs, checkpoint);
+  MergeOutcome outcome = make_outcome(adjusted);
+  const std::vector<TileResult> parts = gather_parts(job, inputs, adjusted, outcome);
+  double peak = 0;
+  for (const std::string& text : job.ranks.gather_all(std::to_string(peak_rss_mib()))) peak = std::max(peak, std::stod(text));
+  job.statistics.push_back({"merge", monotonic_seconds() - start, peak, tiles.tile_count, 0});
+  on_first_rank(job.ranks, [&] {
+    write_final(job, inputs, fingerprint, adjusted, outcome, parts);
+    checkpoint.clear();
+    return std::string();
+  });
+}
+
+}  // namespace megablock

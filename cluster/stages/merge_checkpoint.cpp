@@ -1,0 +1,141 @@
+#include "cluster/stages/merge_checkpoint.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "cluster/collective.h"
+#include "cluster/stages/stages.h"
+#include "io/error.h"
+#include "io/hash.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kMarker = "/iteration.bin";  // written last
+
+TileAdjustment snapshot(const RankTile& tile) {
+  TileAdjustment snapshot;
+  snapshot.frames = tile.problem.frames;
+  snapshot.poses = tile.state.frames;
+  snapshot.observations.assign(snapshot.frames.size(), 0);
+  snapshot.cameras = tile.problem.cameras;
+  snapshot.intrinsics = tile.state.cameras;
+  snapshot.camera_observations.assign(snapshot.cameras.size(), 0);
+  snapshot.points = tile.state.points;
+  snapshot.kept = tile.problem.kept;
+  return snapshot;
+}
+
+std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
+
+void write_marker(const std::string& path, const MergePosition& position) {
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(&position), sizeof position);
+}
+
+MergePosition read_marker(const std::string& path) {
+  static_assert(std::is_trivially_copyable_v<MergePosition>);
+  MergePosition position;
+  std::ifstream in(path, std::ios::binary);
+  in.read(reinterpret_cast<char*>(&position), sizeof position);
+  if (!in) throw StoreError(path + ": is truncated; run again to compute it anew");
+  return position;
+}
+
+}  // namespace
+
+std::string MergeCheckpoint::folder(const MergePosition& position) const {
+  char text[64];
+  std::snprintf(text, sizeof text, "merge/%02d-%04d", position.round, position.global.accepted);
+  return text;
+}
+
+std::uint64_t MergeCheckpoint::fingerprint(const std::string& folder) const {
+  Hasher hasher;
+  hasher.add(inputs_).add(folder);
+  return hasher.value();
+}
+
+void MergeCheckpoint::write(const MergePosition& position, const std::vector<RankTile>& tiles,
+                            const BlockState& state) {
+  const std::string here = folder(position);
+  const std::string before = current_;
+  on_first_rank(job_.ranks, [&] {
+    std::filesystem::create_directories(job_.store.path(here));
+    return std::string();
+  });
+  std::string problem;
+  try {
+    for (const RankTile& tile : tiles)
+      job_.store.write(tile_unit(here, tile.tile), fingerprint(here),
+                       [&](const std::string& path) { write_adjustment(path, snapshot(tile)); });
+  } catch (const Error& error) {
+    problem = error.what();
+  }
+  share_error(job_.ranks, 'i', problem);
+  on_first_rank(job_.ranks, [&] {
+    job_.store.write(here + "/state.h5", fingerprint(here), [&](const std::string& path) { write_state(path, state); });
+    job_.store.write(here + kMarker, fingerprint(here), [&](const std::string& path) { write_marker(path, position); });
+    UnitEvent event;
+    event.stage = "merge";
+    event.unit = here;
+    event.rank = 0;
+    job_.events.append(event);
+    if (!before.empty() && before != here) std::filesystem::remove_all(job_.store.path(before));
+    return std::string();
+  });
+  current_ = here;
+}
+
+std::optional<MergePosition> MergeCheckpoint::find() {
+  current_ = on_first_rank(job_.ranks, [&] {
+    std::string last;
+    const std::filesystem::path root(job_.store.path("merge"));
+    std::vector<std::string> folders;
+    if (std::filesystem::exists(root))
+      for (const auto& entry : std::filesystem::directory_iterator(root))
+        folders.push_back("merge/" + entry.path().filename().string());
+    std::sort(folders.begin(), folders.end());
+    for (const std::string& name : folders) {
+      const auto seal = job_.store.seal(name + kMarker);
+      bool valid = seal && seal->fingerprint == fingerprint(name);
+      try {
+        if (valid)
+          for (const auto& file : std::filesystem::directory_iterator(job_.store.path(name)))
+            job_.store.verify(name + "/" + file.path().filename().string());
+      } catch (const StoreError&) {
+        valid = false;
+      }
+      if (valid)
+        last = name;
+      else
+        std::filesystem::remove_all(job_.store.path(name));
+    }
+    return last;
+  });
+  if (current_.empty()) return std::nullopt;
+  return read_marker(job_.store.verified_path(current_ + kMarker));
+}
+
+BlockState MergeCheckpoint::state() const { return read_state(job_.store.verified_path(current_ + "/state.h5")); }
+
+void MergeCheckpoint::load_tile(RankTile& tile) const {
+  const TileAdjustment snapshot = read_adjustment(job_.store.verified_path(tile_unit(current_, tile.tile)));
+  tile.problem.kept = snapshot.kept;
+  tile.state.frames = snapshot.poses;
+  tile.state.cameras = snapshot.intrinsics;
+  tile.state.points = snapshot.points;
+}
+
+void MergeCheckpoint::clear() {
+  std::filesystem::remove_all(job_.store.path("merge"));
+  std::filesystem::create_directories(job_.store.path("merge"));
+  current_.clear();
+}
+
+}  // namespace megablock

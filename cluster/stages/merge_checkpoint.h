@@ -1,0 +1,43 @@
+// Checkpoints of the global adjustment: after each accepted iteration every rank writes its tiles, then rank 0 the
+// state of the iteration, which makes the checkpoint valid. A run that was killed goes on from the last valid one with
+// the same bits.
+#pragma once
+
+#include <optional>
+
+#include "cluster/job.h"
+#include "cluster/rank_runner.h"
+#include "merge/global_adjustment.h"
+
+namespace megablock {
+
+struct MergePosition {
+  std::int32_t round = 0;        // of screening
+  GlobalState global;
+};
+
+class MergeCheckpoint {
+ public:
+  // `inputs`: fingerprint of everything the merge is computed from.
+  MergeCheckpoint(Job& job, std::uint64_t inputs) : job_(job), inputs_(inputs) {}
+
+  // Collective.
+  void write(const MergePosition& position, const std::vector<RankTile>& tiles, const BlockState& state);
+  // The last valid position on disk; the same on every rank. Collective.
+  std::optional<MergePosition> find();
+  // State and points of the position found.
+  BlockState state() const;
+  void load_tile(RankTile& tile) const;
+  // Deletes all checkpoints (the result is written). Rank 0.
+  void clear();
+
+ private:
+  std::string folder(const MergePosition& position) const;
+  std::uint64_t fingerprint(const std::string& folder) const;
+
+  Job& job_;
+  std::uint64_t inputs_;
+  std::string current_;  // folder of the last checkpoint written or found
+};
+
+}  // namespace megablock
