@@ -4,9 +4,9 @@
 #include <limits>
 #include <numeric>
 
+#include "cluster/matrix_bytes.h"
 #include "geometry/camera.h"
 #include "geometry/pose.h"
-#include "merge/bytes.h"
 
 namespace megablock {
 
@@ -126,8 +126,8 @@ std::string to_bytes(const TileResult& part) {
   writer.values(part.tracks.y);
   writer.values(part.tracks.feature);
   writer.values(part.points);
-  writer.values(part.positions);
-  writer.values(part.covariances);
+  write_matrices(writer, part.positions);
+  write_matrices(writer, part.covariances);
   writer.values(part.kept);
   writer.values(part.residual_x);
   writer.values(part.residual_y);
@@ -151,8 +151,8 @@ TileResult tile_result_from_bytes(const std::string& text) {
   read(part.tracks.y);
   read(part.tracks.feature);
   read(part.points);
-  read(part.positions);
-  read(part.covariances);
+  part.positions = read_matrices<Eigen::Vector3d>(reader);
+  part.covariances = read_matrices<Eigen::Matrix3d>(reader);
   read(part.kept);
   read(part.residual_x);
   read(part.residual_y);

@@ -9,7 +9,6 @@ namespace megablock {
 
 namespace {
 
-using GlobalDescriptors = IndexedVector<ImageIndex, std::array<float, 128>>;
 
 GlobalDescriptors read_descriptors(const Job& job, const FeatureStage& features) {
   GlobalDescriptors all;
@@ -62,7 +61,7 @@ CandidateGraph run_candidates(Job& job, const FeatureStage& features) {
       const Block part = first_images(job.block, n);
       GlobalDescriptors some(descriptors.begin(), descriptors.begin() + n);
       graph = before == 0 ? candidate_pairs(part, some, job.settings.candidates)
-                          : extend_candidates(graph, part, some, ImageIndex(before), job.settings.candidates);
+                          : extend_candidates(graph, part, some, job.settings.candidates, ImageIndex(before));
       before = n;
     }
     write_candidates(path, graph);

@@ -7,6 +7,7 @@
 
 #include "adjust/tile_adjustment.h"
 #include "cluster/collective.h"
+#include "cluster/matrix_bytes.h"
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
@@ -45,46 +46,37 @@ std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
   return hasher.value();
 }
 
-// Writes what this rank's tiles know into the block's state, then takes the lowest tile's word from every rank. Tiles
-// agree on what they share, so the order only matters for frames that nothing depends on.
+// The block's state from all ranks' tiles. Tiles hold the same bits of what they share, so their order does not matter.
 BlockState gather_state(Job& job, const BlockState& start, const std::vector<RankTile>& tiles) {
   ByteWriter writer;
   for (const RankTile& tile : tiles) {
     writer.values(tile.problem.frames);
-    for (const Pose& pose : tile.state.frames) {
-      writer.value(pose.rotation.coeffs().eval());
-      writer.value(pose.centre);
-    }
+    write_poses(writer, tile.state.frames);
     writer.values(tile.problem.cameras);
     writer.values(tile.state.cameras);
     writer.values(tile.problem.mounts);
-    for (const Pose& pose : tile.state.mounts) {
-      writer.value(pose.rotation.coeffs().eval());
-      writer.value(pose.centre);
-    }
+    write_poses(writer, tile.state.mounts);
   }
   const Bytes mine = writer.take();
   BlockState state = start;
-  const auto read_pose = [](ByteReader& reader) {
-    Pose pose;
-    pose.rotation.coeffs() = reader.value<Eigen::Vector4d>();
-    pose.centre = reader.value<Eigen::Vector3d>();
-    return pose;
-  };
   std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
   for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
     const Bytes bytes(text.begin(), text.end());
     ByteReader reader(bytes);
     while (!reader.at_end()) {
-      for (const FrameIndex frame : reader.values<FrameIndex>()) {
-        state.frames[frame] = read_pose(reader);
-        state.oriented[frame] = start.oriented[frame];
+      const auto frames = reader.values<FrameIndex>();
+      const auto poses = read_poses(reader);
+      for (std::size_t f = 0; f < frames.size(); ++f) {
+        state.frames[frames[f]] = poses[f];
+        state.oriented[frames[f]] = start.oriented[frames[f]];
       }
       const auto cameras = reader.values<CameraIndex>();
       const auto intrinsics = reader.values<Intrinsics>();
       for (std::size_t c = 0; c < cameras.size(); ++c) state.cameras[cameras[c]] = intrinsics[c];
-      for (const MountId& id : reader.values<MountId>())
-        state.mounts[id.rig][static_cast<std::size_t>(id.mount)] = read_pose(reader);
+      const auto mounts = reader.values<MountId>();
+      const auto mount_poses = read_poses(reader);
+      for (std::size_t m = 0; m < mounts.size(); ++m)
+        state.mounts[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)] = mount_poses[m];
     }
   }
   return state;
@@ -228,8 +220,8 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
     for (std::size_t row = 0; row < adjusted.tiles.size(); ++row)
       job.ranks.send(0, kTag + static_cast<int>(adjusted.tiles[row].tile), to_bytes(part_of(row)));
     ByteWriter writer;
-    writer.values(static_cast<const std::vector<BlockResult::Matrix6>&>(outcome.frame_covariance));
-    writer.values(static_cast<const std::vector<BlockResult::Matrix8>&>(outcome.camera_covariance));
+    write_matrices<BlockResult::Matrix6>(writer, outcome.frame_covariance);
+    write_matrices<BlockResult::Matrix8>(writer, outcome.camera_covariance);
     const Bytes bytes = writer.take();
     job.ranks.send(0, kTag - 1, std::string(bytes.begin(), bytes.end()));
     job.ranks.flush_sends();
@@ -243,8 +235,8 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
     const std::string text = job.ranks.receive(r, kTag - 1);
     const Bytes bytes(text.begin(), text.end());
     ByteReader reader(bytes);
-    const auto frames = reader.values<BlockResult::Matrix6>();
-    const auto cameras = reader.values<BlockResult::Matrix8>();
+    const auto frames = read_matrices<BlockResult::Matrix6>(reader);
+    const auto cameras = read_matrices<BlockResult::Matrix8>(reader);
     for (std::size_t f = 0; f < frames.size(); ++f)
       if (!frames[f].isZero(0)) outcome.frame_covariance[FrameIndex(static_cast<std::int64_t>(f))] = frames[f];
     for (std::size_t c = 0; c < cameras.size(); ++c)
