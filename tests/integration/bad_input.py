@@ -1,0 +1,246 @@
+#!/usr/bin/env python3
+"""What bad input gets: one clear line, nothing lost, the documented exit code.
+
+usage: bad_input.py MEGABLOCK [unittest arguments]
+Works on a small rendered block; needs nothing but the program and the standard library. Cases that need a file system
+of their own (full disk, read-only job) mount a tmpfs and are skipped, saying so, where that is not allowed.
+"""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+MEGABLOCK = sys.argv.pop(1)
+DONE, FAILED_UNITS, BAD_INPUT, INTERRUPTED = 0, 1, 2, 75
+work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-bad-input-"))
+
+
+def megablock(*arguments, expect=DONE):
+    """Runs the program; checks the exit code; returns what it wrote to standard error."""
+    done = subprocess.run([MEGABLOCK, *map(str, arguments)], capture_output=True, text=True)
+    assert done.returncode == expect, f"{arguments}: exit code {done.returncode}, not {expect}\n{done.stdout}\n{done.stderr}"
+    return done.stderr + (done.stdout if expect == DONE else "")
+
+
+def one_line(text):
+    lines = [line for line in text.splitlines() if line.startswith("megablock: ")]
+    assert len(lines) == 1, text
+    return lines[0]
+
+
+def status(job):
+    return json.loads(subprocess.check_output([MEGABLOCK, "status", str(job), "--json"]))
+
+
+def events(job):
+    return [json.loads(line) for file in sorted((job / "events").iterdir()) for line in file.open()]
+
+
+def setUpModule():
+    megablock("simulate", "--rendered", "--frames", 12, "--width", 640, "--image-height", 480, "--focal", 500,
+              "-o", work / "clean")
+    megablock("run", work / "clean/block.yaml", "-j", work / "clean_job", "-q")
+
+
+def tearDownModule():
+    shutil.rmtree(work)
+
+
+class BadInput(unittest.TestCase):
+    def setUp(self):
+        self.folder = work / self.id().split(".")[-1]
+        shutil.copytree(work / "clean", self.folder)
+        self.project = self.folder / "block.yaml"
+        self.images = self.folder / "images"
+        self.job = self.folder / "job"
+
+    def run_job(self, expect=DONE):
+        return megablock("run", self.project, "-j", self.job, "-q", expect=expect)
+
+    # --- the project -------------------------------------------------------------------------------------------------
+    def test_missing_folder(self):
+        line = one_line(megablock("init", self.folder / "nowhere", "-o", self.folder / "x.yaml", expect=BAD_INPUT))
+        self.assertIn("nowhere", line)
+
+    def test_missing_project(self):
+        self.assertIn("megablock init", one_line(megablock("run", "no.yaml", "-j", self.job, expect=BAD_INPUT)))
+
+    def test_unknown_key(self):
+        with self.project.open("a") as f:
+            f.write("matchng:\n  ratio: 0.7\n")
+        line = one_line(self.run_job(BAD_INPUT))
+        self.assertIn(f"{self.project}:{len(self.project.read_text().splitlines()) - 1}", line)
+        self.assertIn("matching", line)
+
+    def test_wrong_unit(self):
+        with self.project.open("a") as f:
+            f.write("adjustment:\n  image_sigma_px: 0.5 mm\n")
+        self.assertIn("block.yaml:", one_line(self.run_job(BAD_INPUT)))
+
+    def test_control_point_names_missing_image(self):
+        control = next(iter(self.folder.glob("gcp_list.txt")), None) or self.folder / "gcp_list.txt"
+        control.write_text("WGS84\n2.35 48.85 50 320 240 not_there.jpg p1\n")
+        text = self.project.read_text()
+        text = "\n".join(line for line in text.splitlines() if not line.startswith("control:"))
+        self.project.write_text(text + "\ncontrol: gcp_list.txt\n")
+        line = one_line(self.run_job(BAD_INPUT))
+        self.assertIn("not_there.jpg", line)
+        self.assertIn("gcp_list.txt:2", line)
+
+    # --- images ------------------------------------------------------------------------------------------------------
+    def test_bad_files_among_good(self):
+        first = sorted(self.images.glob("*.jpg"))
+        data = first[0].read_bytes()
+        (self.images / "zero.jpg").write_bytes(b"")
+        (self.images / "text.jpg").write_text("this is not an image\n")
+        (self.images / "truncated.jpg").write_bytes(data[: len(data) // 2])
+        corrupt = bytearray(data)
+        corrupt[len(data) // 3: len(data) // 3 + 400] = b"\xff" * 400
+        (self.images / "corrupt.jpg").write_bytes(corrupt)
+        self.run_job(FAILED_UNITS)
+        figures = status(self.job)
+        self.assertGreaterEqual(figures["oriented"], 12)
+        report = (self.job / "result/report.html").read_text()
+        for name in ("zero.jpg", "text.jpg", "truncated.jpg"):
+            self.assertIn(name, report)
+
+    def test_duplicate_file(self):
+        first = sorted(self.images.glob("*.jpg"))[0]
+        shutil.copy(first, self.images / "zz_copy.jpg")
+        self.run_job()
+        self.assertEqual(status(self.job)["images"], 12)
+        self.assertIn("zz_copy.jpg", (self.job / "result/report.html").read_text())
+
+    def test_no_images(self):
+        for image in self.images.iterdir():
+            image.unlink()
+        self.assertIn("image", one_line(self.run_job(BAD_INPUT)))
+
+    # --- the job directory -------------------------------------------------------------------------------------------
+    def test_job_of_another_version(self):
+        shutil.copytree(work / "clean_job", self.job)
+        file = self.job / "job.json"
+        content = json.loads(file.read_text())
+        content["version"] = 999
+        file.write_text(json.dumps(content))
+        self.assertIn("version", one_line(self.run_job(BAD_INPUT)))
+        self.assertTrue((self.job / "result/block.h5").exists())
+
+    def test_damaged_units_are_computed_again(self):
+        megablock("run", self.project, "-j", self.job, "-q")
+        digest = status(self.job)["digest"]
+        for unit, damage in (("features/000000.h5", "flip"), ("tracks/000000.h5", "cut"), ("adjust/000000.h5", "flip"),
+                             ("matches/000000.h5", "gone")):
+            file = self.job / unit
+            data = bytearray(file.read_bytes())
+            if damage == "flip":
+                data[len(data) // 2] ^= 4
+                file.write_bytes(data)
+            elif damage == "cut":
+                file.write_bytes(data[:-100])
+            else:
+                file.unlink()
+            before = len(events(self.job))
+            self.run_job()
+            self.assertIn(unit if unit[:6] != "tracks" else "tracks/index.txt",
+                          [e["unit"] for e in events(self.job)[before:]])
+            self.assertEqual(status(self.job)["digest"], digest)
+
+    def test_check_names_the_damaged_file(self):
+        shutil.copytree(work / "clean_job", self.job)
+        self.assertIn("whole", megablock("check", self.job))
+        file = self.job / "matches/000000.h5"
+        data = bytearray(file.read_bytes())
+        data[len(data) // 2] ^= 1
+        file.write_bytes(data)
+        done = subprocess.run([MEGABLOCK, "check", self.job], capture_output=True, text=True)
+        self.assertEqual(done.returncode, FAILED_UNITS)
+        self.assertIn("matches/000000.h5", done.stdout)
+
+    def test_finished_job_computes_nothing(self):
+        megablock("run", self.project, "-j", self.job, "-q")
+        before = len(events(self.job))
+        self.run_job()
+        self.assertEqual(events(self.job)[before:], [])
+
+    def test_changed_option_redoes_what_depends_on_it(self):
+        megablock("run", self.project, "-j", self.job, "-q")
+        before = len(events(self.job))
+        with self.project.open("a") as f:
+            f.write("adjustment:\n  max_residual_sigmas: 3.5\n")
+        self.run_job()
+        self.assertEqual({e["stage"] for e in events(self.job)[before:]} - {"adjustment", "merge"}, set())
+        self.assertIn("adjustment", {e["stage"] for e in events(self.job)[before:]})
+
+    def test_two_runs_on_one_job(self):
+        first = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stderr=subprocess.DEVNULL)
+        while not (self.job / "lock").exists():
+            self.assertIsNone(first.poll())
+            time.sleep(0.01)
+        first.send_signal(signal.SIGSTOP)  # it holds the lock for as long as we like
+        try:
+            line = one_line(self.run_job(BAD_INPUT))
+            self.assertIn(str(first.pid), line)
+        finally:
+            first.send_signal(signal.SIGCONT)
+        self.assertEqual(first.wait(), DONE)
+
+    def with_file_system(self, size):
+        self.job.mkdir()
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(self.job)]
+        if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+            self.skipTest("needs the right to mount a tmpfs")
+        self.addCleanup(subprocess.run, ["umount", str(self.job)])
+
+    def test_full_disk(self):
+        self.with_file_system("1m")
+        line = one_line(self.run_job(BAD_INPUT))
+        self.assertRegex(line, "(?i)space|full")
+        subprocess.check_call(["mount", "-o", "remount,size=500m", str(self.job)])
+        self.run_job()
+        self.assertEqual(status(self.job)["digest"], status(work / "clean_job")["digest"])
+
+    def test_read_only_job(self):
+        self.with_file_system("500m")
+        subprocess.check_call(["mount", "-o", "remount,ro", str(self.job)])
+        self.assertRegex(one_line(self.run_job(BAD_INPUT)), "(?i)read-only")
+
+    # --- signals -----------------------------------------------------------------------------------------------------
+    def test_sigterm_in_every_stage(self):
+        reference = status(work / "clean_job")["digest"]
+        begun = {"features": "job.json", "candidates": "features/000000.h5", "matching": "graph.h5",
+                 "tracks": "matches/000000.h5", "orientation": "tracks/index.txt", "adjustment": "orient/000000.h5",
+                 "merge": "adjust/000000.h5"}
+        for stage, sign in begun.items():
+            job = self.folder / f"job_{stage}"
+            run = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", job, "-q"], stderr=subprocess.DEVNULL)
+            while not (job / sign).exists() and run.poll() is None:
+                time.sleep(0.002)
+            run.send_signal(signal.SIGTERM)
+            asked = time.monotonic()
+            code = run.wait()
+            self.assertIn(code, (INTERRUPTED, DONE), stage)  # the last stages may end before the signal comes
+            self.assertLess(time.monotonic() - asked, 1)
+            megablock("run", self.project, "-j", job, "-q")
+            self.assertEqual(status(job)["digest"], reference, stage)
+
+    def test_sigusr1_stops_gracefully(self):
+        run = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stderr=subprocess.PIPE, text=True)
+        while not (self.job / "job.json").exists():
+            time.sleep(0.002)
+        run.send_signal(signal.SIGUSR1)
+        message = run.communicate()[1]
+        self.assertEqual(run.returncode, INTERRUPTED, message)
+        self.assertIn("resume", message)
+        self.run_job()
+        self.assertEqual(status(self.job)["digest"], status(work / "clean_job")["digest"])
+
+
+if __name__ == "__main__":
+    unittest.main()
