@@ -13,7 +13,7 @@ namespace {
 GlobalDescriptors read_descriptors(const Job& job, const FeatureStage& features) {
   GlobalDescriptors all;
   for (const std::string& shard : features.shards)
-    for (const ImageFeatures& image : read_features(job.store.verified_path(shard))) all.push_back(image.global_descriptor);
+    for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard))) all.push_back(image.global_descriptor);
   return all;
 }
 

@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
+#include "cluster/collective.h"
 #include "cluster/stages/stages.h"
+#include "io/error.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
 #include "match/features.h"
@@ -45,6 +48,18 @@ void write_shard(const Job& job, std::int64_t first, std::int64_t end, const std
   write_features(path, shard);
 }
 
+// Images without features become failures of the run, with their reasons.
+void list_unreadable(Job& job, const FeatureStage& stage) {
+  const std::string text = on_first_rank(job.ranks, [&] {
+    nlohmann::json failed = nlohmann::json::array();
+    for (const std::string& shard : stage.shards)
+      for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard)))
+        if (!image.failure.empty()) failed.push_back({job.block.images[image.image].name, image.failure});
+    return failed.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  });
+  for (const auto& entry : nlohmann::json::parse(text)) job.failures.push_back({"features", entry[0], entry[1]});
+}
+
 }  // namespace
 
 FeatureStage run_features(Job& job) {
@@ -64,7 +79,9 @@ FeatureStage run_features(Job& job) {
     stage.shards.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  run_stage(job, "features", units);
+  const StageOutcome outcome = run_stage(job, "features", units);
+  if (!outcome.failures.empty()) throw ComputeError("features: " + outcome.failures.front().reason);
+  list_unreadable(job, stage);
   return stage;
 }
 

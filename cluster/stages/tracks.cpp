@@ -121,7 +121,7 @@ IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job) 
   IndexedVector<ImageIndex, std::vector<Keypoint>> keypoints;
   const auto images = static_cast<std::int64_t>(job.block.images.size());
   for (std::int64_t shard = 0; shard * kShardImages < images; ++shard)
-    for (ImageFeatures& image : read_features(job.store.verified_path(unit_name("features", shard))))
+    for (ImageFeatures& image : read_keypoints(job.store.verified_path(unit_name("features", shard))))
       keypoints.push_back(std::move(image.keypoints));
   return keypoints;
 }
