@@ -84,7 +84,7 @@ void write_cameras(const BlockResult& result, const std::string& path) {
 void export_csv(const BlockResult& result, const std::string& folder) {
   const ExportView view = make_export_view(result);
   const fs::path root(folder);
-  write_pose_csv((root / "frames.csv").string(), result.block, result.state);
+  write_pose_csv((root / "frames.csv").string(), pose_table(result.block, result.state));
   write_local(view, (root / "images_local.csv").string());
   if (result.block.ground.georeferenced) write_wgs84(view, (root / "images_wgs84.csv").string());
   write_cameras(result, (root / "cameras.csv").string());
