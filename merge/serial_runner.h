@@ -25,10 +25,12 @@ class SerialRunner : public TreeRunner {
   void accept() override;
   void reject() override;
 
-  // After a last up(0): posterior covariances per tile.
+  // The pass that ends a run: up(0) with the seam checks.
+  UpReport final_up();
+  // After up(0) or final_up(): posterior covariances per tile.
   std::vector<TileCovariance> covariances();
-  // Seams of all inner nodes, from the last up(0).
-  std::vector<SeamReport> seams() const;
+  // Seams of all inner nodes in node order, from final_up().
+  const std::vector<SeamReport>& seams() const { return seams_; }
 
   const EliminationPlan& plan() const { return plan_; }
   const std::vector<TilePlan>& tile_plans() const { return tile_plans_; }
@@ -36,18 +38,25 @@ class SerialRunner : public TreeRunner {
   const std::vector<TileState>& states() const { return states_; }
   const std::vector<TileStep>& steps() const { return steps_; }  // of the last down()
   const GaugeReport& gauge() const { return gauge_; }            // of the last up(0)
-  const MemoryStatistics& memory() const { return statistics_; }
+  const MemoryStatistics& memory() const { return factors_.statistics(); }
 
  private:
-  struct Factors;
+  // Update matrix of a node's subtree; its factors go to the store.
+  UpdateMatrix condense_subtree(std::int64_t node, double lambda, bool check_seams);
+  // Factor of an inner node or a tile; recomputes the subtree where it was dropped.
+  const NodeFactors& inner_factor(std::int64_t node, double lambda);
+  void down_from(std::int64_t node, double lambda, const Step& parent);
+  void covariances_from(std::int64_t node, const CovarianceMatrix& parent, std::vector<TileCovariance>& result);
+  std::int64_t seam_count() const;
+
   std::vector<TileProblem> problems_;
   std::vector<TileState> states_, trial_;
   std::vector<TilePlan> tile_plans_;
   std::vector<TileStep> steps_;
   EliminationPlan plan_;
-  MemoryOptions memory_options_;
-  MemoryStatistics statistics_;
+  FactorStore factors_;
   GaugeReport gauge_;
+  std::vector<SeamReport> seams_;
 };
 
 }  // namespace megablock

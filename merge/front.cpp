@@ -1,0 +1,451 @@
+#include "merge/front.h"
+
+#include <cblas.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::int64_t kPanel = 64;  // columns per step of the blocked factorisation
+
+int blas(std::int64_t n) { return static_cast<int>(n); }
+
+// First row of every unknown of `wanted` in `list` laid out as row_offsets(list).
+std::vector<std::int64_t> rows_in(const UnknownList& list, const UnknownList& wanted, const char* what) {
+  const std::vector<std::int64_t> offsets = row_offsets(list);
+  std::vector<std::int64_t> rows;
+  rows.reserve(wanted.size());
+  for (const Unknown& u : wanted) {
+    const std::int64_t at = find_unknown(list, u.id);
+    if (at < 0) throw ComputeError(std::string(what) + " lacks " + describe(u.id));
+    rows.push_back(offsets[static_cast<std::size_t>(at)]);
+  }
+  return rows;
+}
+
+// Scalar rows in the larger table of every scalar row of `wanted`.
+std::vector<std::int64_t> scalar_rows(const UnknownList& wanted, const std::vector<std::int64_t>& first_rows) {
+  std::vector<std::int64_t> rows;
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    for (std::int64_t k = 0; k < wanted[i].dimension; ++k) rows.push_back(first_rows[i] + k);
+  return rows;
+}
+
+void write_list(ByteWriter& out, const UnknownList& list) { out.values(list); }
+
+void write_sums(ByteWriter& out, const SubtreeSums& sums) {
+  out.value(sums.cost);
+  out.value(sums.weighted_squares);
+  out.value(sums.decrement_squared);
+  out.value(sums.residuals);
+  out.value(sums.observations);
+  out.value(sums.points);
+  out.value(sums.unknowns);
+  out.value(sums.held_points);
+  out.values(sums.held);
+}
+
+SubtreeSums read_sums(ByteReader& in) {
+  SubtreeSums sums;
+  sums.cost = in.value<double>();
+  sums.weighted_squares = in.value<double>();
+  sums.decrement_squared = in.value<double>();
+  sums.residuals = in.value<std::int64_t>();
+  sums.observations = in.value<std::int64_t>();
+  sums.points = in.value<std::int64_t>();
+  sums.unknowns = in.value<std::int64_t>();
+  sums.held_points = in.value<std::int64_t>();
+  sums.held = in.values<HeldUnknown>();
+  return sums;
+}
+
+// Partial Cholesky of the first e rows and columns of a symmetric n x n matrix (lower triangle, column-major).
+class PartialCholesky {
+ public:
+  PartialCholesky(double* matrix, std::int64_t n, std::int64_t e, double* rhs, std::int64_t right_hand_sides,
+                  const double* reference)
+      : a_(matrix), n_(n), e_(e), rhs_(rhs), columns_(right_hand_sides), reference_(reference) {}
+
+  void run() {
+    for (std::int64_t first = 0; first < e_; first += kPanel) panel(first, std::min(kPanel, e_ - first));
+    const std::int64_t p = n_ - e_;
+    if (p > 0 && e_ > 0) {
+      cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, blas(p), blas(e_), -1, a_ + e_, blas(n_), 1,
+                  a_ + e_ + e_ * n_, blas(n_));
+    }
+  }
+  std::vector<std::int64_t> held;
+  std::vector<double> held_ratio;
+
+ private:
+  double& at(std::int64_t row, std::int64_t column) { return a_[row + column * n_]; }
+
+  void panel(std::int64_t first, std::int64_t width) {
+    const std::int64_t end = first + width, below = n_ - end;
+    const std::size_t held_before = held.size();
+    factorise_diagonal_block(first, end);
+    if (below > 0) {
+      cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, blas(below), blas(width), 1,
+                  &at(first, first), blas(n_), &at(end, first), blas(n_));
+      for (std::size_t h = held_before; h < held.size(); ++h) std::fill_n(&at(end, held[h]), below, 0.0);
+    }
+    forward_substitute(first, width, held_before);
+    const std::int64_t trailing = e_ - end, passed = n_ - e_;
+    if (trailing > 0) {
+      cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, blas(trailing), blas(width), -1, &at(end, first), blas(n_),
+                  1, &at(end, end), blas(n_));
+      if (passed > 0)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, blas(passed), blas(trailing), blas(width), -1,
+                    &at(e_, first), blas(n_), &at(end, first), blas(n_), 1, &at(e_, end), blas(n_));
+    }
+  }
+
+  // Column by column with the pivot test; a held row and column become those of the identity.
+  void factorise_diagonal_block(std::int64_t first, std::int64_t end) {
+    for (std::int64_t k = first; k < end; ++k) {
+      const double pivot = at(k, k);
+      if (!(pivot > kPivotTolerance * reference_[k])) {
+        held.push_back(k);
+        held_ratio.push_back(reference_[k] > 0 ? pivot / reference_[k] : 0);
+        for (std::int64_t j = 0; j < k; ++j) at(k, j) = 0;
+        for (std::int64_t i = k + 1; i < end; ++i) at(i, k) = 0;
+        at(k, k) = 1;
+        continue;
+      }
+      const double root = std::sqrt(pivot), inverse = 1 / root;
+      at(k, k) = root;
+      for (std::int64_t i = k + 1; i < end; ++i) at(i, k) *= inverse;
+      for (std::int64_t j = k + 1; j < end; ++j) {
+        const double factor = at(j, k);
+        for (std::int64_t i = j; i < end; ++i) at(i, j) -= at(i, k) * factor;
+      }
+    }
+  }
+
+  void forward_substitute(std::int64_t first, std::int64_t width, std::size_t held_before) {
+    for (std::size_t h = held_before; h < held.size(); ++h)
+      for (std::int64_t c = 0; c < columns_; ++c) rhs_[held[h] + c * n_] = 0;
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, blas(width), blas(columns_), 1,
+                &at(first, first), blas(n_), rhs_ + first, blas(n_));
+    const std::int64_t end = first + width, below = n_ - end;
+    if (below > 0)
+      cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, blas(below), blas(columns_), blas(width), -1,
+                  &at(end, first), blas(n_), rhs_ + first, blas(n_), 1, rhs_ + end, blas(n_));
+  }
+
+  double* a_;
+  std::int64_t n_, e_;
+  double* rhs_;
+  std::int64_t columns_;
+  const double* reference_;
+};
+
+}  // namespace
+
+void SubtreeSums::add(const SubtreeSums& other) {
+  cost += other.cost;
+  weighted_squares += other.weighted_squares;
+  decrement_squared += other.decrement_squared;
+  residuals += other.residuals;
+  observations += other.observations;
+  points += other.points;
+  unknowns += other.unknowns;
+  held_points += other.held_points;
+  held.insert(held.end(), other.held.begin(), other.held.end());
+}
+
+Bytes UpdateMatrix::to_bytes() const {
+  ByteWriter out;
+  write_list(out, unknowns);
+  out.value(right_hand_sides);
+  out.values(matrix);
+  out.values(rhs);
+  out.values(diagonal);
+  write_sums(out, sums);
+  return out.take();
+}
+
+UpdateMatrix UpdateMatrix::from_bytes(const Bytes& bytes) {
+  ByteReader in(bytes);
+  UpdateMatrix update;
+  update.unknowns = in.values<Unknown>();
+  update.right_hand_sides = in.value<std::int64_t>();
+  update.matrix = in.values<double>();
+  update.rhs = in.values<double>();
+  update.diagonal = in.values<double>();
+  update.sums = read_sums(in);
+  const auto n = static_cast<std::size_t>(total_dimension(update.unknowns));
+  if (!in.at_end() || update.right_hand_sides < 1 || update.matrix.size() != n * (n + 1) / 2 ||
+      update.rhs.size() != n * static_cast<std::size_t>(update.right_hand_sides) || update.diagonal.size() != n)
+    throw StoreError("merge: an update matrix has the wrong size");
+  return update;
+}
+
+std::int64_t FrontFactor::byte_count() const {
+  return static_cast<std::int64_t>(sizeof(FrontFactor) + (factor.size() + z.size()) * sizeof(double) +
+                                   (eliminated.size() + passed.size()) * sizeof(Unknown));
+}
+
+void FrontFactor::write(ByteWriter& out) const {
+  write_list(out, eliminated);
+  write_list(out, passed);
+  out.value(right_hand_sides);
+  out.values(factor);
+  out.values(z);
+  out.values(held);
+}
+
+FrontFactor FrontFactor::read(ByteReader& in) {
+  FrontFactor f;
+  f.eliminated = in.values<Unknown>();
+  f.passed = in.values<Unknown>();
+  f.right_hand_sides = in.value<std::int64_t>();
+  f.factor = in.values<double>();
+  f.z = in.values<double>();
+  f.held = in.values<std::int64_t>();
+  return f;
+}
+
+const double* Step::find(const UnknownId& id, std::int64_t column) const {
+  std::int64_t row = 0;
+  const std::int64_t at = find_unknown(unknowns, id);
+  if (at < 0) return nullptr;
+  for (std::int64_t i = 0; i < at; ++i) row += unknowns[static_cast<std::size_t>(i)].dimension;
+  return values.data() + row + column * (static_cast<std::int64_t>(values.size()) / columns);
+}
+
+Step Step::restricted_to(const UnknownList& wanted) const {
+  const std::vector<std::int64_t> rows = scalar_rows(wanted, rows_in(unknowns, wanted, "step"));
+  const std::int64_t n = total_dimension(unknowns);
+  Step part{wanted, columns, {}};
+  part.values.reserve(rows.size() * static_cast<std::size_t>(columns));
+  for (std::int64_t c = 0; c < columns; ++c)
+    for (std::int64_t row : rows) part.values.push_back(values[static_cast<std::size_t>(row + c * n)]);
+  return part;
+}
+
+Bytes Step::to_bytes() const {
+  ByteWriter out;
+  write_list(out, unknowns);
+  out.value(columns);
+  out.values(values);
+  return out.take();
+}
+
+Step Step::from_bytes(const Bytes& bytes) {
+  ByteReader in(bytes);
+  Step step;
+  step.unknowns = in.values<Unknown>();
+  step.columns = in.value<std::int64_t>();
+  step.values = in.values<double>();
+  if (!in.at_end() || step.columns < 1 ||
+      static_cast<std::int64_t>(step.values.size()) != total_dimension(step.unknowns) * step.columns)
+    throw StoreError("merge: a step has the wrong size");
+  return step;
+}
+
+CovarianceMatrix CovarianceMatrix::restricted_to(const UnknownList& wanted) const {
+  const std::vector<std::int64_t> rows = scalar_rows(wanted, rows_in(unknowns, wanted, "covariance"));
+  const std::int64_t n = total_dimension(unknowns);
+  CovarianceMatrix part{wanted, {}};
+  part.matrix.reserve(rows.size() * rows.size());
+  for (std::int64_t column : rows)
+    for (std::int64_t row : rows) part.matrix.push_back(matrix[static_cast<std::size_t>(row + column * n)]);
+  return part;
+}
+
+bool CovarianceMatrix::block(const UnknownId& row, const UnknownId& column, double* out) const {
+  const std::int64_t r = find_unknown(unknowns, row), c = find_unknown(unknowns, column);
+  if (r < 0 || c < 0) return false;
+  const std::vector<std::int64_t> offsets = row_offsets(unknowns);
+  const std::int64_t n = offsets.back();
+  for (std::int64_t j = offsets[static_cast<std::size_t>(c)]; j < offsets[static_cast<std::size_t>(c) + 1]; ++j)
+    for (std::int64_t i = offsets[static_cast<std::size_t>(r)]; i < offsets[static_cast<std::size_t>(r) + 1]; ++i)
+      *out++ = matrix[static_cast<std::size_t>(i + j * n)];
+  return true;
+}
+
+Bytes CovarianceMatrix::to_bytes() const {
+  ByteWriter out;
+  write_list(out, unknowns);
+  out.values(matrix);
+  return out.take();
+}
+
+CovarianceMatrix CovarianceMatrix::from_bytes(const Bytes& bytes) {
+  ByteReader in(bytes);
+  CovarianceMatrix covariance;
+  covariance.unknowns = in.values<Unknown>();
+  covariance.matrix = in.values<double>();
+  const auto n = static_cast<std::size_t>(total_dimension(covariance.unknowns));
+  if (!in.at_end() || covariance.matrix.size() != n * n)
+    throw StoreError("merge: a covariance matrix has the wrong size");
+  return covariance;
+}
+
+Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides)
+    : eliminated_(std::move(eliminated)), passed_(std::move(passed)), right_hand_sides_(right_hand_sides) {
+  eliminated_rows_ = row_offsets(eliminated_);
+  passed_rows_ = row_offsets(passed_);
+  eliminated_dimension_ = eliminated_rows_.back();
+  for (std::int64_t& row : passed_rows_) row += eliminated_dimension_;
+  dimension_ = passed_rows_.back();
+  if (dimension_ > 100000)
+    throw ComputeError("merge: a front of " + std::to_string(dimension_) +
+                       " unknowns; make tiles smaller or drop weak links between tiles");
+  matrix_.assign(static_cast<std::size_t>(dimension_ * dimension_), 0);
+  rhs_.assign(static_cast<std::size_t>(dimension_ * right_hand_sides_), 0);
+  diagonal_.assign(static_cast<std::size_t>(dimension_), 0);
+}
+
+std::int64_t Front::row_of(const UnknownId& id) const {
+  if (const std::int64_t at = find_unknown(eliminated_, id); at >= 0)
+    return eliminated_rows_[static_cast<std::size_t>(at)];
+  if (const std::int64_t at = find_unknown(passed_, id); at >= 0) return passed_rows_[static_cast<std::size_t>(at)];
+  return -1;
+}
+
+void Front::add(const UpdateMatrix& child) {
+  std::vector<std::int64_t> first_rows;
+  for (const Unknown& u : child.unknowns) {
+    first_rows.push_back(row_of(u.id));
+    if (first_rows.back() < 0) throw ComputeError("merge: a front lacks " + describe(u.id) + " of its child");
+  }
+  const std::vector<std::int64_t> rows = scalar_rows(child.unknowns, first_rows);
+  const auto n = static_cast<std::int64_t>(rows.size());
+  const double* source = child.matrix.data();
+  for (std::int64_t j = 0; j < n; ++j) {
+    const std::int64_t column = rows[static_cast<std::size_t>(j)];
+    for (std::int64_t i = j; i < n; ++i) {
+      const std::int64_t row = rows[static_cast<std::size_t>(i)];
+      matrix_[static_cast<std::size_t>(std::max(row, column) + std::min(row, column) * dimension_)] += *source++;
+    }
+    diagonal_[static_cast<std::size_t>(column)] += child.diagonal[static_cast<std::size_t>(j)];
+  }
+  for (std::int64_t c = 0; c < child.right_hand_sides; ++c)
+    for (std::int64_t i = 0; i < n; ++i)
+      rhs_[static_cast<std::size_t>(rows[static_cast<std::size_t>(i)] + c * dimension_)] +=
+          child.rhs[static_cast<std::size_t>(i + c * n)];
+  sums_.add(child.sums);
+}
+
+Front::Result Front::eliminate(double lambda) && {
+  const std::int64_t n = dimension_, e = eliminated_dimension_, p = n - e;
+  std::vector<double> reference(static_cast<std::size_t>(e));
+  for (std::int64_t k = 0; k < e; ++k) {
+    const double d = diagonal_[static_cast<std::size_t>(k)];
+    matrix_[static_cast<std::size_t>(k + k * n)] += lambda * d;
+    reference[static_cast<std::size_t>(k)] = (1 + lambda) * d;
+  }
+  PartialCholesky cholesky(matrix_.data(), n, e, rhs_.data(), right_hand_sides_, reference.data());
+  cholesky.run();
+
+  Result result;
+  result.factor.right_hand_sides = right_hand_sides_;
+  result.factor.factor.assign(matrix_.begin(), matrix_.begin() + n * e);
+  for (std::int64_t c = 0; c < right_hand_sides_; ++c)
+    result.factor.z.insert(result.factor.z.end(), rhs_.begin() + c * n, rhs_.begin() + c * n + e);
+  result.factor.held = cholesky.held;
+
+  UpdateMatrix& update = result.update;
+  update.right_hand_sides = right_hand_sides_;
+  update.matrix.reserve(static_cast<std::size_t>(p * (p + 1) / 2));
+  for (std::int64_t j = e; j < n; ++j)
+    update.matrix.insert(update.matrix.end(), matrix_.begin() + j + j * n, matrix_.begin() + n + j * n);
+  for (std::int64_t c = 0; c < right_hand_sides_; ++c)
+    update.rhs.insert(update.rhs.end(), rhs_.begin() + e + c * n, rhs_.begin() + n + c * n);
+  update.diagonal.assign(diagonal_.begin() + e, diagonal_.end());
+
+  update.sums = std::move(sums_);
+  update.sums.unknowns += e;
+  double squares = 0;
+  for (std::int64_t k = 0; k < e; ++k) squares += rhs_[static_cast<std::size_t>(k)] * rhs_[static_cast<std::size_t>(k)];
+  update.sums.decrement_squared += squares;
+  for (std::size_t h = 0; h < cholesky.held.size(); ++h) {
+    const auto after = std::upper_bound(eliminated_rows_.begin(), eliminated_rows_.end(), cholesky.held[h]);
+    const auto u = static_cast<std::size_t>(after - eliminated_rows_.begin()) - 1;
+    update.sums.held.push_back({eliminated_[u].id, cholesky.held[h] - eliminated_rows_[u], cholesky.held_ratio[h]});
+  }
+  update.unknowns = passed_;
+  result.factor.eliminated = std::move(eliminated_);
+  result.factor.passed = std::move(passed_);
+  return result;
+}
+
+Step back_substitute(const FrontFactor& factor, const Step& passed) {
+  const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
+  const std::int64_t columns = factor.right_hand_sides;
+  const Step outer = factor.passed.empty() ? Step{{}, columns, {}} : passed.restricted_to(factor.passed);
+  std::vector<double> x = factor.z;
+  if (e > 0) {
+    if (p > 0)
+      cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, blas(e), blas(columns), blas(p), -1,
+                  factor.factor.data() + e, blas(n), outer.values.data(), blas(p), 1, x.data(), blas(e));
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, blas(e), blas(columns), 1,
+                factor.factor.data(), blas(n), x.data(), blas(e));
+  }
+  Step step;
+  step.unknowns = unite({&factor.eliminated, &factor.passed});
+  step.columns = columns;
+  step.values.resize(static_cast<std::size_t>(n * columns));
+  const auto copy = [&](const UnknownList& list, const std::vector<double>& values, std::int64_t count) {
+    const auto rows = scalar_rows(list, rows_in(step.unknowns, list, "step"));
+    for (std::int64_t c = 0; c < columns; ++c)
+      for (std::int64_t i = 0; i < count; ++i)
+        step.values[static_cast<std::size_t>(rows[static_cast<std::size_t>(i)] + c * n)] =
+            values[static_cast<std::size_t>(i + c * count)];
+  };
+  copy(factor.eliminated, x, e);
+  copy(factor.passed, outer.values, p);
+  return step;
+}
+
+CovarianceMatrix covariance_down(const FrontFactor& factor, const CovarianceMatrix& parent) {
+  const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
+  const CovarianceMatrix outer = factor.passed.empty() ? CovarianceMatrix{} : parent.restricted_to(factor.passed);
+
+  // Rows E, then P: [C_EE; C_PE] (n x e). inverse = L^-1, x = K_PE K_EE^-1 = Y L^-1.
+  std::vector<double> inverse(static_cast<std::size_t>(e * e), 0), x(static_cast<std::size_t>(p * e));
+  for (std::int64_t k = 0; k < e; ++k) inverse[static_cast<std::size_t>(k + k * e)] = 1;
+  for (std::int64_t h : factor.held) inverse[static_cast<std::size_t>(h + h * e)] = 0;
+  std::vector<double> inner(static_cast<std::size_t>(e * e), 0), cross(static_cast<std::size_t>(p * e), 0);
+  if (e > 0) {
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, blas(e), blas(e), 1,
+                factor.factor.data(), blas(n), inverse.data(), blas(e));
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, blas(e), blas(e), 1, inverse.data(), blas(e), 0, inner.data(),
+                blas(e));
+  }
+  if (e > 0 && p > 0) {
+    for (std::int64_t j = 0; j < e; ++j) std::copy_n(factor.factor.begin() + e + j * n, p, x.begin() + j * p);
+    cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, blas(p), blas(e), 1,
+                factor.factor.data(), blas(n), x.data(), blas(p));
+    cblas_dsymm(CblasColMajor, CblasLeft, CblasLower, blas(p), blas(e), -1, outer.matrix.data(), blas(p), x.data(),
+                blas(p), 0, cross.data(), blas(p));
+    cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, blas(e), blas(e), blas(p), -1, x.data(), blas(p), cross.data(),
+                blas(p), 1, inner.data(), blas(e));
+  }
+
+  CovarianceMatrix covariance;
+  covariance.unknowns = unite({&factor.eliminated, &factor.passed});
+  covariance.matrix.assign(static_cast<std::size_t>(n * n), 0);
+  const auto rows_e = scalar_rows(factor.eliminated, rows_in(covariance.unknowns, factor.eliminated, "covariance"));
+  const auto rows_p = scalar_rows(factor.passed, rows_in(covariance.unknowns, factor.passed, "covariance"));
+  const auto set = [&](std::int64_t row, std::int64_t column, double value) {
+    covariance.matrix[static_cast<std::size_t>(row + column * n)] = value;
+    covariance.matrix[static_cast<std::size_t>(column + row * n)] = value;
+  };
+  for (std::size_t j = 0; j < rows_e.size(); ++j) {
+    for (std::size_t i = j; i < rows_e.size(); ++i) set(rows_e[i], rows_e[j], inner[i + j * rows_e.size()]);
+    for (std::size_t i = 0; i < rows_p.size(); ++i) set(rows_p[i], rows_e[j], cross[i + j * rows_p.size()]);
+  }
+  for (std::size_t j = 0; j < rows_p.size(); ++j)
+    for (std::size_t i = j; i < rows_p.size(); ++i) set(rows_p[i], rows_p[j], outer.matrix[i + j * rows_p.size()]);
+  return covariance;
+}
+
+}  // namespace megablock

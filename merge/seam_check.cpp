@@ -1,0 +1,160 @@
+#include "merge/seam_check.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace megablock {
+
+namespace {
+
+constexpr double kRankTolerance = 1e-10;  // of the scaled matrix (unit diagonal)
+
+struct Quadratic {
+  Eigen::MatrixXd s;  // full symmetric
+  Eigen::VectorXd b;
+};
+
+// Condensed normal equations on `wanted`, minimised over the rest.
+Quadratic reduced_to(const UpdateMatrix& update, const UnknownList& wanted) {
+  UnknownList others;
+  for (const Unknown& u : update.unknowns)
+    if (find_unknown(wanted, u.id) < 0) others.push_back(u);
+  Front front(others, wanted);
+  front.add(update);
+  const UpdateMatrix reduced = std::move(front).eliminate(0).update;
+  const std::int64_t n = total_dimension(wanted);
+  Quadratic q{Eigen::MatrixXd::Zero(n, n), Eigen::Map<const Eigen::VectorXd>(reduced.rhs.data(), n)};
+  const double* value = reduced.matrix.data();
+  for (std::int64_t j = 0; j < n; ++j)
+    for (std::int64_t i = j; i < n; ++i) q.s(i, j) = q.s(j, i) = *value++;
+  return q;
+}
+
+struct Minimum {
+  double value = 0;  // b' S^+ b = -2 min q
+  std::int64_t rank = 0;
+};
+
+// By symmetric eigenvalues of the scaled matrix (the scale leaves rank and minimum as they are, b being in the range).
+Minimum minimum(const Eigen::MatrixXd& s, const Eigen::VectorXd& b, const Eigen::VectorXd& scale) {
+  Minimum m;
+  if (b.size() == 0) return m;
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * s * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
+  const Eigen::VectorXd along = solver.eigenvectors().transpose() * scale.cwiseProduct(b);
+  const double limit = kRankTolerance * std::max(1.0, solver.eigenvalues().maxCoeff());
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
+    if (solver.eigenvalues()[i] <= limit) continue;
+    m.value += along[i] * along[i] / solver.eigenvalues()[i];
+    ++m.rank;
+  }
+  return m;
+}
+
+Eigen::VectorXd scale_of(const Eigen::MatrixXd& s) {
+  return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
+}
+
+// Regularised upper incomplete gamma function Q(a, x): series below a + 1, continued fraction above.
+double upper_gamma(double a, double x) {
+  if (x <= 0) return 1;
+  const double log_front = a * std::log(x) - x - std::lgamma(a);
+  if (x < a + 1) {
+    double term = 1 / a, sum = term;
+    for (int n = 1; n < 100000 && term > 1e-17 * sum; ++n) sum += term *= x / (a + n);
+    return 1 - sum * std::exp(log_front);
+  }
+  double b = x + 1 - a, c = 1e300, d = 1 / b, h = d;
+  for (int i = 1; i < 100000; ++i) {
+    const double an = -i * (i - a);
+    b += 2;
+    d = 1 / (an * d + b);
+    c = b + an / c;
+    const double factor = d * c;
+    h *= factor;
+    if (std::abs(factor - 1) < 1e-15) break;
+  }
+  return h * std::exp(log_front);
+}
+
+}  // namespace
+
+double chi_square_quantile(double probability, std::int64_t degrees) {
+  const double a = 0.5 * static_cast<double>(degrees);
+  double low = 0, high = static_cast<double>(degrees) + 10;
+  while (upper_gamma(a, 0.5 * high) > probability) high *= 2;
+  for (int i = 0; i < 200 && high - low > 1e-12 * high; ++i) {
+    const double middle = 0.5 * (low + high);
+    (upper_gamma(a, 0.5 * middle) > probability ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
+                      double variance_factor) {
+  SeamReport report;
+  report.node = node;
+  UnknownList common;
+  for (const Unknown& u : left.unknowns)
+    if (find_unknown(right.unknowns, u.id) >= 0) common.push_back(u);
+  if (common.empty()) return report;
+  const Quadratic a = reduced_to(left, common), b = reduced_to(right, common);
+  const Eigen::VectorXd scale = scale_of(a.s + b.s);
+  const Minimum ma = minimum(a.s, a.b, scale), mb = minimum(b.s, b.b, scale);
+  const Minimum both = minimum(a.s + b.s, a.b + b.b, scale);
+  report.degrees = ma.rank + mb.rank - both.rank;
+  report.statistic = std::max(0.0, ma.value + mb.value - both.value) / variance_factor;
+  if (report.degrees > 0) report.threshold = chi_square_quantile(probability, report.degrees);
+  return report;
+}
+
+TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
+                     double probability, double variance_factor) {
+  TileCheck check;
+  check.tile = tile;
+  const Quadratic own = reduced_to(condensed, condensed.unknowns);
+  const Eigen::VectorXd scale = scale_of(own.s);
+  const Minimum alone = minimum(own.s, own.b, scale);
+  const SubtreeSums& sums = condensed.sums;
+  check.own_chi2 = (sums.weighted_squares - sums.decrement_squared - alone.value) / variance_factor;
+  check.own_degrees =
+      sums.residuals - (sums.unknowns - static_cast<std::int64_t>(sums.held.size()) - sums.held_points) - alone.rank;
+
+  // The rest's normal equations on the boundary: C^-1 - S, so (C^-1 - S)^-1 s = (I - C S)^-1 C s.
+  const CovarianceMatrix c = boundary.restricted_to(condensed.unknowns);
+  const Eigen::Index n = own.b.size();
+  if (n == 0) return check;
+  const Eigen::Map<const Eigen::MatrixXd> covariance(c.matrix.data(), n, n);
+  const Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n) - covariance * own.s;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+  solver.setThreshold(kRankTolerance);
+  solver.compute(system);
+  const Eigen::VectorXd moved = solver.solve(covariance * own.b);
+  check.degrees = alone.rank - (n - solver.rank());
+  check.statistic = std::max(0.0, alone.value + own.b.dot(moved)) / variance_factor;
+  if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+  return check;
+}
+
+std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles) {
+  const TileCheck* worst = nullptr;
+  const auto excess = [](const TileCheck& t) { return t.threshold > 0 ? t.statistic / t.threshold : 0; };
+  for (const TileCheck& tile : tiles)
+    if (worst == nullptr || excess(tile) > excess(*worst)) worst = &tile;
+  std::vector<std::string> lines;
+  for (const SeamReport& seam : seams) {
+    if (!seam.alarm()) continue;
+    char line[240];
+    std::snprintf(line, sizeof line, "seam at node %lld: T = %.0f with %lld degrees of freedom (limit %.0f)",
+                  static_cast<long long>(seam.node), seam.statistic, static_cast<long long>(seam.degrees),
+                  seam.threshold);
+    lines.emplace_back(line);
+    if (worst != nullptr)
+      lines.back() += "; tile " + std::to_string(worst->tile) + " disagrees most with the rest of the block";
+  }
+  return lines;
+}
+
+}  // namespace megablock

@@ -1,0 +1,126 @@
+#include "merge/serial_runner.h"
+
+#include "adjust/linearise.h"
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+SerialRunner::SerialRunner(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
+                           MemoryOptions memory)
+    : problems_(std::move(problems)), states_(std::move(states)), factors_(std::move(memory)) {
+  std::vector<UnknownList> lists;
+  for (const TileProblem& problem : problems_) lists.push_back(tile_unknowns(problem));
+  plan_ = make_plan(tree, lists);
+  for (std::size_t t = 0; t < problems_.size(); ++t)
+    tile_plans_.push_back(make_tile_plan(problems_[t], plan_.nodes[at(plan_.node_of_leaf[t])]));
+  steps_.resize(problems_.size());
+}
+
+SerialRunner::~SerialRunner() = default;
+
+std::int64_t SerialRunner::seam_count() const {
+  std::int64_t count = 0;
+  for (const PlanNode& node : plan_.nodes) count += node.leaf < 0;
+  return count;
+}
+
+UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, double lambda, bool check_seams) {
+  const PlanNode& node = plan_.nodes[at(number)];
+  NodeFactors factors;
+  UpdateMatrix update;
+  if (node.leaf >= 0) {
+    const std::size_t t = at(node.leaf);
+    TileCondensation condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], lambda);
+    update = std::move(condensed.update);
+    factors.tile = std::move(condensed.factor);
+  } else {
+    const UpdateMatrix left = condense_subtree(node.left, lambda, check_seams);
+    const UpdateMatrix right = condense_subtree(node.right, lambda, check_seams);
+    if (check_seams)
+      seams_.push_back(check_seam(number, left, right, kSeamAlarmProbability / static_cast<double>(seam_count())));
+    Front::Result result = eliminate_node(node, {&left, &right}, lambda);
+    update = std::move(result.update);
+    factors.front = std::move(result.factor);
+  }
+  factors_.put(number, std::move(factors));
+  return update;
+}
+
+UpReport SerialRunner::up(double lambda) {
+  factors_.clear();
+  const UpdateMatrix root = condense_subtree(plan_.root(), lambda, false);
+  if (lambda == 0) gauge_ = judge_gauge(root.sums);
+  return {root.sums};
+}
+
+UpReport SerialRunner::final_up() {
+  factors_.clear();
+  seams_.clear();
+  const UpdateMatrix root = condense_subtree(plan_.root(), 0, true);
+  gauge_ = judge_gauge(root.sums);
+  return {root.sums};
+}
+
+const NodeFactors& SerialRunner::inner_factor(std::int64_t node, double lambda) {
+  if (const NodeFactors* kept = factors_.get(node)) return *kept;
+  factors_.note_recomputed();
+  condense_subtree(node, lambda, false);
+  return *factors_.get(node);
+}
+
+void SerialRunner::down_from(std::int64_t number, double lambda, const Step& parent) {
+  const PlanNode& node = plan_.nodes[at(number)];
+  if (node.leaf >= 0) {
+    const std::size_t t = at(node.leaf);
+    steps_[t] =
+        solve_tile_down(problems_[t], tile_plans_[t], states_[t], lambda, inner_factor(number, lambda).tile, parent);
+    return;
+  }
+  const Step step = back_substitute_node(inner_factor(number, lambda).front, parent);
+  down_from(node.right, lambda, step);
+  down_from(node.left, lambda, step);
+}
+
+DownReport SerialRunner::down(double lambda) {
+  down_from(plan_.root(), lambda, Step());
+  trial_.clear();
+  DownReport report;
+  for (std::size_t t = 0; t < problems_.size(); ++t) {
+    trial_.push_back(apply_step(problems_[t], states_[t], steps_[t]));
+    report.damping_norm += steps_[t].damping_norm;
+    report.trial_cost += evaluate_cost(problems_[t], trial_[t]);
+  }
+  return report;
+}
+
+void SerialRunner::accept() { states_ = std::move(trial_); }
+
+void SerialRunner::reject() { trial_.clear(); }
+
+void SerialRunner::covariances_from(std::int64_t number, const CovarianceMatrix& parent,
+                                    std::vector<TileCovariance>& result) {
+  const PlanNode& node = plan_.nodes[at(number)];
+  if (node.leaf >= 0) {
+    const std::size_t t = at(node.leaf);
+    const CovarianceMatrix boundary = node.passed.empty() ? CovarianceMatrix{} : parent.restricted_to(node.passed);
+    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], inner_factor(number, 0).tile, boundary);
+    return;
+  }
+  const CovarianceMatrix covariance = covariance_node(inner_factor(number, 0).front, parent);
+  covariances_from(node.right, covariance, result);
+  covariances_from(node.left, covariance, result);
+}
+
+std::vector<TileCovariance> SerialRunner::covariances() {
+  std::vector<TileCovariance> result(problems_.size());
+  covariances_from(plan_.root(), CovarianceMatrix{}, result);
+  return result;
+}
+
+}  // namespace megablock

@@ -1,0 +1,114 @@
+#include "merge/tile_linearisation.h"
+
+namespace megablock {
+
+std::vector<std::int64_t> prior_rows(const TileProblem& problem) {
+  std::vector<std::int64_t> rows(problem.points.size(), -1);
+  for (std::size_t i = 0; i < problem.point_priors.size(); ++i)
+    rows[static_cast<std::size_t>(problem.point_priors[i].point.value)] = static_cast<std::int64_t>(i);
+  return rows;
+}
+
+PointEquations::Block& PointEquations::block_of(std::int64_t unknown, int dimension) {
+  std::int32_t& slot = slot_[static_cast<std::size_t>(unknown)];
+  if (slot < 0) {
+    slot = static_cast<std::int32_t>(blocks_.size());
+    blocks_.emplace_back();
+    blocks_.back().unknown = unknown;
+    blocks_.back().dimension = dimension;
+    blocks_.back().w.setZero(dimension, 3);
+  }
+  return blocks_[static_cast<std::size_t>(slot)];
+}
+
+void PointEquations::linearise(std::int64_t point, double lambda) {
+  for (const Block& block : blocks_) slot_[static_cast<std::size_t>(block.unknown)] = -1;
+  blocks_.clear();
+  observations_.clear();
+  v_.setZero();
+  b_.setZero();
+  rho_ = weighted_squares_ = 0;
+  residual_count_ = 0;
+  for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row)
+    if (problem_.kept[row]) add_observation(point, row);
+  if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0) {
+    const auto& term = problem_.point_priors[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d weight = term.sigma.cwiseInverse();  // 0 on a free axis
+    const Eigen::Vector3d r = point_prior_residual(state_.points[point], term);
+    v_.diagonal() += weight.cwiseAbs2();
+    b_ -= weight.cwiseProduct(r);
+    rho_ += r.squaredNorm();
+    weighted_squares_ += r.squaredNorm();
+    residual_count_ += (weight.array() > 0).count();
+  }
+  factorise(lambda);
+}
+
+void PointEquations::add_observation(std::int64_t point, std::int64_t row) {
+  const TileImage& image = problem_.images[problem_.image[row].value];
+  const auto frame = image.frame.value, camera = image.camera.value, mount = image.mount;
+  const ImageResidual r =
+      linearise_image(state_.frames[frame], state_.mounts[mount], state_.cameras[camera], state_.points[point],
+                      {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row]);
+  if (!r.in_front)
+    throw ComputeError("a kept observation of point " + std::to_string(problem_.points[point].index) +
+                       " lies behind image " + std::to_string(image.image.value));
+  const auto rho = problem_.image_loss.evaluate(r.residual.squaredNorm());
+  const double root = std::sqrt(rho[1]);
+  rho_ += rho[0];
+  residual_count_ += 2;
+
+  Observation& observation = observations_.emplace_back();
+  observation.residual = root * r.residual;
+  weighted_squares_ += observation.residual.squaredNorm();
+  const Eigen::Matrix<double, 2, 3> by_point = root * r.by_point;
+  v_.noalias() += by_point.transpose() * by_point;
+  b_.noalias() -= by_point.transpose() * observation.residual;
+
+  const auto add = [&](std::int64_t unknown, const auto& jacobian, int dimension) {
+    JacobianBlock& block = observation.blocks[static_cast<std::size_t>(observation.block_count++)];
+    block.unknown = unknown;
+    block.jacobian = jacobian;
+    block_of(unknown, dimension).w.noalias() += block.jacobian.transpose() * by_point;
+  };
+  add(plan_.unknown_of_frame[frame], Eigen::Matrix<double, 2, 6>(root * r.by_frame), 6);
+  if (const std::int64_t unknown = plan_.unknown_of_camera[camera]; unknown >= 0) {
+    const int free_count = __builtin_popcount(problem_.camera_free[camera]);
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 8> jacobian(2, free_count);
+    for (int k = 0, column = 0; k < kIntrinsicCount; ++k)
+      if ((problem_.camera_free[camera] >> k) & 1) jacobian.col(column++) = root * r.by_intrinsics.col(k);
+    add(unknown, jacobian, free_count);
+  }
+  if (const std::int64_t unknown = plan_.unknown_of_mount[mount]; unknown >= 0)
+    add(unknown, Eigen::Matrix<double, 2, 6>(root * r.by_mount), 6);
+}
+
+void PointEquations::factorise(double lambda) {
+  diagonal_ = v_.diagonal();
+  Eigen::Matrix3d c = v_;
+  c.diagonal() += lambda * diagonal_;
+  held_ = 0;
+  std::array<bool, 3> held{};
+  for (int k = 0; k < 3; ++k) {
+    if (!(c(k, k) > kPivotTolerance * (1 + lambda) * diagonal_[k])) {
+      held[static_cast<std::size_t>(k)] = true;
+      ++held_;
+      for (int j = 0; j < k; ++j) c(k, j) = 0;
+      for (int i = k + 1; i < 3; ++i) c(i, k) = 0;
+      c(k, k) = 1;
+      continue;
+    }
+    c(k, k) = std::sqrt(c(k, k));
+    for (int i = k + 1; i < 3; ++i) c(i, k) /= c(k, k);
+    for (int j = k + 1; j < 3; ++j)
+      for (int i = j; i < 3; ++i) c(i, j) -= c(i, k) * c(j, k);
+  }
+  inverse_.setIdentity();
+  c.triangularView<Eigen::Lower>().solveInPlace(inverse_);
+  for (int k = 0; k < 3; ++k)
+    if (held[static_cast<std::size_t>(k)]) inverse_.row(k).setZero();
+  z_ = inverse_ * b_;
+  for (Block& block : blocks_) block.w = (block.w * inverse_.transpose()).eval();
+}
+
+}  // namespace megablock

@@ -1,0 +1,163 @@
+// Linearised residuals of one cell, point by point and term by term: shared by condensation, back-substitution and
+// covariances, which all recompute them (cheaper than keeping them).
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "adjust/linearise.h"
+#include "io/error.h"
+#include "merge/condense.h"
+
+namespace megablock {
+
+// Jacobian of a residual of up to 6 rows by one unknown (position in TilePlan::unknowns), weighted.
+struct JacobianBlock {
+  std::int64_t unknown = -1;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 8> jacobian;
+};
+
+// A residual without a point, divided by sigma and weighted by sqrt(rho').
+struct TermResidual {
+  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
+  std::array<JacobianBlock, 2> blocks;
+  int block_count = 0;
+  double rho = 0;  // of the squared norm
+
+  void add_block(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& jacobian) {
+    if (unknown < 0) return;
+    blocks[static_cast<std::size_t>(block_count)].unknown = unknown;
+    blocks[static_cast<std::size_t>(block_count++)].jacobian = jacobian;
+  }
+  void weight(const RobustLoss& loss) {
+    const auto rho_values = loss.evaluate(residual.squaredNorm());
+    rho = rho_values[0];
+    const double root = std::sqrt(rho_values[1]);
+    residual *= root;
+    for (int b = 0; b < block_count; ++b) blocks[static_cast<std::size_t>(b)].jacobian *= root;
+  }
+};
+
+// Calls visit(TermResidual) for every observation without a point of a cell.
+template <typename Visitor>
+void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, std::size_t cell,
+                 Visitor&& visit) {
+  const RobustLoss none;
+  for (std::int64_t i : plan.positions[cell]) {
+    const auto& term = problem.positions[static_cast<std::size_t>(i)];
+    const FrameResidual3 r = linearise_position(state.frames[term.frame.value], term.prior);
+    TermResidual out;
+    out.residual = r.residual;
+    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
+    out.weight(problem.position_loss);
+    visit(out);
+  }
+  for (std::int64_t i : plan.attitudes[cell]) {
+    const auto& term = problem.attitudes[static_cast<std::size_t>(i)];
+    const FrameResidual3 r = linearise_attitude(state.frames[term.frame.value], term.prior);
+    TermResidual out;
+    out.residual = r.residual;
+    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
+    out.weight(none);
+    visit(out);
+  }
+  for (std::int64_t i : plan.relatives[cell]) {
+    const auto& term = problem.relatives[static_cast<std::size_t>(i)];
+    const RelativeResidual r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term);
+    TermResidual out;
+    out.residual = r.residual;
+    out.add_block(plan.unknown_of_frame[term.from.value], r.by_from);
+    out.add_block(plan.unknown_of_frame[term.to.value], r.by_to);
+    out.weight(problem.relative_loss);
+    visit(out);
+  }
+  for (std::int64_t i : plan.intrinsic_priors[cell]) {
+    const auto& term = problem.intrinsic_priors[static_cast<std::size_t>(i)];
+    const auto camera = static_cast<std::size_t>(term.camera.value);
+    const int free_count = __builtin_popcount(problem.camera_free[camera]);
+    int column = 0;
+    for (int k = 0; k < kIntrinsicCount; ++k) {
+      const bool free = (problem.camera_free[camera] >> k) & 1;
+      const double weight = intrinsic_prior_weight(term, k);
+      if (weight != 0) {
+        TermResidual out;
+        out.residual = Eigen::Matrix<double, 1, 1>(intrinsic_prior_residual(state.cameras[camera], term, k));
+        Eigen::MatrixXd row = Eigen::MatrixXd::Zero(1, free_count);
+        if (free) {
+          row(0, column) = weight;
+          out.add_block(plan.unknown_of_camera[camera], row);
+        }
+        out.weight(none);
+        visit(out);
+      }
+      column += free;
+    }
+  }
+  for (std::int64_t i : plan.mount_priors[cell]) {
+    const auto& term = problem.mount_priors[static_cast<std::size_t>(i)];
+    const MountResidual r = linearise_mount(state.mounts[static_cast<std::size_t>(term.mount)], term);
+    TermResidual out;
+    out.residual = r.residual;
+    out.add_block(plan.unknown_of_mount[static_cast<std::size_t>(term.mount)], r.by_mount);
+    out.weight(none);
+    visit(out);
+  }
+}
+
+// Row of the point's prior in TileProblem::point_priors, -1: none. [points]
+std::vector<std::int64_t> prior_rows(const TileProblem& problem);
+
+// One point's part of the normal equations.
+class PointEquations {
+ public:
+  // Unknown that sees the point: W = J_i'J_p, later Y = W C^-T, and its own diagonal of J_i'J_i.
+  struct Block {
+    std::int64_t unknown = -1;
+    int dimension = 0;
+    Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, 8, 3> w;
+  };
+  struct Observation {
+    Eigen::Vector2d residual;
+    std::array<JacobianBlock, 3> blocks;  // 2 x dimension, weighted
+    int block_count = 0;
+  };
+
+  PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)
+      : problem_(problem), plan_(plan), state_(state), prior_(prior_rows(problem)) {
+    slot_.assign(plan.unknowns.size(), -1);
+  }
+
+  // Linearises all kept observations of the point and factorises its own block. Throws ComputeError behind a camera.
+  void linearise(std::int64_t point, double lambda);
+
+  const std::vector<Observation>& observations() const { return observations_; }
+  const std::vector<Block>& blocks() const { return blocks_; }        // holding Y after linearise()
+  const Eigen::Matrix3d& inverse_factor() const { return inverse_; }  // C^-1, zero rows where held
+  const Eigen::Vector3d& z() const { return z_; }                     // C^-1 b_p
+  const Eigen::Vector3d& diagonal() const { return diagonal_; }       // of J_p'J_p
+  double rho() const { return rho_; }
+  double weighted_squares() const { return weighted_squares_; }
+  std::int64_t residual_count() const { return residual_count_; }
+  std::int64_t observation_count() const { return static_cast<std::int64_t>(observations_.size()); }
+  int held() const { return held_; }
+
+ private:
+  Block& block_of(std::int64_t unknown, int dimension);
+  void add_observation(std::int64_t point, std::int64_t row);
+  void factorise(double lambda);
+
+  const TileProblem& problem_;
+  const TilePlan& plan_;
+  const TileState& state_;
+  std::vector<std::int64_t> prior_;
+  std::vector<std::int32_t> slot_;
+  std::vector<Observation> observations_;
+  std::vector<Block> blocks_;
+  Eigen::Matrix3d v_, inverse_;
+  Eigen::Vector3d b_, z_, diagonal_;
+  double rho_ = 0, weighted_squares_ = 0;
+  std::int64_t residual_count_ = 0;
+  int held_ = 0;
+};
+
+}  // namespace megablock

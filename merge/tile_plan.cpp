@@ -1,0 +1,233 @@
+// Symbolic work of a tile: its unknowns, its cells and what each cell owns.
+#include <algorithm>
+#include <map>
+
+#include "merge/condense.h"
+#include "partition/tiles.h"
+
+namespace megablock {
+
+namespace {
+
+// Which rows of the problem's tables a kept residual touches.
+struct Touched {
+  std::vector<std::uint8_t> frames, cameras, mounts;
+};
+
+Touched touched_rows(const TileProblem& problem) {
+  Touched touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
+                  std::vector<std::uint8_t>(problem.cameras.size(), 0),
+                  std::vector<std::uint8_t>(problem.mounts.size(), 0)};
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      touched.frames[image.frame.value] = 1;
+      touched.cameras[image.camera.value] = problem.camera_free[image.camera.value] != 0;
+      touched.mounts[image.mount] = problem.mount_free[image.mount] != 0;
+    }
+  }
+  for (const auto& term : problem.positions) touched.frames[term.frame.value] = 1;
+  for (const auto& term : problem.attitudes) touched.frames[term.frame.value] = 1;
+  for (const auto& term : problem.relatives) touched.frames[term.from.value] = touched.frames[term.to.value] = 1;
+  for (const auto& term : problem.intrinsic_priors)
+    if (problem.camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
+  for (const auto& term : problem.mount_priors)
+    if (problem.mount_free[term.mount]) touched.mounts[term.mount] = 1;
+  return touched;
+}
+
+Unknown frame_unknown(const TileProblem& problem, std::size_t row) {
+  return {{UnknownKind::kFrame, 0, problem.frames[row].value}, 6};
+}
+Unknown camera_unknown(const TileProblem& problem, std::size_t row) {
+  return {{UnknownKind::kCamera, 0, problem.cameras[row].value}, __builtin_popcount(problem.camera_free[row])};
+}
+Unknown mount_unknown(const TileProblem& problem, std::size_t row) {
+  return {{UnknownKind::kMount, problem.mounts[row].mount, problem.mounts[row].rig.value}, 6};
+}
+
+UnknownList listed(const TileProblem& problem, const Touched& touched) {
+  UnknownList unknowns;
+  for (std::size_t row = 0; row < touched.frames.size(); ++row)
+    if (touched.frames[row]) unknowns.push_back(frame_unknown(problem, row));
+  for (std::size_t row = 0; row < touched.cameras.size(); ++row)
+    if (touched.cameras[row]) unknowns.push_back(camera_unknown(problem, row));
+  for (std::size_t row = 0; row < touched.mounts.size(); ++row)
+    if (touched.mounts[row]) unknowns.push_back(mount_unknown(problem, row));
+  return unknowns;
+}
+
+// Distinct frame rows of an active point's kept observations, ascending.
+void frames_of_point(const TileProblem& problem, std::int64_t point, std::vector<std::int32_t>& frames) {
+  frames.clear();
+  for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
+    if (problem.kept[row]) frames.push_back(problem.images[problem.image[row].value].frame.value);
+  std::sort(frames.begin(), frames.end());
+}
+
+// Edges between frames that share points, and relative poses.
+FrameGraph graph_of(const TileProblem& problem) {
+  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
+  std::vector<std::int32_t> frames;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    frames_of_point(problem, p, frames);
+    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    for (std::size_t a = 0; a < frames.size(); ++a)
+      for (std::size_t b = a + 1; b < frames.size(); ++b) pairs.emplace_back(frames[a], frames[b]);
+  }
+  for (const auto& term : problem.relatives)
+    pairs.emplace_back(std::min(term.from.value, term.to.value), std::max(term.from.value, term.to.value));
+  std::sort(pairs.begin(), pairs.end());
+  FrameGraph graph;
+  graph.frame_count = static_cast<std::int64_t>(problem.frames.size());
+  for (const auto& [a, b] : pairs) {
+    if (a == b) continue;
+    if (graph.edges.empty() || graph.edges.back().a.value != a || graph.edges.back().b.value != b)
+      graph.edges.push_back({FrameIndex(a), FrameIndex(b), 0});
+    ++graph.edges.back().weight;
+  }
+  return graph;
+}
+
+// The cell with most of a point's observations, ties to the lower cell.
+std::size_t owner_cell(const std::vector<std::int32_t>& frames, const std::vector<std::int32_t>& cell_of_frame,
+                       std::vector<std::int32_t>& cells) {
+  cells.clear();
+  for (std::int32_t frame : frames) cells.push_back(cell_of_frame[static_cast<std::size_t>(frame)]);
+  std::sort(cells.begin(), cells.end());
+  std::int32_t best = cells.front();
+  std::ptrdiff_t most = 0;
+  for (auto run = cells.begin(); run != cells.end();) {
+    const auto next = std::upper_bound(run, cells.end(), *run);
+    if (next - run > most) {
+      most = next - run;
+      best = *run;
+    }
+    run = next;
+  }
+  return static_cast<std::size_t>(best);
+}
+
+// Shares out points and the observations without a point, and notes which unknowns each cell touches.
+class CellPlanner {
+ public:
+  CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
+              std::size_t cells)
+      : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame) {
+    for (auto* list :
+         {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.intrinsic_priors, &plan.mount_priors})
+      list->resize(cells);
+    touched_.assign(cells, std::vector<std::uint8_t>(plan.unknowns.size(), 0));
+  }
+
+  std::vector<UnknownList> run() {
+    share_points();
+    share_terms();
+    std::vector<UnknownList> lists(touched_.size());
+    for (std::size_t c = 0; c < touched_.size(); ++c)
+      for (std::size_t u = 0; u < plan_.unknowns.size(); ++u)
+        if (touched_[c][u]) lists[c].push_back(plan_.unknowns[u]);
+    return lists;
+  }
+
+ private:
+  void touch(std::size_t cell, std::int64_t unknown) {
+    if (unknown >= 0) touched_[cell][static_cast<std::size_t>(unknown)] = 1;
+  }
+  std::size_t cell_of(LocalFrame frame) const {
+    return static_cast<std::size_t>(cell_of_frame_[static_cast<std::size_t>(frame.value)]);
+  }
+
+  void share_points() {
+    std::vector<std::int32_t> frames, scratch;
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
+      if (!problem_.active(p)) continue;
+      frames_of_point(problem_, p, frames);
+      const std::size_t cell = owner_cell(frames, cell_of_frame_, scratch);
+      plan_.points[cell].push_back(p);
+      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
+        if (!problem_.kept[row]) continue;
+        const TileImage& image = problem_.images[problem_.image[row].value];
+        touch(cell, plan_.unknown_of_frame[image.frame.value]);
+        touch(cell, plan_.unknown_of_camera[image.camera.value]);
+        touch(cell, plan_.unknown_of_mount[image.mount]);
+      }
+    }
+  }
+
+  void share_terms() {
+    for (std::size_t i = 0; i < problem_.positions.size(); ++i) {
+      const LocalFrame frame = problem_.positions[i].frame;
+      plan_.positions[cell_of(frame)].push_back(static_cast<std::int64_t>(i));
+      touch(cell_of(frame), plan_.unknown_of_frame[frame.value]);
+    }
+    for (std::size_t i = 0; i < problem_.attitudes.size(); ++i) {
+      const LocalFrame frame = problem_.attitudes[i].frame;
+      plan_.attitudes[cell_of(frame)].push_back(static_cast<std::int64_t>(i));
+      touch(cell_of(frame), plan_.unknown_of_frame[frame.value]);
+    }
+    for (std::size_t i = 0; i < problem_.relatives.size(); ++i) {
+      const auto& term = problem_.relatives[i];
+      const std::size_t cell = cell_of(std::min(term.from, term.to));
+      plan_.relatives[cell].push_back(static_cast<std::int64_t>(i));
+      touch(cell, plan_.unknown_of_frame[term.from.value]);
+      touch(cell, plan_.unknown_of_frame[term.to.value]);
+    }
+    // Shared parameters' priors go where the first image of the camera or mount lies.
+    std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);
+    for (auto image = problem_.images.rbegin(); image != problem_.images.rend(); ++image)
+      camera_cell[image->camera.value] = mount_cell[static_cast<std::size_t>(image->mount)] = cell_of(image->frame);
+    for (std::size_t i = 0; i < problem_.intrinsic_priors.size(); ++i) {
+      const auto camera = static_cast<std::size_t>(problem_.intrinsic_priors[i].camera.value);
+      plan_.intrinsic_priors[camera_cell[camera]].push_back(static_cast<std::int64_t>(i));
+      touch(camera_cell[camera], plan_.unknown_of_camera[camera]);
+    }
+    for (std::size_t i = 0; i < problem_.mount_priors.size(); ++i) {
+      const auto mount = static_cast<std::size_t>(problem_.mount_priors[i].mount);
+      plan_.mount_priors[mount_cell[mount]].push_back(static_cast<std::int64_t>(i));
+      touch(mount_cell[mount], plan_.unknown_of_mount[mount]);
+    }
+  }
+
+  const TileProblem& problem_;
+  TilePlan& plan_;
+  const std::vector<std::int32_t>& cell_of_frame_;
+  std::vector<std::vector<std::uint8_t>> touched_;
+};
+
+}  // namespace
+
+UnknownList tile_unknowns(const TileProblem& problem) {
+  UnknownList unknowns = listed(problem, touched_rows(problem));
+  std::sort(unknowns.begin(), unknowns.end());
+  return unknowns;
+}
+
+TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames) {
+  TilePlan plan;
+  plan.unknowns = tile_unknowns(problem);
+  plan.boundary = node.passed;
+  const auto position = [&](const Unknown& u) { return find_unknown(plan.unknowns, u.id); };
+  for (std::size_t row = 0; row < problem.frames.size(); ++row)
+    plan.unknown_of_frame.push_back(position(frame_unknown(problem, row)));
+  for (std::size_t row = 0; row < problem.cameras.size(); ++row)
+    plan.unknown_of_camera.push_back(position(camera_unknown(problem, row)));
+  for (std::size_t row = 0; row < problem.mounts.size(); ++row)
+    plan.unknown_of_mount.push_back(position(mount_unknown(problem, row)));
+
+  BisectionTree cells = bisect(graph_of(problem), cell_max_frames);
+  if (cells.tree.nodes.empty()) {  // a tile without frames: one empty cell
+    cells.tree.nodes.emplace_back();
+    cells.tree.nodes.back().tile = TileIndex(0);
+  }
+  std::size_t cell_count = 0;
+  for (const MergeTree::Node& n : cells.tree.nodes) cell_count += n.left < 0 && n.right < 0;
+  const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, cell_count).run();
+  plan.cells = make_plan(cells.tree, lists, plan.boundary);
+  return plan;
+}
+
+}  // namespace megablock
