@@ -1,0 +1,21 @@
+// Image files as grey levels, with the failures a photogrammetrist meets told apart.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+#include <string>
+
+namespace megablock {
+
+struct GreyImage {
+  cv::Mat pixels;       // CV_8UC1, as stored in the file (an EXIF orientation is not applied); empty on failure
+  std::string failure;  // one line; empty when decoded
+};
+
+// Never throws for a bad file. Files of more than 8 bits are stretched from their darkest to their brightest pixel.
+GreyImage read_grey_image(const std::string& path);
+
+// Whether a JPEG stream reaches its end-of-image marker. Decoders fill the missing part with grey and say nothing.
+bool is_complete_jpeg(std::span<const unsigned char> file);
+
+}  // namespace megablock

@@ -1,0 +1,49 @@
+// The inner loops of nearest_neighbours on raw pointers, so that they can be compiled for another processor.
+//
+// |a - b|^2 = |a|^2 + |b|^2 - 2 a.b is a matrix product of bytes. It is computed in tiles of 4 rows x 16 columns that
+// stay in registers and go straight into the lists of nearest neighbours of the rows and of the columns: the matrix
+// is never stored. Bytes are widened to 16 bits, so that products are exact in 32 bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace megablock::nearest_kernel {
+
+inline constexpr std::size_t kDimension = 128, kRowTile = 4, kColumnTile = 16, kRowBlock = 64;
+
+struct Problem {
+  std::size_t rows, columns;    // multiples of kRowTile and kColumnTile; the padding's norm is Neighbours::kFar
+  const std::int16_t* a;        // [rows][kDimension]
+  const std::int16_t* b;        // [columns / kColumnTile][kDimension / 2][kColumnTile][2]
+  const std::int32_t *norm_a, *norm_b;  // squared norms
+  std::size_t k;
+  // Nearest first; all distances start at Neighbours::kFar, all indices at -1.
+  std::int32_t *row_distance, *row_index;        // [rows][k]
+  std::int32_t *column_distance, *column_index;  // [k][columns]
+};
+
+// Inserts into a sorted list whose entries lie `stride` apart, behind equal distances. Rows and columns are visited
+// in ascending order, so ties keep the lower index.
+inline void insert(std::int32_t* distances, std::int32_t* indices, std::size_t stride, std::size_t k,
+                   std::int32_t distance, std::int32_t index) {
+  std::size_t i = k - 1;
+  if (distance >= distances[i * stride]) return;
+  for (; i > 0 && distance < distances[(i - 1) * stride]; --i) {
+    distances[i * stride] = distances[(i - 1) * stride];
+    indices[i * stride] = indices[(i - 1) * stride];
+  }
+  distances[i * stride] = distance;
+  indices[i * stride] = index;
+}
+
+inline void insert_both(const Problem& p, std::size_t row, std::size_t column, std::int32_t distance) {
+  insert(p.row_distance + row * p.k, p.row_index + row * p.k, 1, p.k, distance, static_cast<std::int32_t>(column));
+  insert(p.column_distance + column, p.column_index + column, p.columns, p.k, distance,
+         static_cast<std::int32_t>(row));
+}
+
+void run_portable(const Problem& problem);
+void run_avx2(const Problem& problem);  // needs a processor with AVX2
+
+}  // namespace megablock::nearest_kernel

@@ -1,0 +1,24 @@
+#include <string>
+
+#include "io/error.h"
+#include "match/features.h"
+#include "match/pair_matching.h"
+
+namespace megablock {
+
+void FeatureOptions::check() const {
+  if (max_features < 0) throw InputError("max_features must be 0 (all) or more, not " + std::to_string(max_features));
+  if (!(max_megapixels >= 0.1)) throw InputError("max_megapixels must be at least 0.1");
+  if (!(contrast_threshold >= 0 && contrast_threshold < 1)) {
+    throw InputError("contrast_threshold must be in [0, 1)");
+  }
+}
+
+void MatchOptions::check() const {
+  if (k_best < 1 || k_best > 7) throw InputError("k_best must be 1 to 7, not " + std::to_string(k_best));
+  if (!(ratio > 0 && ratio <= 1)) throw InputError("ratio must be in (0, 1]");
+  if (!(max_residual_px > 0 && max_residual_px <= 100)) throw InputError("max_residual_px must be in (0, 100]");
+  if (min_inliers < 8) throw InputError("min_inliers must be at least 8, not " + std::to_string(min_inliers));
+}
+
+}  // namespace megablock

@@ -1,0 +1,131 @@
+#include "match/pair_matching.h"
+
+#include <algorithm>
+#include <optional>
+#include <tuple>
+
+#include "geometry/camera.h"
+#include "io/error.h"
+#include "io/hash.h"
+#include "io/tracks.h"
+#include "match/nearest.h"
+#include "match/two_view.h"
+
+namespace megablock {
+
+namespace {
+
+// Neighbours 1..k of a row that are nearer than ratio x neighbour k + 1.
+std::size_t accepted(const Neighbours& neighbours, std::size_t row, double ratio) {
+  const std::size_t k = neighbours.k - 1;
+  const std::int32_t* distance = neighbours.distance.data() + row * neighbours.k;
+  const double limit = ratio * ratio * distance[k];
+  std::size_t count = 0;
+  while (count < k && distance[count] < limit && distance[count] < Neighbours::kFar) ++count;
+  return count;
+}
+
+bool accepts(const Neighbours& neighbours, std::size_t row, std::int32_t other, double ratio) {
+  const auto first = neighbours.row.begin() + static_cast<std::ptrdiff_t>(row * neighbours.k);
+  const auto last = first + static_cast<std::ptrdiff_t>(accepted(neighbours, row, ratio));
+  return std::find(first, last, other) != last;
+}
+
+using Matches = std::vector<std::pair<std::int32_t, std::int32_t>>;
+
+struct PositionedMatches {
+  Matches matches;
+  PointPairs points;
+};
+
+std::optional<Eigen::Vector2d> normalised_point(const Camera& camera, const Keypoint& k) {
+  return unproject(camera.intrinsics, {from_fixed_pixel(k.x), from_fixed_pixel(k.y)});
+}
+
+// Matches with their normalised points. The same pair of positions counts once, however many orientations SIFT gave it.
+PositionedMatches position(const Matches& matches, const ImageFeatures& a, const ImageFeatures& b,
+                           const Camera& camera_a, const Camera& camera_b) {
+  std::vector<std::tuple<std::int32_t, std::int32_t, std::int32_t, std::int32_t, std::size_t>> places;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Keypoint& ka = a.keypoints[static_cast<std::size_t>(matches[i].first)];
+    const Keypoint& kb = b.keypoints[static_cast<std::size_t>(matches[i].second)];
+    places.emplace_back(ka.x, ka.y, kb.x, kb.y, i);
+  }
+  std::sort(places.begin(), places.end());
+  const auto same_place = [](const auto& p, const auto& q) {
+    return std::get<0>(p) == std::get<0>(q) && std::get<1>(p) == std::get<1>(q) && std::get<2>(p) == std::get<2>(q) &&
+           std::get<3>(p) == std::get<3>(q);
+  };
+  places.erase(std::unique(places.begin(), places.end(), same_place), places.end());
+  std::vector<std::size_t> rows;
+  for (const auto& p : places) rows.push_back(std::get<4>(p));
+  std::sort(rows.begin(), rows.end());
+
+  PositionedMatches result;
+  for (const std::size_t i : rows) {
+    const auto pa = normalised_point(camera_a, a.keypoints[static_cast<std::size_t>(matches[i].first)]);
+    const auto pb = normalised_point(camera_b, b.keypoints[static_cast<std::size_t>(matches[i].second)]);
+    if (!pa || !pb) continue;  // beyond the radius the distortion can be inverted at
+    result.matches.push_back(matches[i]);
+    result.points.a.push_back(*pa);
+    result.points.b.push_back(*pb);
+  }
+  return result;
+}
+
+std::uint64_t pair_seed(ImageIndex a, ImageIndex b) {
+  return Hasher().add(a.value).add(b.value).value();
+}
+
+}  // namespace
+
+Matches match_descriptors(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
+                          const MatchOptions& options) {
+  options.check();
+  const MutualNeighbours nearest = nearest_neighbours(a, b, static_cast<std::size_t>(options.k_best) + 1);
+  Matches matches;
+  for (std::size_t row = 0; row < a.size(); ++row) {
+    const std::size_t count = accepted(nearest.of_a, row, options.ratio);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int32_t other = nearest.of_a.row[row * nearest.of_a.k + i];
+      const auto this_row = static_cast<std::int32_t>(row);
+      if (accepts(nearest.of_b, static_cast<std::size_t>(other), this_row, options.ratio)) {
+        matches.emplace_back(this_row, other);
+      }
+    }
+  }
+  std::sort(matches.begin(), matches.end());
+  return matches;
+}
+
+VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
+                        const MatchOptions& options) {
+  if (!(a.image < b.image)) throw InputError("match_pair: the first image must have the lower index");
+  VerifiedPair pair;
+  pair.a = a.image;
+  pair.b = b.image;
+  const Matches matches = match_descriptors(a.descriptors, b.descriptors, options);
+  pair.putative = static_cast<std::int32_t>(matches.size());
+  const PositionedMatches positioned = position(matches, a, b, camera_a, camera_b);
+
+  TwoViewOptions two_view;
+  const double focal = 0.5 * (camera_a.intrinsics[kFocal] + camera_b.intrinsics[kFocal]);
+  two_view.max_residual = options.max_residual_px / focal;
+  two_view.min_inliers = options.min_inliers;
+  two_view.seed = pair_seed(a.image, b.image);
+  const TwoView found = estimate_two_view(positioned.points, two_view);
+  if (found.model == PairModel::kNone) return pair;
+
+  pair.model = found.model;
+  pair.rotation_wxyz = {found.rotation.w(), found.rotation.x(), found.rotation.y(), found.rotation.z()};
+  pair.translation = {found.translation.x(), found.translation.y(), found.translation.z()};
+  pair.median_angle_deg = found.median_angle_deg;
+  for (std::size_t i = 0; i < positioned.matches.size(); ++i) {
+    if (!found.inlier[i]) continue;
+    pair.feature_a.push_back(positioned.matches[i].first);
+    pair.feature_b.push_back(positioned.matches[i].second);
+  }
+  return pair;
+}
+
+}  // namespace megablock
