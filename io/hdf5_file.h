@@ -127,12 +127,16 @@ class Hdf5Writer {
   Hdf5Handle file_;
 };
 
+// What a file holds: its attribute `kind`. Errors as Hdf5Reader.
+std::string file_kind(const std::string& path);
+
 class Hdf5Reader {
  public:
   // Throws StoreError when the file is missing, no HDF5 file, of another kind or format version.
   Hdf5Reader(const std::string& path, const std::string& kind);
 
   const std::string& path() const { return path_; }
+  std::string kind() const { return text_attribute("/", "kind"); }
   bool has(const std::string& name) const;  // group or dataset
   std::vector<std::int64_t> shape(const std::string& name) const;
 
@@ -168,6 +172,8 @@ class Hdf5Reader {
   [[noreturn]] void fail(const std::string& name, const std::string& what) const;
 
  private:
+  friend std::string file_kind(const std::string& path);
+  explicit Hdf5Reader(const std::string& path);  // of any kind
   void read(const std::string& name, ElementType type, void* values) const;
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, void* value) const;
   // Number of values of a dataset, whose shape must be as expected.

@@ -22,7 +22,7 @@ std::string shape_text(const std::vector<std::int64_t>& shape) {
 
 }  // namespace
 
-Hdf5Reader::Hdf5Reader(const std::string& path, const std::string& kind) : path_(path) {
+Hdf5Reader::Hdf5Reader(const std::string& path) : path_(path) {
   silence_hdf5();
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) throw StoreError(path + ": is missing; run the stage that makes it");
@@ -36,9 +36,14 @@ Hdf5Reader::Hdf5Reader(const std::string& path, const std::string& kind) : path_
   if (version != kFormatVersion)
     throw StoreError(path + ": has format version " + std::to_string(version) + ", this program reads version " +
                      std::to_string(kFormatVersion) + "; make it again with this program");
-  const std::string found = text_attribute("/", "kind");
+}
+
+Hdf5Reader::Hdf5Reader(const std::string& path, const std::string& kind) : Hdf5Reader(path) {
+  const std::string found = this->kind();
   if (found != kind) throw StoreError(path + ": holds '" + found + "', not '" + kind + "'; check the file name");
 }
+
+std::string file_kind(const std::string& path) { return Hdf5Reader(path).kind(); }
 
 bool Hdf5Reader::has(const std::string& name) const { return H5Lexists(file_.id(), name.c_str(), H5P_DEFAULT) > 0; }
 

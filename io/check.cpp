@@ -1,0 +1,109 @@
+#include "io/check.h"
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "io/error.h"
+#include "io/events.h"
+#include "io/hdf5_file.h"
+#include "io/result.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kResult = "result/block.h5";
+
+class Check {
+ public:
+  explicit Check(const JobStore& store) : store_(store) {}
+
+  std::vector<std::string> run() {
+    if (!std::filesystem::is_directory(store_.directory()))
+      throw InputError(store_.directory() + ": no such job directory; check the path");
+    attempt([&] { check_text(); });
+    for (const std::string& name : units()) attempt([&] { check_unit(name); });
+    attempt([&] { check_tile_files(); });
+    return std::move(problems_);
+  }
+
+ private:
+  // Collects what an action throws as one problem.
+  void attempt(const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const Error& error) {
+      problems_.emplace_back(error.what());
+    }
+  }
+
+  void check_text() {
+    const std::string path = store_.path("job.json");
+    std::ifstream file(path);
+    if (!file) throw StoreError(path + ": is missing; this is no job, or its first run was interrupted: run it again");
+    if (!nlohmann::json::accept(file)) throw StoreError(path + ": is not valid JSON; restore it or start a new job");
+    read_events(store_);
+  }
+
+  // Everything sealed: the .h5 files of the job's own folder, everything in the folders of the stages, the result.
+  std::vector<std::string> units() const {
+    std::vector<std::string> names;
+    for (const std::string& name : store_.list("")) {
+      const bool top = name.find('/') == std::string::npos;
+      const bool text = name.starts_with("events/") || (name.starts_with("result/") && name != kResult);
+      if (top ? name.ends_with(".h5") : !text) names.push_back(name);
+    }
+    return names;
+  }
+
+  void check_unit(const std::string& name) {
+    const std::string path = store_.verified_path(name);
+    if (!name.ends_with(".h5")) return;  // its contents are known to its stage alone
+    const std::string kind = file_kind(path);
+    if (kind == "result") {
+      check_result(path);
+    } else {
+      const std::map<std::string, std::function<void()>> readers = {
+          {"block", [&] { check(read_block(path)); }},    {"features", [&] { read_features(path); }},
+          {"candidates", [&] { read_candidates(path); }}, {"matches", [&] { read_matches(path); }},
+          {"tiles", [&] { read_tiles(path); }},           {"tracks", [&] { read_tracks(path); }},
+          {"state", [&] { read_state(path); }},           {"adjustment", [&] { read_adjustment(path); }}};
+      if (const auto reader = readers.find(kind); reader != readers.end()) reader->second();
+    }
+  }
+
+  void check_result(const std::string& path) {
+    const BlockResult result = read_result(path);
+    const std::string digest = result_digest(result);
+    if (digest != result.digest)
+      throw StoreError(path + ": says its digest is " + result.digest + ", its contents have " + digest +
+                       "; delete it and run again");
+  }
+
+  // A stage of one unit per tile: when some tiles have their file, all must.
+  void check_tile_files() {
+    if (!store_.seal("tiles.h5")) return;
+    const std::int64_t tiles = read_tiles(store_.verified_path("tiles.h5")).tile_count;
+    for (const char* folder : {"tracks", "adjust"}) {
+      const std::vector<std::string> names = store_.list(folder);
+      std::int64_t found = 0;
+      for (const std::string& name : names) found += name.ends_with(".h5");
+      if (found > 0 && found < tiles)
+        problems_.push_back(store_.path(folder) + ": has files of " + std::to_string(found) + " of " +
+                            std::to_string(tiles) + " tiles; run the job again to complete it");
+    }
+  }
+
+  const JobStore& store_;
+  std::vector<std::string> problems_;
+};
+
+}  // namespace
+
+std::vector<std::string> check_job(const JobStore& store) { return Check(store).run(); }
+
+}  // namespace megablock
