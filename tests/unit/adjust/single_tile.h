@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "adjust/linearise.h"
 #include "adjust/tile_adjustment.h"
 #include "io/simulate/simulate.h"
 
