@@ -1,0 +1,143 @@
+#include "io/import.h"
+
+#include <gmock/gmock.h>
+
+#include "image_files.h"
+#include "io/error.h"
+#include "io/export.h"
+#include "io/export_view.h"
+#include "io/project.h"
+#include "io/unit_files.h"
+#include "small_result.h"
+
+namespace megablock {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::message_of;
+using testing::read_file;
+using testing::small_result;
+using testing::TemporaryFolder;
+using testing::write_file;
+
+// Residuals of an imported model are those of the result it was exported from, in the files' order.
+void expect_same_residuals(const ImportedBlock& imported, const BlockResult& result, double tolerance_px) {
+  const ExportView view = make_export_view(result);
+  ASSERT_EQ(imported.block.images.size(), view.images.size());
+  ASSERT_EQ(imported.points.size(), view.tracks.size());
+  ASSERT_EQ(imported.tracks.image.size(), view.observations.size());
+  EXPECT_NO_THROW(check(imported.block));
+  for (std::size_t t = 0; t < imported.points.size(); ++t)
+    for (auto k = static_cast<std::size_t>(imported.tracks.begin[t]);
+         k < static_cast<std::size_t>(imported.tracks.begin[t + 1]); ++k) {
+      const ImageIndex image = imported.tracks.image[k];
+      const std::int64_t i = view.image_of(view.observations[k]);
+      ASSERT_EQ(image.value, i);
+      const Pose& pose = *imported.block.frames[imported.block.images[image].frame].given_pose;
+      const Eigen::Vector2d theirs =
+          project(imported.state.cameras[imported.block.camera_of(image)], to_inside(pose, imported.points[t])) -
+          Eigen::Vector2d(from_fixed_pixel(imported.tracks.x[k]), from_fixed_pixel(imported.tracks.y[k]));
+      const Eigen::Vector2d ours =
+          project(view.intrinsics(i), to_inside(view.pose(i), view.point(static_cast<std::int64_t>(t)))) -
+          view.pixel(view.observations[k]);
+      EXPECT_LT((theirs - ours).norm(), tolerance_px);
+    }
+}
+
+TEST(Import, ColmapTextReturnsTheModel) {
+  TemporaryFolder folder;
+  const BlockResult result = small_result();
+  export_result(result, "colmap-text", folder / "model");
+  const ImportedBlock imported = import_block("colmap-text", folder / "model");
+  expect_same_residuals(imported, result, 1e-9);
+  EXPECT_EQ(imported.block.images[ImageIndex(1)].name, "frame0/1.jpg");
+  EXPECT_EQ(imported.block.cameras.size(), 2u);
+  EXPECT_EQ(imported.state.cameras[CameraIndex(1)], result.state.cameras[CameraIndex(1)]);
+}
+
+TEST(Import, BalAndBundlerReturnTheResiduals) {
+  TemporaryFolder folder;
+  const BlockResult result = small_result(false);
+  for (const std::string format : {"bal", "bundler"}) {
+    export_result(result, format, folder / format);
+    const ImportedBlock imported = import_block(format, folder / format);
+    expect_same_residuals(imported, result, 1.5e-3);  // observations are rounded to 2^-10 px again
+    EXPECT_EQ(imported.block.images[ImageIndex(1)].name, format == "bal" ? "image000001" : "frame0/1.jpg");
+  }
+}
+
+TEST(Import, WritesAProjectThatReads) {
+  TemporaryFolder folder;
+  export_result(small_result(false), "bal", folder / "problem.txt");
+  const ImportedBlock imported = import_block("bal", folder / "problem.txt");
+  write_imported(imported, folder / "project");
+  const Project project = read_project(folder / "project/block.yaml");
+  EXPECT_EQ(project.block.images.size(), 6u);
+  EXPECT_TRUE(project.block.frames[FrameIndex(5)].given_pose);
+  EXPECT_EQ(read_tracks(project.tie_points).x, imported.tracks.x);
+}
+
+TEST(Import, ASmallBundlerFileByHand) {
+  TemporaryFolder folder;
+  // A camera at (0, 0, 10) that looks down -z, another not oriented; the point at (1, 2, 0) is seen at f / 10 * (1, 2).
+  write_file(folder / "b.out",
+             "# Bundle file v0.3\n2 1\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
+             "1000 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -10\n1 2 0\n9 9 9\n2 1 7 100 200 0 3 5 5\n");
+  const ImportedBlock imported = import_block("bundler", folder / "b.out");
+  ASSERT_EQ(imported.block.images.size(), 1u);
+  EXPECT_EQ(imported.block.images[ImageIndex(0)].name, "image000001");
+  const Camera& camera = imported.block.cameras[CameraIndex(0)];
+  EXPECT_EQ(camera.width, 200);
+  EXPECT_EQ(camera.height, 400);
+  const Pose& pose = *imported.block.frames[FrameIndex(0)].given_pose;
+  EXPECT_LT((pose.centre - Eigen::Vector3d(0, 0, 10)).norm(), 1e-12);
+  const Eigen::Vector2d pixel = project(camera.intrinsics, to_inside(pose, imported.points[0]));
+  EXPECT_LT((pixel - Eigen::Vector2d(100 + 100, 200 - 200)).norm(), 1e-12) << "right and up";
+  EXPECT_EQ(imported.tracks.x[0], to_fixed_pixel(200));
+  EXPECT_EQ(imported.tracks.y[0], to_fixed_pixel(0));
+}
+
+TEST(Import, BadFilesAreRefusedByLine) {
+  TemporaryFolder folder;
+  const auto refusal = [&](const std::string& format, const std::string& text) {
+    write_file(folder / "f", text);
+    return message_of<InputError>([&] { import_block(format, folder / "f"); });
+  };
+  EXPECT_THAT(refusal("bal", "1 1 1\n0 0 1 x\n"), HasSubstr("f:2: y of an observation: 'x' is not a number"));
+  EXPECT_THAT(refusal("bal", "1 1 1\n1 0 1 1\n"), HasSubstr("f:2: camera of an observation: 1 is outside 0..0"));
+  EXPECT_THAT(refusal("bal", "1 1 1\n0 0 1 1\n1\n2\n"), HasSubstr("ends before a camera's parameters"));
+  EXPECT_THAT(refusal("bal", "1 0 0\n0 0 0 0 0 0 -5 0 0\n"), HasSubstr("focal length of camera 0"));
+  EXPECT_THAT(refusal("bal", "1 0 0\n0 0 0 0 0 0 5 0 0 7\n"), HasSubstr("more numbers"));
+  EXPECT_THAT(refusal("bal", ""), HasSubstr("ends before number of cameras"));
+  EXPECT_THAT(refusal("bundler", "1 1\n"), HasSubstr("no Bundler file"));
+  EXPECT_THAT(refusal("bundler", "# Bundle file v0.3\n1 0\n5 0 0 2 0 0 0 1 0 0 0 1 0 0 0\n"),
+              HasSubstr("no rotation matrix"));
+  EXPECT_THAT(refusal("nvm", ""), HasSubstr("'nvm' is no import format"));
+  EXPECT_THAT(message_of<InputError>([&] { import_block("bal", folder / "none"); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-text", folder.path()); }), HasSubstr("cannot be read"));
+}
+
+TEST(Import, BadColmapModelsAreRefusedByLine) {
+  TemporaryFolder folder;
+  const auto refusal = [&](const std::string& cameras, const std::string& images, const std::string& points) {
+    write_file(folder / "cameras.txt", cameras);
+    write_file(folder / "images.txt", images);
+    write_file(folder / "points3D.txt", points);
+    return message_of<InputError>([&] { import_block("colmap-text", folder.path()); });
+  };
+  const std::string camera = "# comment\n1 SIMPLE_RADIAL 100 80 90 50 40 -0.1\n";
+  const std::string image = "1 1 0 0 0 0 0 0 1 a b.jpg\n10 20 7 30 40 -1\n";
+  EXPECT_EQ(refusal(camera, image, "7 1 2 3 0 0 0 0.1 1 0\n"), "");
+  EXPECT_EQ(refusal(camera, "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 b.jpg\n\n", ""), "") << "no observations";
+  EXPECT_THAT(refusal(camera, image, ""), HasSubstr("images.txt:2: an observation names point 7"));
+  EXPECT_THAT(refusal("1 FISHEYE 100 80 90 50 40\n", image, ""), HasSubstr("cameras.txt:1: camera model 'FISHEYE'"));
+  EXPECT_THAT(refusal("1 PINHOLE 100 80 90 91 50 40\n", image, ""), HasSubstr("square pixels"));
+  EXPECT_THAT(refusal("x PINHOLE 100 80 90 90 50 40\n", image, ""), HasSubstr("'x' is not a whole number"));
+  EXPECT_THAT(refusal(camera, "1 1 0 0 0 0 0 0 2 a.jpg\n\n", ""), HasSubstr("names a camera"));
+  EXPECT_THAT(refusal(camera, "1 2 0 0 0 0 0 0 1 a.jpg\n\n", ""), HasSubstr("not a unit quaternion"));
+  EXPECT_THAT(refusal(camera, "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 a.jpg\n\n", ""),
+              HasSubstr("appears twice"));
+}
+
+}  // namespace
+}  // namespace megablock
