@@ -13,7 +13,8 @@ namespace megablock::report {
 
 namespace {
 
-constexpr double kWidth = 1000, kMostHeight = 900, kLeastHeight = 360, kMargin = 28;
+constexpr double kWidth = 1000, kMostHeight = 900, kLeastHeight = 320, kMargin = 28;
+constexpr double kFoot = 30;                // strip below the map for the scale
 constexpr std::size_t kSingleMarks = 3000;  // frames drawn one by one, with their names
 constexpr std::size_t kBackgroundPoints = 6000;
 constexpr std::size_t kLinks = 20000;
@@ -105,7 +106,7 @@ class MapDrawing {
     return fmt::format(
         "<svg id=map viewBox=\"0 0 {:.0f} {:.0f}\" role=img aria-label=\"Map of the block\">"
         "<rect width={:.0f} height={:.0f} class=frame />{}</svg>",
-        kWidth, plane_.height, kWidth, plane_.height, body);
+        kWidth, plane_.height + kFoot, kWidth, plane_.height + kFoot, body);
   }
 
  private:
@@ -207,7 +208,7 @@ class MapDrawing {
 
   std::string scale_bar() const {
     const double length = round_step((plane_.high - plane_.low).maxCoeff() / 5, 1);
-    const double drawn = length * plane_.scale, y = plane_.height - 14;
+    const double drawn = length * plane_.scale, y = plane_.height + kFoot - 14;
     const std::string label = length >= 1000 ? significant(length / 1000, 2) + " km" : significant(length, 2) + " m";
     return fmt::format(
         "<g class=scale><rect x=8 y={:.1f} width={:.1f} height=26 rx=4 />"

@@ -24,10 +24,9 @@ double largest(const std::vector<Eigen::Vector3d>& values) {
   return result;
 }
 
-std::string axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std::vector<std::string>& cells) {
+void axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std::vector<std::string>& cells) {
   for (double c : v)
     cells.push_back(sign ? with_sign(c * unit.factor, unit.decimals) : fixed(c * unit.factor, unit.decimals));
-  return {};
 }
 
 void add_row(Table& table, const std::string& name, const Eigen::Vector3d& v, const LengthUnit& unit, bool sign) {
@@ -234,7 +233,7 @@ std::string accuracy_section(const BlockResult& result, const Figures& f) {
       "accuracy", "Accuracy from the adjustment",
       paragraph("Standard deviations from the covariance of the whole block, a-priori variance factor 1; the last "
                 "column multiplies by σ₀ a posteriori. Rotation: the largest of the three axes.") +
-          table.html());
+          table.html("compact"));
 }
 
 }  // namespace megablock::report

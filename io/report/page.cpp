@@ -20,7 +20,7 @@ p{margin:4px 0 10px}
 a{color:var(--accent)}
 code{font:13px ui-monospace,Menlo,Consolas,monospace}
 .muted,figcaption{color:var(--muted);font-size:13px}
-.cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(165px,1fr));gap:10px;margin:16px 0}
+.cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(205px,1fr));gap:10px;margin:16px 0}
 .card{background:var(--paper);border:1px solid var(--line);border-radius:8px;padding:10px 14px;display:flex;flex-direction:column}
 .card b{font-size:23px;font-weight:600;line-height:1.25;white-space:nowrap}
 .card i{font-style:normal;font-size:14px;font-weight:400;color:var(--muted)}
@@ -32,7 +32,7 @@ code{font:13px ui-monospace,Menlo,Consolas,monospace}
 .assessment .good::before{background:var(--good)}
 .assessment .look::before{background:var(--look);border-radius:1px}
 .assessment .bad::before{background:var(--bad);border-radius:0;transform:rotate(45deg)}
-.row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,430px),1fr));gap:14px 26px;align-items:start}
+.row{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,430px),1fr));gap:14px 26px;align-items:start}
 figure{margin:0}
 figure svg{width:100%;height:auto;display:block}
 .aside{min-width:0}
@@ -41,6 +41,7 @@ table{border-collapse:collapse;width:100%;font-size:14px;font-variant-numeric:ta
 th,td{text-align:right;padding:3px 8px;border-bottom:1px solid var(--line);white-space:nowrap}
 th{color:var(--muted);font-weight:500;font-size:13px}
 .t{text-align:left}
+.compact{max-width:720px}
 td.t{white-space:normal;overflow-wrap:anywhere}
 th:first-child,td:first-child{padding-left:0}
 tr.sum td{font-weight:600}
@@ -58,6 +59,7 @@ svg .title{fill:var(--ink);font-size:12px}
 .curve{fill:none;stroke:#b26a00;stroke-width:1.5}
 .frame{fill:#fbfcfd;stroke:var(--line)}
 .shade{fill:#6fa3b5}
+.foot{stroke:#1c2733;stroke-width:2.6;stroke-linecap:round}
 .arrow{fill:none;stroke:#1c2733;stroke-width:1.2}
 .dot{fill:var(--accent);fill-opacity:.65}
 .out{fill:none;stroke:var(--bad)}

@@ -40,8 +40,13 @@ std::string titles(const Axes& a, const std::string& x, const std::string& y) {
                      middle, y);
 }
 
-std::string horizontal_grid(const Axes& a, int decimals, double factor = 1) {
-  const double step = round_step(a.y_high - a.y_low, 5);
+// As many decimals as the labels of a grid of this step need.
+int decimals_of(double step) { return std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9))); }
+
+// `factor` turns data into what is labelled.
+std::string horizontal_grid(const Axes& a, double factor = 1) {
+  const double step = round_step((a.y_high - a.y_low) * factor, 5) / factor;
+  const int decimals = decimals_of(step * factor);
   std::string svg;
   for (double v = std::ceil(a.y_low / step - 1e-9) * step; v <= a.y_high + 1e-9 * step; v += step) {
     svg += line(a.left, a.y(v), a.width - a.right, a.y(v), std::abs(v) < 1e-9 * step ? "axis" : "grid");
@@ -52,8 +57,9 @@ std::string horizontal_grid(const Axes& a, int decimals, double factor = 1) {
   return svg;
 }
 
-std::string vertical_grid(const Axes& a, int decimals, double factor) {
-  const double step = round_step(a.x_high - a.x_low, 6);
+std::string vertical_grid(const Axes& a, double factor) {
+  const double step = round_step((a.x_high - a.x_low) * factor, 7) / factor;
+  const int decimals = decimals_of(step * factor);
   std::string svg;
   for (double v = std::ceil(a.x_low / step - 1e-9) * step; v <= a.x_high + 1e-9 * step; v += step) {
     svg += line(a.x(v), a.top, a.x(v), a.height - a.bottom, std::abs(v) < 1e-9 * step ? "axis" : "grid");
@@ -109,7 +115,7 @@ std::string draw(const BarChart& chart) {
   const std::int64_t most = h.bins.empty() ? 0 : *std::max_element(h.bins.begin(), h.bins.end());
   if (most == 0) return paragraph("Nothing to show.", "muted");
   Axes axes{h.low, h.low + h.width * static_cast<double>(h.bins.size()), 0, 1.06 * static_cast<double>(most)};
-  std::string svg = open(axes, escape(chart.x_title)) + horizontal_grid(axes, most < 5 ? 1 : 0);
+  std::string svg = open(axes, escape(chart.x_title)) + horizontal_grid(axes);
   for (std::size_t b = 0; b < h.bins.size(); ++b) {
     if (h.bins[b] == 0) continue;
     const double low = h.low + h.width * static_cast<double>(b);
@@ -144,7 +150,7 @@ FieldDrawing draw(const ResidualField& field, const Camera& camera) {
   const double typical = spread(lengths).p95;
   const double wanted = typical > 0 ? 1.5 * cell_width / (typical * scale) : 1;
   const double exaggeration = round_step(wanted, 1) > wanted ? round_step(wanted / 2, 1) : round_step(wanted, 1);
-  std::string shades, arrows;
+  std::string shades, arrows, feet;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.columns; ++c) {
       const std::int64_t n = field.count[static_cast<std::size_t>(r * field.columns + c)];
@@ -161,6 +167,7 @@ FieldDrawing draw(const ResidualField& field, const Camera& camera) {
       Eigen::Vector2d d = mean * scale * exaggeration;
       const double limit = 3 * cell_width;
       if (d.norm() > limit) d *= limit / d.norm();
+      feet += fmt::format("M{:.1f} {:.1f}h0", x + cell_width / 2, y + cell_height / 2);
       arrows += fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}", x + cell_width / 2, y + cell_height / 2, d.x(), d.y());
     }
   const double reference = round_step(1.5 * cell_width / scale / exaggeration, 1);
@@ -169,11 +176,12 @@ FieldDrawing draw(const ResidualField& field, const Camera& camera) {
   result.svg = fmt::format("<svg viewBox=\"-1 -1 {:.0f} {:.0f}\" role=img aria-label=\"Residual field\">", width + 2,
                            height + 26) +
                fmt::format("<rect width={:.0f} height={:.1f} class=frame />", width, height) + shades + "<path d=\"" +
-               arrows + "\" class=arrow marker-end=none />" +
+               arrows + "\" class=arrow /><path d=\"" + feet + "\" class=foot />" +
                fmt::format("<path d=\"M4 {0:.1f}h{1:.1f}\" class=arrow />", height + 15, bar) +
                text(bar + 12, height + 19, "start", significant(reference, 2) + " px in the image") + "</svg>";
   result.caption = fmt::format(
-      "Mean residual (adjusted − measured) per part of the sensor, exaggerated {}-fold; darker = more observations (up "
+      "Mean residual (adjusted − measured) per part of the sensor, from the dot, exaggerated {}-fold; darker = more "
+      "observations (up "
       "to "
       "{} a part). Single residuals: {} px rms.",
       exaggeration >= 1 ? count(std::llround(exaggeration)) : significant(exaggeration, 2), count(most),
@@ -188,11 +196,13 @@ std::string draw_horizontal(const std::vector<PositionResidual>& residuals) {
   // One outlier must not hide the rest: beyond three times the 95 % value marks sit at the border.
   const double reach = 1.1 * std::max(1e-4, std::min(size.largest, 3 * size.p95));
   Axes axes{-reach, reach, -reach, reach};
-  axes.width = 320;
-  axes.height = 300;
+  axes.height = 340;
+  const double aspect = (axes.width - axes.left - axes.right) / (axes.height - axes.top - axes.bottom);
+  axes.x_low *= aspect;  // one scale for both axes
+  axes.x_high *= aspect;
   const LengthUnit unit = length_unit(reach);
-  std::string svg = open(axes, "Horizontal GNSS residuals") + horizontal_grid(axes, unit.decimals, unit.factor) +
-                    vertical_grid(axes, unit.decimals, unit.factor);
+  std::string svg =
+      open(axes, "Horizontal GNSS residuals") + horizontal_grid(axes, unit.factor) + vertical_grid(axes, unit.factor);
   const std::size_t step = 1 + residuals.size() / 4000;
   for (std::size_t i = 0; i < residuals.size(); i += step) {
     const Eigen::Vector2d d = residuals[i].difference.head<2>();
@@ -209,9 +219,9 @@ std::string draw_vertical(const std::vector<PositionResidual>& residuals) {
   const Spread size = spread(sizes);
   const double reach = 1.1 * std::max(1e-4, std::min(size.largest, 3 * size.p95));
   Axes axes{-0.5, std::max(1.0, static_cast<double>(residuals.size())) - 0.5, -reach, reach};
-  axes.height = 300;
+  axes.height = 340;
   const LengthUnit unit = length_unit(reach);
-  std::string svg = open(axes, "Vertical GNSS residuals") + horizontal_grid(axes, unit.decimals, unit.factor), stems;
+  std::string svg = open(axes, "Vertical GNSS residuals") + horizontal_grid(axes, unit.factor), stems;
   const std::size_t step = 1 + residuals.size() / 4000;
   for (std::size_t i = 0; i < residuals.size(); i += step) {
     const double d = residuals[i].difference.z();

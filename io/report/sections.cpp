@@ -83,8 +83,8 @@ std::string assessment(const BlockResult& result, const Figures& f) {
   else if (lost == 0)
     list += item("good", "All images are oriented.");
   else
-    list += item("look", fmt::format("{} of {} images are not oriented: see <a href=\"#failures\">below</a>.",
-                                     count(lost), count(images)));
+    list += item("look", fmt::format("{} of {} images {} not oriented: see <a href=\"#failures\">below</a>.",
+                                     count(lost), count(images), lost == 1 ? "is" : "are"));
   if (f.components > 1)
     list += item("look", fmt::format("The block falls into {} sets of images without a link between them.",
                                      count(f.components)));
@@ -119,11 +119,11 @@ std::string map_section(const BlockResult& result, const Figures& figures) {
       "<button type=button id=whole>whole block</button>"
       "<span class=muted>wheel or pinch to enlarge, drag to move</span></p>";
   const GroundFrame& ground = result.block.ground;
-  std::string caption =
-      ground.georeferenced
-          ? fmt::format("Local ground frame (east, north, up) about {:.6f}°, {:.6f}°, {:.1f} m; inputs in {}.",
-                        ground.latitude_deg, ground.longitude_deg, ground.height_m, escape(ground.crs))
-          : "Local frame without georeference; seen from +z.";
+  std::string caption = ground.georeferenced
+                            ? fmt::format("Local ground frame (east, north, up) about {}°, {}°, {} m; inputs in {}.",
+                                          fixed(ground.latitude_deg, 6), fixed(ground.longitude_deg, 6),
+                                          fixed(ground.height_m, 1), escape(ground.crs))
+                            : "Local frame without georeference; seen from +z.";
   return section("map-section", "Map", body + figure(draw_map(result, figures), caption));
 }
 
@@ -185,7 +185,7 @@ std::string tiles_section(const BlockResult& result, const Figures& f) {
   for (std::size_t t = 0; t < listed; ++t)
     tiles.add({count(static_cast<std::int64_t>(t)), count(f.tile_frames[t]), count(f.tile_boundary[t]),
                count(f.tile_observations[t]), fixed(f.tile_rms_px[t], 3)});
-  body += tiles.html() + more(f.tile_frames.size(), listed);
+  body += tiles.html("compact") + more(f.tile_frames.size(), listed);
   if (!result.seams.empty()) {
     Table seams({"joint", "verdict", "note", "T", "degrees of freedom", "limit"}, 3);
     std::vector<const SeamCheck*> order;
