@@ -17,7 +17,7 @@ Block read_block(const std::string& path);
 
 void write_features(const std::string& path, const std::vector<ImageFeatures>& images);
 std::vector<ImageFeatures> read_features(const std::string& path);
-// Without descriptors and global descriptors: an eighth of the bytes.
+// Without the keypoints' descriptors: an eighth of the bytes.
 std::vector<ImageFeatures> read_keypoints(const std::string& path);
 
 void write_candidates(const std::string& path, const CandidateGraph& graph);
