@@ -66,6 +66,29 @@ std::vector<ImageFeatures> read_keypoints(const std::string& path) {
   const auto index = file.vector<std::int64_t>("images/index");
   const auto count = static_cast<std::int64_t>(index.size());
   const auto size = file.matrix<std::int32_t>("images/size", 2, count);
+  const auto global = file.matrix<float>("images/global_descriptor", kDescriptorSize, count);
+  const std::vector<std::string> failures = file.texts("images/failure", count);
+  const auto scale = file.vector<float>("keypoints/scale");
+  const auto rows = static_cast<std::int64_t>(scale.size());
+  const auto angle = file.vector<float>("keypoints/angle", rows);
+  const auto position = file.matrix<std::int32_t>("keypoints/position", 2, rows);
+  const auto begin = begin_of(file, "images/keypoints", file.vector<std::int64_t>("images/keypoints", count), rows);
+  std::vector<ImageFeatures> images(index.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    images[i].image = ImageIndex(index[i]);
+    images[i].width = size[2 * i];
+    images[i].height = size[2 * i + 1];
+    std::copy_n(&global[kDescriptorSize * i], kDescriptorSize, images[i].global_descriptor.begin());
+    images[i].failure = failures[i];
+    for (auto k = static_cast<std::size_t>(begin[i]); k < static_cast<std::size_t>(begin[i + 1]); ++k)
+      images[i].keypoints.push_back({position[2 * k], position[2 * k + 1], scale[k], angle[k]});
+  }
+  return images;
+}
+
+std::vector<ImageFeatures> read_features(const std::string& path) {
+  std::vector<ImageFeatures> images = read_keypoints(path);
+  const Hdf5Reader file(path, "features");
   std::int64_t rows = 0;
   for (const ImageFeatures& features : images) rows += static_cast<std::int64_t>(features.keypoints.size());
   const auto descriptors = file.matrix<std::uint8_t>("keypoints/descriptor", kDescriptorSize, rows);
