@@ -130,8 +130,8 @@ std::string control_section(const BlockResult& result, const Figures& f) {
   std::vector<Eigen::Vector3d> differences;
   for (const PointResidual& r : f.points) differences.push_back(r.difference);
   const LengthUnit unit = length_unit(largest(differences));
-  Table table({"point", "role", in_unit("ΔE", unit), in_unit("ΔN", unit), in_unit("ΔU", unit), "σE", "σN", "σU",
-               "images", "rms [px]"},
+  Table table({"point", "role", in_unit("ΔE", unit), in_unit("ΔN", unit), in_unit("ΔU", unit), in_unit("σE", unit),
+               in_unit("σN", unit), in_unit("σU", unit), "images", "rms [px]"},
               2);
   add_point_rows(result, f, PointRole::kControl, unit, table);
   add_point_rows(result, f, PointRole::kCheck, unit, table);

@@ -133,8 +133,34 @@ std::string draw(const BarChart& chart) {
   return svg + bin_labels(chart, axes) + titles(axes, chart.x_title, chart.y_title) + "</svg>";
 }
 
-FieldDrawing draw(const ResidualField& field, const Camera& camera) {
+namespace {
+
+// Two by two cells in one.
+ResidualField coarser(const ResidualField& fine) {
+  ResidualField field;
+  field.columns = (fine.columns + 1) / 2;
+  field.rows = (fine.rows + 1) / 2;
+  field.squares = fine.squares;
+  field.observations = fine.observations;
+  field.sum.assign(static_cast<std::size_t>(field.columns * field.rows), Eigen::Vector2d::Zero());
+  field.count.assign(field.sum.size(), 0);
+  for (int r = 0; r < fine.rows; ++r)
+    for (int c = 0; c < fine.columns; ++c) {
+      const auto from = static_cast<std::size_t>(r * fine.columns + c);
+      const auto to = static_cast<std::size_t>(r / 2 * field.columns + c / 2);
+      field.sum[to] += fine.sum[from];
+      field.count[to] += fine.count[from];
+    }
+  return field;
+}
+
+}  // namespace
+
+FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   constexpr double width = 480;
+  constexpr std::int64_t enough = 40;  // observations a cell in the mean, so that its mean rises above the noise
+  const bool sparse = fine.observations < enough * fine.columns * fine.rows && fine.columns > 2 && fine.rows > 2;
+  const ResidualField field = sparse ? coarser(fine) : fine;
   constexpr std::int64_t few = 3;  // observations of a cell; fewer say nothing of the mean
   const double scale = width / camera.width, height = camera.height * scale;
   const double cell_width = width / field.columns, cell_height = height / field.rows;
@@ -146,9 +172,9 @@ FieldDrawing draw(const ResidualField& field, const Camera& camera) {
       most = std::max(most, n);
       if (n >= few) lengths.push_back(field.mean(r, c).norm());
     }
-  // The 95 % arrow is as long as one and a half cells; exaggeration rounded so that it can be told.
+  // The 95 % arrow is as long as a cell; exaggeration rounded so that it can be told.
   const double typical = spread(lengths).p95;
-  const double wanted = typical > 0 ? 1.5 * cell_width / (typical * scale) : 1;
+  const double wanted = typical > 0 ? cell_width / (typical * scale) : 1;
   const double exaggeration = round_step(wanted, 1) > wanted ? round_step(wanted / 2, 1) : round_step(wanted, 1);
   std::string shades, arrows, feet;
   for (int r = 0; r < field.rows; ++r)
@@ -165,12 +191,12 @@ FieldDrawing draw(const ResidualField& field, const Camera& camera) {
           count(n), with_sign(mean.x(), 2), with_sign(mean.y(), 2));
       if (n < few) continue;
       Eigen::Vector2d d = mean * scale * exaggeration;
-      const double limit = 3 * cell_width;
+      const double limit = 1.5 * cell_width;
       if (d.norm() > limit) d *= limit / d.norm();
       feet += fmt::format("M{:.1f} {:.1f}h0", x + cell_width / 2, y + cell_height / 2);
       arrows += fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}", x + cell_width / 2, y + cell_height / 2, d.x(), d.y());
     }
-  const double reference = round_step(1.5 * cell_width / scale / exaggeration, 1);
+  const double reference = round_step(cell_width / scale / exaggeration, 1);
   const double bar = reference * scale * exaggeration;
   FieldDrawing result;
   result.svg = fmt::format("<svg viewBox=\"-1 -1 {:.0f} {:.0f}\" role=img aria-label=\"Residual field\">", width + 2,

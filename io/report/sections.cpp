@@ -111,20 +111,22 @@ std::string assessment(const BlockResult& result, const Figures& f) {
 }
 
 std::string map_section(const BlockResult& result, const Figures& figures) {
-  std::string body = map_legend(result, figures);
-  body +=
+  const std::string drawing = draw_map(result, figures);
+  const bool empty = drawing.find("<svg") == std::string::npos;
+  if (empty) return section("map-section", "Map", drawing);
+  const std::string controls =
       "<p class=controls><label><input type=checkbox data-layer=points checked> tie points</label>"
       "<label><input type=checkbox data-layer=boundary checked> boundary frames</label>"
       "<label><input type=checkbox data-layer=links> links</label>"
       "<button type=button id=whole>whole block</button>"
       "<span class=muted>wheel or pinch to enlarge, drag to move</span></p>";
   const GroundFrame& ground = result.block.ground;
-  std::string caption = ground.georeferenced
-                            ? fmt::format("Local ground frame (east, north, up) about {}°, {}°, {} m; inputs in {}.",
-                                          fixed(ground.latitude_deg, 6), fixed(ground.longitude_deg, 6),
-                                          fixed(ground.height_m, 1), escape(ground.crs))
-                            : "Local frame without georeference; seen from +z.";
-  return section("map-section", "Map", body + figure(draw_map(result, figures), caption));
+  const std::string caption =
+      ground.georeferenced ? fmt::format("Local ground frame (east, north, up) about {}°, {}°, {} m; inputs in {}.",
+                                         fixed(ground.latitude_deg, 6), fixed(ground.longitude_deg, 6),
+                                         fixed(ground.height_m, 1), escape(ground.crs))
+                           : "Local frame without georeference; seen from +z.";
+  return section("map-section", "Map", map_legend(result, figures) + controls + figure(drawing, caption));
 }
 
 std::string tie_points_section(const BlockResult& result, const Figures& f) {
