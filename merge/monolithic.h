@@ -1,0 +1,40 @@
+// The reference: the whole block as one system, from one Ceres problem with automatic derivatives. None of the
+// linearisation or elimination code of this room takes part, so that agreement means something.
+//
+// For blocks that fit in memory; the reduced system is made dense (6 times the number of frames squared).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+#include "adjust/tile_problem.h"
+
+namespace megablock {
+
+// Weighted Jacobian and residual of the whole block. Columns: frames, cameras, mounts (rows of the problem's tables,
+// only those that are unknown and observed), then points.
+struct MonolithicSystem {
+  Eigen::SparseMatrix<double> jacobian;
+  Eigen::VectorXd residual;
+  double cost = 0;
+  std::vector<std::int64_t> frame_column, camera_column, mount_column, point_column;  // first column, -1: none
+  std::int64_t reduced_dimension = 0;                                                 // columns before the points
+
+  Eigen::VectorXd gradient() const { return jacobian.transpose() * residual; }
+  Eigen::VectorXd diagonal() const;  // of J'J
+};
+
+// `problem`: one tile that holds everything.
+MonolithicSystem monolithic_system(const TileProblem& problem, const TileState& state);
+
+// x of (J'J + lambda diag(J'J)) x = -J'r by CHOLMOD. Throws ComputeError when it is not positive definite.
+Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda);
+
+// Inverse of the reduced (points eliminated) undamped normal equations: covariances of everything but points, dense.
+// Throws ComputeError when the datum is free.
+Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system);
+
+// Largest component of the undamped Newton step at `state` over its posterior sigma, over all frames.
+double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state);
+
+}  // namespace megablock

@@ -1,0 +1,147 @@
+// One step of the block-wise compensation equals one solution of the full damped normal equations.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "merge/monolithic.h"
+#include "tests/unit/merge/tiled_block.h"
+
+namespace megablock {
+namespace {
+
+struct Scene {
+  const char* name;
+  SimulationOptions simulation;
+  ObservationOptions observations;
+  bool free_mounts = false;
+};
+
+SimulationOptions aerial() {
+  SimulationOptions o;
+  o.frames = 90;
+  o.points_per_frame = 60;
+  return o;
+}
+
+SimulationOptions street() {
+  SimulationOptions o = aerial();
+  o.scene = SimulationOptions::Scene::kStreet;
+  o.frames = 100;
+  o.rig_cameras = 2;
+  o.points_per_frame = 80;
+  return o;
+}
+
+std::vector<Scene> scenes() {
+  std::vector<Scene> list;
+  ObservationOptions plain, cauchy;
+  plain.image_loss.kind = RobustLoss::Kind::kNone;
+  plain.position_loss.kind = RobustLoss::Kind::kNone;
+  cauchy.image_loss = {RobustLoss::Kind::kCauchy, 1.5};
+  cauchy.relative_loss = {RobustLoss::Kind::kHuber, 0.5};
+  list.push_back({"AerialCalibrated", aerial(), plain});
+  SimulationOptions held = aerial();
+  held.calibrate = false;
+  list.push_back({"AerialHeldCamera", held, {}});
+  SimulationOptions control = aerial();
+  control.control_points = 8;
+  control.check_points = 4;
+  control.gps_share = 0.3;
+  control.outlier_share = 0.02;
+  list.push_back({"AerialControlRobust", control, cauchy});
+  SimulationOptions relative = street();
+  relative.relative_position_sigma_m = 0.02;
+  relative.attitude_sigma_deg = 0.5;
+  relative.gps_share = 0.2;
+  list.push_back({"StreetRelative", relative, cauchy});
+  list.push_back({"StreetFreeMounts", street(), {}, true});
+  return list;
+}
+
+SimulatedBlock simulated(const Scene& scene) {
+  SimulatedBlock block = simulate_block(scene.simulation);
+  if (scene.free_mounts)
+    for (Rig& rig : block.block.rigs)
+      for (std::size_t m = 1; m < rig.mounts.size(); ++m) {
+        rig.mounts[m].rotation_sigma_rad = 0.01;
+        rig.mounts[m].position_sigma_m = 0.05;
+      }
+  return block;
+}
+
+class StepEquality : public testing::TestWithParam<Scene> {};
+
+// Largest difference between the tiles' step and the monolithic one, in units of `sigma` [columns].
+double difference(const TiledBlock& block, const SerialRunner& runner, const MonolithicSystem& system,
+                  const Eigen::VectorXd& expected, const Eigen::VectorXd& sigma) {
+  double largest = 0;
+  const auto compare = [&](std::int64_t column, const double* values, std::int64_t count) {
+    for (std::int64_t k = 0; k < count; ++k)
+      largest = std::max(largest, std::abs(values[k] - expected[column + k]) / sigma[column + k]);
+  };
+  for (std::size_t t = 0; t < runner.problems().size(); ++t) {
+    const TileProblem& tile = runner.problems()[t];
+    const TileStep& step = runner.steps()[t];
+    for (const Unknown& u : step.unknowns.unknowns) {
+      std::int64_t column = -1;
+      if (u.id.kind == UnknownKind::kFrame)
+        column = system.frame_column[TiledBlock::row(block.whole.frames, FrameIndex(u.id.index))];
+      if (u.id.kind == UnknownKind::kCamera)
+        column = system.camera_column[TiledBlock::row(block.whole.cameras, CameraIndex(u.id.index))];
+      if (u.id.kind == UnknownKind::kMount)
+        column = system.mount_column[TiledBlock::row(block.whole.mounts, MountId{RigIndex(u.id.index), u.id.part})];
+      EXPECT_GE(column, 0) << describe(u.id);
+      if (column >= 0) compare(column, step.unknowns.find(u.id), u.dimension);
+    }
+    for (std::size_t p = 0; p < tile.points.size(); ++p) {
+      const std::int64_t column = system.point_column[block.point_row(tile.points[p])];
+      if (column >= 0) compare(column, step.points[p].data(), 3);
+    }
+  }
+  return largest;
+}
+
+// Posterior sigmas of all columns: the reduced ones exactly, the points' by a lower bound (their own 3 x 3 block).
+Eigen::VectorXd sigmas(const MonolithicSystem& system) {
+  Eigen::VectorXd sigma(system.jacobian.cols());
+  const Eigen::MatrixXd covariance = monolithic_covariance(system);
+  sigma.head(system.reduced_dimension) = covariance.diagonal().cwiseSqrt();
+  for (Eigen::Index p = system.reduced_dimension; p < system.jacobian.cols(); p += 3) {
+    const Eigen::MatrixXd columns = system.jacobian.middleCols(p, 3);
+    const Eigen::Matrix3d own = columns.transpose() * columns;
+    sigma.segment<3>(p) = own.inverse().diagonal().cwiseSqrt();
+  }
+  return sigma;
+}
+
+TEST_P(StepEquality, OverEightTilesAndThreeLevels) {
+  const TiledBlock block(simulated(GetParam()), 12, GetParam().observations, 0.05);
+  ASSERT_GE(block.tiles.tile_count, 8);
+  ASSERT_GE(block.levels(), 3);
+  const MonolithicSystem system = monolithic_system(block.whole, block.whole_state);
+  const Eigen::VectorXd sigma = sigmas(system);
+  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  for (const double lambda : {0.0, 1e-4, 1.0}) {
+    const UpReport up = runner.up(lambda);
+    const DownReport down = runner.down(lambda);
+    const Eigen::VectorXd expected = monolithic_step(system, lambda);
+    EXPECT_LE(difference(block, runner, system, expected, sigma), 1e-7) << "lambda " << lambda;
+    EXPECT_NEAR(up.sums.cost, system.cost, 1e-11 * system.cost);
+    EXPECT_EQ(up.sums.unknowns, system.jacobian.cols());
+    EXPECT_EQ(up.sums.residuals, system.jacobian.rows());
+    EXPECT_TRUE(up.sums.held.empty());
+    // d^2 = b'H^-1 b and the decrease that the linearised model predicts.
+    const Eigen::VectorXd b = -system.gradient();
+    EXPECT_NEAR(up.sums.decrement_squared, b.dot(expected), 1e-9 * b.dot(expected));
+    const double model = 0.5 * (system.residual + system.jacobian * expected).squaredNorm();
+    const double predicted = 0.5 * (up.sums.decrement_squared + lambda * down.damping_norm);
+    const double plain = 0.5 * system.residual.squaredNorm();
+    EXPECT_NEAR(predicted, plain - model, 1e-9 * plain);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, StepEquality, testing::ValuesIn(scenes()),
+                         [](const auto& parameter) { return parameter.param.name; });
+
+}  // namespace
+}  // namespace megablock
