@@ -228,5 +228,16 @@ TEST_F(UnitFiles, ContradictingLengthsAreNamed) {
   EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr("tracks/observations: adds up to 4 rows"));
 }
 
+TEST_F(UnitFiles, TracksOutOfOrderAreRefused) {
+  TrackSet tracks = example_tracks();
+  std::swap(tracks.image[0], tracks.image[1]);
+  write_tracks(path_, tracks);
+  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr("the images of a track do not ascend"));
+  tracks = example_tracks();
+  std::swap(tracks.id[0], tracks.id[1]);
+  write_tracks(path_, tracks);
+  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr("indices do not ascend"));
+}
+
 }  // namespace
 }  // namespace megablock
