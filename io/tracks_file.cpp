@@ -38,6 +38,19 @@ std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, con
   return images;
 }
 
+void check_order(const Hdf5Reader& file, const TrackSet& tracks) {
+  for (std::size_t t = 0; t < tracks.id.size(); ++t) {
+    if (tracks.id[t].value < 0 || (t > 0 && tracks.id[t] <= tracks.id[t - 1]))
+      file.fail("tracks/id_difference", "indices do not ascend");
+    ImageIndex previous;  // -1
+    for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o) {
+      const ImageIndex image = tracks.image[static_cast<std::size_t>(o)];
+      if (image <= previous) file.fail("observations/image_difference", "the images of a track do not ascend");
+      previous = image;
+    }
+  }
+}
+
 }  // namespace
 
 void write_tracks(const std::string& path, const TrackSet& tracks) {
@@ -67,15 +80,8 @@ TrackSet read_tracks(const std::string& path) {
   tracks.feature = file.vector<std::int32_t>("observations/feature", count);
   tracks.begin = begin_of(file, "tracks/observations",
                           file.vector<std::int64_t>("tracks/observations", tracks.track_count()), count);
-  for (std::size_t t = 0; t < tracks.id.size(); ++t)
-    if (tracks.id[t].value < 0 || (t > 0 && tracks.id[t] <= tracks.id[t - 1]))
-      file.fail("tracks/id_difference", "indices do not ascend");
   tracks.image = images_from(file.vector<std::int64_t>("observations/image_difference", count), tracks.begin);
-  for (std::size_t t = 0; t < tracks.id.size(); ++t)
-    for (auto o = static_cast<std::size_t>(tracks.begin[t]); o < static_cast<std::size_t>(tracks.begin[t + 1]); ++o)
-      if (tracks.image[o].value < 0 ||
-          (o > static_cast<std::size_t>(tracks.begin[t]) && tracks.image[o] <= tracks.image[o - 1]))
-        file.fail("observations/image_difference", "the images of a track do not ascend");
+  check_order(file, tracks);
   return tracks;
 }
 
