@@ -6,9 +6,7 @@
 add_library(megablock_options INTERFACE)
 target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})
 # Contraction off: a*b+c gives the same bits wherever the compiler could have fused it or not.
-# The two warnings left out are GCC 12's false alarms on inlined std::string and std::vector copies.
-target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow -Wno-restrict -Wno-stringop-overflow
-                       -ffp-contract=off)
+target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow -ffp-contract=off)
 if(MEGABLOCK_WERROR)
   target_compile_options(megablock_options INTERFACE -Werror)
 endif()
