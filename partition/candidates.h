@@ -16,7 +16,7 @@ struct CandidateOptions {
   int order_neighbours = 2;        // neighbours before and after in the order of acquisition (time, else name)
   int descriptor_neighbours = 20;  // for images without position
   int exhaustive_below = 300;      // blocks without any position: all pairs when there are fewer images
-  int cell_pairs = 400;            // pairs per cell, the unit of matching
+  int cell_pairs = 100;            // pairs per cell, the unit of matching (about 10 s of work)
   void check() const;              // throws InputError
 };
 
