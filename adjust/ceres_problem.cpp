@@ -133,10 +133,14 @@ ceres::CostFunction* automatic(Functor functor) {
 }  // namespace
 
 CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options)
-    : frames_(state.frames.size()),
-      mounts_(state.mounts.size()),
-      cameras_(state.cameras),
-      points_(state.points.size()),
+    : frame_count_(std::ssize(state.frames)),
+      mount_count_(std::ssize(state.mounts)),
+      camera_count_(std::ssize(state.cameras)),
+      point_count_(std::ssize(state.points)),
+      mounts_begin_(frame_count_ * kPoseBlock),
+      cameras_begin_(mounts_begin_ + mount_count_ * kPoseBlock),
+      points_begin_(cameras_begin_ + camera_count_ * kIntrinsicCount),
+      values_(static_cast<std::size_t>(points_begin_ + point_count_ * 3)),
       point_used_(problem.points.size(), 0),
       image_loss_(ceres_loss(problem.image_loss)),
       position_loss_(ceres_loss(problem.position_loss)),
@@ -147,9 +151,10 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
       state.mounts.size() != problem.mounts.size() || state.points.size() != problem.points.size() ||
       camera_free.size() != problem.cameras.size())
     throw InputError("the tile's state does not fit its problem");
-  for (std::size_t f = 0; f < frames_.size(); ++f) to_block(state.frames[f], frames_[f].data());
-  for (std::size_t m = 0; m < mounts_.size(); ++m) to_block(state.mounts[m], mounts_[m].data());
-  for (std::size_t p = 0; p < points_.size(); ++p) Eigen::Map<Eigen::Vector3d>(points_[p].data()) = state.points[p];
+  for (std::int64_t f = 0; f < frame_count_; ++f) to_block(state.frames[f], frame(f));
+  for (std::int64_t m = 0; m < mount_count_; ++m) to_block(state.mounts[m], mount(m));
+  for (std::int64_t c = 0; c < camera_count_; ++c) std::copy_n(state.cameras[c].begin(), kIntrinsicCount, camera(c));
+  for (std::int64_t p = 0; p < point_count_; ++p) Eigen::Map<Eigen::Vector3d>(point(p)) = state.points[p];
   add_images(problem, options.derivatives);
   add_priors(problem);
   hold_parameters(problem, camera_free);
@@ -197,15 +202,15 @@ void CeresTile::add_priors(const TileProblem& problem) {
 }
 
 void CeresTile::hold_parameters(const TileProblem& problem, const std::vector<std::uint8_t>& camera_free) {
-  for (auto& block : frames_)
-    if (ceres_->HasParameterBlock(block.data())) ceres_->SetManifold(block.data(), &pose_manifold_);
-  for (std::size_t m = 0; m < mounts_.size(); ++m) {
-    if (!ceres_->HasParameterBlock(mounts_[m].data())) continue;
-    ceres_->SetManifold(mounts_[m].data(), &pose_manifold_);
-    if (!problem.mount_free[m]) ceres_->SetParameterBlockConstant(mounts_[m].data());
+  for (std::int64_t f = 0; f < frame_count_; ++f)
+    if (ceres_->HasParameterBlock(frame(f))) ceres_->SetManifold(frame(f), &pose_manifold_);
+  for (std::int64_t m = 0; m < mount_count_; ++m) {
+    if (!ceres_->HasParameterBlock(mount(m))) continue;
+    ceres_->SetManifold(mount(m), &pose_manifold_);
+    if (!problem.mount_free[m]) ceres_->SetParameterBlockConstant(mount(m));
   }
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    double* block = cameras_[c].data();
+  for (std::int64_t c = 0; c < camera_count_; ++c) {
+    double* block = camera(c);
     if (!ceres_->HasParameterBlock(block)) continue;
     std::vector<int> held;
     for (int k = 0; k < kIntrinsicCount; ++k)
@@ -219,41 +224,40 @@ void CeresTile::hold_parameters(const TileProblem& problem, const std::vector<st
   }
 }
 
-bool CeresTile::unknown(double* block) const {
+bool CeresTile::unknown(const double* block) const {
   return ceres_->HasParameterBlock(block) && !ceres_->IsParameterBlockConstant(block);
 }
 
 bool CeresTile::is_point(const double* block) const {
-  const std::less<const double*> before;
-  return !points_.empty() && !before(block, points_.front().data()) && !before(points_.back().data(), block);
+  const std::less_equal<const double*> not_after;
+  return not_after(values_.data() + points_begin_, block);
 }
 
 std::vector<double*> CeresTile::unknown_blocks_without_points() {
   std::vector<double*> blocks;
-  const auto add = [&](auto& table) {
-    for (auto& block : table)
-      if (unknown(block.data())) blocks.push_back(block.data());
+  const auto add = [&](double* block) {
+    if (unknown(block)) blocks.push_back(block);
   };
-  add(frames_);
-  add(cameras_);
-  add(mounts_);
+  for (std::int64_t f = 0; f < frame_count_; ++f) add(frame(f));
+  for (std::int64_t c = 0; c < camera_count_; ++c) add(camera(c));
+  for (std::int64_t m = 0; m < mount_count_; ++m) add(mount(m));
   return blocks;
 }
 
 std::vector<double*> CeresTile::unknown_blocks() {
   std::vector<double*> blocks = unknown_blocks_without_points();
-  for (std::size_t p = 0; p < points_.size(); ++p)
-    if (point_used_[p]) blocks.push_back(points_[p].data());
+  for (std::int64_t p = 0; p < point_count_; ++p)
+    if (point_used_[p]) blocks.push_back(point(p));
   return blocks;
 }
 
-void CeresTile::store(TileState& state) const {
+void CeresTile::store(TileState& state) {
   // As Plus left them: already unit, and held blocks keep their bits.
-  for (std::size_t f = 0; f < frames_.size(); ++f) state.frames[f] = from_block(frames_[f].data());
-  for (std::size_t m = 0; m < mounts_.size(); ++m) state.mounts[m] = from_block(mounts_[m].data());
-  state.cameras = cameras_;
-  for (std::size_t p = 0; p < points_.size(); ++p)
-    if (point_used_[p]) state.points[p] = Eigen::Map<const Eigen::Vector3d>(points_[p].data());
+  for (std::int64_t f = 0; f < frame_count_; ++f) state.frames[f] = from_block(frame(f));
+  for (std::int64_t m = 0; m < mount_count_; ++m) state.mounts[m] = from_block(mount(m));
+  for (std::int64_t c = 0; c < camera_count_; ++c) std::copy_n(camera(c), kIntrinsicCount, state.cameras[c].begin());
+  for (std::int64_t p = 0; p < point_count_; ++p)
+    if (point_used_[p]) state.points[p] = Eigen::Map<const Eigen::Vector3d>(point(p));
 }
 
 }  // namespace megablock

@@ -29,10 +29,10 @@ class CeresTile {
   ~CeresTile();
 
   ceres::Problem& problem() { return *ceres_; }
-  double* frame(std::int64_t row) { return frames_[row].data(); }
-  double* mount(std::int64_t row) { return mounts_[row].data(); }
-  double* camera(std::int64_t row) { return cameras_[row].data(); }
-  double* point(std::int64_t row) { return points_[row].data(); }
+  double* frame(std::int64_t row) { return &values_[row * kPoseBlock]; }
+  double* mount(std::int64_t row) { return &values_[mounts_begin_ + row * kPoseBlock]; }
+  double* camera(std::int64_t row) { return &values_[cameras_begin_ + row * kIntrinsicCount]; }
+  double* point(std::int64_t row) { return &values_[points_begin_ + row * 3]; }
 
   bool is_point(const double* block) const;
 
@@ -43,17 +43,19 @@ class CeresTile {
   std::vector<double*> unknown_blocks_without_points();
 
   // Writes the blocks' values back (points that take no part keep their value).
-  void store(TileState& state) const;
+  void store(TileState& state);
 
  private:
   void add_images(const TileProblem& problem, CeresOptions::Derivatives derivatives);
   void add_priors(const TileProblem& problem);
   void hold_parameters(const TileProblem& problem, const std::vector<std::uint8_t>& camera_free);
-  bool unknown(double* block) const;
+  bool unknown(const double* block) const;
 
-  std::vector<std::array<double, kPoseBlock>> frames_, mounts_;
-  std::vector<Intrinsics> cameras_;
-  std::vector<std::array<double, 3>> points_;
+  // Ceres orders blocks by their addresses: one allocation, so that the order, and with it the bits of the result, are
+  // the same every time. Frames, mounts, cameras, points.
+  std::int64_t frame_count_, mount_count_, camera_count_, point_count_;
+  std::int64_t mounts_begin_, cameras_begin_, points_begin_;
+  std::vector<double> values_;
   std::vector<std::uint8_t> point_used_;
   PoseManifold pose_manifold_;
   std::vector<std::unique_ptr<ceres::Manifold>> camera_manifolds_;
