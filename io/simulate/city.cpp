@@ -46,7 +46,8 @@ Eigen::Vector3d HeightGrid::normal(double x, double y) const {
 
 // Far from the ground by steps that cannot overshoot: the ray's height above the ground shrinks at most by the slope of
 // the ray plus the steepest ground. Near the ground by Newton's method, except on grazing rays.
-double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit) const {
+double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit,
+                             double guess) const {
   const double closing = -direction.z() + steepest_ * direction.head<2>().norm();
   if (closing <= 1e-6) return kInfinity;
   double t = 0;
@@ -55,6 +56,7 @@ double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3
     t = (highest_ - origin.z()) / direction.z();
   }
   const bool steep = -direction.z() > 2 * (closing + direction.z());
+  if (steep && guess > 0) t = guess;  // a steep ray meets the ground once
   for (int i = 0; i < 200 && t < limit; ++i) {
     const Eigen::Vector3d p = origin + t * direction;
     const Eigen::Vector3d ground = sample(p.x(), p.y());
@@ -241,10 +243,10 @@ std::int64_t City::nearest_box(const Eigen::Vector3d& origin, const Eigen::Vecto
   return found;
 }
 
-City::Hit City::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+City::Hit City::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double ground_guess) const {
   constexpr double kHorizon = 2000;  // metres
   Hit hit;
-  hit.distance = ground_.intersect(origin, direction, kHorizon);
+  hit.distance = ground_.intersect(origin, direction, kHorizon, ground_guess);
   if (hit.distance < kInfinity) hit.object = kGround;
   double distance = 0;
   int axis = 0;

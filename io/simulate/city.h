@@ -29,8 +29,8 @@ class HeightGrid {
   }
   double height(double x, double y) const { return sample(x, y)[0]; }
   Eigen::Vector3d normal(double x, double y) const;
-  // Distance along the ray (unit direction) to the surface; infinity beyond `limit`.
-  double intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit) const;
+  // Distance along the ray (unit direction) to the surface; infinity beyond `limit`. `guess`: of a neighbouring ray.
+  double intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit, double guess) const;
 
  private:
   void measure();
@@ -55,7 +55,8 @@ class City : public Scene {
 
   City(const SimulationOptions& options, const Layout& layout);
 
-  Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+  // `ground_guess`: distance at which a neighbouring ray met the ground; 0 = unknown.
+  Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double ground_guess = 0) const;
   // Red, green, blue, 0 to 255. `pixel_angle`: of a pixel, radians.
   Eigen::Vector3f colour(const Hit& hit, const Eigen::Vector3d& direction, double pixel_angle) const;
 

@@ -1,6 +1,7 @@
 #include "io/simulate/render.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "io/error.h"
@@ -44,19 +45,29 @@ cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera,
 #pragma omp parallel for schedule(dynamic, 8)
   for (int row = 0; row < image.rows; ++row) {
     auto* line = image.ptr<cv::Vec3b>(row);
+    double guess = 0;
     for (int column = 0; column < image.cols; ++column) {
-      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-      for (int sample = 0; sample < 4; ++sample) {
-        const Eigen::Vector2f& ray = rays.at(2 * row + sample / 2, 2 * column + sample % 2);
-        const Eigen::Vector3d direction =
+      std::array<Eigen::Vector3d, 4> direction;
+      std::array<City::Hit, 4> hit;
+      bool edge = false;
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2f& ray = rays.at(2 * row + static_cast<int>(k / 2), 2 * column + static_cast<int>(k % 2));
+        direction[k] =
             (to_ground * Eigen::Vector3d(static_cast<double>(ray.x()), static_cast<double>(ray.y()), 1)).normalized();
-        sum += city.colour(city.cast(camera.centre, direction), direction, 1 / focal_px);
+        hit[k] = city.cast(camera.centre, direction[k], guess);
+        if (hit[k].object == City::kGround) guess = hit[k].distance;
+        edge = edge || hit[k].object != hit[0].object;
       }
+      // Within one surface two samples on the diagonal do: the texture fades where it is finer than the pixel.
+      Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+      const std::size_t step = edge ? 1 : 3;
+      for (std::size_t k = 0; k < 4; k += step) mean += city.colour(hit[k], direction[k], 1 / focal_px);
+      mean /= edge ? 4 : 2;
       std::uint64_t bits =
           mix_bits(seed + static_cast<std::uint64_t>(row) * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(column));
       for (int k = 0; k < 3; ++k) {
         bits = mix_bits(bits + 1);
-        const float value = 0.25f * sum[2 - k] + kNoise * sensor_noise(bits);
+        const float value = mean[2 - k] + kNoise * sensor_noise(bits);
         line[column][k] = static_cast<unsigned char>(std::clamp(value + 0.5f, 0.0f, 255.0f));
       }
     }
