@@ -136,6 +136,10 @@ class PairFinder {
   // Images without position, or with a doubtful one, against the images that look most alike. Descriptors are compared
   // as integers, so that the order of additions cannot decide.
   void add_similar() {
+    std::vector<ImageIndex> sought;
+    for (ImageIndex image : by_rank_)
+      if (!view(image).located || view(image).doubtful) sought.push_back(image);
+    if (sought.empty()) return;
     constexpr float scale = 4096;  // 128 products of at most 2^24 each stay below 2^31 for unit vectors
     const std::size_t count = descriptors_.size();
     std::vector<std::array<std::int16_t, 128>> codes(count);
@@ -147,8 +151,7 @@ class PairFinder {
         described[i] |= codes[i][k] != 0;
       }
     }
-    for (ImageIndex image : by_rank_) {
-      if (view(image).located && !view(image).doubtful) continue;
+    for (ImageIndex image : sought) {
       if (count > 0 && described[static_cast<std::size_t>(image.value)])
         add_most_alike(image, codes, described);
       else if (small() && !view(image).located)
