@@ -1,0 +1,338 @@
+#include "adjust/baselines.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
+#include "adjust/disjoint_sets.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct TrackRay {
+  std::int32_t track;
+  Eigen::Vector3d ray;  // ground axes
+};
+using ImageRays = std::vector<std::vector<TrackRay>>;  // per image, ascending by track
+
+ImageRays rays_of_images(const OrientationGraph& graph, const std::vector<std::optional<Eigen::Quaterniond>>& rotations,
+                         const std::vector<Eigen::Vector3d>& rays) {
+  ImageRays result(graph.images.size());
+  for (std::int64_t t = 0; t < graph.track_count(); ++t)
+    for (auto o = graph.begin[static_cast<std::size_t>(t)]; o < graph.begin[static_cast<std::size_t>(t) + 1]; ++o) {
+      const std::size_t image = row(graph.observations[static_cast<std::size_t>(o)].image);
+      const Eigen::Vector3d& ray = rays[static_cast<std::size_t>(o)];
+      if (rotations[image] && ray.squaredNorm() > 0)
+        result[image].push_back({static_cast<std::int32_t>(t), rotations[image]->conjugate() * ray});
+    }
+  return result;
+}
+
+struct CommonTrack {
+  std::int32_t track;
+  Eigen::Vector3d a, b;  // rays
+};
+
+std::vector<CommonTrack> common_tracks(const std::vector<TrackRay>& a, const std::vector<TrackRay>& b) {
+  std::vector<CommonTrack> result;
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    if (a[i].track == b[j].track)
+      result.push_back({a[i].track, a[i].ray, b[j].ray}), ++i, ++j;
+    else
+      a[i].track < b[j].track ? ++i : ++j;
+  }
+  return result;
+}
+
+// Angle of each ray pair from the common plane, radians (first order).
+double epipolar_angle(const CommonTrack& c, const Eigen::Vector3d& t) {
+  return std::abs(t.dot(c.a.cross(c.b))) / std::max(t.cross(c.a).norm(), 0.02);
+}
+
+// Direction of the baseline, unit, sign by the majority of points in front; empty when the rays do not say.
+std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>& common,
+                                                  const Eigen::Vector3d& start) {
+  constexpr double kSmallest = 0.02 * kDegree;
+  const auto refine = [&](std::optional<Eigen::Vector3d> t) {
+    for (int iteration = 0; iteration < 15; ++iteration) {
+      double scale = kSmallest;
+      if (t) {
+        std::vector<double> angles;
+        for (const auto& c : common) angles.push_back(epipolar_angle(c, *t));
+        scale = std::max(kSmallest, 1.5 * median(angles));
+      }
+      Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+      for (const auto& c : common) {
+        const Eigen::Vector3d n = c.a.cross(c.b);
+        double weight = 1;
+        if (t) {
+          const double angle = epipolar_angle(c, *t) / scale, across = std::max(t->cross(c.a).norm(), 0.02);
+          weight = 1 / (across * across * std::pow(1 + angle * angle, 2));
+        }
+        normal += weight * n * n.transpose();
+      }
+      const Eigen::Vector3d next = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normal).eigenvectors().col(0);
+      const double change = t ? next.cross(*t).norm() : 1;
+      t = next;
+      if (change < 1e-12) break;
+    }
+    return *t;
+  };
+  const auto cost = [&](const Eigen::Vector3d& t) {
+    double sum = 0;
+    for (const auto& c : common) sum += std::log1p(std::pow(epipolar_angle(c, t) / (0.2 * kDegree), 2));
+    return sum;
+  };
+  Eigen::Vector3d best = refine(std::nullopt);
+  if (start.squaredNorm() > 0)
+    if (const Eigen::Vector3d other = refine(start); cost(other) < cost(best)) best = other;
+
+  int forward = 0, backward = 0;
+  for (const auto& c : common) {
+    // d_a a - d_b b = t  =>  d_a ~ (t x b).(a x b), d_b ~ (t x a).(a x b)
+    const Eigen::Vector3d n = c.a.cross(c.b);
+    const double da = best.cross(c.b).dot(n), db = best.cross(c.a).dot(n);
+    if (da > 0 && db > 0) ++forward;
+    if (da < 0 && db < 0) ++backward;
+  }
+  if (backward > forward) best = -best;
+  if (2 * std::max(forward, backward) < static_cast<int>(common.size())) return std::nullopt;
+  return best;
+}
+
+struct Depth {
+  std::int32_t track;
+  double logarithm;  // of the distance in units of the baseline
+};
+
+struct MeasuredBaseline {
+  std::int32_t a, b;
+  Eigen::Vector3d direction;
+  std::vector<Depth> depth_a, depth_b;  // ascending by track
+};
+
+void measure_depths(const std::vector<CommonTrack>& common, MeasuredBaseline& baseline) {
+  constexpr double kSmallestAngle = 1 * kDegree, kLargestError = 1.5 * kDegree;
+  for (const auto& c : common) {
+    const Eigen::Vector3d n = c.a.cross(c.b);
+    const double n2 = n.squaredNorm();
+    if (n2 < std::pow(std::sin(kSmallestAngle), 2) || epipolar_angle(c, baseline.direction) > kLargestError) continue;
+    const double da = baseline.direction.cross(c.b).dot(n) / n2, db = baseline.direction.cross(c.a).dot(n) / n2;
+    if (!(da > 0 && db > 0)) continue;
+    baseline.depth_a.push_back({c.track, std::log(da)});
+    baseline.depth_b.push_back({c.track, std::log(db)});
+  }
+}
+
+constexpr std::size_t kFewestTracks = 8;  // of a baseline, and shared by two baselines
+
+// Keeps the `limit` baselines with most depths at either end.
+void keep_best(std::size_t images, std::size_t limit, std::vector<MeasuredBaseline>& baselines) {
+  std::vector<std::vector<std::size_t>> of_image(images);
+  for (std::size_t e = 0; e < baselines.size(); ++e) {
+    of_image[row(baselines[e].a)].push_back(e);
+    of_image[row(baselines[e].b)].push_back(e);
+  }
+  std::vector<std::uint8_t> keep(baselines.size(), 0);
+  for (auto& list : of_image) {
+    std::sort(list.begin(), list.end(), [&](std::size_t p, std::size_t q) {
+      const auto np = baselines[p].depth_a.size(), nq = baselines[q].depth_a.size();
+      return np != nq ? np > nq : p < q;
+    });
+    for (std::size_t i = 0; i < std::min(limit, list.size()); ++i) keep[list[i]] = 1;
+  }
+  std::vector<MeasuredBaseline> kept;
+  for (std::size_t e = 0; e < baselines.size(); ++e)
+    if (keep[e]) kept.push_back(std::move(baselines[e]));
+  baselines = std::move(kept);
+}
+
+// Logarithm of length(f) / length(e) from the depths at their common image, with the number of tracks behind it.
+struct LengthRatio {
+  std::int32_t e, f;
+  double logarithm, tracks;
+};
+
+std::vector<LengthRatio> length_ratios(std::size_t images, const std::vector<MeasuredBaseline>& baselines) {
+  struct End {
+    std::int32_t baseline;
+    const std::vector<Depth>* depths;
+  };
+  std::vector<std::vector<End>> ends(images);
+  for (std::size_t e = 0; e < baselines.size(); ++e) {
+    ends[row(baselines[e].a)].push_back({static_cast<std::int32_t>(e), &baselines[e].depth_a});
+    ends[row(baselines[e].b)].push_back({static_cast<std::int32_t>(e), &baselines[e].depth_b});
+  }
+  std::vector<LengthRatio> result;
+  std::vector<double> differences;
+  for (const auto& list : ends)
+    for (std::size_t i = 0; i < list.size(); ++i)
+      for (std::size_t j = i + 1; j < list.size(); ++j) {
+        differences.clear();
+        const auto &p = *list[i].depths, &q = *list[j].depths;
+        for (std::size_t k = 0, l = 0; k < p.size() && l < q.size();) {
+          if (p[k].track == q[l].track)
+            differences.push_back(p[k].logarithm - q[l].logarithm), ++k, ++l;
+          else
+            p[k].track < q[l].track ? ++k : ++l;
+        }
+        if (differences.size() >= kFewestTracks)
+          result.push_back({list[i].baseline, list[j].baseline, median(differences),
+                            static_cast<double>(std::min<std::size_t>(differences.size(), 50))});
+      }
+  return result;
+}
+
+// Logarithms of the lengths of the largest connected part; empty for the others.
+std::vector<std::optional<double>> solve_lengths(std::size_t count, const std::vector<LengthRatio>& ratios) {
+  DisjointSets sets(static_cast<std::int32_t>(count));
+  for (const auto& r : ratios) sets.join(r.e, r.f);
+  std::vector<std::int32_t> size(count, 0);
+  for (std::size_t e = 0; e < count; ++e) ++size[row(sets.find(static_cast<std::int32_t>(e)))];
+  const auto largest = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
+
+  std::vector<std::int32_t> unknown(count, -1);
+  std::int32_t unknowns = 0;
+  for (std::size_t e = 0; e < count; ++e)
+    if (const auto i = static_cast<std::int32_t>(e); i != largest && sets.find(i) == largest) unknown[e] = unknowns++;
+
+  Eigen::VectorXd value = Eigen::VectorXd::Zero(unknowns);
+  const auto value_of = [&](std::int32_t e) { return unknown[row(e)] < 0 ? 0.0 : value[unknown[row(e)]]; };
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
+  constexpr int kIterations = 20;
+  for (int iteration = 0; iteration < kIterations && unknowns > 0; ++iteration) {
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
+    for (const auto& r : ratios) {
+      if (sets.find(r.e) != largest) continue;
+      const double error = r.logarithm - (value_of(r.f) - value_of(r.e));
+      const double weight = r.tracks / (iteration == 0 ? 1 : std::max(0.01, std::abs(error)));
+      const std::int32_t e = unknown[row(r.e)], f = unknown[row(r.f)];
+      if (e >= 0) entries.emplace_back(e, e, weight), right[e] -= weight * r.logarithm;
+      if (f >= 0) entries.emplace_back(f, f, weight), right[f] += weight * r.logarithm;
+      if (e >= 0 && f >= 0) entries.emplace_back(std::max(e, f), std::min(e, f), -weight);
+    }
+    Eigen::SparseMatrix<double> normal(unknowns, unknowns);
+    normal.setFromTriplets(entries.begin(), entries.end());
+    if (iteration == 0) solver.analyzePattern(normal);
+    solver.factorize(normal);
+    if (solver.info() != Eigen::Success) break;
+    value = solver.solve(right);
+  }
+  std::vector<std::optional<double>> result(count);
+  for (std::size_t e = 0; e < count; ++e)
+    if (const auto i = static_cast<std::int32_t>(e); sets.find(i) == largest) result[e] = value_of(i);
+  return result;
+}
+
+}  // namespace
+
+std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
+                                        const std::vector<std::optional<Eigen::Quaterniond>>& rotations,
+                                        const std::vector<std::uint8_t>& usable,
+                                        const std::vector<Eigen::Vector3d>& rays) {
+  const ImageRays image_rays = rays_of_images(graph, rotations, rays);
+  std::vector<MeasuredBaseline> baselines;
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const auto& edge = graph.edges[e];
+    if (!usable[e] || !rotations[row(edge.a)] || !rotations[row(edge.b)] || edge.baseline.squaredNorm() == 0) continue;
+    const auto common = common_tracks(image_rays[row(edge.a)], image_rays[row(edge.b)]);
+    if (common.size() < kFewestTracks) continue;
+    const auto direction = baseline_direction(common, rotations[row(edge.a)]->conjugate() * edge.baseline);
+    if (!direction) continue;
+    MeasuredBaseline baseline{edge.a, edge.b, *direction, {}, {}};
+    measure_depths(common, baseline);
+    if (baseline.depth_a.size() >= kFewestTracks) baselines.push_back(std::move(baseline));
+  }
+  constexpr std::size_t kBaselinesPerImage = 20;
+  keep_best(graph.images.size(), kBaselinesPerImage, baselines);
+
+  std::vector<Baseline> result;
+  if (baselines.empty()) return result;
+  const auto lengths = solve_lengths(baselines.size(), length_ratios(graph.images.size(), baselines));
+  for (std::size_t e = 0; e < baselines.size(); ++e)
+    if (lengths[e]) result.push_back({baselines[e].a, baselines[e].b, baselines[e].direction, std::exp(*lengths[e])});
+  return result;
+}
+
+std::vector<std::optional<Eigen::Vector3d>> solve_centres(std::int32_t nodes,
+                                                          const std::vector<CentreDifference>& differences,
+                                                          const std::vector<std::optional<CentrePrior>>& priors) {
+  DisjointSets sets(nodes);
+  for (const auto& d : differences) sets.join(d.a, d.b);
+  std::vector<std::int32_t> size(row(nodes), 0);
+  std::vector<std::uint8_t> anchored(row(nodes), 0);
+  bool any_prior = false;
+  for (std::int32_t i = 0; i < nodes; ++i) {
+    ++size[row(sets.find(i))];
+    if (priors[row(i)]) anchored[row(sets.find(i))] = 1, any_prior = true;
+  }
+  const auto largest = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
+  if (!any_prior) anchored[row(largest)] = 1;
+
+  std::vector<std::int32_t> unknown(row(nodes), -1);
+  std::int32_t unknowns = 0;
+  for (std::int32_t i = 0; i < nodes; ++i)
+    if (anchored[row(sets.find(i))] && (any_prior || i != largest)) unknown[row(i)] = unknowns++;
+
+  std::vector<Eigen::Vector3d> centre(row(nodes), Eigen::Vector3d::Zero());
+  constexpr int kIterations = 50;
+  bool first = true;
+  for (int iteration = 0; iteration < kIterations && unknowns > 0; ++iteration) {
+    double largest_step = 0;
+    std::vector<Eigen::Vector3d> next = centre;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<Eigen::Triplet<double>> entries;
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
+      for (const auto& d : differences) {
+        const std::int32_t a = unknown[row(d.a)], b = unknown[row(d.b)];
+        if (a < 0 && b < 0) continue;
+        const double error = (centre[row(d.b)] - centre[row(d.a)] - d.offset).norm() / d.sigma;
+        const double weight = 1 / (d.sigma * d.sigma) / (first ? 1 : 1 + error * error);
+        if (a >= 0) entries.emplace_back(a, a, weight), right[a] -= weight * d.offset[axis];
+        if (b >= 0) entries.emplace_back(b, b, weight), right[b] += weight * d.offset[axis];
+        if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -weight);
+      }
+      for (std::size_t i = 0; i < priors.size(); ++i)
+        if (priors[i] && unknown[i] >= 0) {
+          const double error = (centre[i] - priors[i]->position).cwiseQuotient(priors[i]->sigma).norm() / 3;
+          const double sigma = priors[i]->sigma[axis];
+          const double weight = 1 / (sigma * sigma) / (first ? 1 : 1 + error * error);
+          entries.emplace_back(unknown[i], unknown[i], weight);
+          right[unknown[i]] += weight * priors[i]->position[axis];
+        }
+      Eigen::SparseMatrix<double> normal(unknowns, unknowns);
+      normal.setFromTriplets(entries.begin(), entries.end());
+      const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(normal);
+      if (solver.info() != Eigen::Success) return std::vector<std::optional<Eigen::Vector3d>>(row(nodes));
+      const Eigen::VectorXd solution = solver.solve(right);
+      for (std::size_t i = 0; i < unknown.size(); ++i)
+        if (unknown[i] >= 0) next[i][axis] = solution[unknown[i]];
+    }
+    for (std::size_t i = 0; i < next.size(); ++i) largest_step = std::max(largest_step, (next[i] - centre[i]).norm());
+    centre = std::move(next);
+    first = false;
+    double extent = 0;
+    for (const auto& d : differences) extent = std::max(extent, d.offset.norm());
+    if (largest_step < 1e-10 * extent) break;
+  }
+  std::vector<std::optional<Eigen::Vector3d>> result(row(nodes));
+  for (std::int32_t i = 0; i < nodes; ++i)
+    if (anchored[row(sets.find(i))]) result[row(i)] = centre[row(i)];
+  return result;
+}
+
+}  // namespace megablock

@@ -1,0 +1,62 @@
+// What initial orientation works on: frames, images, relative orientations and tracks of one component in local numbers
+// whose order does not depend on the order of the block's images (frames and images by name, tracks by length, then by
+// their first observations).
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "adjust/orientation.h"
+#include "adjust/tile_problem.h"
+#include "io/features.h"
+
+namespace megablock {
+
+struct OrientationGraph {
+  struct FrameNode {
+    FrameIndex index;
+    bool given = false;  // oriented beforehand: stays where it is
+    std::optional<PositionPrior> position;
+    std::optional<AttitudePrior> attitude;
+  };
+  struct ImageNode {
+    ImageIndex index;
+    std::int32_t frame = -1;
+    std::int32_t camera = -1;  // row of `cameras`
+    Pose mount;
+  };
+  // Relative orientation of camera b with respect to camera a.
+  struct PairEdge {
+    std::int32_t a = -1, b = -1;  // rows of `images`, a < b
+    Eigen::Quaterniond rotation;  // camera a -> camera b
+    Eigen::Vector3d baseline;     // unit direction from a to b in the axes of camera a; zero: rotation only
+    double inliers = 0;
+  };
+  // Observations of a track: rows [begin[t], begin[t + 1]); images ascending.
+  struct Observation {
+    std::int32_t image = -1;
+    Eigen::Vector2d pixel;
+  };
+
+  std::vector<FrameNode> frames;
+  std::vector<ImageNode> images;
+  std::vector<CameraIndex> cameras;
+  std::vector<PairEdge> edges;  // of images of different frames, ascending by (a, b)
+  std::vector<std::int64_t> begin;
+  std::vector<Observation> observations;
+
+  std::int64_t track_count() const { return static_cast<std::int64_t>(begin.size()) - 1; }
+  std::int32_t frame_count() const { return static_cast<std::int32_t>(frames.size()); }
+};
+
+// Keeps the longest tracks until every pair of images has `tracks_per_pair` of them.
+OrientationGraph make_orientation_graph(const Block& block, const BlockState& start,
+                                        const std::vector<FrameIndex>& frames, const std::vector<VerifiedPair>& pairs,
+                                        const TrackSet& tracks, const OrientationOptions& options);
+
+// Unit viewing directions of all observations in camera axes; zero where the distortion cannot be inverted.
+std::vector<Eigen::Vector3d> viewing_rays(const OrientationGraph& graph, const std::vector<Intrinsics>& cameras);
+
+}  // namespace megablock

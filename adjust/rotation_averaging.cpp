@@ -1,0 +1,302 @@
+#include "adjust/rotation_averaging.h"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <tuple>
+
+#include "adjust/disjoint_sets.h"
+
+namespace megablock {
+
+namespace {
+
+using Edges = std::vector<RelativeRotation>;
+using Priors = std::vector<std::optional<RotationPrior>>;
+constexpr double kDegree = std::numbers::pi / 180;
+
+std::size_t row(std::int32_t node) { return static_cast<std::size_t>(node); }
+
+struct Neighbour {
+  std::int32_t node;
+  std::int32_t edge;
+};
+
+// Neighbours of every node, ascending by node; of parallel edges the one with most inliers.
+std::vector<std::vector<Neighbour>> adjacency(std::int32_t nodes, const Edges& edges,
+                                              const std::vector<std::uint8_t>& kept) {
+  std::vector<std::vector<Neighbour>> result(row(nodes));
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    if (!kept[e]) continue;
+    result[row(edges[e].a)].push_back({edges[e].b, static_cast<std::int32_t>(e)});
+    result[row(edges[e].b)].push_back({edges[e].a, static_cast<std::int32_t>(e)});
+  }
+  for (auto& list : result) {
+    std::sort(list.begin(), list.end(), [&](const Neighbour& p, const Neighbour& q) {
+      const double ip = edges[row(p.edge)].inliers, iq = edges[row(q.edge)].inliers;
+      return std::tuple(p.node, -ip, p.edge) < std::tuple(q.node, -iq, q.edge);
+    });
+    list.erase(std::unique(list.begin(), list.end(), [](const auto& p, const auto& q) { return p.node == q.node; }),
+               list.end());
+  }
+  return result;
+}
+
+Eigen::Quaterniond along(const RelativeRotation& edge, std::int32_t from) {
+  return edge.a == from ? edge.rotation : edge.rotation.conjugate();
+}
+
+// Inliers times the share of the edge's triangles that close within 5 degrees (one half without triangles).
+std::vector<double> trust(std::int32_t nodes, const Edges& edges) {
+  const auto neighbours = adjacency(nodes, edges, std::vector<std::uint8_t>(edges.size(), 1));
+  constexpr double kClosed = 5 * kDegree;
+  std::vector<double> result(edges.size());
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const RelativeRotation& edge = edges[e];
+    const auto &of_a = neighbours[row(edge.a)], &of_b = neighbours[row(edge.b)];
+    int triangles = 0, closed = 0;
+    for (std::size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
+      if (of_a[i].node != of_b[j].node) {
+        of_a[i].node < of_b[j].node ? ++i : ++j;
+        continue;
+      }
+      const Eigen::Quaterniond to_c = along(edges[row(of_a[i].edge)], edge.a);
+      const Eigen::Quaterniond to_c_by_b = along(edges[row(of_b[j].edge)], edge.b) * edge.rotation;
+      ++triangles;
+      if (rotation_angle(to_c, to_c_by_b) < kClosed) ++closed;
+      ++i, ++j;
+    }
+    result[e] = edge.inliers * (closed + 0.5) / (triangles + 1);
+  }
+  return result;
+}
+
+bool held(const Priors& priors, std::size_t node) { return priors[node] && priors[node]->sigma_rad == 0; }
+
+// 1 for the nodes to average: those connected to held ones, else the largest part.
+std::vector<std::uint8_t> reachable(std::int32_t nodes, const Edges& edges, const std::vector<std::uint8_t>& kept,
+                                    const Priors& priors) {
+  DisjointSets sets(nodes);
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (kept[e]) sets.join(edges[e].a, edges[e].b);
+  std::vector<std::int32_t> size(row(nodes), 0);
+  std::vector<std::uint8_t> anchored(row(nodes), 0);
+  bool any_held = false;
+  for (std::int32_t i = 0; i < nodes; ++i) {
+    const std::size_t root = row(sets.find(i));
+    ++size[root];
+    if (held(priors, row(i))) anchored[root] = 1, any_held = true;
+  }
+  if (!any_held && nodes > 0)
+    anchored[static_cast<std::size_t>(std::max_element(size.begin(), size.end()) - size.begin())] = 1;
+  std::vector<std::uint8_t> result(row(nodes));
+  for (std::int32_t i = 0; i < nodes; ++i) result[row(i)] = anchored[row(sets.find(i))];
+  return result;
+}
+
+// Rotations along the maximum spanning tree. Held nodes count as one node from the beginning.
+std::vector<Eigen::Quaterniond> tree_start(std::int32_t nodes, const Edges& edges, const Priors& priors,
+                                           const std::vector<std::uint8_t>& active) {
+  const std::vector<double> value = trust(nodes, edges);
+  std::vector<std::int32_t> order(edges.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](auto p, auto q) { return std::tuple(-value[row(p)], p) < std::tuple(-value[row(q)], q); });
+  DisjointSets sets(nodes);
+  std::int32_t first_held = -1;
+  for (std::int32_t i = 0; i < nodes; ++i)
+    if (held(priors, row(i))) first_held < 0 ? void(first_held = i) : void(sets.join(first_held, i));
+  std::vector<std::uint8_t> in_tree(edges.size(), 0);
+  for (std::int32_t e : order)
+    if (sets.join(edges[row(e)].a, edges[row(e)].b)) in_tree[row(e)] = 1;
+
+  const auto neighbours = adjacency(nodes, edges, in_tree);
+  std::vector<Eigen::Quaterniond> rotation(row(nodes), Eigen::Quaterniond::Identity());
+  std::vector<std::uint8_t> done(row(nodes), 0);
+  std::vector<std::int32_t> queue;
+  for (std::int32_t i = 0; i < nodes; ++i)
+    if (held(priors, row(i))) {
+      rotation[row(i)] = priors[row(i)]->rotation;
+      done[row(i)] = 1;
+      queue.push_back(i);
+    }
+  for (std::int32_t i = 0; i < nodes && queue.empty(); ++i)
+    if (active[row(i)]) {
+      done[row(i)] = 1;
+      queue.push_back(i);
+    }
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    const std::int32_t i = queue[next];
+    for (const Neighbour& n : neighbours[row(i)]) {
+      if (done[row(n.node)]) continue;
+      rotation[row(n.node)] = (along(edges[row(n.edge)], i) * rotation[row(i)]).normalized();
+      done[row(n.node)] = 1;
+      queue.push_back(n.node);
+    }
+  }
+  return rotation;
+}
+
+// Turns all rotations by the one world rotation that brings most of them to their priors.
+void turn_to_priors(const Priors& priors, const std::vector<std::uint8_t>& active,
+                    std::vector<Eigen::Quaterniond>& rotation) {
+  std::vector<Eigen::Quaterniond> candidates;  // R_i G = R_prior
+  for (std::size_t i = 0; i < rotation.size(); ++i)
+    if (active[i] && priors[i]) candidates.push_back((rotation[i].conjugate() * priors[i]->rotation).normalized());
+  if (candidates.empty()) return;
+  constexpr double kSpread = 5 * kDegree;
+  const auto cost = [&](const Eigen::Quaterniond& g) {
+    double sum = 0;
+    for (const auto& c : candidates) sum += std::log1p(std::pow(rotation_angle(g, c) / kSpread, 2));
+    return sum;
+  };
+  Eigen::Quaterniond best = candidates.front();
+  double best_cost = cost(best);
+  const std::size_t stride = 1 + candidates.size() / 100;
+  for (std::size_t i = stride; i < candidates.size(); i += stride)
+    if (const double c = cost(candidates[i]); c < best_cost) best = candidates[i], best_cost = c;
+  for (int iteration = 0; iteration < 50; ++iteration) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    double weights = 0;
+    for (const auto& c : candidates) {
+      const Eigen::Vector3d e = rotation_log<double>(best.conjugate() * c);
+      const double w = 1 / (kSpread * kSpread + e.squaredNorm());
+      mean += w * e;
+      weights += w;
+    }
+    best = rotation_update(best, mean / weights);
+    if ((mean / weights).norm() < 1e-12) break;
+  }
+  for (auto& r : rotation) r = (r * best).normalized();
+}
+
+// The reweighted iterations over the active nodes.
+class Averager {
+ public:
+  Averager(const Edges& edges, const std::vector<std::uint8_t>& kept, const Priors& priors,
+           const std::vector<std::uint8_t>& active, std::vector<Eigen::Quaterniond>& rotation)
+      : edges_(edges),
+        kept_(kept),
+        priors_(priors),
+        active_(active),
+        rotation_(rotation),
+        unknown_(rotation.size(), -1) {
+    bool anchored = false;
+    for (std::size_t i = 0; i < rotation.size(); ++i) anchored |= active[i] && priors[i].has_value();
+    for (std::size_t i = 0; i < rotation.size(); ++i) {
+      if (!active[i] || held(priors, i)) continue;
+      if (!anchored) {  // the first node carries the gauge
+        anchored = true;
+        continue;
+      }
+      unknown_[i] = count_++;
+    }
+  }
+
+  void run() {
+    if (count_ == 0) return;
+    constexpr double kSmallest = 0.05 * kDegree, kScale = 2 * kDegree;
+    constexpr int kL1Iterations = 15, kIterations = 100;
+    for (int i = 0; i < kL1Iterations; ++i)
+      if (iterate([&](double e) { return kScale / std::max(e, kSmallest); }) < 1e-6) break;
+    for (int i = 0; i < kIterations; ++i)
+      if (iterate([&](double e) { return std::pow(1 + e * e / (kScale * kScale), -2); }) < 1e-12) break;
+  }
+
+ private:
+  // One weighted solution; returns the largest increment.
+  template <typename Weight>
+  double iterate(Weight robust) {
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::MatrixX3d right = Eigen::MatrixX3d::Zero(count_, 3);
+    const auto add = [&](std::int32_t i, double w, const Eigen::Vector3d& e) {
+      if (i < 0) return;
+      entries.emplace_back(i, i, w);
+      right.row(i) += w * e.transpose();
+    };
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      const RelativeRotation& edge = edges_[k];
+      if (!kept_[k] || !active_[row(edge.a)]) continue;
+      const Eigen::Vector3d e = error(edge);
+      constexpr double kVariance = 0.25 * kDegree * kDegree * 100;  // of a rotation from one inlier
+      const double w = (1 + edge.inliers) / kVariance * robust(e.norm());
+      const std::int32_t a = unknown_[row(edge.a)], b = unknown_[row(edge.b)];
+      add(a, w, -e);
+      add(b, w, e);
+      if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -w);
+    }
+    for (std::size_t i = 0; i < rotation_.size(); ++i)
+      if (unknown_[i] >= 0 && priors_[i]) {
+        const Eigen::Vector3d e = rotation_log<double>(rotation_[i].conjugate() * priors_[i]->rotation);
+        const double sigma = priors_[i]->sigma_rad;
+        add(unknown_[i], 1 / (sigma * sigma + e.squaredNorm()), e);
+      }
+    Eigen::SparseMatrix<double> normal(count_, count_);
+    normal.setFromTriplets(entries.begin(), entries.end());
+    if (!analysed_) solver_.analyzePattern(normal), analysed_ = true;
+    solver_.factorize(normal);
+    if (solver_.info() != Eigen::Success) return 0;
+    const Eigen::MatrixX3d step = solver_.solve(right);
+    double largest = 0;
+    for (std::size_t i = 0; i < rotation_.size(); ++i)
+      if (unknown_[i] >= 0) {
+        const Eigen::Vector3d w = step.row(unknown_[i]).transpose();
+        rotation_[i] = rotation_update(rotation_[i], w);
+        largest = std::max(largest, w.norm());
+      }
+    return largest;
+  }
+
+  Eigen::Vector3d error(const RelativeRotation& edge) const {
+    return rotation_log<double>(rotation_[row(edge.b)].conjugate() * edge.rotation * rotation_[row(edge.a)]);
+  }
+
+  const Edges& edges_;
+  const std::vector<std::uint8_t>& kept_;
+  const Priors& priors_;
+  const std::vector<std::uint8_t>& active_;
+  std::vector<Eigen::Quaterniond>& rotation_;
+  std::vector<std::int32_t> unknown_;  // number of the node's unknown; -1: none
+  std::int32_t count_ = 0;
+  bool analysed_ = false;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+};
+
+}  // namespace
+
+AveragedRotations average_rotations(std::int32_t nodes, const Edges& edges, const Priors& priors,
+                                    double max_error_rad) {
+  AveragedRotations result;
+  result.kept.assign(edges.size(), 1);
+  auto active = reachable(nodes, edges, result.kept, priors);
+  std::vector<Eigen::Quaterniond> rotation = tree_start(nodes, edges, priors, active);
+  const bool any_held = [&] {
+    for (std::size_t i = 0; i < priors.size(); ++i)
+      if (held(priors, i)) return true;
+    return false;
+  }();
+  if (!any_held) turn_to_priors(priors, active, rotation);
+
+  constexpr int kRounds = 3;  // of dropping edges and averaging again
+  for (int round = 0; round < kRounds; ++round) {
+    Averager(edges, result.kept, priors, active, rotation).run();
+    bool changed = false;
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+      if (!active[row(edges[e].a)]) continue;
+      const Eigen::Quaterniond average = rotation[row(edges[e].b)] * rotation[row(edges[e].a)].conjugate();
+      const std::uint8_t keep = rotation_angle(average, edges[e].rotation) <= max_error_rad;
+      changed |= keep != result.kept[e];
+      result.kept[e] = keep;
+    }
+    active = reachable(nodes, edges, result.kept, priors);
+    if (!changed) break;
+  }
+  result.rotation.resize(row(nodes));
+  for (std::size_t i = 0; i < rotation.size(); ++i)
+    if (active[i]) result.rotation[i] = rotation[i];
+  return result;
+}
+
+}  // namespace megablock
