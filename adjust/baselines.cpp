@@ -270,7 +270,8 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
 
 std::vector<std::optional<Eigen::Vector3d>> solve_centres(std::int32_t nodes,
                                                           const std::vector<CentreDifference>& differences,
-                                                          const std::vector<std::optional<CentrePrior>>& priors) {
+                                                          const std::vector<std::optional<CentrePrior>>& priors,
+                                                          const std::vector<std::optional<Eigen::Vector3d>>& start) {
   DisjointSets sets(nodes);
   for (const auto& d : differences) sets.join(d.a, d.b);
   std::vector<std::int32_t> size(row(nodes), 0);
@@ -290,7 +291,9 @@ std::vector<std::optional<Eigen::Vector3d>> solve_centres(std::int32_t nodes,
 
   std::vector<Eigen::Vector3d> centre(row(nodes), Eigen::Vector3d::Zero());
   constexpr int kIterations = 50;
-  bool first = true;
+  bool first = start.empty();
+  for (std::size_t i = 0; i < start.size(); ++i)
+    if (start[i]) centre[i] = *start[i];
   for (int iteration = 0; iteration < kIterations && unknowns > 0; ++iteration) {
     double largest_step = 0;
     std::vector<Eigen::Vector3d> next = centre;

@@ -40,9 +40,10 @@ struct CentrePrior {
   Eigen::Vector3d position, sigma;
 };
 // [nodes]; empty for nodes that nothing connects: to a prior, or without priors to the largest part (its lowest node is
-// the origin).
-std::vector<std::optional<Eigen::Vector3d>> solve_centres(std::int32_t nodes,
-                                                          const std::vector<CentreDifference>& differences,
-                                                          const std::vector<std::optional<CentrePrior>>& priors);
+// the origin). `start` [nodes] or empty: known approximately, weights the first iteration.
+std::vector<std::optional<Eigen::Vector3d>> solve_centres(
+    std::int32_t nodes, const std::vector<CentreDifference>& differences,
+    const std::vector<std::optional<CentrePrior>>& priors,
+    const std::vector<std::optional<Eigen::Vector3d>>& start = {});
 
 }  // namespace megablock

@@ -42,9 +42,14 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
     const FrameIndex frame = block.images[image].frame;
     if (rows.frame[frame] < 0) {
       rows.frame[frame] = graph.frame_count();
-      OrientationGraph::FrameNode node{frame, start.oriented[frame] != 0, {}, {}};
+      OrientationGraph::FrameNode node{frame, {}, {}, {}};
       if (options.observations.use_position_priors) node.position = block.frames[frame].position_prior;
       if (options.observations.use_attitude_priors) node.attitude = block.frames[frame].attitude_prior;
+      if (start.oriented[frame]) {
+        constexpr double kSigma = 0.01;  // metres
+        node.given = start.frames[frame];
+        node.position = PositionPrior{node.given->centre, Eigen::Vector3d::Constant(kSigma), Eigen::Vector3d::Zero()};
+      }
       graph.frames.push_back(std::move(node));
     }
     const CameraIndex camera = block.camera_of(image);

@@ -17,8 +17,8 @@ namespace megablock {
 struct OrientationGraph {
   struct FrameNode {
     FrameIndex index;
-    bool given = false;  // oriented beforehand: stays where it is
-    std::optional<PositionPrior> position;
+    std::optional<Pose> given;              // oriented beforehand: stays where it is
+    std::optional<PositionPrior> position;  // of given frames their own position
     std::optional<AttitudePrior> attitude;
   };
   struct ImageNode {

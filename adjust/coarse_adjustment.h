@@ -1,0 +1,22 @@
+// Coarse bundle adjustment of initial orientation: the tile's residuals over the graph's tracks, solved by Ceres.
+#pragma once
+
+#include "adjust/tile_problem.h"
+#include "adjust/track_intersection.h"
+
+namespace megablock {
+
+struct CoarseOptions {
+  ObservationOptions observations;        // sigma and priors; the loss below replaces theirs
+  double loss_scale_px = 4;               // Cauchy scale of image residuals
+  std::vector<std::uint8_t> camera_free;  // [graph.cameras] bit mask of the refined intrinsics
+  int max_iterations = 20;
+  double function_tolerance = 1e-4;
+};
+
+// Adjusts oriented frames, points and the free intrinsics over the kept observations; given frames stay. Throws
+// ComputeError when Ceres finds no usable solution.
+void adjust_coarsely(const Block& block, const OrientationGraph& graph, const CoarseOptions& options,
+                     OrientationValues& values);
+
+}  // namespace megablock

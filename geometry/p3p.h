@@ -1,0 +1,20 @@
+// Pose of a camera from three points (perspective three-point problem), up to four solutions.
+//
+// Grunert's quartic in the ratio of two distances, with the coefficients as in Haralick, Lee, Ottenberg and Noelle,
+// "Review and analysis of solutions of the three point perspective pose estimation problem", IJCV 13(3), 1994; the
+// distances are polished by Newton iterations on the three cosine laws.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "geometry/pose.h"
+
+namespace megablock {
+
+// `rays`: unit viewing directions in camera axes; `points`: in the ground frame, same order. Poses ground -> camera.
+// Empty for points on one line or where the quartic has no valid root.
+std::vector<Pose> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const std::array<Eigen::Vector3d, 3>& points);
+
+}  // namespace megablock
