@@ -1,0 +1,47 @@
+#include "geometry/p3p.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace megablock {
+namespace {
+
+TEST(P3p, FindsTheTruthAmongConsistentSolutions) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 1);
+  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  int missed = 0;
+  constexpr int kTrials = 2000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Pose truth{rotation_exp<double>(2 * vector()), 1000 * vector()};
+    std::array<Eigen::Vector3d, 3> rays, points;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d inside(3 * normal(random), 2 * normal(random), 10 + 2 * std::abs(normal(random)));
+      rays[k] = inside.normalized();
+      points[k] = truth.centre + truth.rotation.conjugate() * inside;
+    }
+    const auto poses = solve_p3p(rays, points);
+    EXPECT_LE(poses.size(), 4u);
+    double nearest = 1e9;
+    for (const Pose& pose : poses) {
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_LT((to_inside(pose, points[k]).normalized() - rays[k]).norm(), 1e-6) << "every solution meets the rays";
+      nearest = std::min(nearest, (pose.centre - truth.centre).norm() + rotation_angle(pose.rotation, truth.rotation));
+    }
+    missed += !(nearest < 1e-5);
+  }
+  EXPECT_LE(missed, kTrials / 200) << "near-degenerate triangles only";
+}
+
+TEST(P3p, RefusesPointsOnOneLine) {
+  const std::array<Eigen::Vector3d, 3> points = {Eigen::Vector3d(-1, 0, 5), Eigen::Vector3d(0, 0, 5),
+                                                 Eigen::Vector3d(1, 0, 5)};
+  std::array<Eigen::Vector3d, 3> rays;
+  for (std::size_t k = 0; k < 3; ++k) rays[k] = points[k].normalized();
+  EXPECT_TRUE(solve_p3p(rays, points).empty());
+}
+
+}  // namespace
+}  // namespace megablock
