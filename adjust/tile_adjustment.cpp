@@ -126,7 +126,24 @@ class TileAdjuster {
 
   // The a-priori sigma may be too small for the images at hand: the threshold follows the residuals upwards.
   std::int64_t screen(double threshold) {
-    return screen_observations(problem_, state_, threshold * std::max(1.0, robust_sigma(problem_, state_)), options_);
+    const std::vector<std::uint8_t> before = problem_.kept;
+    const double sigma = robust_sigma(problem_, state_) / std::sqrt(redundancy());
+    const std::int64_t changed = screen_observations(problem_, state_, threshold * std::max(1.0, sigma), options_);
+    for (std::size_t row = 0; row < before.size(); ++row) restored_ += !before[row] && problem_.kept[row];
+    return changed;
+  }
+
+  // Mean redundancy of an image residual: least squares shortens residuals by its root.
+  double redundancy() const {
+    std::int64_t observations = 0, points = 0;
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
+      if (!problem_.active(p)) continue;
+      ++points;
+      observations +=
+          std::count(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 1);
+    }
+    const auto unknowns = static_cast<double>(3 * points + 6 * std::ssize(problem_.frames));
+    return std::clamp(1 - unknowns / static_cast<double>(2 * std::max<std::int64_t>(1, observations)), 0.25, 1.0);
   }
 
   // A few iterations with a loss that forgets gross errors and is as wide as the residuals are.
@@ -176,6 +193,7 @@ class TileAdjuster {
   AdjustSummary count(AdjustSummary summary) const {
     for (std::int64_t row = 0; row < problem_.observation_count(); ++row)
       if (problem_.image[row].valid()) summary.rejected += !problem_.kept[row];
+    summary.restored = restored_;
     summary.text += fmt::format(", {} rejected", summary.rejected);
     return summary;
   }
@@ -184,6 +202,7 @@ class TileAdjuster {
   TileState& state_;
   const AdjustOptions& options_;
   std::vector<std::int64_t> images_;  // of each camera
+  std::int64_t restored_ = 0;
 };
 
 }  // namespace

@@ -40,7 +40,9 @@ struct AdjustSummary {
   // Square root of the weighted squares of kept residuals / (residuals - unknowns + datum defect).
   double sigma0 = 0;
   int iterations = 0;
-  std::int64_t observations = 0, points = 0, rejected = 0, restored = 0;
+  std::int64_t observations = 0, points = 0;
+  std::int64_t rejected = 0;  // observations that take no part in the end (points held out included)
+  std::int64_t restored = 0;  // observations that came back in a later round
   bool usable = false;
   std::string text;  // one line
 };
