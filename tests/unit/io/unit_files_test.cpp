@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
 #include <fstream>
 
@@ -202,6 +203,18 @@ TEST_F(UnitFiles, MissingFileIsNamed) {
 TEST_F(UnitFiles, FileOfAnotherKindIsNamed) {
   write_block(path_, example_block());
   EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr(path_ + ": holds 'block', not 'tracks'"));
+}
+
+TEST_F(UnitFiles, FileOfAnotherVersionIsNamed) {
+  write_block(path_, example_block());
+  const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hid_t version = H5Aopen(file, "format_version", H5P_DEFAULT);
+  const std::uint32_t other = kFormatVersion + 1;
+  EXPECT_GE(H5Awrite(version, H5T_NATIVE_UINT32, &other), 0);
+  H5Aclose(version);
+  H5Fclose(file);
+  EXPECT_THAT(message_of([&] { read_block(path_); }),
+              HasSubstr(path_ + ": has format version " + std::to_string(other)));
 }
 
 TEST_F(UnitFiles, FileThatIsNoHdf5IsNamed) {
