@@ -1,7 +1,7 @@
 #include <map>
 #include <optional>
 
-#include "io/crs.h"
+#include "io/ground_change.h"
 #include "io/project.h"
 
 namespace megablock {
@@ -26,31 +26,15 @@ IndexedVector<Index, Index> places_by_name(const IndexedVector<Index, Item>& pre
   return places;
 }
 
-// Moves what refers to the ground frame of one block into another with its own origin.
-class GroundChange {
- public:
-  GroundChange(const GroundFrame& from, const GroundFrame& to)
-      : from_(from), to_(to), turn_(to_.own_from_block({from.latitude_deg, from.longitude_deg, from.height_m})) {}
-
-  Eigen::Vector3d position(const Eigen::Vector3d& p) const { return to_.to_local(from_.to_geodetic(p)); }
-  // turn_ takes directions of the new frame into the old one.
-  Eigen::Quaterniond rotation(const Eigen::Quaterniond& r) const { return (r * turn_).normalized(); }
-
-  void apply(Block& block) const {
-    for (Frame& frame : block.frames) {
-      if (frame.position_prior) frame.position_prior->position = position(frame.position_prior->position);
-      if (frame.attitude_prior) frame.attitude_prior->rotation_cw = rotation(frame.attitude_prior->rotation_cw);
-      if (frame.given_pose)
-        *frame.given_pose = {rotation(frame.given_pose->rotation), position(frame.given_pose->centre)};
-    }
-    for (ControlPoint& point : block.control_points)
-      if (point.position.allFinite()) point.position = position(point.position);
+void move(const GroundChange& change, Block& block) {
+  for (Frame& frame : block.frames) {
+    if (frame.position_prior) frame.position_prior->position = change.position(frame.position_prior->position);
+    if (frame.attitude_prior) frame.attitude_prior->rotation_cw = change.rotation(frame.attitude_prior->rotation_cw);
+    if (frame.given_pose) frame.given_pose = change.pose(*frame.given_pose);
   }
-
- private:
-  Georeference from_, to_;
-  Eigen::Quaterniond turn_;
-};
+  for (ControlPoint& point : block.control_points)
+    if (point.position.allFinite()) point.position = change.position(point.position);
+}
 
 bool same_origin(const GroundFrame& a, const GroundFrame& b) {
   return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
@@ -61,7 +45,7 @@ bool same_origin(const GroundFrame& a, const GroundFrame& b) {
 Block append_to(const Block& previous, const Block& now) {
   Block moved = now;
   if (previous.ground.georeferenced && now.ground.georeferenced && !same_origin(previous.ground, now.ground))
-    GroundChange(now.ground, previous.ground).apply(moved);
+    move(GroundChange(now.ground, previous.ground), moved);
   Block merged;
   merged.ground = previous.ground.georeferenced ? previous.ground : now.ground;
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);

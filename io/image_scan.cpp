@@ -73,10 +73,12 @@ std::vector<ScannedImage> scan_images(const std::string& folder, Project& projec
       continue;
     }
     const auto [first, inserted] = seen.emplace(all[i].hash, all[i].name);
-    if (inserted)
+    if (inserted) {
       scanned.push_back(std::move(all[i]));
-    else
-      project.warnings.push_back("image '" + all[i].name + "' is a copy of '" + first->second + "'; left out");
+      continue;
+    }
+    project.copies.push_back(all[i].name);
+    project.warnings.push_back("image '" + all[i].name + "' is a copy of '" + first->second + "'; left out");
   }
   return scanned;
 }

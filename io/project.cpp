@@ -3,11 +3,10 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <numbers>
 
+#include "io/approximate_poses.h"
+#include "io/control_file.h"
 #include "io/error.h"
 #include "io/image_scan.h"
 #include "io/project_sections.h"
@@ -42,6 +41,13 @@ void read_simulated_block(YamlReader& top, Project& project, const std::string& 
   }
 }
 
+// Images that are in the folder and not in the block: files that refer to them are not wrong.
+std::vector<std::string> names_left_out(const Project& project) {
+  std::vector<std::string> names = project.copies;
+  for (const auto& [name, reason] : project.unreadable) names.push_back(name);
+  return names;
+}
+
 // Keys in which files are named or the block is changed, in the order in which they build on one another.
 void read_block_sections(YamlReader& top, Project& project, const std::optional<GroundFrame>& ground) {
   const auto images = top.existing_folder("images");
@@ -68,8 +74,18 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (images) add_images(scanned, grouping, project.block);
   if (cameras) read_cameras(*cameras, project.block);
   if (const auto masks = top.existing_folder("masks")) read_masks(*masks, project);
-  read_positions(top, scanned, ground, project);
+  read_rigs(top, project);
+
+  const auto poses = read_poses(top);
+  const auto control_file = top.existing_file("control");
+  std::optional<ControlTable> control;
+  if (control_file) control = read_control_table(*control_file);
+  std::vector<Geodetic> others = poses ? poses->positions() : std::vector<Geodetic>();
+  if (control && others.empty()) others = geodetic_positions(*control);
+  read_positions(top, scanned, others, ground, project);
   read_attitudes(top, scanned, project);
+  if (poses) set_given_poses(*poses, names_left_out(project), project.block, project.warnings);
+  if (control) add_control(*control, names_left_out(project), project.block, project.warnings);
 }
 
 }  // namespace

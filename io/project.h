@@ -25,6 +25,7 @@ struct Project {
   std::string tie_points;  // HDF5 of given tracks (write_tracks), absolute; empty: features and matching run
   StageSettings settings;
   std::vector<std::pair<std::string, std::string>> unreadable;  // image file and reason, reported and skipped
+  std::vector<std::string> copies;    // image files left out because an earlier one has the same bytes
   std::vector<std::string> warnings;                            // one line each: GPS at 0,0, duplicates, outliers ...
 };
 

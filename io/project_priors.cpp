@@ -62,7 +62,8 @@ void set_position_priors(const std::vector<ScannedImage>& scanned,
     prior.position = georeference.to_local(position);
     prior.sigma = position_sigma(header, options);
     prior.lever_arm = options.lever_arm;
-    block.frames[FrameIndex(static_cast<std::int64_t>(i))].position_prior = prior;
+    Frame& frame = block.frames[block.images[ImageIndex(static_cast<std::int64_t>(i))].frame];
+    if (!frame.position_prior) frame.position_prior = prior;  // of a rig: its first camera's
   }
 }
 
@@ -81,8 +82,8 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
 
 }  // namespace
 
-void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::optional<GroundFrame>& ground,
-                    Project& project) {
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
+                    const std::optional<GroundFrame>& ground, Project& project) {
   Block& block = project.block;
   const GpsOptions options = read_gps_options(top);
   const auto origin = read_origin(top);
@@ -93,12 +94,17 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   std::vector<Geodetic> known;
   for (const auto& position : positions)
     if (position) known.push_back(*position);
-  if (ground)
+  const bool from_images = !scanned.empty();  // else a given block with a frame of its own
+  if (origin && !from_images)
+    throw InputError(top.where("origin") + ": 'origin' cannot be given with 'block', which has its own ground frame");
+  if (ground && from_images)
     block.ground = *ground;
   else if (origin)
     block.ground = *origin;
   else if (!known.empty())
     block.ground = ground_at(rounded_median(known));
+  else if (!others.empty() && !block.ground.georeferenced)
+    block.ground = ground_at(rounded_median(others));
   if (!known.empty() && !block.ground.georeferenced) {
     project.warnings.push_back("GPS positions are not used: the job's block is not georeferenced");
     return;
@@ -124,7 +130,9 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
   for (std::size_t i = 0; i < scanned.size(); ++i) {
     if (!scanned[i].header.attitude) continue;
     const auto& angles = *scanned[i].header.attitude;
-    Frame& frame = block.frames[FrameIndex(static_cast<std::int64_t>(i))];
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    Frame& frame = block.frames[block.images[image].frame];
+    if (frame.attitude_prior) continue;
     AttitudePrior prior;
     prior.rotation_cw = rotation_from(YawPitchRoll{
         angles.yaw_deg * kRadiansPerDegree, angles.pitch_deg * kRadiansPerDegree, angles.roll_deg * kRadiansPerDegree});
@@ -132,7 +140,8 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
       prior.rotation_cw =
           (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))
               .normalized();
-    // Heading is worse than the vertical: the ground's (tilt, tilt, yaw) seen about the camera's axes.
+    prior.rotation_cw = (block.mount_of(image).pose.rotation.conjugate() * prior.rotation_cw).normalized();
+    // Heading is worse than the vertical: the ground's (tilt, tilt, yaw) seen about the rig's axes.
     const Eigen::Matrix3d r = prior.rotation_cw.toRotationMatrix();
     const Eigen::Vector3d variance(tilt * tilt, tilt * tilt, yaw * yaw);
     prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();

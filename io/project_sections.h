@@ -1,6 +1,7 @@
 // The sections of the project file that change the block. Internal to io/ (project.cpp).
 #pragma once
 
+#include "io/approximate_poses.h"
 #include "io/image_scan.h"
 #include "io/yaml_reader.h"
 
@@ -13,9 +14,16 @@ void read_cameras(YamlReader& cameras, Block& block);
 // masks: a folder with one PNG per camera, "<camera name>.png" ('/' in a name written as '_').
 void read_masks(const std::string& folder, Project& project);
 
-// gps, origin: position priors in the ground frame; fixes the ground frame. `ground` overrides both (a running job's).
-void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::optional<GroundFrame>& ground,
-                    Project& project);
+// rigs: joins the images of an exposure of a rig into one frame (OpenSfM's rig_cameras.json, rig_assignments.json).
+void read_rigs(YamlReader& top, Project& project);
+
+// poses: approximate poses.
+std::optional<ApproximatePoses> read_poses(YamlReader& top);
+
+// gps, origin: position priors in the ground frame; fixes the ground frame: `ground` (a running job's), else `origin`,
+// else about the images' positions, else about the `others` (of poses and control).
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
+                    const std::optional<GroundFrame>& ground, Project& project);
 
 // attitude: attitude priors from the images' angles, turned to the block's vertical.
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);

@@ -1,0 +1,143 @@
+#include "io/approximate_poses.h"
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "io/csv_table.h"
+#include "io/error.h"
+#include "io/ground_change.h"
+#include "io/pose_csv.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+
+Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, bool photogrammetric) {
+  const auto angle = [&](const char* column) { return csv.needed_number(row, column) * kRadiansPerDegree; };
+  if (photogrammetric) return rotation_from(OmegaPhiKappa{angle("omega_deg"), angle("phi_deg"), angle("kappa_deg")});
+  return rotation_from(YawPitchRoll{angle("yaw_deg"), angle("pitch_deg"), angle("roll_deg")});
+}
+
+ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column) {
+  const bool geodetic = csv.has("latitude_deg"), photogrammetric = csv.has("omega_deg");
+  if (geodetic)
+    csv.require({"latitude_deg", "longitude_deg", "height_m"});
+  else
+    csv.require({"x_m", "y_m", "z_m"});
+  if (photogrammetric)
+    csv.require({"omega_deg", "phi_deg", "kappa_deg"});
+  else
+    csv.require({"yaw_deg", "pitch_deg", "roll_deg"});
+  ApproximatePoses poses;
+  std::set<std::string> seen;
+  for (std::size_t row = 0; row < csv.row_count(); ++row) {
+    ApproximatePoses::Row entry;
+    entry.name = csv.text(row, name_column);
+    entry.where = csv.where(row);
+    if (!seen.insert(entry.name).second) throw InputError(entry.where + ": '" + entry.name + "' appears twice");
+    entry.geodetic = geodetic;
+    if (geodetic)
+      entry.position = {csv.needed_number(row, "latitude_deg"), csv.needed_number(row, "longitude_deg"),
+                        csv.needed_number(row, "height_m")};
+    else
+      entry.pose.centre = {csv.needed_number(row, "x_m"), csv.needed_number(row, "y_m"), csv.needed_number(row, "z_m")};
+    entry.pose.rotation = rotation_of(csv, row, photogrammetric);
+    poses.rows.push_back(std::move(entry));
+  }
+  return poses;
+}
+
+ApproximatePoses read_quaternions(const std::string& path) {
+  const PoseTable table = read_pose_csv(path);
+  ApproximatePoses poses;
+  poses.ground = table.ground;
+  for (std::size_t i = 0; i < table.names.size(); ++i)
+    poses.rows.push_back({table.names[i], path, false, {}, table.poses[i]});
+  return poses;
+}
+
+bool same_origin(const GroundFrame& a, const GroundFrame& b) {
+  return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
+}
+
+// Poses of the file in the block's frame.
+class ToBlock {
+ public:
+  ToBlock(const ApproximatePoses& poses, const GroundFrame& ground) : ground_(ground) {
+    if (ground.georeferenced) reference_.emplace(ground);
+    if (ground.georeferenced && poses.ground && !same_origin(*poses.ground, ground))
+      change_.emplace(*poses.ground, ground);
+  }
+
+  Pose operator()(const ApproximatePoses::Row& row) const {
+    if (!row.geodetic) return change_ ? change_->pose(row.pose) : row.pose;
+    if (!reference_)
+      throw InputError(row.where + ": WGS84 poses need a georeferenced block; give 'origin' in the project file");
+    try {
+      return {(row.pose.rotation * reference_->own_from_block(row.position)).normalized(),
+              reference_->to_local(row.position)};
+    } catch (const InputError& error) {
+      throw InputError(row.where + ": '" + row.name + "': " + error.what());
+    }
+  }
+
+ private:
+  GroundFrame ground_;
+  std::optional<Georeference> reference_;
+  std::optional<GroundChange> change_;
+};
+
+}  // namespace
+
+std::vector<Geodetic> ApproximatePoses::positions() const {
+  std::vector<Geodetic> result;
+  for (const Row& row : rows)
+    if (row.geodetic) result.push_back(row.position);
+  if (result.empty() && ground) result.push_back({ground->latitude_deg, ground->longitude_deg, ground->height_m});
+  return result;
+}
+
+ApproximatePoses read_approximate_poses(const std::string& path) {
+  const CsvTable csv(path);
+  if (csv.has("qw")) return read_quaternions(path);
+  const std::string name_column = csv.has("image") ? "image" : "name";
+  csv.require({name_column});
+  return read_angles(csv, name_column);
+}
+
+void set_given_poses(const ApproximatePoses& poses, const std::vector<std::string>& left_out, Block& block,
+                     std::vector<std::string>& warnings) {
+  const ToBlock to_block(poses, block.ground);
+  std::map<std::string, FrameIndex> frames;
+  std::map<std::string, ImageIndex> images;
+  for (std::size_t f = 0; f < block.frames.size(); ++f)
+    frames.emplace(block.frames[FrameIndex(static_cast<std::int64_t>(f))].name,
+                   FrameIndex(static_cast<std::int64_t>(f)));
+  for (std::size_t i = 0; i < block.images.size(); ++i)
+    images.emplace(block.images[ImageIndex(static_cast<std::int64_t>(i))].name,
+                   ImageIndex(static_cast<std::int64_t>(i)));
+  for (const ApproximatePoses::Row& row : poses.rows) {
+    const auto image = images.find(row.name);
+    const auto frame = frames.find(row.name);
+    if (std::find(left_out.begin(), left_out.end(), row.name) != left_out.end()) {
+      warnings.push_back(row.where + ": pose of '" + row.name + "', which was left out; not used");
+    } else if (image != images.end()) {
+      // X_cam = R_m (R_f (X - C_f) - C_m): the frame's pose from the camera's.
+      const Pose camera = to_block(row);
+      const Pose& mount = block.mount_of(image->second).pose;
+      const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
+      Frame& target = block.frames[block.images[image->second].frame];
+      if (!target.given_pose) target.given_pose = Pose{rotation, camera.centre - rotation.conjugate() * mount.centre};
+    } else if (frame != frames.end()) {
+      block.frames[frame->second].given_pose = to_block(row);
+    } else {
+      throw InputError(row.where + ": pose of '" + row.name + "', which is no image or frame of the block");
+    }
+  }
+}
+
+}  // namespace megablock

@@ -1,0 +1,128 @@
+#include "io/approximate_poses.h"
+
+#include <gmock/gmock.h>
+
+#include <numbers>
+
+#include "image_files.h"
+#include "io/error.h"
+#include "io/export.h"
+#include "io/pose_csv.h"
+#include "io/project.h"
+#include "small_result.h"
+
+namespace megablock {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::gps_tags;
+using ::testing::HasSubstr;
+using testing::message_of;
+using testing::small_result;
+using testing::TemporaryFolder;
+using testing::write_file;
+using testing::write_picture;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// What the export wrote comes back as given poses of the frames, rigs included.
+TEST(ApproximatePoses, ReadWhatTheExportWrites) {
+  TemporaryFolder folder;
+  const BlockResult result = small_result();
+  export_result(result, "csv", folder / "out");
+  for (const std::string name : {"frames.csv", "images_local.csv", "images_wgs84.csv"}) {
+    Block block = result.block;
+    std::vector<std::string> warnings;
+    set_given_poses(read_approximate_poses(folder / ("out/" + name)), {}, block, warnings);
+    for (const FrameIndex f : {FrameIndex(0), FrameIndex(1), FrameIndex(3)}) {
+      ASSERT_TRUE(block.frames[f].given_pose) << name;
+      EXPECT_LT((block.frames[f].given_pose->centre - result.state.frames[f].centre).norm(), 2e-5) << name;
+      EXPECT_LT(rotation_angle(block.frames[f].given_pose->rotation, result.state.frames[f].rotation), 1e-9) << name;
+    }
+    EXPECT_FALSE(block.frames[FrameIndex(2)].given_pose);
+  }
+}
+
+// A pose by the name of the second camera of a rig gives the frame's.
+TEST(ApproximatePoses, OfAnyImageOfARig) {
+  TemporaryFolder folder;
+  const BlockResult result = small_result();
+  export_result(result, "csv", folder / "out");
+  std::istringstream lines(testing::read_file(folder / "out/images_local.csv"));
+  std::string header, first, second;
+  std::getline(lines, header);
+  std::getline(lines, first);
+  std::getline(lines, second);
+  write_file(folder / "p.csv", header + "\n" + second + "\n");
+  Block block = result.block;
+  std::vector<std::string> warnings;
+  set_given_poses(read_approximate_poses(folder / "p.csv"), {}, block, warnings);
+  const Pose& pose = *block.frames[FrameIndex(0)].given_pose;
+  EXPECT_LT((pose.centre - result.state.frames[FrameIndex(0)].centre).norm(), 1e-9);
+  EXPECT_LT(rotation_angle(pose.rotation, result.state.frames[FrameIndex(0)].rotation), 1e-9);
+}
+
+TEST(ApproximatePoses, FramesOfAnotherOriginAreTurned) {
+  TemporaryFolder folder;
+  const BlockResult result = small_result();
+  write_pose_csv(folder / "p.csv", pose_table(result.block, result.state));
+  Block block = result.block;
+  block.ground = {true, 46.9, -92.1, 150, "EPSG:4979"};
+  std::vector<std::string> warnings;
+  set_given_poses(read_approximate_poses(folder / "p.csv"), {}, block, warnings);
+  const Georeference before(result.block.ground), after(block.ground);
+  const Pose &pose = *block.frames[FrameIndex(0)].given_pose, &given = result.state.frames[FrameIndex(0)];
+  for (const Eigen::Vector3d& point : {Eigen::Vector3d(0, 0, 0), {30, -20, 5}}) {
+    const Eigen::Vector3d moved = after.to_local(before.to_geodetic(point));
+    EXPECT_LT((to_inside(pose, moved) - to_inside(given, point)).norm(), 1e-6);
+  }
+}
+
+TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
+  TemporaryFolder folder;
+  write_picture(folder / "images/a.jpg", 64, 48, 1);
+  write_picture(folder / "images/b.jpg", 64, 48, 2);
+  write_file(folder / "images/broken.jpg", "");
+  write_file(folder / "poses.csv",
+             "image,latitude_deg,longitude_deg,height_m,yaw_deg,pitch_deg,roll_deg,note\n"
+             "a.jpg,52.5201,13.4002,140,90,-90,0,first\nbroken.jpg,52.52,13.4,140,0,0,0,\n");
+  write_file(folder / "block.yaml", "images: images\nposes: poses.csv\n");
+  const Project project = read_project(folder / "block.yaml");
+  EXPECT_DOUBLE_EQ(project.block.ground.latitude_deg, 52.52);
+  ASSERT_TRUE(project.block.frames[FrameIndex(0)].given_pose);
+  EXPECT_FALSE(project.block.frames[FrameIndex(1)].given_pose);
+  const Pose& pose = *project.block.frames[FrameIndex(0)].given_pose;
+  EXPECT_NEAR(pose.centre.y(), 11.13, 0.01);
+  // Nadir, top of the image to the east.
+  EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, -1, 0)).norm(), 1e-4);
+  EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d(0, 0, -1)).norm(), 1e-4);
+  EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("broken.jpg")));
+}
+
+TEST(ApproximatePoses, Refusals) {
+  TemporaryFolder folder;
+  Block block = small_result().block;
+  const auto refusal = [&](const std::string& text) {
+    write_file(folder / "p.csv", text);
+    std::vector<std::string> warnings;
+    return message_of<InputError>([&] {
+      const ApproximatePoses poses = read_approximate_poses(folder / "p.csv");
+      set_given_poses(poses, {}, block, warnings);
+    });
+  };
+  const std::string local = "image,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg\n";
+  EXPECT_EQ(refusal(local + "frame0/0.jpg,1,2,3,0,0,0\n"), "");
+  EXPECT_THAT(refusal("image,x_m,y_m,z_m\n"), HasSubstr("p.csv:1: column 'yaw_deg' is missing"));
+  EXPECT_THAT(refusal("image,latitude_deg,longitude_deg,omega_deg\n"), HasSubstr("column 'height_m' is missing"));
+  EXPECT_THAT(refusal("x_m,y_m,z_m\n"), HasSubstr("column 'name' is missing"));
+  EXPECT_THAT(refusal(local + "frame0/0.jpg,1,two,3,0,0,0\n"), HasSubstr("p.csv:2: y_m: 'two' is not a number"));
+  EXPECT_THAT(refusal(local + "frame0/0.jpg,1,,3,0,0,0\n"), HasSubstr("p.csv:2: y_m is empty"));
+  EXPECT_THAT(refusal(local + "none.jpg,1,2,3,0,0,0\n"), HasSubstr("p.csv:2: pose of 'none.jpg', which is no image"));
+  EXPECT_THAT(refusal(local + "frame0/0.jpg,1,2,3,0,0,0\nframe0/0.jpg,1,2,3,0,0,0\n"), HasSubstr("appears twice"));
+  EXPECT_THAT(
+      refusal("image,latitude_deg,longitude_deg,height_m,yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,97,1,1,0,0,0\n"),
+      HasSubstr("p.csv:2"));
+}
+
+}  // namespace
+}  // namespace megablock
