@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iomanip>
 
+#include "io/control_file.h"
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/pose_csv.h"
@@ -86,16 +87,18 @@ void write_truth(const Layout& layout, const fs::path& folder) {
   write_state((folder / "truth.h5").string(), state);
 }
 
-// Control points with longitude, latitude, ellipsoidal height, then column and row in the image.
-void write_control(const Block& block, const fs::path& path) {
+// The control points (without the check points) in the form that other programs read: longitude, latitude, ellipsoidal
+// height, then column and row counted from the centre of the first pixel.
+void write_gcp_list(const Block& block, const fs::path& path) {
   const Georeference georeference(block.ground);
   std::ofstream stream(path);
   stream << "WGS84\n" << std::fixed;
   for (const ControlPoint& point : block.control_points) {
+    if (point.role != PointRole::kControl) continue;
     const Geodetic place = georeference.to_geodetic(point.position);
     for (const ImageMeasurement& m : point.measurements)
       stream << std::setprecision(10) << place.longitude_deg << ' ' << place.latitude_deg << ' ' << std::setprecision(5)
-             << place.height_m << ' ' << std::setprecision(4) << m.pixel.x() << ' ' << m.pixel.y() << ' '
+             << place.height_m << ' ' << std::setprecision(4) << m.pixel.x() - 0.5 << ' ' << m.pixel.y() - 0.5 << ' '
              << block.images[m.image].name << ' ' << point.name << '\n';
   }
   stream.close();
@@ -130,7 +133,7 @@ void write_project(const SimulationOptions& options, const Layout& layout, bool 
   if (options.gps_sigma_m > 0)
     yaml << "gps:\n  sigma_horizontal_m: " << options.gps_sigma_m << "\n  sigma_vertical_m: " << options.gps_sigma_m
          << '\n';
-  if (with_control) yaml << "control: gcp_list.txt\n";
+  if (with_control) yaml << "control: control.csv\n";
   write_cameras(options, layout, yaml);
   yaml.close();
   if (!yaml) throw InputError(path.string() + ": cannot be written");
@@ -153,7 +156,10 @@ void write_rendered_block(const SimulationOptions& options, const std::string& f
   write_images(options, layout, simulated.block, root / "images");
   write_truth(layout, root);
   const bool with_control = !simulated.block.control_points.empty();
-  if (with_control) write_control(simulated.block, root / "gcp_list.txt");
+  if (with_control) {
+    write_control_csv((root / "control.csv").string(), simulated.block);
+    write_gcp_list(simulated.block, root / "gcp_list.txt");
+  }
   write_project(options, layout, with_control, root / "block.yaml");
 }
 

@@ -192,6 +192,43 @@ TEST_P(RenderTest, FilesAreAProject) {
   fs::remove_all(folder);
 }
 
+// Control as read from the project lies where the true cameras see it, in both files.
+TEST_P(RenderTest, ControlFitsTheTruth) {
+  options_.control_points = 4;
+  options_.check_points = 2;
+  options_.image_noise_px = 0.3;
+  options_.frames = GetParam() == SimulationOptions::Scene::kStreet ? 3 : 6;
+  const fs::path folder =
+      fs::path(testing::TempDir()) / ("rendered_control" + std::to_string(static_cast<int>(GetParam())));
+  fs::remove_all(folder);
+  write_rendered_block(options_, folder.string());
+  const BlockState truth = read_state((folder / "truth.h5").string());
+  for (const std::string file : {"control.csv", "gcp_list.txt"}) {
+    std::ofstream(folder / "block.yaml") << "images: images\norigin: [48.85, 2.35, 100]\ncontrol: " << file << "\n";
+    const Block block = read_project((folder / "block.yaml").string()).block;
+    double chi2 = 0, n = 0;
+    std::int64_t control = 0;
+    for (const ControlPoint& point : block.control_points) {
+      control += point.role == PointRole::kControl;
+      for (const ImageMeasurement& m : point.measurements) {
+        const Pose& pose = truth.frames[block.images[m.image].frame];
+        const Eigen::Vector2d seen = project(truth.cameras[block.camera_of(m.image)], to_inside(pose, point.position));
+        chi2 += ((seen - m.pixel) / options_.image_noise_px).squaredNorm();
+        n += 2;
+      }
+      if (file == "gcp_list.txt") continue;
+      EXPECT_NEAR(point.sigma.x(), options_.control_sigma_m, 1e-12);
+      EXPECT_NEAR(point.measurements.front().sigma_px, options_.image_noise_px, 1e-12);
+    }
+    EXPECT_GE(control, 3);
+    EXPECT_EQ(std::ssize(block.control_points) - control > 0, file == "control.csv");
+    // Sigma 1 cm of the points is less than a tenth of a pixel in the aerial images, up to half a pixel in the street.
+    EXPECT_LT(chi2 / n, GetParam() == SimulationOptions::Scene::kStreet ? 4 : 2) << file;
+    EXPECT_GT(chi2 / n, 0.3) << file;
+  }
+  fs::remove_all(folder);
+}
+
 TEST_P(RenderTest, HeldCamerasAreInTheProject) {
   options_.calibrate = false;
   options_.frames = 2;
