@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "adjust/lost_frames.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -45,6 +46,23 @@ double robust_sigma(const TileProblem& problem, const TileState& state) {
   return *middle / 1.1774;
 }
 
+// Mean redundancy of an image residual: least squares shortens residuals by its root.
+double redundancy(const TileProblem& problem) {
+  std::int64_t observations = 0, points = 0;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    ++points;
+    observations += std::count(problem.kept.begin() + problem.begin[p], problem.kept.begin() + problem.begin[p + 1], 1);
+  }
+  const auto unknowns = static_cast<double>(3 * points + 6 * std::ssize(problem.frames));
+  return std::clamp(1 - unknowns / static_cast<double>(2 * std::max<std::int64_t>(1, observations)), 0.25, 1.0);
+}
+
+// The a-priori sigma may be too small for the images at hand: thresholds follow the residuals upwards.
+double threshold_factor(const TileProblem& problem, const TileState& state) {
+  return std::max(1.0, robust_sigma(problem, state) / std::sqrt(redundancy(problem)));
+}
+
 class TileAdjuster {
  public:
   TileAdjuster(TileProblem& problem, TileState& state, const AdjustOptions& options)
@@ -54,6 +72,7 @@ class TileAdjuster {
 
   AdjustSummary run() {
     approach();
+    recover();
     AdjustSummary summary;
     for (int round = 0; round + 1 < options_.screening_rounds; ++round) {
       // From 8 x to 1 x of the final threshold.
@@ -95,6 +114,17 @@ class TileAdjuster {
     triangulate_points(problem_, state_, options_);
   }
 
+  // Frames that none of it has brought to their points; a few rounds, as they may hang on one another.
+  void recover() {
+    constexpr int kMaxRounds = 3;
+    for (int round = 0; round < kMaxRounds; ++round) {
+      screen(8 * options_.max_residual_sigmas);
+      if (recover_lost_frames(problem_, state_, 8 * options_.max_residual_sigmas) == 0) return;
+      screen(8 * options_.max_residual_sigmas);
+      solve_rough(Stage::kFocal);
+    }
+  }
+
   // Enough tracks for each image, the longest first.
   void select_long_tracks() {
     constexpr int kEnough = 200;
@@ -124,26 +154,12 @@ class TileAdjuster {
     return result;
   }
 
-  // The a-priori sigma may be too small for the images at hand: the threshold follows the residuals upwards.
   std::int64_t screen(double threshold) {
     const std::vector<std::uint8_t> before = problem_.kept;
-    const double sigma = robust_sigma(problem_, state_) / std::sqrt(redundancy());
-    const std::int64_t changed = screen_observations(problem_, state_, threshold * std::max(1.0, sigma), options_);
+    const std::int64_t changed =
+        screen_observations(problem_, state_, threshold * threshold_factor(problem_, state_), options_);
     for (std::size_t row = 0; row < before.size(); ++row) restored_ += !before[row] && problem_.kept[row];
     return changed;
-  }
-
-  // Mean redundancy of an image residual: least squares shortens residuals by its root.
-  double redundancy() const {
-    std::int64_t observations = 0, points = 0;
-    for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
-      if (!problem_.active(p)) continue;
-      ++points;
-      observations +=
-          std::count(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 1);
-    }
-    const auto unknowns = static_cast<double>(3 * points + 6 * std::ssize(problem_.frames));
-    return std::clamp(1 - unknowns / static_cast<double>(2 * std::max<std::int64_t>(1, observations)), 0.25, 1.0);
   }
 
   // A few iterations with a loss that forgets gross errors and is as wide as the residuals are.
@@ -206,6 +222,10 @@ class TileAdjuster {
 };
 
 }  // namespace
+
+double screening_threshold(const TileProblem& problem, const TileState& state, const AdjustOptions& options) {
+  return options.max_residual_sigmas * threshold_factor(problem, state);
+}
 
 AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options) {
   options.check();

@@ -35,6 +35,10 @@ std::int64_t screen_observations(TileProblem& problem, TileState& state, double 
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
                                  const AdjustOptions& options, const std::vector<std::uint8_t>& which);
 
+// The final screening threshold of a tile, in sigmas: max_residual_sigmas, raised where the kept residuals show (by their
+// median) that the a-priori sigma is too small for these images. What adjust_tile ends with.
+double screening_threshold(const TileProblem& problem, const TileState& state, const AdjustOptions& options);
+
 struct AdjustSummary {
   double initial_cost = 0, final_cost = 0;
   // Square root of the weighted squares of kept residuals / (residuals - unknowns + datum defect).

@@ -252,6 +252,39 @@ TEST(Priors, AWrongPositionDoesNotBendTheBlock) {
   EXPECT_LT(tile.position_rms(), 0.1);
 }
 
+// A few start poses that are plainly wrong are found again from the points of the others.
+TEST_P(Blocks, FindsLostFrames) {
+  SimulatedBlock simulated = simulate_block(options(18));
+  for (std::int64_t f : {5, 17, 18, 31}) {
+    Pose& given = *simulated.block.frames[FrameIndex(f)].given_pose;
+    given.rotation = rotation_update(given.rotation, Eigen::Vector3d(0.1, 0.3, f == 17 ? 3.0 : 1.5));
+    if (f == 31) given.centre += Eigen::Vector3d(30, -20, 5);
+  }
+  SingleTile tile(std::move(simulated));
+  const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options);
+  EXPECT_NEAR(summary.sigma0, 1, 0.05);
+  EXPECT_LT(verdicts(tile).good_lost, 0.005);
+  EXPECT_LT(tile.position_rms(), 0.1);
+}
+
+// Images noisier than their a-priori sigma says: the threshold follows, good observations stay.
+TEST(Sigmas, TooSmallOnesDoNotCostGoodObservations) {
+  SimulationOptions simulation = aerial(40, 19);
+  simulation.image_noise_px = 1.5;
+  simulation.outlier_share = 0.03;
+  SingleTile tile(simulation);
+  const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options);
+  EXPECT_NEAR(summary.sigma0, 3, 0.15);
+  EXPECT_NEAR(screening_threshold(tile.problem, tile.state, tile.options), 12, 1);
+  EXPECT_LT(verdicts(tile).good_lost, 0.01);
+  EXPECT_GE(verdicts(tile).outliers_found, 0.98);
+  // And the threshold never falls below what was asked for.
+  simulation.image_noise_px = 0.1;
+  SingleTile sharp(simulation);
+  adjust_tile(sharp.problem, sharp.state, sharp.options);
+  EXPECT_EQ(screening_threshold(sharp.problem, sharp.state, sharp.options), tile.options.max_residual_sigmas);
+}
+
 TEST(Rigs, FreeMountsAreFound) {
   SimulatedBlock simulated = simulate_block(street(30, 14));
   Rig& rig = simulated.block.rigs[RigIndex(0)];

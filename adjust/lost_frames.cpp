@@ -1,0 +1,143 @@
+#include "adjust/lost_frames.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <random>
+
+#include "geometry/p3p.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::size_t kMinAgreeing = 12;
+constexpr double kMinShare = 0.3;
+
+// Rows of each frame whose points stand without it.
+std::vector<std::vector<std::int64_t>> rows_of_frames(const TileProblem& problem,
+                                                      std::vector<std::int64_t>& point_of_row) {
+  std::vector<std::vector<std::int64_t>> result(problem.frames.size());
+  point_of_row.assign(problem.image.size(), -1);
+  std::vector<std::int32_t> keeping;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    const auto frame_of = [&](std::int64_t row) { return problem.images[problem.image[row].value].frame.value; };
+    keeping.clear();
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row)
+      if (problem.kept[row]) keeping.push_back(frame_of(row));
+    std::sort(keeping.begin(), keeping.end());
+    keeping.erase(std::unique(keeping.begin(), keeping.end()), keeping.end());
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.image[row].valid()) continue;
+      const std::int32_t frame = frame_of(row);
+      const bool itself = std::binary_search(keeping.begin(), keeping.end(), frame);
+      if (keeping.size() < (itself ? 3u : 2u)) continue;
+      point_of_row[row] = p;
+      result[frame].push_back(row);
+    }
+  }
+  return result;
+}
+
+class Resection {
+ public:
+  Resection(const TileProblem& problem, const TileState& state, const std::vector<std::int64_t>& point_of_row,
+            double threshold)
+      : problem_(problem), state_(state), point_of_row_(point_of_row), threshold_(threshold) {}
+
+  std::optional<Pose> find(const std::vector<std::int64_t>& rows, std::uint64_t seed) const {
+    constexpr std::size_t kMaxScored = 300;
+    std::vector<std::int64_t> scored;
+    const std::size_t stride = 1 + (rows.size() - 1) / kMaxScored;
+    for (std::size_t i = 0; i < rows.size(); i += stride) scored.push_back(rows[i]);
+
+    std::mt19937_64 random(seed);
+    std::optional<Pose> best;
+    std::size_t most = 0;
+    constexpr int kSamples = 300;
+    for (int sample = 0; sample < kSamples; ++sample) {
+      for (const Pose& candidate : candidates(rows, random)) {
+        const std::size_t agree = agreeing(candidate, scored);
+        if (agree > most) most = agree, best = candidate;
+      }
+    }
+    if (!best) return std::nullopt;
+    const std::size_t agree = agreeing(*best, rows);
+    const bool enough = agree >= kMinAgreeing && static_cast<double>(agree) >= kMinShare * std::ssize(rows);
+    return enough ? best : std::nullopt;
+  }
+
+  std::size_t agreeing(const Pose& frame, const std::vector<std::int64_t>& rows) const {
+    return static_cast<std::size_t>(
+        std::count_if(rows.begin(), rows.end(), [&](std::int64_t row) { return agrees(frame, row); }));
+  }
+
+ private:
+  const TileImage& image_of(std::int64_t row) const { return problem_.images[problem_.image[row].value]; }
+
+  bool agrees(const Pose& frame, std::int64_t row) const {
+    const TileImage& image = image_of(row);
+    const Eigen::Vector3d inside = to_camera(frame, state_.mounts[image.mount], state_.points[point_of_row_[row]]);
+    if (!(inside.z() > 0)) return false;
+    const Eigen::Vector2d measured(problem_.x[row], problem_.y[row]);
+    return (project(state_.cameras[image.camera.value], inside) - measured).norm() * problem_.inverse_sigma[row] <=
+           threshold_;
+  }
+
+  // Poses of the frame from three observations of one of its images.
+  std::vector<Pose> candidates(const std::vector<std::int64_t>& rows, std::mt19937_64& random) const {
+    const LocalImage local = problem_.image[rows[random() % rows.size()]];
+    std::array<Eigen::Vector3d, 3> rays, points;
+    for (std::size_t k = 0; k < 3; ++k) {
+      constexpr int kTries = 50;
+      std::int64_t row = -1;
+      for (int attempt = 0; attempt < kTries && row < 0; ++attempt) {
+        const std::int64_t drawn = rows[random() % rows.size()];
+        if (problem_.image[drawn] == local) row = drawn;
+      }
+      if (row < 0) return {};
+      const auto ray = viewing_ray(state_.cameras[image_of(row).camera.value], {problem_.x[row], problem_.y[row]});
+      if (!ray) return {};
+      rays[k] = *ray;
+      points[k] = state_.points[point_of_row_[row]];
+    }
+    const Pose& mount = state_.mounts[problem_.images[local.value].mount];
+    std::vector<Pose> result;
+    for (const Pose& camera : solve_p3p(rays, points)) {
+      const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
+      result.push_back({rotation, camera.centre - rotation.conjugate() * mount.centre});
+    }
+    return result;
+  }
+
+  const TileProblem& problem_;
+  const TileState& state_;
+  const std::vector<std::int64_t>& point_of_row_;
+  double threshold_;
+};
+
+}  // namespace
+
+int recover_lost_frames(const TileProblem& problem, TileState& state, double threshold_sigmas) {
+  std::vector<std::int64_t> point_of_row;
+  const std::vector<std::vector<std::int64_t>> rows = rows_of_frames(problem, point_of_row);
+  const Resection resection(problem, state, point_of_row, threshold_sigmas);
+  std::vector<std::optional<Pose>> found(rows.size());
+  for (std::size_t f = 0; f < rows.size(); ++f) {
+    if (rows[f].size() < kMinAgreeing) continue;
+    const std::size_t now = resection.agreeing(state.frames[f], rows[f]);
+    if (static_cast<double>(now) >= kMinShare * static_cast<double>(rows[f].size())) continue;
+    found[f] = resection.find(rows[f], static_cast<std::uint64_t>(problem.frames[f].value));
+    if (found[f] && resection.agreeing(*found[f], rows[f]) <= now) found[f].reset();
+  }
+  int count = 0;
+  for (std::size_t f = 0; f < found.size(); ++f) {
+    if (!found[f]) continue;
+    state.frames[f] = *found[f];
+    ++count;
+  }
+  return count;
+}
+
+}  // namespace megablock
