@@ -1,0 +1,23 @@
+// Where the real photographs are: the folder of the environment variable MEGABLOCK_DATA, else ../shared/data beside the
+// sources. Tests skip, and say so, when a set is absent.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+namespace megablock::testing {
+
+inline std::string real_data(const std::string& set) {
+  const char* folder = std::getenv("MEGABLOCK_DATA");
+  return (std::filesystem::path(folder ? folder : MEGABLOCK_DATA) / set).lexically_normal().string();
+}
+
+}  // namespace megablock::testing
+
+#define MEGABLOCK_NEEDS_DATA(set)                                           \
+  if (!std::filesystem::is_directory(::megablock::testing::real_data(set))) \
+  GTEST_SKIP() << ::megablock::testing::real_data(set)                      \
+               << " is absent; set MEGABLOCK_DATA to the folder of the photographs"
