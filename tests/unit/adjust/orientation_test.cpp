@@ -3,161 +3,314 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <map>
-#include <numbers>
-#include <random>
+#include <algorithm>
+#include <numeric>
 
-#include "geometry/similarity.h"
 #include "io/error.h"
-#include "io/simulate/simulate.h"
+#include "tests/unit/adjust/orientation_scene.h"
 
 namespace megablock {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+using namespace orientation_scene;
 
-struct PairNoise {
-  double rotation_deg = 0.3, direction_deg = 3;
-  double wrong_share = 0.1;  // of relative rotations
-  int min_tracks = 20;
-};
+std::vector<Eigen::Vector3d> random_points(int count, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  std::mt19937_64 random(99);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d u(uniform(random), uniform(random), uniform(random));
+    points.push_back(low + u.cwiseProduct(high - low));
+  }
+  return points;
+}
 
-// Verified pairs as matching would give them: relative orientations from the truth with noise.
-std::vector<VerifiedPair> pairs_of(const SimulatedBlock& simulated, const PairNoise& noise) {
-  std::map<std::pair<std::int64_t, std::int64_t>, int> common;
-  const TrackSet& tracks = simulated.tracks;
-  for (std::size_t t = 0; t < tracks.id.size(); ++t)
-    for (auto i = tracks.begin[t]; i < tracks.begin[t + 1]; ++i)
-      for (auto j = i + 1; j < tracks.begin[t + 1]; ++j)
-        ++common[{tracks.image[static_cast<std::size_t>(i)].value, tracks.image[static_cast<std::size_t>(j)].value}];
+// Nadir images 80 m above terrain of +-5 m, rows flown to and fro, small random tilts.
+SimulatedBlock aerial(int rows, int columns, const SceneOptions& options, double relief = 5) {
+  std::mt19937_64 random(3);
+  std::vector<Pose> poses;
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c) {
+      const Eigen::Vector3d down(0, r % 2 ? -1 : 1, 0);
+      const Eigen::Quaterniond tilt = rotation_exp<double>(2 * kDegree * normal_vector(random));
+      poses.push_back({(tilt * looking({0, 0, -1}, down)).normalized(),
+                       Eigen::Vector3d(14 * c, 30 * r, 80) + 0.5 * normal_vector(random)});
+    }
+  return make_scene(
+      poses, random_points(rows * columns * 60, {-50, -50, -relief}, {14.0 * columns + 50, 30.0 * rows + 50, relief}),
+      options);
+}
 
+// A camera driven forward between facades, y down.
+SimulatedBlock street(int frames, const SceneOptions& options) {
+  std::mt19937_64 random(4);
+  std::vector<Pose> poses;
+  for (int i = 0; i < frames; ++i) {
+    const Eigen::Quaterniond sway = rotation_exp<double>(1 * kDegree * normal_vector(random));
+    poses.push_back({(sway * looking({0.6, 0.8, 0}, {0, 0, -1})).normalized(),
+                     Eigen::Vector3d(1.8 * i, 2.4 * i, 2) + 0.05 * normal_vector(random)});
+  }
+  std::vector<Eigen::Vector3d> points;
+  for (Eigen::Vector3d p : random_points(frames * 60, {0, -1, 0}, {3.0 * frames + 50, 1, 12})) {
+    const double side = p.y() > 0 ? 8 + p.y() : -8 + p.y();  // along the street, across it, up
+    points.push_back({0.6 * p.x() - 0.8 * side, 0.8 * p.x() + 0.6 * side, p.z()});
+  }
+  SceneOptions near = options;
+  near.max_distance_m = 45;
+  return make_scene(poses, points, near);
+}
+
+// Cameras on a circle that look at an object in its middle.
+SimulatedBlock ring(int frames, const SceneOptions& options) {
   std::mt19937_64 random(5);
-  std::normal_distribution<double> normal(0, 1);
-  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
-  std::vector<VerifiedPair> pairs;
-  for (const auto& [key, count] : common) {
-    if (count < noise.min_tracks) continue;
-    VerifiedPair pair;
-    pair.a = ImageIndex(key.first);
-    pair.b = ImageIndex(key.second);
-    const auto camera = [&](ImageIndex image) {
-      const Image& i = simulated.block.images[image];
-      return camera_pose(
-          simulated.truth.frames[i.frame],
-          simulated.truth.mounts[simulated.block.frames[i.frame].rig][static_cast<std::size_t>(i.mount)]);
-    };
-    const Pose a = camera(pair.a), b = camera(pair.b);
-    Eigen::Quaterniond rotation = b.rotation * a.rotation.conjugate();
-    const Eigen::Vector3d base = b.rotation * (a.centre - b.centre);
-    rotation = rotation_update(rotation, noise.rotation_deg * kDegree * vector());
-    pair.model = base.norm() > 1e-6 ? PairModel::kEssential : PairModel::kRotationOnly;
-    Eigen::Vector3d t = base.norm() > 1e-6 ? base.normalized() : Eigen::Vector3d::Zero();
-    if (base.norm() > 1e-6) t = rotation_exp<double>(noise.direction_deg * kDegree * vector()) * t;
-    if (std::uniform_real_distribution<double>(0, 1)(random) < noise.wrong_share)
-      rotation = rotation_update(rotation, 2.0 * vector());
-    pair.rotation_wxyz = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
-    pair.translation = {t.x(), t.y(), t.z()};
-    pair.feature_a.resize(static_cast<std::size_t>(count));
-    pair.feature_b.resize(static_cast<std::size_t>(count));
-    pairs.push_back(std::move(pair));
+  std::vector<Pose> poses;
+  for (int i = 0; i < frames; ++i) {
+    const double angle = 2 * std::numbers::pi * i / frames;
+    const Eigen::Vector3d centre =
+        Eigen::Vector3d(10 * std::cos(angle), 10 * std::sin(angle), 3) + 0.2 * normal_vector(random);
+    poses.push_back({looking(Eigen::Vector3d(0, 0, 1) - centre, {0, 0, -1}), centre});
   }
-  return pairs;
-}
-
-std::vector<FrameIndex> all_frames(const Block& block) {
-  std::vector<FrameIndex> frames;
-  for (FrameIndex f(0); block.frames.contains(f); ++f.value) frames.push_back(f);
-  return frames;
-}
-
-struct Errors {
-  double position_m = 0, rotation_deg = 0;  // largest
-  std::size_t oriented = 0;
-};
-
-// Against the truth, directly or after the best similarity.
-Errors errors_of(const SimulatedBlock& simulated, const OrientationResult& result, bool free) {
-  std::vector<Eigen::Vector3d> from, to;
-  std::vector<Pose> poses, truth;
-  for (FrameIndex f : all_frames(simulated.block)) {
-    if (!result.state.oriented[f]) continue;
-    poses.push_back(result.state.frames[f]);
-    truth.push_back(simulated.truth.frames[f]);
-    from.push_back(poses.back().centre);
-    to.push_back(truth.back().centre);
+  SimulatedBlock scene = make_scene(poses, random_points(1500, {-2, -2, 0}, {2, 2, 3}), options);
+  // An opaque object: a point is seen from its own side only.
+  TrackSet seen;
+  seen.begin = {0};
+  for (std::size_t t = 0; t < scene.tracks.id.size(); ++t) {
+    for (auto o = static_cast<std::size_t>(scene.tracks.begin[t]);
+         o < static_cast<std::size_t>(scene.tracks.begin[t + 1]); ++o) {
+      const Eigen::Vector3d& centre = poses[static_cast<std::size_t>(scene.tracks.image[o].value)].centre;
+      if (scene.points[t].head<2>().normalized().dot(centre.head<2>().normalized()) < 0.5) continue;
+      seen.image.push_back(scene.tracks.image[o]);
+      seen.x.push_back(scene.tracks.x[o]);
+      seen.y.push_back(scene.tracks.y[o]);
+      seen.feature.push_back(-1);
+    }
+    seen.id.push_back(TrackIndex(static_cast<std::int64_t>(t)));
+    seen.begin.push_back(static_cast<std::int64_t>(seen.image.size()));
   }
-  Similarity similarity;
-  if (free) similarity = fit_similarity(from, to).value();
-  Errors errors;
-  errors.oriented = poses.size();
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Pose pose = similarity(poses[i]);
-    errors.position_m = std::max(errors.position_m, (pose.centre - truth[i].centre).norm());
-    errors.rotation_deg = std::max(errors.rotation_deg, rotation_angle(pose.rotation, truth[i].rotation) / kDegree);
+  scene.tracks = seen;
+  return scene;
+}
+
+void expect_oriented(const SimulatedBlock& scene, const OrientationResult& result, bool free, double position_m,
+                     double rotation_deg) {
+  const Errors errors = errors_of(scene, result, free);
+  EXPECT_EQ(errors.oriented, scene.block.frames.size());
+  EXPECT_LT(errors.position_m, position_m);
+  EXPECT_LT(errors.rotation_deg, rotation_deg);
+}
+
+TEST(Orientation, AerialBlock) {
+  const SimulatedBlock free = aerial(4, 7, {});
+  expect_oriented(free, orient(free, pairs_of(free)), true, 0.3, 0.3);
+  SceneOptions options;
+  options.gps_sigma_m = 1;
+  const SimulatedBlock positioned = aerial(4, 7, options);
+  expect_oriented(positioned, orient(positioned, pairs_of(positioned)), false, 1.5, 2);
+}
+
+TEST(Orientation, AerialBlockOverFlatGroundWithUnknownFocalLength) {
+  SceneOptions options;
+  options.gps_sigma_m = 1;
+  for (double guess : {0.8, 1.25}) {
+    options.focal_guess = guess;
+    const SimulatedBlock scene = aerial(4, 7, options, 0.01);
+    const auto result = orient(scene, pairs_of(scene));
+    expect_oriented(scene, result, false, 4, 3);
   }
-  return errors;
 }
 
-OrientationResult orient(const SimulatedBlock& simulated, const std::vector<VerifiedPair>& pairs) {
-  return orient_component(simulated.block, initial_state(simulated.block), all_frames(simulated.block), pairs,
-                          simulated.tracks, {});
+TEST(Orientation, SingleFlightLineLooksDown) {
+  SceneOptions options;
+  options.gps_sigma_m = 0.5;
+  const SimulatedBlock scene = aerial(1, 12, options);
+  expect_oriented(scene, orient(scene, pairs_of(scene)), false, 5, 5);
 }
 
-SimulationOptions aerial(std::int64_t frames) {
+TEST(Orientation, StreetKeepsItsCameraUpright) {
+  const SimulatedBlock free = street(25, {});
+  expect_oriented(free, orient(free, pairs_of(free)), true, 0.1, 1);
+  SceneOptions options;
+  options.gps_sigma_m = 0.5;
+  const SimulatedBlock positioned = street(25, options);
+  expect_oriented(positioned, orient(positioned, pairs_of(positioned)), false, 1.5, 4);
+}
+
+TEST(Orientation, RingAroundAnObject) {
+  const SimulatedBlock scene = ring(30, {});
+  expect_oriented(scene, orient(scene, pairs_of(scene)), true, 0.05, 0.3);
+}
+
+TEST(Orientation, SimulatedStreetOfRigsWithPositions) {
   SimulationOptions options;
-  options.frames = frames;
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 40;
   options.start_position_error_m = options.start_rotation_error_deg = -1;
   options.outlier_share = 0.05;
   options.gps_sigma_m = 3;
-  return options;
+  const SimulatedBlock scene = simulate_block(options);
+  expect_oriented(scene, orient(scene, pairs_of(scene)), false, 3, 3);
 }
 
-SimulationOptions street(std::int64_t frames) {
-  SimulationOptions options = aerial(frames);
-  options.scene = SimulationOptions::Scene::kStreet;
-  return options;
+// The same scene with frames, images and tracks in another order.
+struct Permuted {
+  SimulatedBlock scene;
+  std::vector<VerifiedPair> pairs;
+  std::vector<std::int64_t> place;  // of the old frame in the new block
+};
+
+Permuted permuted(const SimulatedBlock& scene, std::vector<VerifiedPair> pairs) {
+  Permuted result{scene, {}, {}};
+  std::mt19937_64 random(8);
+  const std::size_t count = scene.block.frames.size();
+  result.place.resize(count);
+  std::iota(result.place.begin(), result.place.end(), 0);
+  std::shuffle(result.place.begin(), result.place.end(), random);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto from = static_cast<std::int64_t>(i);
+    const std::int64_t to = result.place[i];
+    result.scene.block.frames[FrameIndex(to)] = scene.block.frames[FrameIndex(from)];
+    result.scene.block.images[ImageIndex(to)] = scene.block.images[ImageIndex(from)];
+    result.scene.block.images[ImageIndex(to)].frame = FrameIndex(to);
+    result.scene.truth.frames[FrameIndex(to)] = scene.truth.frames[FrameIndex(from)];
+  }
+  std::vector<std::size_t> order(scene.tracks.id.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::shuffle(order.begin(), order.end(), random);
+  TrackSet& tracks = result.scene.tracks;
+  tracks = {};
+  tracks.begin = {0};
+  for (std::size_t t : order) {
+    std::vector<std::array<std::int64_t, 3>> rows;
+    for (auto o = static_cast<std::size_t>(scene.tracks.begin[t]);
+         o < static_cast<std::size_t>(scene.tracks.begin[t + 1]); ++o)
+      rows.push_back(
+          {result.place[static_cast<std::size_t>(scene.tracks.image[o].value)], scene.tracks.x[o], scene.tracks.y[o]});
+    std::sort(rows.begin(), rows.end());
+    for (const auto& [image, x, y] : rows) {
+      tracks.image.push_back(ImageIndex(image));
+      tracks.x.push_back(static_cast<std::int32_t>(x));
+      tracks.y.push_back(static_cast<std::int32_t>(y));
+      tracks.feature.push_back(-1);
+    }
+    tracks.id.push_back(TrackIndex(tracks.track_count()));
+    tracks.begin.push_back(tracks.observation_count());
+  }
+  std::shuffle(pairs.begin(), pairs.end(), random);
+  for (VerifiedPair& pair : pairs) {
+    pair.a = ImageIndex(result.place[static_cast<std::size_t>(pair.a.value)]);
+    pair.b = ImageIndex(result.place[static_cast<std::size_t>(pair.b.value)]);
+    if (pair.a < pair.b) continue;
+    std::swap(pair.a, pair.b);
+    const auto& q = pair.rotation_wxyz;
+    const Eigen::Quaterniond back(q[0], -q[1], -q[2], -q[3]);
+    const Eigen::Vector3d t = -(back * Eigen::Vector3d(pair.translation[0], pair.translation[1], pair.translation[2]));
+    pair.rotation_wxyz = {back.w(), back.x(), back.y(), back.z()};
+    pair.translation = {t.x(), t.y(), t.z()};
+  }
+  result.pairs = std::move(pairs);
+  return result;
 }
 
-TEST(Orientation, AerialBlockWithPositions) {
-  const SimulatedBlock simulated = simulate_block(aerial(40));
-  const auto result = orient(simulated, pairs_of(simulated, {}));
-  const Errors errors = errors_of(simulated, result, false);
-  EXPECT_EQ(errors.oriented, 40u);
-  EXPECT_LT(errors.position_m, 6);
-  EXPECT_LT(errors.rotation_deg, 3);
+TEST(Orientation, DoesNotDependOnTheOrderOfImages) {
+  SceneOptions options;
+  for (double gps : {0.0, 1.0}) {
+    options.gps_sigma_m = gps;
+    for (const SimulatedBlock& scene : {aerial(3, 5, options), ring(20, options)}) {
+      const auto pairs = pairs_of(scene);
+      const Permuted other = permuted(scene, pairs);
+      const auto a = orient(scene, pairs), b = orient(other.scene, other.pairs);
+      for (FrameIndex f : all_frames(scene.block)) {
+        const FrameIndex g(other.place[static_cast<std::size_t>(f.value)]);
+        ASSERT_EQ(a.state.oriented[f], b.state.oriented[g]);
+        EXPECT_LT((a.state.frames[f].centre - b.state.frames[g].centre).norm(), 1e-9) << gps;
+        EXPECT_LT(rotation_angle(a.state.frames[f].rotation, b.state.frames[g].rotation), 1e-9);
+      }
+    }
+  }
 }
 
-TEST(Orientation, AerialBlockWithoutPositions) {
-  SimulationOptions options = aerial(40);
-  options.gps_sigma_m = 0;
-  const SimulatedBlock simulated = simulate_block(options);
-  const auto result = orient(simulated, pairs_of(simulated, {}));
-  const Errors errors = errors_of(simulated, result, true);
-  EXPECT_EQ(errors.oriented, 40u);
-  EXPECT_LT(errors.position_m, 3);
-  EXPECT_LT(errors.rotation_deg, 1);
+TEST(Orientation, PositionsFarOffDoNotMoveTheBlock) {
+  SceneOptions options;
+  options.gps_sigma_m = 1;
+  SimulatedBlock scene = aerial(4, 6, options);
+  scene.block.frames[FrameIndex(3)].position_prior->position += Eigen::Vector3d(10000, 0, 0);
+  scene.block.frames[FrameIndex(11)].position_prior->position += Eigen::Vector3d(0, -300, 50);
+  scene.block.frames[FrameIndex(17)].position_prior.reset();
+  expect_oriented(scene, orient(scene, pairs_of(scene)), false, 2, 2);
 }
 
-TEST(Orientation, StreetWithPositions) {
-  const SimulatedBlock simulated = simulate_block(street(40));
-  const auto result = orient(simulated, pairs_of(simulated, {}));
-  const Errors errors = errors_of(simulated, result, false);
-  EXPECT_EQ(errors.oriented, 40u);
-  EXPECT_LT(errors.position_m, 3);
-  EXPECT_LT(errors.rotation_deg, 3);
+TEST(Orientation, AttitudePriorsTurnAFreeBlock) {
+  SimulatedBlock scene = aerial(3, 6, {});
+  std::mt19937_64 random(6);
+  for (FrameIndex f : all_frames(scene.block)) {
+    auto& prior = scene.block.frames[f].attitude_prior.emplace();
+    prior.rotation_cw = rotation_update(scene.truth.frames[f].rotation, 2 * kDegree * normal_vector(random));
+    prior.sigma_rad.setConstant(2 * kDegree);
+  }
+  const auto result = orient(scene, pairs_of(scene));
+  double largest = 0;
+  for (FrameIndex f : all_frames(scene.block))
+    largest =
+        std::max(largest, rotation_angle(result.state.frames[f].rotation, scene.truth.frames[f].rotation) / kDegree);
+  EXPECT_LT(largest, 2);
 }
 
-TEST(Orientation, StreetOfOneCameraWithoutPositions) {
-  SimulationOptions options = street(40);
-  options.rig_cameras = 1;
-  options.gps_sigma_m = 0;
-  const SimulatedBlock simulated = simulate_block(options);
-  const auto result = orient(simulated, pairs_of(simulated, {}));
-  const Errors errors = errors_of(simulated, result, true);
-  EXPECT_EQ(errors.oriented, 40u);
-  EXPECT_LT(errors.position_m, 1.5);
-  EXPECT_LT(errors.rotation_deg, 1);
+TEST(Orientation, ResectsAnImageWhoseRelativeRotationsAreAllWrong) {
+  const SimulatedBlock scene = aerial(4, 6, {});
+  auto pairs = pairs_of(scene);
+  std::mt19937_64 random(7);
+  for (VerifiedPair& pair : pairs) {
+    if (pair.a.value != 8 && pair.b.value != 8) continue;
+    const Eigen::Quaterniond wrong = rotation_exp<double>(normal_vector(random));
+    pair.rotation_wxyz = {wrong.w(), wrong.x(), wrong.y(), wrong.z()};
+  }
+  expect_oriented(scene, orient(scene, pairs), true, 0.3, 0.3);
+}
+
+TEST(Orientation, GivenPosesStayAndOrientTheOthers) {
+  const SimulatedBlock scene = aerial(4, 6, {});
+  BlockState start = initial_state(scene.block);
+  for (std::int64_t f : {0, 1, 2, 3, 4, 5, 8, 9, 10, 12, 14, 15, 20}) {
+    start.oriented[FrameIndex(f)] = 1;
+    start.frames[FrameIndex(f)] = scene.truth.frames[FrameIndex(f)];
+  }
+  const auto result = orient_component(scene.block, start, all_frames(scene.block), pairs_of(scene), scene.tracks, {});
+  expect_oriented(scene, result, false, 0.5, 0.5);
+  for (FrameIndex f : all_frames(scene.block)) {
+    if (!start.oriented[f]) continue;
+    EXPECT_EQ(result.state.frames[f].centre, start.frames[f].centre);
+    EXPECT_EQ(result.state.frames[f].rotation.coeffs(), start.frames[f].rotation.coeffs());
+  }
+}
+
+TEST(Orientation, ReportsImagesThatNothingLinks) {
+  SimulatedBlock scene = aerial(2, 6, {});
+  scene.block.images.push_back({"alone", "", FrameIndex(12), 0, 0});
+  Frame alone;
+  alone.name = "alone";
+  alone.rig = RigIndex(0);
+  scene.block.frames.push_back(alone);
+  scene.truth.frames.push_back({});
+  const auto result = orient(scene, pairs_of(scene));
+  ASSERT_EQ(result.failed.size(), 1u);
+  EXPECT_EQ(result.failed[0].first, FrameIndex(12));
+  EXPECT_FALSE(result.failed[0].second.empty());
+  EXPECT_EQ(result.state.oriented[FrameIndex(12)], 0);
+  EXPECT_EQ(errors_of(scene, result, true).oriented, 12u);
+}
+
+TEST(Orientation, RefusesWhatCannotBeOriented) {
+  const SimulatedBlock scene = aerial(1, 3, {});
+  EXPECT_THROW(orient(scene, {}), ComputeError);
+  SimulatedBlock empty = scene;
+  empty.tracks = {};
+  empty.tracks.begin = {0};
+  EXPECT_THROW(orient(empty, pairs_of(scene)), ComputeError);
+  OrientationOptions bad;
+  bad.max_rotation_error_deg = -1;
+  EXPECT_THROW(
+      orient_component(scene.block, initial_state(scene.block), all_frames(scene.block), {}, scene.tracks, bad),
+      InputError);
 }
 
 }  // namespace
