@@ -54,10 +54,11 @@ SimulatedBlock simulate_block(const SimulationOptions& options);
 
 // Renders the images of a small block (textured terrain and boxes, ray cast, Brown distortion) as JPEG with EXIF GPS
 // into folder/images, and writes the project files around them:
-//   folder/block.yaml, folder/truth.csv and truth.h5 (poses of the images), folder/control.csv (control and check
-//   points, with roles and sigmas), folder/gcp_list.txt (the control points for other programs)
-// The cameras of a rig become images of their own, each with its pose. Attitude priors, relative poses and given poses
-// have no place in image headers and are not written.
+//   folder/block.yaml, folder/truth.csv and truth.h5 (poses of the frames), folder/control.csv (control and check
+//   points, with roles and sigmas), folder/gcp_list.txt (the control points for other programs), folder/poses.csv (the
+//   given poses; block.yaml does not use them), folder/rig_cameras.json and rig_assignments.json (street: the rig,
+//   held)
+// Attitude priors and relative poses have no place in these files and are not written.
 void write_rendered_block(const SimulationOptions& options, const std::string& folder);
 // The tie-point level: folder/block.yaml (with `tie_points: tie_points.h5`, `block: given.h5`), truth.csv, truth.h5.
 void write_simulated_block(const SimulatedBlock& simulated, const std::string& folder);

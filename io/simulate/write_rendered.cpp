@@ -1,8 +1,9 @@
-// A simulated block as pictures with the project files around them. Every image is a frame of its own there: the truth
-// names images and gives the poses of the single cameras.
+// A simulated block as pictures with the project files around them.
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "io/control_file.h"
 #include "io/crs.h"
@@ -32,17 +33,6 @@ Pose image_pose(const Layout& layout, ImageIndex image) {
   return camera_pose(layout.truth.frames[entry.frame], layout.truth.mounts[rig][static_cast<std::size_t>(entry.mount)]);
 }
 
-// The position an image's header states: its own projection centre with the error of the frame's prior.
-std::optional<Geodetic> stated_position(const Layout& layout, const Block& with_priors, ImageIndex image,
-                                        const Georeference& georeference) {
-  const FrameIndex frame = with_priors.images[image].frame;
-  const auto& prior = with_priors.frames[frame].position_prior;
-  if (!prior) return std::nullopt;
-  const Pose& pose = layout.truth.frames[frame];
-  const Eigen::Vector3d antenna = pose.centre + pose.rotation.conjugate() * prior->lever_arm;
-  return georeference.to_geodetic(image_pose(layout, image).centre + prior->position - antenna);
-}
-
 void write_images(const SimulationOptions& options, const Layout& layout, const Block& with_priors,
                   const fs::path& folder) {
   const auto& city = dynamic_cast<const City&>(*layout.scene);
@@ -61,30 +51,48 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
       exif.model = "Simulated " + layout.block.cameras[camera].name;
       exif.focal_px = layout.block.cameras[camera].intrinsics[kFocal];
       exif.time_s = layout.block.frames[layout.block.images[image].frame].time_s;
-      exif.position = stated_position(layout, with_priors, image, georeference);
+      const auto& prior = with_priors.frames[with_priors.images[image].frame].position_prior;
+      if (prior) exif.position = georeference.to_geodetic(prior->position);  // of the antenna
       exif.position_sigma_m = options.gps_sigma_m;
       write_jpeg((folder / layout.block.images[image].name).string(), picture, exif);
     }
   }
 }
 
-// Poses of the images, as frames of their own.
-void write_truth(const Layout& layout, const fs::path& folder) {
-  PoseTable table;
-  table.ground = layout.block.ground;
-  BlockState state;
-  state.cameras = layout.truth.cameras;
-  for (std::size_t c = 0; c < state.cameras.size(); ++c) state.mounts.push_back({Pose()});
-  for (std::size_t i = 0; i < layout.block.images.size(); ++i) {
-    const ImageIndex image(static_cast<std::int64_t>(i));
-    table.names.push_back(layout.block.images[image].name);
-    table.poses.push_back(image_pose(layout, image));
-    table.passes.push_back(layout.block.frames[layout.block.images[image].frame].pass);
-    state.frames.push_back(table.poses.back());
-    state.oriented.push_back(1);
+bool has_rig(const Block& block) { return block.rigs.front().mounts.size() > 1; }
+
+void write_text(const fs::path& path, const std::string& text) {
+  std::ofstream stream(path);
+  stream << text << '\n';
+  stream.close();
+  if (!stream) throw InputError(path.string() + ": cannot be written");
+}
+
+// OpenSfM's description of a rig: X_camera = R X_rig + t, and which images were exposed together.
+void write_rig(const Block& block, const fs::path& root) {
+  nlohmann::ordered_json cameras, assignments;
+  for (const Mount& mount : block.rigs.front().mounts) {
+    const Eigen::Vector3d rotation = rotation_log<double>(mount.pose.rotation);
+    const Eigen::Vector3d translation = -(mount.pose.rotation * mount.pose.centre);
+    cameras[block.cameras[mount.camera].name] = {{"rotation", {rotation.x(), rotation.y(), rotation.z()}},
+                                                 {"translation", {translation.x(), translation.y(), translation.z()}}};
   }
-  write_pose_csv((folder / "truth.csv").string(), table);
-  write_state((folder / "truth.h5").string(), state);
+  for (std::size_t i = 0; i < block.images.size(); ++i) {
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    assignments[block.frames[block.images[image].frame].name].push_back(
+        {block.images[image].name, block.cameras[block.camera_of(image)].name});
+  }
+  write_text(root / "rig_cameras.json", cameras.dump(2));
+  write_text(root / "rig_assignments.json", assignments.dump(2));
+}
+
+// The given poses, for those who want to start from them.
+bool write_poses(const Block& block, const fs::path& path) {
+  const BlockState start = initial_state(block);
+  const PoseTable table = pose_table(block, start);
+  if (table.names.empty()) return false;
+  write_pose_csv(path.string(), table);
+  return true;
 }
 
 // The control points (without the check points) in the form that other programs read: longitude, latitude, ellipsoidal
@@ -105,15 +113,15 @@ void write_gcp_list(const Block& block, const fs::path& path) {
   if (!stream) throw InputError(path.string() + ": cannot be written");
 }
 
-void write_cameras(const SimulationOptions& options, const Layout& layout, std::ostream& yaml) {
+void write_cameras(const SimulationOptions& options, const Block& block, std::ostream& yaml) {
   if (options.calibrate) return;  // the headers of the images say enough
-  yaml << "cameras:\n  grouping: " << (layout.block.cameras.size() > 1 ? "exif" : "one") << '\n';
-  for (std::size_t c = 0; c < layout.block.cameras.size(); ++c) {
-    const Camera& camera = layout.block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
+  yaml << "cameras:\n  grouping: " << (block.cameras.size() > 1 ? "exif" : "one") << '\n';
+  for (std::size_t c = 0; c < block.cameras.size(); ++c) {
+    const Camera& camera = block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
     const Intrinsics& k = camera.intrinsics;
     std::ostringstream focal_mm;
     focal_mm << std::fixed << std::setprecision(2) << k[kFocal] * 10 / std::max(camera.width, camera.height);
-    if (layout.block.cameras.size() > 1)
+    if (block.cameras.size() > 1)
       yaml << "  \"Megablock Simulated " << camera.name << ' ' << camera.width << 'x' << camera.height << ' '
            << focal_mm.str() << "mm\":\n";
     else
@@ -124,19 +132,34 @@ void write_cameras(const SimulationOptions& options, const Layout& layout, std::
   }
 }
 
-void write_project(const SimulationOptions& options, const Layout& layout, bool with_control, const fs::path& path) {
-  const GroundFrame& ground = layout.block.ground;
-  std::ofstream yaml(path);
+// Which of the optional files there are.
+struct Written {
+  bool control, poses;
+};
+
+void write_project(const SimulationOptions& options, const Block& block, const Written& written, const fs::path& path) {
+  const GroundFrame& ground = block.ground;
+  std::ostringstream yaml;
   yaml << std::setprecision(12) << "# A rendered block; the truth is in truth.csv (poses) and truth.h5.\n"
        << "images: images\n"
        << "origin: [" << ground.latitude_deg << ", " << ground.longitude_deg << ", " << ground.height_m << "]\n";
-  if (options.gps_sigma_m > 0)
+  if (options.gps_sigma_m > 0) {
     yaml << "gps:\n  sigma_horizontal_m: " << options.gps_sigma_m << "\n  sigma_vertical_m: " << options.gps_sigma_m
          << '\n';
-  if (with_control) yaml << "control: control.csv\n";
-  write_cameras(options, layout, yaml);
-  yaml.close();
-  if (!yaml) throw InputError(path.string() + ": cannot be written");
+    for (const Frame& frame : block.frames) {
+      if (!frame.position_prior) continue;
+      const Eigen::Vector3d& arm = frame.position_prior->lever_arm;
+      if (!arm.isZero()) yaml << "  lever_arm_m: [" << arm.x() << ", " << arm.y() << ", " << arm.z() << "]\n";
+      break;
+    }
+  }
+  if (has_rig(block))
+    yaml << "rigs:\n  cameras: rig_cameras.json\n  assignments: rig_assignments.json\n"
+         << "  sigma_position_m: 0  # held\n  sigma_rotation_deg: 0\n";
+  if (written.control) yaml << "control: control.csv\n";
+  if (written.poses) yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
+  write_cameras(options, block, yaml);
+  write_text(path, yaml.str());
 }
 
 }  // namespace
@@ -154,13 +177,17 @@ void write_rendered_block(const SimulationOptions& options, const std::string& f
   simulate_control(options, layout, simulated);
   simulate_priors(options, simulated);
   write_images(options, layout, simulated.block, root / "images");
-  write_truth(layout, root);
-  const bool with_control = !simulated.block.control_points.empty();
-  if (with_control) {
+  write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
+  write_state((root / "truth.h5").string(), simulated.truth);
+  if (has_rig(simulated.block)) write_rig(simulated.block, root);
+  Written written{};
+  written.poses = write_poses(simulated.block, root / "poses.csv");
+  written.control = !simulated.block.control_points.empty();
+  if (written.control) {
     write_control_csv((root / "control.csv").string(), simulated.block);
     write_gcp_list(simulated.block, root / "gcp_list.txt");
   }
-  write_project(options, layout, with_control, root / "block.yaml");
+  write_project(options, simulated.block, written, root / "block.yaml");
 }
 
 }  // namespace megablock

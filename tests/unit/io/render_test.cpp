@@ -159,7 +159,8 @@ TEST_P(RenderTest, FilesAreAProject) {
   fs::remove_all(folder);
   write_rendered_block(options_, folder.string());
   const Project project = read_project((folder / "block.yaml").string());
-  ASSERT_EQ(std::ssize(project.block.frames), options_.frames * (street ? options_.rig_cameras : 1));
+  ASSERT_EQ(std::ssize(project.block.frames), options_.frames);
+  ASSERT_EQ(std::ssize(project.block.images), options_.frames * (street ? options_.rig_cameras : 1));
   EXPECT_TRUE(project.unreadable.empty());
   EXPECT_TRUE(project.warnings.empty());
   ASSERT_EQ(std::ssize(project.block.cameras), street ? options_.rig_cameras : 1);
@@ -180,12 +181,29 @@ TEST_P(RenderTest, FilesAreAProject) {
     EXPECT_EQ(truth.poses[f].centre, state.frames[FrameIndex(static_cast<std::int64_t>(f))].centre);
     ASSERT_TRUE(frame.position_prior);
     EXPECT_NEAR(frame.position_prior->sigma.z(), options_.gps_sigma_m, 1e-12);
-    const Eigen::Vector3d error = frame.position_prior->position - truth.poses[f].centre;
+    const PositionPrior& prior = *frame.position_prior;
+    const Pose& pose = truth.poses[f];
+    const Eigen::Vector3d error = prior.position - pose.centre - pose.rotation.conjugate() * prior.lever_arm;
     EXPECT_LT(error.norm(), 5 * options_.gps_sigma_m);
     sum += error.squaredNorm();
   }
   EXPECT_GT(std::sqrt(sum / static_cast<double>(3 * truth.names.size())), 0.4 * options_.gps_sigma_m);
-  const std::string image = (folder / "images" / truth.names[3]).string();
+  ASSERT_EQ(std::ssize(project.block.rigs), 1);
+  for (std::size_t m = 0; m < project.block.rigs.front().mounts.size(); ++m) {
+    const Mount& mount = project.block.rigs.front().mounts[m];
+    EXPECT_TRUE(mount.held());
+    EXPECT_LT((mount.pose.centre - state.mounts.front()[m].centre).norm(), 1e-12);
+    EXPECT_LT(rotation_angle(mount.pose.rotation, state.mounts.front()[m].rotation), 1e-12);
+  }
+  // The approximate poses can be used in place of the images.
+  std::ofstream(folder / "block.yaml", std::ios::app) << "poses: poses.csv\n";
+  const Block with_poses = read_project((folder / "block.yaml").string()).block;
+  for (std::size_t f = 0; f < truth.names.size(); ++f) {
+    const Frame& frame = with_poses.frames[FrameIndex(static_cast<std::int64_t>(f))];
+    ASSERT_TRUE(frame.given_pose);
+    EXPECT_LT((frame.given_pose->centre - truth.poses[f].centre).norm(), 5 * options_.start_position_error_m);
+  }
+  const std::string image = (folder / "images" / project.block.images[ImageIndex(3)].name).string();
   const std::uint64_t before = hash_file(image);
   write_rendered_block(options_, folder.string());
   EXPECT_EQ(hash_file(image), before);
@@ -204,14 +222,20 @@ TEST_P(RenderTest, ControlFitsTheTruth) {
   write_rendered_block(options_, folder.string());
   const BlockState truth = read_state((folder / "truth.h5").string());
   for (const std::string file : {"control.csv", "gcp_list.txt"}) {
-    std::ofstream(folder / "block.yaml") << "images: images\norigin: [48.85, 2.35, 100]\ncontrol: " << file << "\n";
+    std::ofstream(folder / "block.yaml") << "images: images\norigin: [48.85, 2.35, 100]\n"
+                                         << "control: " << file << "\n"
+                                         << (truth.mounts.front().size() > 1 ? "rigs: {cameras: rig_cameras.json, "
+                                                                               "assignments: rig_assignments.json}\n"
+                                                                             : "");
     const Block block = read_project((folder / "block.yaml").string()).block;
     double chi2 = 0, n = 0;
     std::int64_t control = 0;
     for (const ControlPoint& point : block.control_points) {
       control += point.role == PointRole::kControl;
       for (const ImageMeasurement& m : point.measurements) {
-        const Pose& pose = truth.frames[block.images[m.image].frame];
+        const Image& image = block.images[m.image];
+        const auto& mounts = truth.mounts[block.frames[image.frame].rig];
+        const Pose pose = camera_pose(truth.frames[image.frame], mounts[static_cast<std::size_t>(image.mount)]);
         const Eigen::Vector2d seen = project(truth.cameras[block.camera_of(m.image)], to_inside(pose, point.position));
         chi2 += ((seen - m.pixel) / options_.image_noise_px).squaredNorm();
         n += 2;
