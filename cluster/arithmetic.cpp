@@ -20,11 +20,20 @@ struct Setting {
 constexpr Setting kSettings[] = {
     {"OPENBLAS_CORETYPE", "Haswell"},
     {"OPENBLAS_NUM_THREADS", "1"},
-    {"OPENCV_CPU_DISABLE", "AVX512_COMMON,AVX512_SKX,AVX512_KNL,AVX512_KNM,AVX512_CNL,AVX512_CLX,AVX512_ICL"},
     {"OPENCV_IPP", "disabled"},
     // Large images: keep malloc from returning and re-faulting pages between features of one image and the next.
     {"GLIBC_TUNABLES", "glibc.malloc.mmap_threshold=1073741824:glibc.malloc.trim_threshold=2147483648"},
 };
+// Named only where the processor has it: OpenCV complains of features it cannot disable.
+constexpr Setting kWithoutAvx512 = {"OPENCV_CPU_DISABLE", "AVX512-SKX"};
+
+// True when it was so already.
+bool set(const Setting& setting) {
+  const char* present = std::getenv(setting.name);
+  if (present != nullptr && std::strcmp(present, setting.value) == 0) return true;
+  setenv(setting.name, setting.value, 1);
+  return false;
+}
 
 }  // namespace
 
@@ -32,12 +41,8 @@ void pin_arithmetic(char** argv) {
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma"))
     throw InputError("this processor has no AVX2/FMA; jobs use the arithmetic level avx2: run on a newer processor");
   bool pinned = true;
-  for (const Setting& setting : kSettings) {
-    const char* present = std::getenv(setting.name);
-    if (present != nullptr && std::strcmp(present, setting.value) == 0) continue;
-    setenv(setting.name, setting.value, 1);
-    pinned = false;
-  }
+  for (const Setting& setting : kSettings) pinned = set(setting) && pinned;
+  if (__builtin_cpu_supports("avx512f")) pinned = set(kWithoutAvx512) && pinned;
   if (pinned) return;
   execv("/proc/self/exe", argv);  // returns only when it failed: go on unpinned rather than not at all
 }

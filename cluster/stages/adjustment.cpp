@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "adjust/tile_adjustment.h"
+#include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -50,17 +51,9 @@ void add_tile_values(Hasher& hasher, const Job& job, const BlockState& state, co
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   for (const FrameIndex f : frames) {
-    const Pose& pose = state.frames[f];
     hasher.add(f.value).add(state.oriented[f]).add(tiles.tile_of_frame[f].value);
-    for (int k = 0; k < 4; ++k) hasher.add(pose.rotation.coeffs()[k]);
-    for (int k = 0; k < 3; ++k) hasher.add(pose.centre[k]);
-    const Frame& frame = job.block.frames[f];
-    if (frame.position_prior)
-      for (int k = 0; k < 3; ++k)
-        hasher.add(frame.position_prior->position[k]).add(frame.position_prior->sigma[k])
-            .add(frame.position_prior->lever_arm[k]);
-    if (frame.attitude_prior)
-      for (int k = 0; k < 4; ++k) hasher.add(frame.attitude_prior->rotation_cw.coeffs()[k]);
+    add_to_hash(hasher, state.frames[f]);
+    add_priors_to_hash(hasher, job.block.frames[f]);
   }
   for (std::size_t c = 0; c < state.cameras.size(); ++c) {
     const CameraIndex camera(static_cast<std::int64_t>(c));
@@ -69,7 +62,8 @@ void add_tile_values(Hasher& hasher, const Job& job, const BlockState& state, co
   }
   for (const ControlPoint& point : job.block.control_points) {
     hasher.add(point.name).add(point.role);
-    for (int k = 0; k < 3; ++k) hasher.add(point.position[k]).add(point.sigma[k]);
+    add_to_hash(hasher, point.position);
+    add_to_hash(hasher, point.sigma);
     for (const ImageMeasurement& m : point.measurements)
       hasher.add(m.image.value).add(m.pixel.x()).add(m.pixel.y()).add(m.sigma_px);
   }

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
@@ -23,13 +24,15 @@ std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& feature
   add_to_hash(hasher, job.settings.candidates);
   hasher.add(features.image_fingerprint).add(job.generations);
   for (const Image& image : job.block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
+  for (const Camera& camera : job.block.cameras)
+    hasher.add(camera.width).add(camera.height).add(camera.intrinsics[kFocal]);
+  for (const Rig& rig : job.block.rigs)
+    for (const Mount& mount : rig.mounts) add_to_hash(hasher, mount.pose);
   for (const Frame& frame : job.block.frames) {
-    hasher.add(frame.name).add(frame.pass).add(frame.time_s);
-    if (frame.position_prior)
-      for (int i = 0; i < 3; ++i) hasher.add(frame.position_prior->position[i]).add(frame.position_prior->sigma[i]);
-    if (frame.attitude_prior) hasher.add(frame.attitude_prior->rotation_cw.w()).add(frame.attitude_prior->rotation_cw.z());
-    if (frame.given_pose)
-      for (int i = 0; i < 3; ++i) hasher.add(frame.given_pose->centre[i]);
+    hasher.add(frame.name).add(frame.pass).add(frame.time_s).add(frame.rig.value);
+    if (frame.position_prior) add_to_hash(hasher.add('p'), *frame.position_prior);
+    if (frame.attitude_prior) add_to_hash(hasher.add('a'), *frame.attitude_prior);
+    if (frame.given_pose) add_to_hash(hasher.add('g'), *frame.given_pose);
   }
   return hasher.value();
 }

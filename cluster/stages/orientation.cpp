@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -21,18 +22,8 @@ void add_block_values(Hasher& hasher, const Block& block, std::int64_t images) {
     const Image& image = block.images[ImageIndex(i)];
     hasher.add(image.frame.value).add(image.mount).add(block.camera_of(ImageIndex(i)).value);
     const Frame& frame = block.frames[image.frame];
-    if (frame.position_prior)
-      for (int k = 0; k < 3; ++k)
-        hasher.add(frame.position_prior->position[k]).add(frame.position_prior->sigma[k])
-            .add(frame.position_prior->lever_arm[k]);
-    if (frame.attitude_prior) {
-      for (int k = 0; k < 4; ++k) hasher.add(frame.attitude_prior->rotation_cw.coeffs()[k]);
-      for (int k = 0; k < 3; ++k) hasher.add(frame.attitude_prior->sigma_rad[k]);
-    }
-    if (frame.given_pose) {
-      for (int k = 0; k < 4; ++k) hasher.add(frame.given_pose->rotation.coeffs()[k]);
-      for (int k = 0; k < 3; ++k) hasher.add(frame.given_pose->centre[k]);
-    }
+    add_priors_to_hash(hasher, frame);
+    if (frame.given_pose) add_to_hash(hasher, *frame.given_pose);
   }
   for (const Camera& camera : block.cameras) {
     for (const double value : camera.intrinsics) hasher.add(value);
