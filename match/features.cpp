@@ -16,9 +16,7 @@ namespace megablock {
 namespace {
 
 // OpenCV's own threads would make the result of a unit depend on the machine; the caller runs units in parallel.
-void use_one_opencv_thread() {
-  [[maybe_unused]] static const bool done = (cv::setNumThreads(1), true);
-}
+void use_one_opencv_thread() { [[maybe_unused]] static const bool done = (cv::setNumThreads(1), true); }
 
 // The image SIFT sees: reduced when it is larger than asked for.
 struct ReducedImage {
@@ -45,7 +43,6 @@ constexpr double kSiftOffset = 0.25;
 
 struct Detection {
   Keypoint keypoint;
-  float response;
   int row;  // of the descriptor matrix
 };
 
@@ -72,18 +69,17 @@ auto position_key(const Detection& d) {
   return std::tuple(-d.keypoint.scale_px, d.keypoint.x, d.keypoint.y, d.keypoint.angle_deg, d.row);
 }
 
-// Keeps `limit` detections: every grid cell gives its strongest in turn (first all the strongest, then all the second
-// strongest ...) until the limit is reached, the last round by response.
+// Keeps `limit` detections: every grid cell gives its largest in turn (first all the largest, then all the second
+// largest ...) until the limit is reached. Large regions are found again from another place far more often than
+// strong small ones (foliage: half as many matches again).
 void keep_evenly(std::vector<Detection>& detections, int limit, int width, int height) {
   if (limit == 0 || detections.size() <= static_cast<std::size_t>(limit)) return;
   constexpr int kFeaturesPerCell = 40;
   const Grid grid(width, height, std::max(1, limit / kFeaturesPerCell));
-  std::sort(detections.begin(), detections.end(), [](const Detection& a, const Detection& b) {
-    if (a.response != b.response) return a.response > b.response;
-    return position_key(a) < position_key(b);
-  });
+  std::sort(detections.begin(), detections.end(),
+            [](const Detection& a, const Detection& b) { return position_key(a) < position_key(b); });
   std::vector<int> count(grid.size(), 0);
-  std::vector<std::pair<int, std::size_t>> order(detections.size());  // (round in its cell, rank by response)
+  std::vector<std::pair<int, std::size_t>> order(detections.size());  // (round in its cell, rank by size)
   for (std::size_t i = 0; i < detections.size(); ++i) order[i] = {count[grid.cell(detections[i].keypoint)]++, i};
   std::sort(order.begin(), order.end());
   std::vector<Detection> kept(static_cast<std::size_t>(limit));
@@ -133,7 +129,6 @@ std::vector<Detection> detect(const ReducedImage& image, const cv::Mat& mask, co
     d.keypoint.y = to_fixed_pixel((f.pt.y + kSiftOffset) * image.scale_y);
     d.keypoint.scale_px = static_cast<float>(f.size * std::sqrt(image.scale_x * image.scale_y));
     d.keypoint.angle_deg = f.angle;
-    d.response = f.response;
     d.row = static_cast<int>(i);
     if (!is_masked(mask, d.keypoint)) detections.push_back(d);
   }

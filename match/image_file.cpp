@@ -1,8 +1,10 @@
 #include "match/image_file.h"
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <system_error>
 #include <vector>
 
 namespace megablock {
@@ -38,8 +40,9 @@ std::size_t end_of_scan(std::span<const unsigned char> file, std::size_t at) {
 }
 
 bool read_bytes(const std::string& path, std::vector<unsigned char>& bytes) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;
   std::ifstream stream(path, std::ios::binary | std::ios::ate);
-  if (!stream) return false;
   const std::streamoff size = stream.tellg();
   if (size < 0) return false;
   bytes.resize(static_cast<std::size_t>(size));

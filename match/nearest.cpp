@@ -49,7 +49,8 @@ std::vector<std::int32_t> squared_norms(const std::vector<SiftDescriptor>& descr
 std::vector<std::int16_t> pack_rows(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
   std::vector<std::int16_t> packed(padded * kDimension, 0);
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    std::copy(descriptors[i].begin(), descriptors[i].end(), packed.begin() + static_cast<std::ptrdiff_t>(i * kDimension));
+    std::copy(descriptors[i].begin(), descriptors[i].end(),
+              packed.begin() + static_cast<std::ptrdiff_t>(i * kDimension));
   }
   return packed;
 }
@@ -86,8 +87,17 @@ MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const 
   const std::vector<std::int32_t> norm_a = squared_norms(a, rows), norm_b = squared_norms(b, columns);
   std::vector<std::int32_t> row_distance(rows * k, Neighbours::kFar), row_index(rows * k, -1);
   std::vector<std::int32_t> column_distance(columns * k, Neighbours::kFar), column_index(columns * k, -1);
-  const Problem problem{rows, columns, packed_a.data(), packed_b.data(), norm_a.data(), norm_b.data(), k,
-                        row_distance.data(), row_index.data(), column_distance.data(), column_index.data()};
+  const Problem problem{rows,
+                        columns,
+                        packed_a.data(),
+                        packed_b.data(),
+                        norm_a.data(),
+                        norm_b.data(),
+                        k,
+                        row_distance.data(),
+                        row_index.data(),
+                        column_distance.data(),
+                        column_index.data()};
   if (!portable && __builtin_cpu_supports("avx2")) {
     run_avx2(problem);
   } else {

@@ -46,8 +46,8 @@ void tile(const Problem& p, std::size_t row, std::size_t column) {
       const __m256i twice = _mm256_slli_epi32(sum[r][h], 1);
       const __m256i value = _mm256_sub_epi32(_mm256_add_epi32(norm, load(p.norm_b + column + 8 * h)), twice);
       _mm256_store_si256(reinterpret_cast<__m256i*>(distance[r] + 8 * h), value);
-      const __m256i nearer = _mm256_or_si256(_mm256_cmpgt_epi32(worst_row, value),
-                                             _mm256_cmpgt_epi32(load(worst_column + 8 * h), value));
+      const __m256i nearer =
+          _mm256_or_si256(_mm256_cmpgt_epi32(worst_row, value), _mm256_cmpgt_epi32(load(worst_column + 8 * h), value));
       candidates[r] |= static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(nearer))) << (8 * h);
     }
     any |= candidates[r];

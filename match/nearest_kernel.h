@@ -13,9 +13,9 @@ namespace megablock::nearest_kernel {
 inline constexpr std::size_t kDimension = 128, kRowTile = 4, kColumnTile = 16, kRowBlock = 64;
 
 struct Problem {
-  std::size_t rows, columns;    // multiples of kRowTile and kColumnTile; the padding's norm is Neighbours::kFar
-  const std::int16_t* a;        // [rows][kDimension]
-  const std::int16_t* b;        // [columns / kColumnTile][kDimension / 2][kColumnTile][2]
+  std::size_t rows, columns;            // multiples of kRowTile and kColumnTile; the padding's norm is Neighbours::kFar
+  const std::int16_t* a;                // [rows][kDimension]
+  const std::int16_t* b;                // [columns / kColumnTile][kDimension / 2][kColumnTile][2]
   const std::int32_t *norm_a, *norm_b;  // squared norms
   std::size_t k;
   // Nearest first; all distances start at Neighbours::kFar, all indices at -1.
@@ -39,8 +39,7 @@ inline void insert(std::int32_t* distances, std::int32_t* indices, std::size_t s
 
 inline void insert_both(const Problem& p, std::size_t row, std::size_t column, std::int32_t distance) {
   insert(p.row_distance + row * p.k, p.row_index + row * p.k, 1, p.k, distance, static_cast<std::int32_t>(column));
-  insert(p.column_distance + column, p.column_index + column, p.columns, p.k, distance,
-         static_cast<std::int32_t>(row));
+  insert(p.column_distance + column, p.column_index + column, p.columns, p.k, distance, static_cast<std::int32_t>(row));
 }
 
 void run_portable(const Problem& problem);

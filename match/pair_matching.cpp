@@ -73,9 +73,7 @@ PositionedMatches position(const Matches& matches, const ImageFeatures& a, const
   return result;
 }
 
-std::uint64_t pair_seed(ImageIndex a, ImageIndex b) {
-  return Hasher().add(a.value).add(b.value).value();
-}
+std::uint64_t pair_seed(ImageIndex a, ImageIndex b) { return Hasher().add(a.value).add(b.value).value(); }
 
 }  // namespace
 

@@ -32,7 +32,8 @@ Linearised linearise(const RelativePoseEstimate& pose, const PointPairs& points,
   const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
   const Eigen::Matrix3d essential = skew<double>(pose.translation) * rotation;
   std::array<Eigen::Matrix3d, 5> derivative;
-  for (int i = 0; i < 3; ++i) derivative[static_cast<std::size_t>(i)] = essential * skew<double>(Eigen::Vector3d::Unit(i));
+  for (int i = 0; i < 3; ++i)
+    derivative[static_cast<std::size_t>(i)] = essential * skew<double>(Eigen::Vector3d::Unit(i));
   const auto basis = tangent_basis(pose.translation);
   for (std::size_t i = 0; i < 2; ++i) derivative[3 + i] = skew<double>(basis[i]) * rotation;
 
@@ -106,8 +107,8 @@ std::vector<RelativePoseEstimate> decompose_essential(const Eigen::Matrix3d& ess
   Eigen::Matrix3d quarter;
   quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   std::vector<RelativePoseEstimate> poses;
-  for (const Eigen::Matrix3d& rotation : {Eigen::Matrix3d(u * quarter * v.transpose()),
-                                          Eigen::Matrix3d(u * quarter.transpose() * v.transpose())}) {
+  for (const Eigen::Matrix3d& rotation :
+       {Eigen::Matrix3d(u * quarter * v.transpose()), Eigen::Matrix3d(u * quarter.transpose() * v.transpose())}) {
     for (const double sign : {1.0, -1.0}) {
       poses.push_back({Eigen::Quaterniond(rotation).normalized(), sign * u.col(2)});
     }
@@ -152,9 +153,8 @@ Support support_of_fundamental(const Eigen::Matrix3d& fundamental, const PointPa
   return support;
 }
 
-RelativePoseEstimate refine(const RelativePoseEstimate& start, const PointPairs& points, double max_residual) {
+RelativePoseEstimate refine(const RelativePoseEstimate& start, const PointPairs& points, double scale) {
   constexpr int kMaxIterations = 30;
-  const double scale = max_residual / 2;
   RelativePoseEstimate pose = start;
   Linearised current = linearise(pose, points, scale);
   double damping = 1e-6;

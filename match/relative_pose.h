@@ -41,8 +41,8 @@ Support support_of(const RelativePoseEstimate& pose, const PointPairs& points, d
 Support support_of_rotation(const Eigen::Quaterniond& rotation, const PointPairs& points, double max_residual);
 Support support_of_fundamental(const Eigen::Matrix3d& fundamental, const PointPairs& points, double max_residual);
 
-// Gauss-Newton with Geman-McClure weights over all matches within reach, to convergence.
-RelativePoseEstimate refine(const RelativePoseEstimate& start, const PointPairs& points, double max_residual);
+// Gauss-Newton on the Sampson residuals with Geman-McClure weights 1 / (1 + (r / scale)^2)^2, to convergence.
+RelativePoseEstimate refine(const RelativePoseEstimate& start, const PointPairs& points, double scale);
 
 // Rotation by least squares over the given matches (Kabsch on unit rays).
 Eigen::Quaterniond fit_rotation(const PointPairs& points, const std::vector<std::size_t>& rows);

@@ -96,9 +96,8 @@ std::vector<std::vector<std::int32_t>> rows_by_position(
       const Keypoint& k = points[static_cast<std::size_t>(i)];
       return std::pair(k.x, k.y);
     };
-    std::sort(order.begin(), order.end(), [&](std::int32_t i, std::int32_t j) {
-      return std::pair(position(i), i) < std::pair(position(j), j);
-    });
+    std::sort(order.begin(), order.end(),
+              [&](std::int32_t i, std::int32_t j) { return std::pair(position(i), i) < std::pair(position(j), j); });
     result[image].resize(points.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
       const bool repeats = i > 0 && position(order[i]) == position(order[i - 1]);
@@ -117,9 +116,8 @@ void check_pair(const VerifiedPair& pair, const IndexedVector<ImageIndex, std::v
   if (!keypoints.contains(pair.a) || !keypoints.contains(pair.b) || pair.a == pair.b) complain("no such image pair");
   if (pair.feature_a.size() != pair.feature_b.size()) complain("columns of different length");
   const auto outside = [](const std::vector<std::int32_t>& rows, std::size_t count) {
-    return std::any_of(rows.begin(), rows.end(), [&](std::int32_t r) {
-      return r < 0 || static_cast<std::size_t>(r) >= count;
-    });
+    return std::any_of(rows.begin(), rows.end(),
+                       [&](std::int32_t r) { return r < 0 || static_cast<std::size_t>(r) >= count; });
   };
   if (outside(pair.feature_a, keypoints[pair.a].size()) || outside(pair.feature_b, keypoints[pair.b].size())) {
     complain("a feature does not exist");
@@ -144,7 +142,8 @@ TrackSet build_tracks(const IndexedVector<ImageIndex, std::vector<Keypoint>>& ke
                       const std::vector<VerifiedPair>& pairs, const TrackOptions& options) {
   if (options.min_length < 2) throw InputError("min_length of tracks must be at least 2");
   std::vector<std::int64_t> image_begin{0};
-  for (const auto& points : keypoints) image_begin.push_back(image_begin.back() + static_cast<std::int64_t>(points.size()));
+  for (const auto& points : keypoints)
+    image_begin.push_back(image_begin.back() + static_cast<std::int64_t>(points.size()));
   FeatureSets sets(std::move(image_begin));
   const auto canonical = rows_by_position(keypoints);
 

@@ -1,9 +1,11 @@
 #include "match/two_view.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <optional>
@@ -18,13 +20,10 @@ namespace {
 // OpenCV's robust estimators expect pixels; normalised points are given a nominal focal length.
 constexpr double kNominalFocal = 1000;
 
-std::vector<cv::Point2d> nominal_pixels(const std::vector<Eigen::Vector2d>& points,
-                                        const std::vector<std::uint8_t>* chosen = nullptr) {
+std::vector<cv::Point2d> nominal_pixels(const std::vector<Eigen::Vector2d>& points) {
   std::vector<cv::Point2d> result;
   result.reserve(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!chosen || (*chosen)[i]) result.emplace_back(points[i].x() * kNominalFocal, points[i].y() * kNominalFocal);
-  }
+  for (const auto& p : points) result.emplace_back(p.x() * kNominalFocal, p.y() * kNominalFocal);
   return result;
 }
 
@@ -82,11 +81,9 @@ std::optional<Eigen::Matrix3d> robust_fundamental(const PointPairs& points, cons
   return f;
 }
 
-// Homography of the chosen matches, normalised coordinates, x_b ~ H x_a.
-std::optional<Eigen::Matrix3d> robust_homography(const PointPairs& points, const std::vector<std::uint8_t>* chosen,
-                                                 const TwoViewOptions& options) {
-  const auto a = nominal_pixels(points.a, chosen), b = nominal_pixels(points.b, chosen);
-  if (a.size() < 8) return std::nullopt;
+// x_b ~ H x_a in normalised coordinates.
+std::optional<Eigen::Matrix3d> robust_homography(const PointPairs& points, const TwoViewOptions& options) {
+  const auto a = nominal_pixels(points.a), b = nominal_pixels(points.b);
   auto h = robust_matrix([&] {
     cv::Mat mask;
     return cv::findHomography(a, b, mask, usac_parameters(options));
@@ -117,7 +114,8 @@ std::vector<RelativePoseEstimate> decompose_homography(const Eigen::Matrix3d& h)
   }
   std::vector<RelativePoseEstimate> poses;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const Eigen::Vector3d t(translations[i].at<double>(0), translations[i].at<double>(1), translations[i].at<double>(2));
+    const Eigen::Vector3d t(translations[i].at<double>(0), translations[i].at<double>(1),
+                            translations[i].at<double>(2));
     if (!(t.norm() > 1e-9)) continue;
     poses.push_back({Eigen::Quaterniond(to_eigen(rotations[i])).normalized(), t.normalized()});
   }
@@ -138,7 +136,7 @@ std::optional<Hypothesis> best_hypothesis(const std::vector<RelativePoseEstimate
                    [](const Hypothesis& p, const Hypothesis& q) { return p.support.score > q.support.score; });
   std::optional<Hypothesis> best;
   for (std::size_t i = 0; i < all.size() && i < 2; ++i) {
-    const RelativePoseEstimate pose = refine(all[i].pose, points, max_residual);
+    const RelativePoseEstimate pose = refine(all[i].pose, points, 0.5 * max_residual);
     Hypothesis refined{pose, support_of(pose, points, max_residual)};
     Hypothesis& better = refined.support.score > all[i].support.score ? refined : all[i];
     if (!best || better.support.score > best->support.score) best = std::move(better);
@@ -160,31 +158,24 @@ struct RotationHypothesis {
 };
 
 // Samples of two matches, then least squares over the inliers until their number stops growing.
-RotationHypothesis robust_rotation(const PointPairs& points, const std::vector<std::size_t>& rows,
-                                   const TwoViewOptions& options) {
-  constexpr int kSamples = 50;
-  PointPairs chosen;
-  for (const std::size_t i : rows) {
-    chosen.a.push_back(points.a[i]);
-    chosen.b.push_back(points.b[i]);
-  }
+RotationHypothesis robust_rotation(const PointPairs& points, const TwoViewOptions& options) {
+  constexpr int kSamples = 60;
   std::mt19937_64 generator(options.seed);
   RotationHypothesis best;
-  best.support = support_of_rotation(best.rotation, chosen, options.max_residual);
+  best.support = support_of_rotation(best.rotation, points, options.max_residual);
+  const auto improve = [&](const Eigen::Quaterniond& rotation) {
+    Support support = support_of_rotation(rotation, points, options.max_residual);
+    if (!(support.score > best.support.score)) return false;
+    best = {rotation, std::move(support)};
+    return true;
+  };
   for (int s = 0; s < kSamples; ++s) {
-    const std::size_t i = generator() % chosen.size(), j = generator() % chosen.size();
-    if (i == j) continue;
-    const Eigen::Quaterniond rotation = fit_rotation(chosen, {i, j});
-    Support support = support_of_rotation(rotation, chosen, options.max_residual);
-    if (support.score > best.support.score) best = {rotation, std::move(support)};
+    const std::size_t i = generator() % points.size(), j = generator() % points.size();
+    if (i != j) improve(fit_rotation(points, {i, j}));
   }
   for (int round = 0; round < 10 && best.support.count >= 2; ++round) {
-    const Eigen::Quaterniond rotation = fit_rotation(chosen, rows_of(best.support.inlier));
-    Support support = support_of_rotation(rotation, chosen, options.max_residual);
-    if (!(support.score > best.support.score)) break;
-    best = {rotation, std::move(support)};
+    if (!improve(fit_rotation(points, rows_of(best.support.inlier)))) break;
   }
-  best.support = support_of_rotation(best.rotation, points, options.max_residual);
   return best;
 }
 
@@ -198,11 +189,21 @@ double median_angle_deg(const Eigen::Quaterniond& rotation, const PointPairs& po
   return *middle * 180 / std::numbers::pi;
 }
 
-TwoView finish(PairModel model, const RelativePoseEstimate& pose, Support support, const PointPairs& points,
-               const TwoViewOptions& options) {
+// Inliers that chance would give: random matches fall into the residual's band along the epipolar line with the share
+// of the image that the band covers, and the unknowns of the model adapt to them.
+int inliers_needed(const PointPairs& points, const TwoViewOptions& options) {
+  constexpr double kAdaptation = 4;
+  Eigen::AlignedBox2d box;
+  for (const auto& p : points.b) box.extend(p);
+  const Eigen::Vector2d size = box.sizes().cwiseMax(options.max_residual);
+  const double share = std::min(1.0, 2 * options.max_residual * size.norm() / size.prod());
+  const double by_chance = kAdaptation * share * static_cast<double>(points.size());
+  // Matches crowded into a corner all lie in the band: never ask for more than a half.
+  return options.min_inliers + static_cast<int>(std::min(by_chance, 0.5 * static_cast<double>(points.size())));
+}
+
+TwoView finish(PairModel model, const RelativePoseEstimate& pose, Support support, const PointPairs& points) {
   TwoView result;
-  result.inlier.assign(points.size(), 0);
-  if (support.count < options.min_inliers) return result;
   result.model = model;
   result.rotation = pose.rotation;
   result.translation = pose.translation;
@@ -212,46 +213,68 @@ TwoView finish(PairModel model, const RelativePoseEstimate& pose, Support suppor
   return result;
 }
 
+// Last refinement, with the weights' reach taken from the inliers' own scatter.
+Hypothesis polish(const Hypothesis& start, const PointPairs& points, double max_residual) {
+  const Eigen::Matrix3d essential = essential_matrix(start.pose);
+  std::vector<double> residuals;
+  for (const std::size_t i : rows_of(start.support.inlier)) {
+    residuals.push_back(std::abs(sampson_residual(essential, points.a[i], points.b[i])));
+  }
+  if (residuals.empty()) return start;
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  const double sigma = 1.4826 * *middle;
+  const RelativePoseEstimate pose =
+      refine(start.pose, points, std::clamp(2 * sigma, 1e-3 * max_residual, 0.5 * max_residual));
+  Hypothesis polished{pose, support_of(pose, points, max_residual)};
+  return polished.support.score > 0.98 * start.support.score ? polished : start;
+}
+
+// Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate.
+std::optional<TwoView> uncalibrated(const PointPairs& points, const TwoViewOptions& options, int needed) {
+  const auto f = robust_fundamental(points, options);
+  if (!f) return std::nullopt;
+  Support support = support_of_fundamental(*f, points, options.max_residual);
+  if (support.count < needed) return std::nullopt;
+  const auto pose = best_hypothesis(decompose_essential(*f), points, 4 * options.max_residual);
+  if (!pose || pose->support.count < needed / 2) return std::nullopt;
+  return finish(PairModel::kEssential, pose->pose, std::move(support), points);
+}
+
 }  // namespace
 
 TwoView estimate_two_view(const PointPairs& points, const TwoViewOptions& options) {
-  constexpr double kRotationShare = 0.9, kPlaneShare = 0.8, kFocalGain = 1.3;
+  // A simpler model is chosen when it explains this share of the matches of the richer one.
+  constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
+  // The fundamental matrix is tried below the first share of all matches and chosen by the second factor of gain.
+  constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
   TwoView none;
   none.inlier.assign(points.size(), 0);
   if (points.size() < static_cast<std::size_t>(options.min_inliers)) return none;
+  const int needed = inliers_needed(points, options);
 
-  std::optional<Hypothesis> best;
-  if (const auto e = robust_essential(points, options)) {
-    best = best_hypothesis(decompose_essential(*e), points, options.max_residual);
-  }
-  const bool essential_holds = best && best->support.count >= options.min_inliers;
+  std::vector<RelativePoseEstimate> candidates;
+  if (const auto e = robust_essential(points, options)) candidates = decompose_essential(*e);
+  const auto h = robust_homography(points, options);
+  if (h) std::ranges::copy(decompose_homography(*h), std::back_inserter(candidates));
+  const auto best = best_hypothesis(candidates, points, options.max_residual);
+  const int best_count = best ? best->support.count : 0;
 
-  // Focal lengths that are far off: the fundamental matrix holds where the essential does not.
-  if (!essential_holds || best->support.count < 0.5 * static_cast<double>(points.size())) {
-    if (const auto f = robust_fundamental(points, options)) {
-      Support support = support_of_fundamental(*f, points, options.max_residual);
-      const auto pose = best_hypothesis(decompose_essential(*f), points, options.max_residual * 4);
-      const int count = best ? best->support.count : 0;
-      if (pose && support.count >= options.min_inliers && support.count > kFocalGain * count) {
-        return finish(PairModel::kEssential, pose->pose, std::move(support), points, options);
-      }
-    }
+  const RotationHypothesis rotation = robust_rotation(points, options);
+  if (rotation.support.count >= needed && rotation.support.count >= kRotationShare * best_count) {
+    return finish(PairModel::kRotationOnly, {rotation.rotation, Eigen::Vector3d::Zero()}, rotation.support, points);
   }
-  if (!essential_holds) return none;
-
-  const auto rotation = robust_rotation(points, rows_of(best->support.inlier), options);
-  if (rotation.support.count >= kRotationShare * best->support.count) {
-    return finish(PairModel::kRotationOnly, {rotation.rotation, Eigen::Vector3d::Zero()}, rotation.support, points,
-                  options);
+  // A plane leaves the fundamental matrix undetermined.
+  const int plane_count = h ? count_homography(*h, points, options.max_residual) : 0;
+  const bool planar = plane_count >= kPlaneShare * best_count;
+  if (best_count < needed || (!planar && best_count < kDoubtfulShare * static_cast<double>(points.size()))) {
+    auto found = uncalibrated(points, options, needed);
+    if (found && found->inlier_count > kFocalGain * best_count) return *std::move(found);
   }
-  PairModel model = PairModel::kEssential;
-  const auto h = robust_homography(points, &best->support.inlier, options);
-  if (h && count_homography(*h, points, options.max_residual) >= kPlaneShare * best->support.count) {
-    model = PairModel::kHomography;
-    auto planar = best_hypothesis(decompose_homography(*h), points, options.max_residual);
-    if (planar && planar->support.score > best->support.score) best = std::move(planar);
-  }
-  return finish(model, best->pose, std::move(best->support), points, options);
+  if (best_count < needed) return none;
+  Hypothesis polished = polish(*best, points, options.max_residual);
+  return finish(planar ? PairModel::kHomography : PairModel::kEssential, polished.pose, std::move(polished.support),
+                points);
 }
 
 }  // namespace megablock

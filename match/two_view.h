@@ -27,8 +27,8 @@ struct TwoView {
   PairModel model = PairModel::kNone;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  double median_angle_deg = 0;        // of intersection of the inlier rays
-  std::vector<std::uint8_t> inlier;   // [pairs]
+  double median_angle_deg = 0;       // of intersection of the inlier rays
+  std::vector<std::uint8_t> inlier;  // [pairs]
   int inlier_count = 0;
 };
 

@@ -1,0 +1,139 @@
+#include "match/pair_matching.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "geometry/rotation.h"
+#include "io/error.h"
+#include "io/tracks.h"
+
+namespace megablock {
+namespace {
+
+constexpr int kMatches = 600, kOthers = 400;
+
+Camera make_camera() {
+  Camera camera;
+  camera.width = 2000;
+  camera.height = 1500;
+  camera.intrinsics = {1400, 1003, 748, -0.05, 0.01, 0, 0.001, -0.0005};
+  return camera;
+}
+
+SiftDescriptor random_descriptor(std::mt19937_64& generator) {
+  SiftDescriptor d;
+  for (auto& v : d) v = static_cast<std::uint8_t>(generator() % 91);
+  return d;
+}
+
+struct Scene {
+  ImageFeatures a, b;
+  Eigen::Quaterniond rotation;
+  std::vector<std::pair<std::int32_t, std::int32_t>> true_matches;
+};
+
+// Row i of a is row i of b for the first kMatches; the rest are features of their own. The first hundred keypoints of
+// the matched ones are reported a second time, with another orientation.
+Scene make_scene() {
+  std::mt19937_64 generator(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  Scene scene;
+  const Camera camera = make_camera();
+  scene.rotation = rotation_exp<double>(Eigen::Vector3d(0.02, -0.1, 0.4));
+  const Eigen::Vector3d t = -(scene.rotation * Eigen::Vector3d(0.2, 0.05, 0));
+  scene.a.image = ImageIndex(4);
+  scene.b.image = ImageIndex(9);
+  const auto add = [](ImageFeatures& f, const Eigen::Vector2d& pixel, const SiftDescriptor& d) {
+    f.keypoints.push_back({to_fixed_pixel(pixel.x()), to_fixed_pixel(pixel.y()), 4, 0});
+    f.descriptors.push_back(d);
+  };
+  const auto random_pixel = [&] { return Eigen::Vector2d(2000 * unit(generator), 1500 * unit(generator)); };
+  while (scene.a.keypoints.size() < kMatches) {
+    const Eigen::Vector3d x =
+        (0.7 + 0.6 * unit(generator)) * Eigen::Vector3d(unit(generator) * 1.4 - 0.7, unit(generator) - 0.5, 1);
+    const Eigen::Vector3d in_b = scene.rotation * x + t;
+    const Eigen::Vector2d pixel_a = project(camera.intrinsics, x), pixel_b = project(camera.intrinsics, in_b);
+    if (pixel_b.x() < 0 || pixel_b.x() > 2000 || pixel_b.y() < 0 || pixel_b.y() > 1500) continue;
+    SiftDescriptor d = random_descriptor(generator);
+    add(scene.a, pixel_a, d);
+    for (auto& v : d) v = static_cast<std::uint8_t>(v + generator() % 11);
+    add(scene.b, pixel_b, d);
+  }
+  for (std::size_t i = 0; i < 100; ++i) {
+    const SiftDescriptor d = random_descriptor(generator);
+    for (ImageFeatures* f : {&scene.a, &scene.b}) {
+      f->keypoints.push_back(f->keypoints[i]);
+      f->keypoints.back().angle_deg = 90;
+      f->descriptors.push_back(d);
+    }
+  }
+  for (int i = 0; i < kOthers; ++i) {
+    add(scene.a, random_pixel(), random_descriptor(generator));
+    add(scene.b, random_pixel(), random_descriptor(generator));
+  }
+  for (int i = 0; i < 100; ++i) {  // wrong matches: same descriptor anywhere
+    const SiftDescriptor d = random_descriptor(generator);
+    add(scene.a, random_pixel(), d);
+    add(scene.b, random_pixel(), d);
+  }
+  return scene;
+}
+
+TEST(MatchPair, FindsOrientationAndInliers) {
+  const Scene scene = make_scene();
+  const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
+  EXPECT_EQ(pair.a, ImageIndex(4));
+  EXPECT_EQ(pair.b, ImageIndex(9));
+  EXPECT_EQ(pair.model, PairModel::kEssential);
+  EXPECT_EQ(pair.putative, kMatches + 200);
+  const Eigen::Quaterniond found(pair.rotation_wxyz[0], pair.rotation_wxyz[1], pair.rotation_wxyz[2],
+                                 pair.rotation_wxyz[3]);
+  EXPECT_LT(rotation_angle(found, scene.rotation), 1e-4);
+  ASSERT_EQ(pair.feature_a.size(), pair.feature_b.size());
+  EXPECT_TRUE(std::is_sorted(pair.feature_a.begin(), pair.feature_a.end()));
+  int matched = 0, wrong = 0;
+  for (std::size_t i = 0; i < pair.feature_a.size(); ++i) {
+    EXPECT_FALSE(pair.feature_a[i] >= kMatches && pair.feature_a[i] < kMatches + 100) << "one place counted twice";
+    (pair.feature_a[i] == pair.feature_b[i] && pair.feature_a[i] < kMatches ? matched : wrong) += 1;
+  }
+  EXPECT_EQ(matched, kMatches);
+  EXPECT_LT(wrong, 5);
+}
+
+TEST(MatchPair, IsRepeatable) {
+  const Scene scene = make_scene();
+  const VerifiedPair first = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
+  const VerifiedPair second = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
+  EXPECT_EQ(first.feature_a, second.feature_a);
+  EXPECT_EQ(first.rotation_wxyz, second.rotation_wxyz);
+  EXPECT_EQ(first.translation, second.translation);
+}
+
+TEST(MatchPair, UnrelatedImagesAreNotVerified) {
+  Scene scene = make_scene();
+  std::mt19937_64 generator(8);
+  for (auto& d : scene.b.descriptors) d = random_descriptor(generator);
+  const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
+  EXPECT_EQ(pair.model, PairModel::kNone);
+  EXPECT_TRUE(pair.feature_a.empty());
+}
+
+TEST(MatchPair, ImagesWithoutFeaturesAreNotVerified) {
+  const Scene scene = make_scene();
+  ImageFeatures empty;
+  empty.image = ImageIndex(20);
+  EXPECT_EQ(match_pair(scene.a, empty, make_camera(), make_camera(), {}).model, PairModel::kNone);
+}
+
+TEST(MatchPair, BadInputIsRefused) {
+  const Scene scene = make_scene();
+  EXPECT_THROW(match_pair(scene.b, scene.a, make_camera(), make_camera(), {}), InputError);
+  MatchOptions options;
+  options.ratio = 1.5;
+  EXPECT_THROW(match_pair(scene.a, scene.b, make_camera(), make_camera(), options), InputError);
+}
+
+}  // namespace
+}  // namespace megablock

@@ -1,0 +1,141 @@
+#include "match/tracks.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+
+#include "io/error.h"
+
+namespace megablock {
+namespace {
+
+using Keypoints = IndexedVector<ImageIndex, std::vector<Keypoint>>;
+
+// Every feature at a place of its own.
+Keypoints make_keypoints(std::size_t images, std::int32_t features) {
+  Keypoints keypoints(images);
+  std::int32_t place = 0;
+  for (auto& points : keypoints) {
+    for (std::int32_t i = 0; i < features; ++i) points.push_back({++place, 2 * place, 3, 0});
+  }
+  return keypoints;
+}
+
+VerifiedPair make_pair(std::int64_t a, std::int64_t b, const std::vector<std::pair<int, int>>& matches) {
+  VerifiedPair pair;
+  pair.a = ImageIndex(a);
+  pair.b = ImageIndex(b);
+  pair.model = PairModel::kEssential;
+  for (const auto& [i, j] : matches) {
+    pair.feature_a.push_back(i);
+    pair.feature_b.push_back(j);
+  }
+  return pair;
+}
+
+using Track = std::vector<std::pair<std::int64_t, std::int32_t>>;  // image, feature
+
+std::vector<Track> to_lists(const TrackSet& set) {
+  std::vector<Track> tracks;
+  for (std::size_t t = 0; t < set.id.size(); ++t) {
+    Track track;
+    for (auto i = static_cast<std::size_t>(set.begin[t]); i < static_cast<std::size_t>(set.begin[t + 1]); ++i) {
+      track.emplace_back(set.image[i].value, set.feature[i]);
+    }
+    tracks.push_back(track);
+  }
+  return tracks;
+}
+
+TEST(Tracks, JoinMatchesOverImages) {
+  const Keypoints keypoints = make_keypoints(4, 5);
+  const TrackSet set = build_tracks(
+      keypoints, {make_pair(2, 3, {{1, 1}}), make_pair(0, 2, {{4, 1}, {0, 0}}), make_pair(0, 1, {{4, 2}})}, {});
+  EXPECT_EQ(to_lists(set), (std::vector<Track>{{{0, 0}, {2, 0}}, {{0, 4}, {1, 2}, {2, 1}, {3, 1}}}));
+  EXPECT_EQ(set.id, (std::vector<TrackIndex>{TrackIndex(0), TrackIndex(1)}));
+  EXPECT_EQ(set.x[1], keypoints[ImageIndex(2)][0].x);
+  EXPECT_EQ(set.y[1], keypoints[ImageIndex(2)][0].y);
+}
+
+TEST(Tracks, SplitWhereAnImageWouldBeSeenTwice) {
+  // Images 0-1-2 agree on one point by strong pairs; the weak pair 0-2 links it to another feature of image 2.
+  const Keypoints keypoints = make_keypoints(3, 5);
+  const TrackSet set = build_tracks(
+      keypoints,
+      {make_pair(0, 2, {{0, 3}}), make_pair(0, 1, {{0, 0}, {1, 1}, {2, 2}}), make_pair(1, 2, {{0, 0}, {1, 1}})}, {});
+  EXPECT_EQ(to_lists(set), (std::vector<Track>{{{0, 0}, {1, 0}, {2, 0}}, {{0, 1}, {1, 1}, {2, 1}}, {{0, 2}, {1, 2}}}));
+}
+
+TEST(Tracks, TheOrientationsOfOneKeypointAreOnePoint) {
+  Keypoints keypoints = make_keypoints(3, 4);
+  keypoints[ImageIndex(1)][2] = keypoints[ImageIndex(1)][1];  // same place
+  const TrackSet set = build_tracks(keypoints, {make_pair(0, 1, {{0, 1}}), make_pair(1, 2, {{2, 3}})}, {});
+  EXPECT_EQ(to_lists(set), (std::vector<Track>{{{0, 0}, {1, 1}, {2, 3}}}));
+}
+
+TEST(Tracks, RandomMatchesGiveConsistentTracksInAnyOrder) {
+  constexpr int kImages = 12, kFeatures = 30;
+  const Keypoints keypoints = make_keypoints(kImages, kFeatures);
+  std::mt19937_64 generator(1);
+  std::vector<VerifiedPair> pairs;
+  for (int a = 0; a < kImages; ++a) {
+    for (int b = a + 1; b < kImages; ++b) {
+      std::vector<std::pair<int, int>> matches;
+      for (int i = 0; i < kFeatures; ++i) {
+        if (generator() % 3 == 0) continue;
+        matches.emplace_back(i,
+                             generator() % 10 == 0 ? static_cast<int>(generator() % kFeatures) : i);  // a tenth wrong
+      }
+      pairs.push_back(make_pair(a, b, matches));
+    }
+  }
+  const TrackSet set = build_tracks(keypoints, pairs, {});
+  std::set<std::pair<std::int64_t, std::int32_t>> seen;
+  for (const Track& track : to_lists(set)) {
+    EXPECT_GE(track.size(), 2u);
+    for (std::size_t i = 0; i < track.size(); ++i) {
+      EXPECT_TRUE(seen.insert(track[i]).second) << "a feature in two tracks";
+      if (i > 0) {
+        EXPECT_LT(track[i - 1].first, track[i].first) << "images ascending and distinct";
+      }
+    }
+  }
+  const auto lists = to_lists(set);
+  EXPECT_TRUE(std::is_sorted(lists.begin(), lists.end()));
+  for (int round = 0; round < 5; ++round) {
+    std::shuffle(pairs.begin(), pairs.end(), generator);
+    EXPECT_EQ(to_lists(build_tracks(keypoints, pairs, {})), lists);
+  }
+}
+
+TEST(Tracks, MinimumLength) {
+  TrackOptions options;
+  options.min_length = 3;
+  const TrackSet set =
+      build_tracks(make_keypoints(3, 3), {make_pair(0, 1, {{0, 0}, {1, 1}}), make_pair(1, 2, {{1, 2}})}, options);
+  EXPECT_EQ(to_lists(set), (std::vector<Track>{{{0, 1}, {1, 1}, {2, 2}}}));
+  options.min_length = 1;
+  EXPECT_THROW(build_tracks(make_keypoints(1, 1), {}, options), InputError);
+}
+
+TEST(Tracks, NothingMatchedGivesNone) {
+  const TrackSet set = build_tracks(make_keypoints(2, 3), {}, {});
+  EXPECT_EQ(set.track_count(), 0);
+  EXPECT_EQ(set.begin, std::vector<std::int64_t>{0});
+}
+
+TEST(Tracks, BadPairsAreRefused) {
+  const Keypoints keypoints = make_keypoints(2, 3);
+  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 2, {{0, 0}})}, {}), InputError);
+  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 1, {{0, 3}})}, {}), InputError);
+  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 1, {{-1, 0}})}, {}), InputError);
+  VerifiedPair uneven = make_pair(0, 1, {{0, 0}});
+  uneven.feature_b.push_back(1);
+  EXPECT_THROW(build_tracks(keypoints, {uneven}, {}), InputError);
+}
+
+}  // namespace
+}  // namespace megablock

@@ -1,0 +1,251 @@
+#include "match/two_view.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "geometry/rotation.h"
+#include "match/relative_pose.h"
+
+namespace megablock {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kFocal = 1400, kWidth = 2000, kHeight = 1500;  // px
+
+enum class Scene { kGeneral, kPlane, kRotation };
+
+struct Simulation {
+  Scene scene = Scene::kGeneral;
+  int matches = 800;
+  double outlier_share = 0.5, noise_px = 0.5;
+  double baseline = 0.15;  // of the distance
+  Eigen::Vector3d rotation{0.05, -0.08, 0.3};
+  double focal_error = 0;  // relative, of the focal length the points are normalised with
+  std::uint64_t seed = 1;
+};
+
+struct SimulatedPair {
+  PointPairs points;
+  std::vector<std::uint8_t> good;
+  RelativePoseEstimate truth;
+};
+
+// Camera a looks down on ground 1 away; camera b is moved sideways and turned.
+SimulatedPair simulate(const Simulation& s) {
+  std::mt19937_64 generator(s.seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> noise(0, s.noise_px / kFocal);
+  SimulatedPair result;
+  result.truth.rotation = rotation_exp<double>(s.rotation);
+  const Eigen::Vector3d centre(s.baseline, 0.3 * s.baseline, 0.05 * s.baseline);
+  const Eigen::Vector3d t =
+      s.scene == Scene::kRotation ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-(result.truth.rotation * centre));
+  result.truth.translation = t.normalized();
+  const auto random_point = [&] {
+    return Eigen::Vector2d((unit(generator) - 0.5) * kWidth / kFocal, (unit(generator) - 0.5) * kHeight / kFocal);
+  };
+  const double scale = 1 / (1 + s.focal_error);
+  while (result.points.size() < static_cast<std::size_t>(s.matches)) {
+    const Eigen::Vector2d a = random_point();
+    const double depth = s.scene == Scene::kPlane ? 1 : 0.7 + 0.6 * unit(generator);
+    const Eigen::Vector3d in_b = result.truth.rotation * (depth * a.homogeneous()) + t;
+    Eigen::Vector2d b = in_b.hnormalized();
+    if (std::abs(b.x()) > 0.5 * kWidth / kFocal || std::abs(b.y()) > 0.5 * kHeight / kFocal) continue;
+    const bool good = unit(generator) >= s.outlier_share;
+    if (!good) b = random_point();
+    const auto jitter = [&] { return Eigen::Vector2d(noise(generator), noise(generator)); };
+    result.points.a.push_back(scale * (a + jitter()));
+    result.points.b.push_back(scale * (b + jitter()));
+    result.good.push_back(good);
+  }
+  return result;
+}
+
+TwoViewOptions options_for(std::uint64_t seed) {
+  TwoViewOptions options;
+  options.max_residual = 3 / kFocal;
+  options.seed = seed;
+  return options;
+}
+
+double rotation_error_deg(const TwoView& found, const SimulatedPair& pair) {
+  return rotation_angle(found.rotation, pair.truth.rotation) / kDegree;
+}
+
+double translation_error_deg(const TwoView& found, const SimulatedPair& pair) {
+  return std::acos(std::clamp(found.translation.dot(pair.truth.translation), -1.0, 1.0)) / kDegree;
+}
+
+// Shares of the good and of the wrong matches that are accepted.
+std::pair<double, double> accepted_shares(const TwoView& found, const SimulatedPair& pair) {
+  double good = 0, wrong = 0, good_accepted = 0, wrong_accepted = 0;
+  for (std::size_t i = 0; i < pair.good.size(); ++i) {
+    (pair.good[i] ? good : wrong) += 1;
+    if (found.inlier[i]) (pair.good[i] ? good_accepted : wrong_accepted) += 1;
+  }
+  return {good_accepted / good, wrong > 0 ? wrong_accepted / wrong : 0};
+}
+
+class TwoViews : public testing::TestWithParam<int> {};
+
+TEST_P(TwoViews, GeneralScene) {
+  Simulation s;
+  s.seed = static_cast<std::uint64_t>(GetParam());
+  const SimulatedPair pair = simulate(s);
+  const TwoView found = estimate_two_view(pair.points, options_for(s.seed));
+  EXPECT_EQ(found.model, PairModel::kEssential);
+  EXPECT_LT(rotation_error_deg(found, pair), 0.2);
+  EXPECT_LT(translation_error_deg(found, pair), 2);
+  const auto [good, wrong] = accepted_shares(found, pair);
+  EXPECT_GT(good, 0.98);
+  EXPECT_LT(wrong, 0.03);
+  EXPECT_NEAR(found.median_angle_deg, std::atan(s.baseline) / kDegree, 2);
+}
+
+TEST_P(TwoViews, NadirPlane) {
+  Simulation s;
+  s.scene = Scene::kPlane;
+  s.baseline = 0.3;
+  s.seed = static_cast<std::uint64_t>(GetParam());
+  const SimulatedPair pair = simulate(s);
+  const TwoView found = estimate_two_view(pair.points, options_for(s.seed));
+  EXPECT_EQ(found.model, PairModel::kHomography);
+  EXPECT_LT(rotation_error_deg(found, pair), 0.4);
+  EXPECT_LT(translation_error_deg(found, pair), 3);
+  EXPECT_GT(accepted_shares(found, pair).first, 0.98);
+}
+
+TEST_P(TwoViews, PureRotation) {
+  Simulation s;
+  s.scene = Scene::kRotation;
+  s.seed = static_cast<std::uint64_t>(GetParam());
+  const SimulatedPair pair = simulate(s);
+  const TwoView found = estimate_two_view(pair.points, options_for(s.seed));
+  EXPECT_EQ(found.model, PairModel::kRotationOnly);
+  EXPECT_LT(rotation_error_deg(found, pair), 0.05);
+  EXPECT_EQ(found.translation.norm(), 0);
+  EXPECT_LT(found.median_angle_deg, 0.1);
+  const auto [good, wrong] = accepted_shares(found, pair);
+  EXPECT_GT(good, 0.98);
+  EXPECT_LT(wrong, 0.01);
+}
+
+TEST_P(TwoViews, FocalLengthTenPerCentWrong) {
+  for (const double error : {-0.1, 0.1}) {
+    for (const Scene scene : {Scene::kGeneral, Scene::kPlane}) {
+      Simulation s;
+      s.scene = scene;
+      s.focal_error = error;
+      s.baseline = 0.3;
+      s.outlier_share = 0.3;
+      s.seed = static_cast<std::uint64_t>(GetParam());
+      const SimulatedPair pair = simulate(s);
+      const TwoView found = estimate_two_view(pair.points, options_for(s.seed));
+      EXPECT_NE(found.model, PairModel::kNone);
+      EXPECT_GT(accepted_shares(found, pair).first, 0.9) << error;
+      EXPECT_LT(rotation_error_deg(found, pair), 5) << error;
+    }
+  }
+}
+
+TEST_P(TwoViews, RandomMatchesAreRefused) {
+  for (const int matches : {30, 200, 1500}) {
+    Simulation s;
+    s.outlier_share = 1;
+    s.matches = matches;
+    s.seed = static_cast<std::uint64_t>(GetParam());
+    const TwoView found = estimate_two_view(simulate(s).points, options_for(s.seed));
+    EXPECT_EQ(found.model, PairModel::kNone) << matches << " matches, " << found.inlier_count << " accepted";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, TwoViews, testing::Range(1, 9));
+
+TEST(TwoView, IsRepeatable) {
+  const SimulatedPair pair = simulate({});
+  const TwoView first = estimate_two_view(pair.points, options_for(5)),
+                second = estimate_two_view(pair.points, options_for(5));
+  EXPECT_EQ(first.inlier, second.inlier);
+  EXPECT_EQ(first.rotation.coeffs(), second.rotation.coeffs());
+  EXPECT_EQ(first.translation, second.translation);
+}
+
+TEST(TwoView, TooFewOrDegenerateMatches) {
+  EXPECT_EQ(estimate_two_view({}, options_for(1)).model, PairModel::kNone);
+  PointPairs same;
+  same.a.assign(100, Eigen::Vector2d(0.1, 0.2));
+  same.b = same.a;
+  EXPECT_NO_THROW(estimate_two_view(same, options_for(1)));
+  PointPairs identical = simulate({}).points;  // the same image twice
+  identical.b = identical.a;
+  const TwoView found = estimate_two_view(identical, options_for(1));
+  EXPECT_EQ(found.model, PairModel::kRotationOnly);
+  EXPECT_LT(rotation_angle(found.rotation, Eigen::Quaterniond::Identity()), 1e-6);
+}
+
+TEST(RelativePose, EssentialDecompositionContainsTheTruth) {
+  const SimulatedPair pair = simulate({});
+  double best = 1e9;
+  for (const auto& pose : decompose_essential(-3 * essential_matrix(pair.truth))) {
+    best = std::min(
+        best, rotation_angle(pose.rotation, pair.truth.rotation) + (pose.translation - pair.truth.translation).norm());
+  }
+  EXPECT_LT(best, 1e-7);
+}
+
+TEST(RelativePose, RefinementReachesTheTruthWithoutNoiseFromNearby) {
+  Simulation s;
+  s.noise_px = 0;
+  const SimulatedPair pair = simulate(s);
+  RelativePoseEstimate start = pair.truth;
+  start.rotation = rotation_update(start.rotation, Eigen::Vector3d(1e-4, -1e-4, 2e-4));
+  start.translation = (start.translation + Eigen::Vector3d(0.001, 0.002, -0.001)).normalized();
+  const RelativePoseEstimate refined = refine(start, pair.points, 0.2 / kFocal);
+  EXPECT_LT(rotation_angle(refined.rotation, pair.truth.rotation), 1e-5);
+  EXPECT_LT((refined.translation - pair.truth.translation).norm(), 1e-4);
+}
+
+TEST(RelativePose, RefinementEndsInAMinimumOfTheSampsonResiduals) {
+  Simulation s;
+  s.outlier_share = 0;
+  const SimulatedPair pair = simulate(s);
+  const double scale = 1.5 / kFocal;
+  const auto cost = [&](const RelativePoseEstimate& pose) {
+    double sum = 0;
+    const Eigen::Matrix3d essential = essential_matrix(pose);
+    for (std::size_t i = 0; i < pair.points.size(); ++i) {
+      const double r = sampson_residual(essential, pair.points.a[i], pair.points.b[i]);
+      sum += r * r / (1 + r * r / (scale * scale));
+    }
+    return sum;
+  };
+  const RelativePoseEstimate refined = refine(pair.truth, pair.points, scale);
+  const double least = cost(refined);
+  EXPECT_LE(least, cost(pair.truth));
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double step : {-1e-5, 1e-5}) {
+      RelativePoseEstimate turned = refined, moved = refined;
+      turned.rotation = rotation_update(refined.rotation, step * Eigen::Vector3d::Unit(axis));
+      moved.translation = (refined.translation + 10 * step * Eigen::Vector3d::Unit(axis)).normalized();
+      EXPECT_GE(cost(turned), least);
+      EXPECT_GE(cost(moved), least * (1 - 1e-12));
+    }
+  }
+}
+
+TEST(RelativePose, PointsBehindTheCamerasAreNoInliers) {
+  Simulation s;
+  s.outlier_share = 0;
+  s.noise_px = 0;
+  const SimulatedPair pair = simulate(s);
+  const RelativePoseEstimate opposite{pair.truth.rotation, -pair.truth.translation};
+  EXPECT_EQ(support_of(pair.truth, pair.points, 3 / kFocal).count, s.matches);
+  EXPECT_LT(support_of(opposite, pair.points, 3 / kFocal).count, s.matches / 20);
+}
+
+}  // namespace
+}  // namespace megablock
