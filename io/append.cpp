@@ -36,6 +36,38 @@ void move(const GroundChange& change, Block& block) {
     if (point.position.allFinite()) point.position = change.position(point.position);
 }
 
+// Turning a frame into another one and back rounds: what agrees with the former value to a fraction of a micrometre
+// keeps its former bits, so that nothing computed from it becomes stale.
+bool agrees(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return (a - b).norm() < 1e-6; }
+bool agrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) { return rotation_angle(a, b) < 1e-9; }
+
+void keep_former_bits(const Block& previous, Block& moved) {
+  std::map<std::string, const Frame*> frames;
+  for (const Frame& frame : previous.frames) frames.emplace(frame.name, &frame);
+  for (Frame& frame : moved.frames) {
+    const auto found = frames.find(frame.name);
+    if (found == frames.end()) continue;
+    const Frame& former = *found->second;
+    if (frame.position_prior && former.position_prior &&
+        agrees(frame.position_prior->position, former.position_prior->position))
+      frame.position_prior->position = former.position_prior->position;
+    if (frame.attitude_prior && former.attitude_prior &&
+        agrees(frame.attitude_prior->rotation_cw, former.attitude_prior->rotation_cw) &&
+        agrees(frame.attitude_prior->sigma_rad, former.attitude_prior->sigma_rad))
+      frame.attitude_prior = former.attitude_prior;
+    if (frame.given_pose && former.given_pose && agrees(frame.given_pose->centre, former.given_pose->centre) &&
+        agrees(frame.given_pose->rotation, former.given_pose->rotation))
+      frame.given_pose = former.given_pose;
+  }
+  std::map<std::string, const ControlPoint*> points;
+  for (const ControlPoint& point : previous.control_points) points.emplace(point.name, &point);
+  for (ControlPoint& point : moved.control_points) {
+    const auto found = points.find(point.name);
+    if (found != points.end() && agrees(point.position, found->second->position))
+      point.position = found->second->position;
+  }
+}
+
 bool same_origin(const GroundFrame& a, const GroundFrame& b) {
   return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
 }
@@ -44,8 +76,10 @@ bool same_origin(const GroundFrame& a, const GroundFrame& b) {
 
 Block append_to(const Block& previous, const Block& now) {
   Block moved = now;
-  if (previous.ground.georeferenced && now.ground.georeferenced && !same_origin(previous.ground, now.ground))
+  if (previous.ground.georeferenced && now.ground.georeferenced && !same_origin(previous.ground, now.ground)) {
     move(GroundChange(now.ground, previous.ground), moved);
+    keep_former_bits(previous, moved);
+  }
   Block merged;
   merged.ground = previous.ground.georeferenced ? previous.ground : now.ground;
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);

@@ -56,9 +56,9 @@ std::vector<Eigen::Vector3d> footprint(const Camera& camera, const Intrinsics& k
 
 Json coordinates(const Georeference& georeference, const Eigen::Vector3d& p, bool with_height) {
   const Geodetic position = georeference.to_geodetic(p);
-  const auto rounded = [](double value, double unit) { return std::round(value / unit) * unit; };
-  Json result = {rounded(position.longitude_deg, 1e-9), rounded(position.latitude_deg, 1e-9)};
-  if (with_height) result.push_back(rounded(position.height_m, 1e-3));
+  const auto rounded = [](double value, double scale) { return std::round(value * scale) / scale; };
+  Json result = {rounded(position.longitude_deg, 1e9), rounded(position.latitude_deg, 1e9)};  // 0.1 mm
+  if (with_height) result.push_back(rounded(position.height_m, 1e3));
   return result;
 }
 

@@ -99,5 +99,29 @@ TEST(AppendTo, TheGroundFrameStaysThePreviousOne) {
   EXPECT_LT(rotation_angle(after.rotation, merged.frames[frame].attitude_prior->rotation_cw), 1e-12);
 }
 
+// Images that were there keep the very bits of their priors, whatever the new origin.
+TEST(AppendTo, AnotherOriginChangesNoBitOfWhatWasThere) {
+  const Block previous = block_of({"b1", "b2"}, kHere);
+  const Georeference here(kHere), there(kThere);
+  Block now = block_of({"a0", "b1", "b2"}, kThere);
+  const Eigen::Quaterniond turn = here.own_from_block({kThere.latitude_deg, kThere.longitude_deg, kThere.height_m});
+  for (const FrameIndex f : {FrameIndex(1), FrameIndex(2)}) {
+    const Frame& former = previous.frames[FrameIndex(f.value - 1)];
+    Frame& frame = now.frames[f];
+    frame.position_prior->position = there.to_local(here.to_geodetic(former.position_prior->position));
+    frame.attitude_prior->rotation_cw = former.attitude_prior->rotation_cw * turn.conjugate();
+    frame.given_pose = Pose{former.given_pose->rotation * turn.conjugate(),
+                            there.to_local(here.to_geodetic(former.given_pose->centre))};
+  }
+  const Block merged = append_to(previous, now);
+  for (const FrameIndex f : {FrameIndex(0), FrameIndex(1)}) {
+    EXPECT_EQ(merged.frames[f].position_prior->position, previous.frames[f].position_prior->position);
+    EXPECT_EQ(merged.frames[f].attitude_prior->rotation_cw.coeffs(),
+              previous.frames[f].attitude_prior->rotation_cw.coeffs());
+    EXPECT_EQ(merged.frames[f].given_pose->centre, previous.frames[f].given_pose->centre);
+    EXPECT_EQ(merged.frames[f].given_pose->rotation.coeffs(), previous.frames[f].given_pose->rotation.coeffs());
+  }
+}
+
 }  // namespace
 }  // namespace megablock
