@@ -77,9 +77,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   read_rigs(top, project);
 
   const auto poses = read_poses(top);
-  const auto control_file = top.existing_file("control");
-  std::optional<ControlTable> control;
-  if (control_file) control = read_control_table(*control_file);
+  const auto control = read_control(top);
   std::vector<Geodetic> others = poses ? poses->positions() : std::vector<Geodetic>();
   if (control && others.empty()) others = geodetic_positions(*control);
   read_positions(top, scanned, others, ground, project);

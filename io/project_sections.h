@@ -2,6 +2,7 @@
 #pragma once
 
 #include "io/approximate_poses.h"
+#include "io/control_file.h"
 #include "io/image_scan.h"
 #include "io/yaml_reader.h"
 
@@ -19,6 +20,9 @@ void read_rigs(YamlReader& top, Project& project);
 
 // poses: approximate poses.
 std::optional<ApproximatePoses> read_poses(YamlReader& top);
+
+// control: a file, or a mapping with the file and settings that override it.
+std::optional<ControlTable> read_control(YamlReader& top);
 
 // gps, origin: position priors in the ground frame; fixes the ground frame: `ground` (a running job's), else `origin`,
 // else about the images' positions, else about the `others` (of poses and control).

@@ -97,6 +97,15 @@ std::optional<std::vector<double>> YamlReader::numbers(const std::string& key, s
   return result;
 }
 
+std::optional<std::vector<std::string>> YamlReader::texts(const std::string& key) {
+  const auto value = node(key);
+  if (!value) return std::nullopt;
+  if (!value->IsSequence()) throw InputError(where(key) + ": " + full(key) + " must be a list");
+  std::vector<std::string> result;
+  for (const auto& item : *value) result.push_back(scalar(item, full(key)));
+  return result;
+}
+
 std::optional<YamlReader> YamlReader::mapping(const std::string& key) {
   const auto value = node(key);
   if (!value) return std::nullopt;

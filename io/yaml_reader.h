@@ -20,6 +20,7 @@ class YamlReader {
   std::optional<double> positive_number(const std::string& key);
   std::optional<bool> flag(const std::string& key);
   std::optional<std::string> text(const std::string& key);
+  std::optional<std::vector<std::string>> texts(const std::string& key);  // a list
   std::optional<std::vector<double>> numbers(const std::string& key, std::size_t count);
   std::optional<YamlReader> mapping(const std::string& key);
   // A path, made absolute against the folder of the file; must exist as a file (or folder).

@@ -174,6 +174,27 @@ TEST_F(ControlFile, MeasurementsInImagesLeftOutAreWarnings) {
   EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("gcp_list.txt:2: point 'a' is measured in 'broken.jpg'")));
 }
 
+TEST_F(ControlFile, SettingsOfTheProjectOverrideTheFile) {
+  read("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 sub/0.jpg a\n13.4001 52.52 NaN 5 6 sub/0.jpg b\n");
+  const auto with = [&](const std::string& control) {
+    write_file(folder_ / "block.yaml", "images: images\ncontrol:\n" + control);
+    return read_project(folder_ / "block.yaml").block.control_points;
+  };
+  const auto points =
+      with("  file: gcp_list.txt\n  sigma_horizontal_m: 0.1\n  sigma_vertical_m: 0.2\n  sigma_px: 2\n  check: [b]\n");
+  EXPECT_EQ(points[0].sigma, Eigen::Vector3d(0.1, 0.1, 0.2));
+  EXPECT_EQ(points[0].role, PointRole::kControl);
+  EXPECT_EQ(points[0].measurements[0].sigma_px, 2);
+  EXPECT_EQ(points[1].role, PointRole::kCheck);
+  EXPECT_EQ(points[1].sigma.z(), 1000) << "an unknown height stays unknown";
+  const auto refusal = [&](const std::string& control) { return message_of<InputError>([&] { with(control); }); };
+  EXPECT_THAT(refusal("  sigma_px: 2\n"), HasSubstr("block.yaml:3: key 'file' is missing"));
+  EXPECT_THAT(refusal("  file: gcp_list.txt\n  check: [c]\n"),
+              HasSubstr("block.yaml:4: control.check: the control file"));
+  EXPECT_THAT(refusal("  file: gcp_list.txt\n  check: c\n"), HasSubstr("must be a list"));
+  EXPECT_THAT(refusal("  file: gcp_list.txt\n  sigma_m: 1\n"), HasSubstr("unknown key 'sigma_m' in 'control'"));
+}
+
 TEST(ControlWithoutGps, GivesTheOrigin) {
   TemporaryFolder folder;
   write_picture(folder / "images/0.jpg", 200, 100, 0);
