@@ -15,8 +15,8 @@ void run_portable(const Problem& p) {
     for (std::size_t panel = 0; panel < p.columns; panel += kColumnTile) {
       for (std::size_t row = block; row < end; ++row) {
         std::int32_t sum[kColumnTile] = {};
-        const std::int16_t* a = p.a + row * kDimension;
-        const std::int16_t* b = p.b + panel * kDimension;
+        const std::int16_t* a = p.a16 + row * kDimension;
+        const std::int16_t* b = p.b16 + panel * kDimension;
         for (std::size_t d = 0; d < kDimension; d += 2, b += 2 * kColumnTile) {
           for (std::size_t c = 0; c < kColumnTile; ++c) sum[c] += a[d] * b[2 * c] + a[d + 1] * b[2 * c + 1];
         }
@@ -46,8 +46,9 @@ std::vector<std::int32_t> squared_norms(const std::vector<SiftDescriptor>& descr
   return norms;
 }
 
-std::vector<std::int16_t> pack_rows(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
-  std::vector<std::int16_t> packed(padded * kDimension, 0);
+template <typename Value>
+std::vector<Value> pack_rows(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
+  std::vector<Value> packed(padded * kDimension, 0);
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     std::copy(descriptors[i].begin(), descriptors[i].end(),
               packed.begin() + static_cast<std::ptrdiff_t>(i * kDimension));
@@ -55,16 +56,39 @@ std::vector<std::int16_t> pack_rows(const std::vector<SiftDescriptor>& descripto
   return packed;
 }
 
-std::vector<std::int16_t> pack_panels(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
-  std::vector<std::int16_t> packed(padded * kDimension, 0);
+// Panels of kColumnTile descriptors; in a panel, four bytes' worth of components of each descriptor in turn.
+template <typename Value>
+std::vector<Value> pack_panels(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
+  constexpr std::size_t kTogether = 4 / sizeof(Value);
+  std::vector<Value> packed(padded * kDimension, 0);
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    std::int16_t* panel = packed.data() + i / kColumnTile * kColumnTile * kDimension + 2 * (i % kColumnTile);
-    for (std::size_t d = 0; d < kDimension; d += 2) {
-      panel[d * kColumnTile] = descriptors[i][d];
-      panel[d * kColumnTile + 1] = descriptors[i][d + 1];
+    Value* panel = packed.data() + i / kColumnTile * kColumnTile * kDimension + kTogether * (i % kColumnTile);
+    for (std::size_t d = 0; d < kDimension; ++d) {
+      panel[d / kTogether * kTogether * kColumnTile + d % kTogether] = descriptors[i][d];
     }
   }
   return packed;
+}
+
+// What the kernel for short descriptors asks of both sets together.
+struct Size {
+  std::int64_t largest_norm = 0;  // squared
+  int largest_byte = 0;
+};
+
+Size size_of(const std::vector<SiftDescriptor>& descriptors, const std::vector<std::int32_t>& norms) {
+  Size size;
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    size.largest_norm = std::max<std::int64_t>(size.largest_norm, norms[i]);
+    size.largest_byte =
+        std::max<int>(size.largest_byte, *std::max_element(descriptors[i].begin(), descriptors[i].end()));
+  }
+  return size;
+}
+
+bool are_short(const Size& a, const Size& b) {
+  constexpr std::int64_t kLargestSum = 32767;
+  return a.largest_byte <= 127 && b.largest_byte <= 127 && a.largest_norm * b.largest_norm <= kLargestSum * kLargestSum;
 }
 
 // [k][padded] to [count][k].
@@ -83,25 +107,33 @@ MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const 
                                     std::size_t k, bool portable) {
   if (k < 1 || k > 8) throw InputError("nearest neighbours: k must be 1 to 8");
   const std::size_t rows = round_up(a.size(), kRowTile), columns = round_up(b.size(), kColumnTile);
-  const std::vector<std::int16_t> packed_a = pack_rows(a, rows), packed_b = pack_panels(b, columns);
   const std::vector<std::int32_t> norm_a = squared_norms(a, rows), norm_b = squared_norms(b, columns);
   std::vector<std::int32_t> row_distance(rows * k, Neighbours::kFar), row_index(rows * k, -1);
   std::vector<std::int32_t> column_distance(columns * k, Neighbours::kFar), column_index(columns * k, -1);
-  const Problem problem{rows,
-                        columns,
-                        packed_a.data(),
-                        packed_b.data(),
-                        norm_a.data(),
-                        norm_b.data(),
-                        k,
-                        row_distance.data(),
-                        row_index.data(),
-                        column_distance.data(),
-                        column_index.data()};
-  if (!portable && __builtin_cpu_supports("avx2")) {
-    run_avx2(problem);
+  Problem problem{rows,
+                  columns,
+                  nullptr,
+                  nullptr,
+                  nullptr,
+                  nullptr,
+                  norm_a.data(),
+                  norm_b.data(),
+                  k,
+                  row_distance.data(),
+                  row_index.data(),
+                  column_distance.data(),
+                  column_index.data()};
+  const bool avx2 = !portable && __builtin_cpu_supports("avx2");
+  if (avx2 && are_short(size_of(a, norm_a), size_of(b, norm_b))) {
+    const auto packed_a = pack_rows<std::uint8_t>(a, rows), packed_b = pack_panels<std::uint8_t>(b, columns);
+    problem.a8 = packed_a.data();
+    problem.b8 = packed_b.data();
+    run_avx2_short(problem);
   } else {
-    run_portable(problem);
+    const auto packed_a = pack_rows<std::int16_t>(a, rows), packed_b = pack_panels<std::int16_t>(b, columns);
+    problem.a16 = packed_a.data();
+    problem.b16 = packed_b.data();
+    avx2 ? run_avx2(problem) : run_portable(problem);
   }
   MutualNeighbours result;
   row_distance.resize(a.size() * k);

@@ -10,29 +10,52 @@ namespace {
 
 __m256i load(const void* p) { return _mm256_loadu_si256(static_cast<const __m256i*>(p)); }
 
-// Two neighbouring 16-bit values of a row, in every lane.
-__m256i broadcast_pair(const std::int16_t* p) {
-  std::int32_t pair;
-  __builtin_memcpy(&pair, p, sizeof pair);
-  return _mm256_set1_epi32(pair);
+// Four bytes of a row (two or four of its components), in every lane.
+__m256i broadcast_four_bytes(const void* p) {
+  std::int32_t bytes;
+  __builtin_memcpy(&bytes, p, sizeof bytes);
+  return _mm256_set1_epi32(bytes);
 }
 
-void tile(const Problem& p, std::size_t row, std::size_t column) {
-  __m256i sum[kRowTile][2];
+using Sums = __m256i[kRowTile][2];  // 32-bit dot products of 4 rows with 16 columns
+
+void multiply(const Problem& p, std::size_t row, std::size_t column, Sums& sum) {
   for (auto& s : sum) s[0] = s[1] = _mm256_setzero_si256();
-  const std::int16_t* a = p.a + row * kDimension;
-  const std::int16_t* b = p.b + column * kDimension;
+  const std::int16_t* a = p.a16 + row * kDimension;
+  const std::int16_t* b = p.b16 + column * kDimension;
   for (std::size_t d = 0; d < kDimension; d += 2, b += 2 * kColumnTile) {
     const __m256i b0 = load(b), b1 = load(b + kColumnTile);
 #pragma GCC unroll 4
     for (std::size_t r = 0; r < kRowTile; ++r) {
-      const __m256i pair = broadcast_pair(a + r * kDimension + d);
+      const __m256i pair = broadcast_four_bytes(a + r * kDimension + d);
       sum[r][0] = _mm256_add_epi32(sum[r][0], _mm256_madd_epi16(pair, b0));
       sum[r][1] = _mm256_add_epi32(sum[r][1], _mm256_madd_epi16(pair, b1));
     }
   }
+}
 
-  // Distances, and which of them could enter a list.
+void multiply_short(const Problem& p, std::size_t row, std::size_t column, Sums& sum) {
+  for (auto& s : sum) s[0] = s[1] = _mm256_setzero_si256();
+  const std::uint8_t* a = p.a8 + row * kDimension;
+  const std::uint8_t* b = p.b8 + column * kDimension;
+  for (std::size_t d = 0; d < kDimension; d += 4, b += 4 * kColumnTile) {
+    const __m256i b0 = load(b), b1 = load(b + 2 * kColumnTile);
+#pragma GCC unroll 4
+    for (std::size_t r = 0; r < kRowTile; ++r) {
+      const __m256i four = broadcast_four_bytes(a + r * kDimension + d);
+      sum[r][0] = _mm256_add_epi16(sum[r][0], _mm256_maddubs_epi16(four, b0));
+      sum[r][1] = _mm256_add_epi16(sum[r][1], _mm256_maddubs_epi16(four, b1));
+    }
+  }
+  const __m256i ones = _mm256_set1_epi16(1);
+  for (auto& s : sum) {
+    s[0] = _mm256_madd_epi16(s[0], ones);
+    s[1] = _mm256_madd_epi16(s[1], ones);
+  }
+}
+
+// Distances of a tile, and those that could enter a list into the lists.
+void keep_nearest(const Problem& p, std::size_t row, std::size_t column, const Sums& sum) {
   alignas(32) std::int32_t distance[kRowTile][kColumnTile];
   const std::int32_t* worst_column = p.column_distance + (p.k - 1) * p.columns + column;
   unsigned candidates[kRowTile], any = 0;
@@ -61,15 +84,28 @@ void tile(const Problem& p, std::size_t row, std::size_t column) {
   }
 }
 
-}  // namespace
-
-void run_avx2(const Problem& p) {
+template <typename Multiply>
+void run(const Problem& p, Multiply multiply_tile) {
+  Sums sum;
   for (std::size_t block = 0; block < p.rows; block += kRowBlock) {
     const std::size_t end = std::min(block + kRowBlock, p.rows);
     for (std::size_t column = 0; column < p.columns; column += kColumnTile) {
-      for (std::size_t row = block; row < end; row += kRowTile) tile(p, row, column);
+      for (std::size_t row = block; row < end; row += kRowTile) {
+        multiply_tile(p, row, column, sum);
+        keep_nearest(p, row, column, sum);
+      }
     }
   }
+}
+
+}  // namespace
+
+void run_avx2(const Problem& p) {
+  run(p, [](const Problem& q, std::size_t row, std::size_t column, Sums& sum) { multiply(q, row, column, sum); });
+}
+
+void run_avx2_short(const Problem& p) {
+  run(p, [](const Problem& q, std::size_t row, std::size_t column, Sums& sum) { multiply_short(q, row, column, sum); });
 }
 
 }  // namespace megablock::nearest_kernel

@@ -166,7 +166,7 @@ TEST_F(Features, RootSiftHasTheNormOfItsScale) {
   for (const SiftDescriptor& d : features.descriptors) {
     double square = 0;
     for (const double v : d) square += v * v;
-    EXPECT_NEAR(std::sqrt(square), 512, 12);
+    EXPECT_NEAR(std::sqrt(square), 176, 5);  // at most 181: matching depends on it for speed
   }
 }
 

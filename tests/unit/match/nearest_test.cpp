@@ -53,7 +53,7 @@ void expect_equal(const Neighbours& found, const Neighbours& expected) {
 
 struct Case {
   std::size_t rows_a, rows_b;
-  int largest;  // 1: many ties; 255: the largest products
+  int largest;  // 1: many ties; 20: the kernel for short descriptors; 255: the largest products
 };
 
 class Nearest : public testing::TestWithParam<Case> {};
@@ -73,7 +73,8 @@ TEST_P(Nearest, EqualsBruteForceBothWays) {
 
 INSTANTIATE_TEST_SUITE_P(Shapes, Nearest,
                          testing::Values(Case{0, 0, 255}, Case{0, 5, 255}, Case{1, 1, 255}, Case{3, 2, 255},
-                                         Case{4, 16, 255}, Case{67, 33, 255}, Case{200, 301, 1}, Case{130, 257, 90}));
+                                         Case{4, 16, 255}, Case{67, 33, 255}, Case{200, 301, 1}, Case{130, 257, 90},
+                                         Case{67, 33, 20}, Case{131, 258, 20}));
 
 TEST(NearestExtremes, FullBytesAreExact) {
   std::vector<SiftDescriptor> bright(5), dark(5);
@@ -84,6 +85,27 @@ TEST(NearestExtremes, FullBytesAreExact) {
     EXPECT_EQ(apart.of_a.distance, std::vector<std::int32_t>(10, 128 * 255 * 255));
     EXPECT_EQ(nearest_neighbours(bright, bright, 1, portable).of_a.distance, std::vector<std::int32_t>(5, 0));
   }
+}
+
+TEST(NearestExtremes, SumsAtTheLimitOfSixteenBits) {
+  // One pair of components carries nearly the whole norm: 127^2 + 127^2 = 32258 < 2^15, and the rest fills up.
+  SiftDescriptor peak{};
+  peak[6] = peak[7] = 127;
+  for (std::size_t i = 10; i < 14; ++i) peak[i] = 11;
+  SiftDescriptor flat;
+  flat.fill(15);
+  for (const auto& d : {peak, flat}) {
+    const std::vector<SiftDescriptor> set(20, d), zero(20, SiftDescriptor{});
+    EXPECT_EQ(nearest_neighbours(set, set, 2).of_a.distance, std::vector<std::int32_t>(40, 0));
+    EXPECT_EQ(nearest_neighbours(set, zero, 2).of_b.distance,
+              std::vector<std::int32_t>(40, squared_distance(d, zero[0])));
+  }
+  const std::vector<SiftDescriptor> peaks(3, peak), flats(3, flat);
+  EXPECT_EQ(nearest_neighbours(peaks, flats, 1).of_a.distance,
+            std::vector<std::int32_t>(3, squared_distance(peak, flat)));
+  std::vector<SiftDescriptor> beyond(3, peak);  // one step above the limit: the other kernel
+  for (auto& d : beyond) d[20] = 60;
+  EXPECT_EQ(nearest_neighbours(beyond, beyond, 1).of_a.distance, std::vector<std::int32_t>(3, 0));
 }
 
 // The rule of the header, written out.
