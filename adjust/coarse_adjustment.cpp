@@ -107,7 +107,9 @@ void adjust_coarsely(const Block& block, const OrientationGraph& graph, const Co
       ceres.problem().SetParameterBlockConstant(ceres.frame(tile.frame_row[f]));
 
   ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_SCHUR;
+  constexpr std::size_t kDenseFrames = 200;  // below, dense is faster
+  solver.linear_solver_type = tile.state.frames.size() <= kDenseFrames ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  solver.dense_linear_algebra_library_type = ceres::LAPACK;
   solver.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   std::vector<double*> blocks;
   ceres.problem().GetParameterBlocks(&blocks);

@@ -95,7 +95,9 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
   if (problem.NumResidualBlocks() == 0) return;
 
   ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_SCHUR;
+  constexpr std::size_t kDenseFrames = 300;  // below, dense is faster
+  solver.linear_solver_type = graph.frames.size() <= kDenseFrames ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  solver.dense_linear_algebra_library_type = ceres::LAPACK;
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_iterations;
   solver.function_tolerance = 1e-4;

@@ -39,6 +39,7 @@ class Orientation {
     for (CameraIndex camera : graph_.cameras) values_.cameras.push_back(start.cameras[camera]);
     for (const auto& frame : graph_.frames) {
       any_position_ |= frame.position.has_value();
+      any_given_ |= frame.given.has_value();
       rotations_in_ground_ |= frame.given.has_value() || frame.attitude.has_value();
     }
   }
@@ -190,6 +191,7 @@ class Orientation {
       CoarseOptions coarse;
       coarse.observations = options_.observations;
       coarse.loss_scale_px = round.limit_px / 3;
+      if (round.limit_px > 4) coarse.function_tolerance = 1e-3;
       coarse.camera_free = free_intrinsics(round.free, round.limit_px >= 25);
       adjust_coarsely(block_, graph_, coarse, values_);
       check_focals();
@@ -251,7 +253,7 @@ class Orientation {
   std::vector<std::uint8_t> free_intrinsics(std::uint8_t wanted, bool unknown_focal_only) const {
     constexpr std::size_t kFewestFrames = 4;
     std::vector<std::uint8_t> result(graph_.cameras.size(), 0);
-    if (oriented() < kFewestFrames) return result;
+    if (oriented() < kFewestFrames || any_given_) return result;  // given poses go with the given cameras
     for (std::size_t c = 0; c < result.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];
       if (unknown_focal_only && camera.focal_known) continue;
@@ -326,7 +328,7 @@ class Orientation {
   std::vector<Baseline> baselines_;
   std::vector<std::string> reasons_;  // [frames] why it has no pose
   std::int64_t dropped_edges_ = 0;
-  bool any_position_ = false, rotations_in_ground_ = false, in_ground_ = false;
+  bool any_position_ = false, any_given_ = false, rotations_in_ground_ = false, in_ground_ = false;
 };
 
 }  // namespace

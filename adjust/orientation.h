@@ -15,7 +15,7 @@ struct OrientationOptions {
   ObservationOptions observations;
   double max_rotation_error_deg = 10;  // relative rotations farther from the average are dropped
   int min_points_per_image = 15;       // an image with fewer triangulated points is not oriented
-  std::int64_t tracks_per_pair = 300;  // longest tracks used for positioning (bounds memory)
+  std::int64_t tracks_per_pair = 120;  // longest tracks used for positioning (bounds memory)
   void check() const;                  // throws InputError
 };
 
