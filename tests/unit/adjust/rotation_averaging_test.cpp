@@ -1,0 +1,101 @@
+#include "adjust/rotation_averaging.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "tests/unit/adjust/orientation_scene.h"
+
+namespace megablock {
+namespace {
+
+using orientation_scene::kDegree;
+using orientation_scene::normal_vector;
+
+struct Graph {
+  std::vector<Eigen::Quaterniond> truth;
+  std::vector<RelativeRotation> edges;
+  std::vector<std::optional<RotationPrior>> priors;
+};
+
+// A chain with links to the next `reach` nodes; a share of the rotations is anything.
+Graph chain(std::int32_t nodes, std::int32_t reach, double noise_deg, double wrong) {
+  Graph graph;
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (std::int32_t i = 0; i < nodes; ++i) graph.truth.push_back(rotation_exp<double>(normal_vector(random)));
+  for (std::int32_t i = 0; i < nodes; ++i)
+    for (std::int32_t j = i + 1; j < std::min(nodes, i + reach + 1); ++j) {
+      const Eigen::Quaterniond exact =
+          graph.truth[static_cast<std::size_t>(j)] * graph.truth[static_cast<std::size_t>(i)].conjugate();
+      const bool is_wrong = j > i + 1 && uniform(random) < wrong;
+      const double spread = is_wrong ? 1.5 : noise_deg * kDegree;
+      graph.edges.push_back({i, j, rotation_update(exact, spread * normal_vector(random)), 100});
+    }
+  graph.priors.resize(static_cast<std::size_t>(nodes));
+  return graph;
+}
+
+// Largest rotation error after the best common world rotation (that of the first node).
+double largest_error_deg(const Graph& graph, const AveragedRotations& found, bool in_ground) {
+  Eigen::Quaterniond gauge = Eigen::Quaterniond::Identity();
+  if (!in_ground) gauge = found.rotation[0]->conjugate() * graph.truth[0];
+  double largest = 0;
+  for (std::size_t i = 0; i < graph.truth.size(); ++i)
+    largest = std::max(largest, rotation_angle(*found.rotation[i] * gauge, graph.truth[i]) / kDegree);
+  return largest;
+}
+
+TEST(RotationAveraging, ExactRotationsAreReproduced) {
+  const Graph graph = chain(40, 4, 0, 0.3);
+  const auto found = average_rotations(40, graph.edges, graph.priors, 5 * kDegree);
+  EXPECT_LT(largest_error_deg(graph, found, false), 1e-3) << "wrong edges have hardly any weight";
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const auto& edge = graph.edges[e];
+    const Eigen::Quaterniond exact =
+        graph.truth[static_cast<std::size_t>(edge.b)] * graph.truth[static_cast<std::size_t>(edge.a)].conjugate();
+    const double error = rotation_angle(exact, edge.rotation) / kDegree;
+    if (std::abs(error - 5) > 0.1) {
+      EXPECT_EQ(found.kept[e], error < 5) << error;
+    }
+  }
+}
+
+TEST(RotationAveraging, NoiseAveragesOut) {
+  // With 20 edges per node the error is far below that of a single relative rotation.
+  const Graph graph = chain(30, 29, 1, 0.1);
+  const auto found = average_rotations(30, graph.edges, graph.priors, 10 * kDegree);
+  EXPECT_LT(largest_error_deg(graph, found, false), 1.2);
+}
+
+TEST(RotationAveraging, PriorsGiveTheGround) {
+  Graph graph = chain(40, 5, 0.2, 0.1);
+  std::mt19937_64 random(2);
+  for (std::size_t i = 0; i < graph.truth.size(); ++i)
+    graph.priors[i] = RotationPrior{rotation_update(graph.truth[i], 2 * kDegree * normal_vector(random)), 2 * kDegree};
+  graph.priors[7]->rotation = rotation_update(graph.truth[7], {2, 0, 0});
+  const auto found = average_rotations(40, graph.edges, graph.priors, 10 * kDegree);
+  EXPECT_LT(largest_error_deg(graph, found, true), 1.5);
+}
+
+TEST(RotationAveraging, HeldRotationsStay) {
+  Graph graph = chain(20, 4, 0.2, 0);
+  for (std::size_t i : {3u, 4u, 15u}) graph.priors[i] = RotationPrior{graph.truth[i], 0};
+  const auto found = average_rotations(20, graph.edges, graph.priors, 10 * kDegree);
+  for (std::size_t i : {3u, 4u, 15u}) EXPECT_EQ(found.rotation[i]->coeffs(), graph.truth[i].coeffs());
+  EXPECT_LT(largest_error_deg(graph, found, true), 1.5);
+}
+
+TEST(RotationAveraging, OnlyTheLargestPartIsAveraged) {
+  Graph graph = chain(20, 4, 0.2, 0);
+  std::erase_if(graph.edges, [](const auto& e) { return e.a < 6 && e.b >= 6; });
+  const auto found = average_rotations(20, graph.edges, graph.priors, 10 * kDegree);
+  for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(found.rotation[i].has_value(), i >= 6);
+  graph.priors[2] = RotationPrior{graph.truth[2], 0};
+  const auto held = average_rotations(20, graph.edges, graph.priors, 10 * kDegree);
+  for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(held.rotation[i].has_value(), i < 6);
+}
+
+}  // namespace
+}  // namespace megablock
