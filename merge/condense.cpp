@@ -121,14 +121,23 @@ Front fill_cell(const TileProblem& problem, const TilePlan& plan, const TileStat
   return front;
 }
 
-// Further right-hand sides enter where their unknown completes, or at the tile's top.
-void add_extra(const Step& extra, const UnknownList& unknowns, Front& front) {
+// The datum enters where its unknown completes, or at the tile's top, where the diagonal is that of the whole tile.
+void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front) {
   for (const Unknown& u : unknowns) {
     const std::int64_t row = front.row_of(u.id);
-    for (std::int64_t c = 0; c < extra.columns; ++c) {
-      const double* values = extra.find(u.id, c);
+    for (std::int64_t c = 0; c < datum.columns.columns; ++c) {
+      const double* values = datum.columns.find(u.id, c);
       if (values == nullptr) continue;
       for (std::int64_t k = 0; k < u.dimension; ++k) front.rhs()[row + k + (c + 1) * front.dimension()] += values[k];
+    }
+    for (const TileDatum::Hold& hold : datum.holds) {
+      if (hold.frame != u.id) continue;
+      const Eigen::Matrix<double, 6, 1> root =
+          Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).cwiseSqrt();
+      const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
+      const Eigen::MatrixXd basis = scaled.householderQr().householderQ() * Eigen::MatrixXd::Identity(6, scaled.cols());
+      const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();
+      add_product(front.matrix(), front.dimension(), row, row, weight, 1);
     }
   }
 }
@@ -179,8 +188,8 @@ TileFactor TileFactor::from_bytes(const Bytes& bytes) {
 }
 
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
-                               const Step* extra) {
-  const std::int64_t right_hand_sides = 1 + (extra == nullptr ? 0 : extra->columns);
+                               const TileDatum& datum) {
+  const std::int64_t right_hand_sides = 1 + datum.columns.columns;
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
   PointEquations equations(problem, plan, state);
   std::vector<UpdateMatrix> updates(nodes.size());
@@ -195,10 +204,8 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
       front.add(updates[at(child)]);
       updates[at(child)] = UpdateMatrix();
     }
-    if (extra != nullptr) {
-      add_extra(*extra, node.eliminated, front);
-      if (i + 1 == nodes.size()) add_extra(*extra, node.passed, front);
-    }
+    add_datum(datum, node.eliminated, front);
+    if (i + 1 == nodes.size()) add_datum(datum, node.passed, front);
     Front::Result eliminated = std::move(front).eliminate(lambda);
     updates[i] = std::move(eliminated.update);
     result.factor.nodes[i] = std::move(eliminated.factor);
@@ -208,16 +215,18 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
 }
 
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
-                         const TileFactor& factor, const Step& boundary) {
+                         const TileFactor& factor, const Step& boundary, const TileDatum& datum) {
   if (factor.empty()) {
-    const TileFactor again = condense_tile(problem, plan, state, lambda).factor;
+    const TileFactor again = condense_tile(problem, plan, state, lambda, datum).factor;
     return solve_tile_down(problem, plan, state, lambda, again, boundary);
   }
   TileStep result;
   result.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
   result.unknowns.unknowns = plan.unknowns;
   const std::vector<std::int64_t> offsets = row_offsets(plan.unknowns);
-  result.unknowns.values.assign(at(offsets.back()), 0);
+  const std::int64_t columns = factor.nodes.back().right_hand_sides, rows_in_all = offsets.back();
+  result.unknowns.columns = columns;
+  result.unknowns.values.assign(at(rows_in_all * columns), 0);
 
   // Fronts from the top; each front's step is complete when its cell is reached.
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
@@ -230,9 +239,9 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
     const std::vector<std::int64_t> rows = row_offsets(own);
     for (std::size_t u = 0; u < own.size(); ++u) {
       const std::int64_t target = find_unknown(plan.unknowns, own[u].id);
-      if (target >= 0)
-        std::copy_n(part.values.begin() + rows[u], own[u].dimension,
-                    result.unknowns.values.begin() + offsets[at(target)]);
+      for (std::int64_t c = 0; target >= 0 && c < columns; ++c)
+        std::copy_n(part.values.begin() + rows[u] + c * rows.back(), own[u].dimension,
+                    result.unknowns.values.begin() + offsets[at(target)] + c * rows_in_all);
     }
   }
 

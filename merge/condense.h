@@ -23,6 +23,7 @@ UnknownList tile_unknowns(const TileProblem& problem);
 struct TilePlan {
   UnknownList unknowns;                           // touched, ascending
   UnknownList boundary;                           // passed to the merge tree, ascending
+  UnknownList owned;                              // no tile with a lower number touches them
   EliminationPlan cells;                          // leaves = cells
   std::vector<std::vector<std::int64_t>> points;  // [cells] active points, ascending
   // Rows of the problem's tables of observations without a point, [cells].
@@ -47,21 +48,31 @@ struct TileCondensation {
   TileFactor factor;
 };
 
-// Linearises at `state`, eliminates the tile's points and interior unknowns. `extra` (may be null): further right-hand
-// sides, rows = plan.unknowns. Throws ComputeError when a kept observation is behind its camera.
+// What the datum of a free block adds to a tile (gauge.h); empty when priors fix it.
+struct TileDatum {
+  struct Hold {
+    UnknownId frame;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> directions;  // along which the frame is held
+  };
+  std::vector<Hold> holds;
+  Step columns{{}, 0, {}};  // further right-hand sides
+};
+
+// Linearises at `state`, eliminates the tile's points and interior unknowns.
+// Throws ComputeError when a kept observation is behind its camera.
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
-                               const Step* extra = nullptr);
+                               const TileDatum& datum = {});
 
 // Step of everything in the tile.
 struct TileStep {
-  Step unknowns;                        // of plan.unknowns
+  Step unknowns;                        // of plan.unknowns, with the columns of the boundary's step
   std::vector<Eigen::Vector3d> points;  // [points], zero for points that take no part
   double damping_norm = 0;              // sum of D x^2 over the tile's own residuals; the predicted decrease of the
                                         // block is 1/2 (decrement^2 + lambda * sum of these)
 };
 // From the boundary's step. `factor` empty: condensed again (same bits).
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
-                         const TileFactor& factor, const Step& boundary);
+                         const TileFactor& factor, const Step& boundary, const TileDatum& datum = {});
 
 // state (+) step; every tile that holds a frame computes the same bits.
 TileState apply_step(const TileProblem& problem, const TileState& state, const TileStep& step);
@@ -73,8 +84,12 @@ struct TileCovariance {
   std::vector<Eigen::Matrix<double, 8, 8>> cameras;  // [cameras]; held parameters zero
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;   // [mounts]
   std::vector<Eigen::Matrix3d> points;               // [points]; zero for points that take no part
+  // [points] of the further columns (3 x columns), where they were asked for.
+  std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };
+// `columns`: of plan.unknowns, column 0 is not used; empty for blocks with a datum.
 TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const TileFactor& factor, const CovarianceMatrix& boundary);
+                               const TileFactor& factor, const CovarianceMatrix& boundary, const TileDatum& datum = {},
+                               const Step& columns = {});
 
 }  // namespace megablock

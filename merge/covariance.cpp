@@ -11,8 +11,11 @@ std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 class TileCovarianceBuilder {
  public:
   TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                        const TileFactor& factor)
-      : problem_(problem), plan_(plan), factor_(factor), equations_(problem, plan, state) {
+                        const TileFactor& factor, const Step& columns)
+      : problem_(problem), plan_(plan), factor_(factor), columns_(columns), equations_(problem, plan, state) {
+    offsets_ = row_offsets(plan.unknowns);
+    if (columns.columns > 1)
+      result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
     result_.frames.assign(problem.frames.size(), Eigen::Matrix<double, 6, 6>::Zero());
     result_.cameras.assign(problem.cameras.size(), Eigen::Matrix<double, 8, 8>::Zero());
     result_.mounts.assign(problem.mounts.size(), Eigen::Matrix<double, 6, 6>::Zero());
@@ -94,13 +97,29 @@ class TileCovarianceBuilder {
           inner += a.w.transpose() * block * b.w;
         }
       }
+      if (columns_.columns > 1) add_point_columns(point);
       result_.points[at(point)] = equations_.inverse_factor().transpose() * inner * equations_.inverse_factor();
     }
+  }
+
+  // Their own right-hand side is zero: x_p = -C^-T sum Y_i' x_i.
+  void add_point_columns(std::int64_t point) {
+    const std::int64_t n = offsets_.back();
+    Eigen::Matrix<double, 3, Eigen::Dynamic> sum = Eigen::MatrixXd::Zero(3, columns_.columns - 1);
+    for (const auto& block : equations_.blocks()) {
+      const double* first = columns_.values.data() + offsets_[at(block.unknown)] + n;
+      const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> x(first, block.dimension, columns_.columns - 1,
+                                                                         Eigen::OuterStride<>(n));
+      sum -= block.w.transpose() * x;
+    }
+    result_.point_columns[at(point)] = equations_.inverse_factor().transpose() * sum;
   }
 
   const TileProblem& problem_;
   const TilePlan& plan_;
   const TileFactor& factor_;
+  const Step& columns_;
+  std::vector<std::int64_t> offsets_;
   PointEquations equations_;
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_, row_of_unknown_;
   TileCovariance result_;
@@ -109,10 +128,12 @@ class TileCovarianceBuilder {
 }  // namespace
 
 TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const TileFactor& factor, const CovarianceMatrix& boundary) {
+                               const TileFactor& factor, const CovarianceMatrix& boundary, const TileDatum& datum,
+                               const Step& columns) {
   if (factor.empty())
-    return covariance_tile(problem, plan, state, condense_tile(problem, plan, state, 0).factor, boundary);
-  return TileCovarianceBuilder(problem, plan, state, factor).build(boundary);
+    return covariance_tile(problem, plan, state, condense_tile(problem, plan, state, 0, datum).factor, boundary, datum,
+                           columns);
+  return TileCovarianceBuilder(problem, plan, state, factor, columns).build(boundary);
 }
 
 }  // namespace megablock

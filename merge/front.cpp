@@ -327,7 +327,7 @@ void Front::add(const UpdateMatrix& child) {
     }
     diagonal_[static_cast<std::size_t>(column)] += child.diagonal[static_cast<std::size_t>(j)];
   }
-  for (std::int64_t c = 0; c < child.right_hand_sides; ++c)
+  for (std::int64_t c = 0; c < std::min(child.right_hand_sides, right_hand_sides_); ++c)
     for (std::int64_t i = 0; i < n; ++i)
       rhs_[static_cast<std::size_t>(rows[static_cast<std::size_t>(i)] + c * dimension_)] +=
           child.rhs[static_cast<std::size_t>(i + c * n)];

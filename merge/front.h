@@ -107,7 +107,7 @@ class Front {
   double* diagonal() { return diagonal_.data(); }  // [n] of J'J
   SubtreeSums& sums() { return sums_; }
 
-  void add(const UpdateMatrix& child);  // extend-add
+  void add(const UpdateMatrix& child);  // extend-add; right-hand sides beyond this front's are left out
 
   struct Result;
   // Adds lambda * diagonal to the eliminated rows, factorises them, leaves the update matrix. Consumes the front.

@@ -1,25 +1,117 @@
-// The datum of the block: what its observations leave undetermined, fixed by inner constraints, never silently.
+// The datum of the block: what its observations leave free, fixed by minimal constraints, expressed by inner ones,
+// never silently.
 //
-// Without priors or control a connected component is determined up to a similarity (7), or a rigid motion (6) when held
-// mounts give the scale; positions on one straight line leave one rotation. The directions are the generators of the
-// similarity group, one matrix N per unknown (translation, rotation about the component's centroid, scale).
+// A similarity of the ground (rotation phi about the component's centroid c, shift L t, scale 1 + s; L its extent)
+// moves
 //
-// Detection: pivots of the lambda = 0 pass (front.h); the held scalars are a minimal datum. The S-transformation
-// (Baarda 1973) x - N (N'WN)^-1 N'W x moves steps and covariances to inner constraints over the component's frames.
+//     frames   dw = -phi,  dC = phi x (C - c) + L t + s (C - c)       points   dX as dC        mounts   dC_m = s C_m
+//
+// and changes no image residual (the scale only where two held mounts of a rig do not fix it). The directions that
+// change no other residual either are the null space of the 7 x 7 matrix sum (J N)'(J N) over the priors: 7 for free
+// single cameras, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. It belongs to a
+// connected component of the block and is found before the first pass; pivots that vanish in spite of it (front.h) are
+// unknowns that too few observations determine, reported as such.
+//
+// Minimal constraints: one frame is held along the free directions, a second one along what is left (the scale), each
+// by adding D^1/2 P D^1/2 to its own 6 x 6 block: no coupling, no dense rows, nothing added to the gradient, and the
+// decrement stays as it is. At the end the S-transformation (Baarda 1973)
+//
+//     C' = S C S',   S = I - N M^-1 N'W,   M = N'WN over the component's frames,  W = (1, 1, 1, 1/L^2, ...)
+//
+// moves the covariances to inner constraints; C N W is formed by as many further right-hand sides through the tree.
 #pragma once
 
+#include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
-#include "merge/front.h"
+#include "adjust/tile_problem.h"
+#include "merge/condense.h"
 
 namespace megablock {
 
-struct GaugeReport {
-  std::int64_t defect = 0;               // scalar unknowns held as a datum
-  std::int64_t undetermined = 0;         // scalar unknowns held because nothing observes them
-  std::string text = "fixed by priors";  // for the report
+using Matrix67 = Eigen::Matrix<double, 6, 7>;
+using Matrix77 = Eigen::Matrix<double, 7, 7>;
+
+// Part of a tile that hangs together: what the tile says of its component's datum.
+struct GaugePart {
+  std::vector<std::int64_t> boundary_frames;  // global frame indices that other tiles may share, ascending
+  std::int64_t frames = 0;                    // of the part, boundary ones included
+  std::int64_t lowest_frame = -1;             // global index
+  Eigen::Vector3d lowest_centre = Eigen::Vector3d::Zero();
+  std::array<std::int64_t, 6> extreme_frames{};  // smallest and largest east, north, up
+  Eigen::Matrix<double, 3, 6> extreme_centres = Eigen::Matrix<double, 3, 6>::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // of `normal`
+  double extent = 1;                                 // of `normal`, metres
+  Matrix77 normal = Matrix77::Zero();                // sum (J N)'(J N) over the part's residuals
 };
-GaugeReport judge_gauge(const SubtreeSums& root);
+
+// Of one tile, parts by lowest frame.
+struct TileGauge {
+  std::vector<GaugePart> parts;
+  Bytes to_bytes() const;
+  static TileGauge from_bytes(const Bytes& bytes);
+};
+TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
+
+// A connected component of the block whose datum is not complete.
+struct FreeComponent {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double extent = 1;
+  std::int64_t frames = 0;  // boundary frames counted once per tile
+  std::int64_t lowest_frame = -1;
+  std::int64_t defect = 0;                 // 1 to 7
+  Matrix77 directions = Matrix77::Zero();  // first `defect` columns: combinations of (phi, t, s) that are free
+  std::int64_t first_column = 0;           // of its further right-hand sides
+  Matrix67 move(const Eigen::Vector3d& centre_of_frame) const;  // N of a frame, restricted to the free directions
+  Eigen::Matrix<double, 3, 7> move_point(const Eigen::Vector3d& position) const;
+  Eigen::Matrix<double, 6, 1> weights() const;  // W
+};
+
+// Holds one frame along `count` directions.
+struct GaugeConstraint {
+  std::int64_t frame = -1;
+  std::int64_t count = 0;
+  Matrix67 directions = Matrix67::Zero();
+};
+
+struct BlockGauge {
+  std::vector<FreeComponent> components;  // by lowest frame
+  std::vector<GaugeConstraint> constraints;
+  std::vector<std::vector<std::int64_t>> part_component;  // [tiles][parts] row of components, -1: complete
+  std::int64_t defect() const;                            // sum over components = columns of further right-hand sides
+  bool free() const { return !components.empty(); }
+};
+// From all tiles, in tile order.
+BlockGauge make_gauge(const std::vector<TileGauge>& tiles);
+
+// What one tile adds: its constraints, and (when asked for) the rows W N of the frames that it owns.
+TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
+                     const TileState& state, bool with_columns);
+
+// Sums for the S-transformation over the frames that a tile owns; added in tile order.
+struct InnerSums {
+  Eigen::MatrixXd m, k;  // [defect x defect]: N'WN, N'W C W N; blocks of different components are not used
+  void add(const InnerSums& other);
+  Bytes to_bytes() const;
+  static InnerSums from_bytes(const Bytes& bytes);
+};
+InnerSums inner_sums(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
+                     const TileState& state, const Step& unknowns);
+
+// Moves a tile's covariances to inner constraints. `unknowns`: the tile's step with the further columns (TileStep),
+// which covariance_tile() had as `columns`.
+void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::int64_t tile, const TileProblem& problem,
+                          const TilePlan& plan, const TileState& state, const Step& unknowns,
+                          TileCovariance& covariance);
+
+// For the report.
+struct GaugeReport {
+  std::int64_t defect = 0;        // of the datum
+  std::int64_t undetermined = 0;  // scalar unknowns held because too little observes them
+  std::string text = "fixed by priors";
+};
+GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge = {});
 
 }  // namespace megablock

@@ -42,11 +42,12 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
 
   std::vector<TouchedList> touched_by_leaf(leaf_unknowns.size());
   std::vector<std::int64_t> leaves_of(table.size(), 0);
+  std::vector<UnknownList> owned(leaf_unknowns.size());
   for (std::size_t leaf = 0; leaf < leaf_unknowns.size(); ++leaf) {
     for (const Unknown& u : leaf_unknowns[leaf]) {
       const auto row = static_cast<std::size_t>(find_unknown(table, u.id));
       touched_by_leaf[leaf].push_back({row, 1});
-      ++leaves_of[row];
+      if (leaves_of[row]++ == 0) owned[leaf].push_back(u);
     }
   }
   for (const Unknown& u : kept) leaves_of[static_cast<std::size_t>(find_unknown(table, u.id))] = -1;  // never complete
@@ -69,6 +70,7 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
       const auto leaf = static_cast<std::size_t>(node.leaf);
       plan.node_of_leaf.at(leaf) = static_cast<std::int64_t>(i);
       here = std::move(touched_by_leaf[leaf]);
+      node.owned = std::move(owned[leaf]);
     } else {
       static const TouchedList kNothing;
       here = merged(source.left < 0 ? kNothing : open[static_cast<std::size_t>(source.left)],

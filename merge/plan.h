@@ -16,6 +16,7 @@ struct PlanNode {
   std::int64_t leaf = -1;                           // leaf number (tile or cell), -1 for inner nodes
   UnknownList eliminated;                           // completed here, ascending
   UnknownList passed;                               // of the update matrix, ascending
+  UnknownList owned;                                // leaves: touched here and by no leaf with a lower number
   std::int64_t front_dimension() const { return total_dimension(eliminated) + total_dimension(passed); }
 };
 

@@ -20,6 +20,10 @@ SerialRunner::SerialRunner(const MergeTree& tree, std::vector<TileProblem> probl
   for (std::size_t t = 0; t < problems_.size(); ++t)
     tile_plans_.push_back(make_tile_plan(problems_[t], plan_.nodes[at(plan_.node_of_leaf[t])]));
   steps_.resize(problems_.size());
+  std::vector<TileGauge> gauges;
+  for (std::size_t t = 0; t < problems_.size(); ++t)
+    gauges.push_back(tile_gauge(problems_[t], tile_plans_[t], states_[t]));
+  block_gauge_ = make_gauge(gauges);
 }
 
 SerialRunner::~SerialRunner() = default;
@@ -36,7 +40,7 @@ UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, double lambda, 
   UpdateMatrix update;
   if (node.leaf >= 0) {
     const std::size_t t = at(node.leaf);
-    TileCondensation condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], lambda);
+    TileCondensation condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], lambda, datum_of(t));
     update = std::move(condensed.update);
     factors.tile = std::move(condensed.factor);
   } else {
@@ -52,19 +56,24 @@ UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, double lambda, 
   return update;
 }
 
-UpReport SerialRunner::up(double lambda) {
-  factors_.clear();
-  const UpdateMatrix root = condense_subtree(plan_.root(), lambda, false);
-  if (lambda == 0) gauge_ = judge_gauge(root.sums);
-  return {root.sums};
+TileDatum SerialRunner::datum_of(std::size_t t) const {
+  return tile_datum(block_gauge_, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t], states_[t],
+                    with_columns_);
 }
 
-UpReport SerialRunner::final_up() {
+UpReport SerialRunner::pass(double lambda, bool final_pass) {
   factors_.clear();
-  seams_.clear();
-  const UpdateMatrix root = condense_subtree(plan_.root(), 0, true);
-  gauge_ = judge_gauge(root.sums);
-  return {root.sums};
+  with_columns_ = final_pass && block_gauge_.free();
+  if (final_pass) seams_.clear();
+  return {condense_subtree(plan_.root(), lambda, final_pass).sums};
+}
+
+UpReport SerialRunner::up(double lambda) { return pass(lambda, false); }
+
+UpReport SerialRunner::final_up() {
+  const UpReport report = pass(0, true);
+  gauge_ = judge_gauge(report.sums, block_gauge_);
+  return report;
 }
 
 const NodeFactors& SerialRunner::inner_factor(std::int64_t node, double lambda) {
@@ -109,7 +118,10 @@ void SerialRunner::covariances_from(std::int64_t number, const CovarianceMatrix&
   if (node.leaf >= 0) {
     const std::size_t t = at(node.leaf);
     const CovarianceMatrix boundary = node.passed.empty() ? CovarianceMatrix{} : parent.restricted_to(node.passed);
-    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], inner_factor(number, 0).tile, boundary);
+    const TileFactor& factor = inner_factor(number, 0).tile;
+    const TileDatum datum = datum_of(t);
+    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], factor, boundary, datum,
+                                with_columns_ ? steps_[t].unknowns : Step{});
     return;
   }
   const CovarianceMatrix covariance = covariance_node(inner_factor(number, 0).front, parent);
@@ -119,8 +131,37 @@ void SerialRunner::covariances_from(std::int64_t number, const CovarianceMatrix&
 
 std::vector<TileCovariance> SerialRunner::covariances() {
   std::vector<TileCovariance> result(problems_.size());
+  if (with_columns_) down_from(plan_.root(), 0, Step());
   covariances_from(plan_.root(), CovarianceMatrix{}, result);
+  if (with_columns_) inner_constraints(result);
   return result;
+}
+
+std::vector<TileCheck> SerialRunner::tile_checks() {
+  const double probability = kSeamAlarmProbability / static_cast<double>(problems_.size());
+  std::vector<TileCovariance> all(problems_.size());
+  covariances_from(plan_.root(), CovarianceMatrix{}, all);
+  std::vector<TileCheck> checks;
+  for (std::size_t t = 0; t < problems_.size(); ++t) {
+    const UpdateMatrix condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], 0, datum_of(t)).update;
+    checks.push_back(check_tile(static_cast<std::int64_t>(t), condensed, all[t].boundary, probability));
+  }
+  return checks;
+}
+
+void SerialRunner::inner_constraints(std::vector<TileCovariance>& covariances) {
+  InnerSums sums;
+  for (std::size_t t = 0; t < problems_.size(); ++t) {
+    const InnerSums part = inner_sums(block_gauge_, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t],
+                                      states_[t], steps_[t].unknowns);
+    if (t == 0)
+      sums = part;
+    else
+      sums.add(part);
+  }
+  for (std::size_t t = 0; t < problems_.size(); ++t)
+    to_inner_constraints(block_gauge_, sums, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t], states_[t],
+                         steps_[t].unknowns, covariances[t]);
 }
 
 }  // namespace megablock

@@ -27,17 +27,21 @@ class SerialRunner : public TreeRunner {
 
   // The pass that ends a run: up(0) with the seam checks.
   UpReport final_up();
-  // After up(0) or final_up(): posterior covariances per tile.
+  // After final_up(): posterior covariances per tile, with inner constraints where the datum is free.
   std::vector<TileCovariance> covariances();
   // Seams of all inner nodes in node order, from final_up().
   const std::vector<SeamReport>& seams() const { return seams_; }
+
+  // Every tile against the rest of the block, after final_up(); recomputes.
+  std::vector<TileCheck> tile_checks();
 
   const EliminationPlan& plan() const { return plan_; }
   const std::vector<TilePlan>& tile_plans() const { return tile_plans_; }
   const std::vector<TileProblem>& problems() const { return problems_; }
   const std::vector<TileState>& states() const { return states_; }
   const std::vector<TileStep>& steps() const { return steps_; }  // of the last down()
-  const GaugeReport& gauge() const { return gauge_; }            // of the last up(0)
+  const BlockGauge& block_gauge() const { return block_gauge_; }
+  const GaugeReport& gauge() const { return gauge_; }  // of the last final_up()
   const MemoryStatistics& memory() const { return factors_.statistics(); }
 
  private:
@@ -47,6 +51,9 @@ class SerialRunner : public TreeRunner {
   const NodeFactors& inner_factor(std::int64_t node, double lambda);
   void down_from(std::int64_t node, double lambda, const Step& parent);
   void covariances_from(std::int64_t node, const CovarianceMatrix& parent, std::vector<TileCovariance>& result);
+  TileDatum datum_of(std::size_t tile) const;
+  UpReport pass(double lambda, bool final_pass);
+  void inner_constraints(std::vector<TileCovariance>& covariances);
   std::int64_t seam_count() const;
 
   std::vector<TileProblem> problems_;
@@ -55,6 +62,8 @@ class SerialRunner : public TreeRunner {
   std::vector<TileStep> steps_;
   EliminationPlan plan_;
   FactorStore factors_;
+  BlockGauge block_gauge_;
+  bool with_columns_ = false;  // the last pass carries the further right-hand sides of a free datum
   GaugeReport gauge_;
   std::vector<SeamReport> seams_;
 };

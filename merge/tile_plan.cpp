@@ -210,6 +210,7 @@ TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::i
   TilePlan plan;
   plan.unknowns = tile_unknowns(problem);
   plan.boundary = node.passed;
+  plan.owned = node.owned;
   const auto position = [&](const Unknown& u) { return find_unknown(plan.unknowns, u.id); };
   for (std::size_t row = 0; row < problem.frames.size(); ++row)
     plan.unknown_of_frame.push_back(position(frame_unknown(problem, row)));
