@@ -533,7 +533,13 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
 GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge) {
   GaugeReport report;
   report.defect = gauge.defect();
-  report.undetermined = static_cast<std::int64_t>(root.held.size());
+  for (const HeldUnknown& held : root.held) {
+    // Without BlockGauge a free datum shows as vanished pivots.
+    const bool datum = !gauge.free() && held.ratio != 0;
+    (datum ? report.defect : report.undetermined) += 1;
+  }
+  if (!gauge.free() && report.defect > 0)
+    report.text = "free: defect " + std::to_string(report.defect) + ", held at " + describe(root.held.back().id);
   if (gauge.free()) {
     report.text = "free, inner constraints:";
     for (const FreeComponent& c : gauge.components)

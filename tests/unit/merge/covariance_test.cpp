@@ -79,10 +79,10 @@ TEST_P(Covariances, EqualTheInverse) {
 
 // Dimension of the null space, and C = S H^+ S' with S from the same inner constraints, by eigenvalues of the dense H.
 TEST_P(Covariances, OfAFreeBlockEqualThePseudoInverse) {
-  SimulationOptions options = small(GetParam(), 24, 30);
+  SimulationOptions options = small(GetParam(), 20, 20);
   options.gps_sigma_m = 0;
   options.calibrate = false;
-  const TiledBlock block(simulate_block(options), 7, {}, 0);
+  const TiledBlock block(simulate_block(options), 6, {}, 0);
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
   const UpReport up = runner.final_up();
   const bool rig = GetParam() == SimulationOptions::Scene::kStreet;

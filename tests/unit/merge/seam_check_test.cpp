@@ -61,7 +61,7 @@ TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
 TEST(SeamCheck, NamesTheTileThatWasShifted) {
   TiledBlock block(simulate_block(scene()), 12, without_loss(), 0.02);
   constexpr std::size_t kWrong = 2;
-  // Everything that this tile observes about position is one metre off.
+  // All positions that this tile observes are 1.5 m off.
   for (auto& term : block.problems[kWrong].positions) term.prior.position.x() += 1.5;
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
   adjust(runner);
