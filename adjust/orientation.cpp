@@ -143,7 +143,9 @@ class Orientation {
   void to_ground() {
     if (!any_position_) return;
     intersect(3 * kDegree, 1 * kDegree);
-    const auto similarity = similarity_to_ground(graph_, values_, median_distance(), rotations_in_ground_);
+    const double distance =
+        median_of_kept([](const Eigen::Vector3d&, const Eigen::Vector3d& inside) { return inside.norm(); });
+    const auto similarity = similarity_to_ground(graph_, values_, distance, rotations_in_ground_);
     if (!similarity) return;
     in_ground_ = true;
     for (auto& rotation : rotations_)
@@ -183,23 +185,36 @@ class Orientation {
     constexpr std::uint8_t kF = 1 << kFocal, kK1 = 1 << kRadial1, kK2 = 1 << kRadial2;
     for (const Round& round : {Round{25, kF}, Round{10, kF | kK1}, Round{4, kF | kK1 | kK2}}) {
       rays_ = viewing_rays(graph_, values_.cameras);
-      const double limit = round.limit_px / smallest_focal();
-      intersect(limit, 1 * kDegree);
+      const double limit = intersect_within(round.limit_px);
       drop_weak_frames();
       if (round.limit_px < 25) resect(limit);
       if (oriented() < 2) throw ComputeError("orientation: fewer than two images could be oriented");
       CoarseOptions coarse;
       coarse.observations = options_.observations;
-      coarse.loss_scale_px = round.limit_px / 3;
+      coarse.loss_scale_px = limit * smallest_focal() / 3;
       if (round.limit_px > 4) coarse.function_tolerance = 1e-3;
       coarse.camera_free = free_intrinsics(round.free, round.limit_px >= 25);
       adjust_coarsely(block_, graph_, coarse, values_);
       check_focals();
     }
     rays_ = viewing_rays(graph_, values_.cameras);
-    intersect(4 / smallest_focal(), 1 * kDegree);
+    intersect_within(4);
     drop_weak_frames();
     if (oriented() < 2) throw ComputeError("orientation: fewer than two images could be oriented");
+  }
+
+  // Intersects with the limit in pixels; with given poses, which may be approximate and do not move, at least four
+  // times the median error. Returns the limit in radians.
+  double intersect_within(double limit_px) {
+    double limit = limit_px / smallest_focal();
+    if (any_given_) {
+      intersect(3 * kDegree, 1 * kDegree);
+      limit = std::max(limit, 4 * median_of_kept([](const Eigen::Vector3d& ray, const Eigen::Vector3d& inside) {
+                                return (ray - inside.normalized()).norm();
+                              }));
+    }
+    intersect(limit, 1 * kDegree);
+    return limit;
   }
 
   // Left-over frames by their observations of points, as long as new ones come in.
@@ -276,17 +291,20 @@ class Orientation {
     intersect_tracks(graph_, rays_, {max_error_rad, min_intersection_rad}, values_);
   }
 
-  double median_distance() const {
-    std::vector<double> distances;
+  // Median over the kept observations of a function of the ray and the point, both in camera axes; 0 without any.
+  template <typename Function>
+  double median_of_kept(Function function) const {
+    std::vector<double> results;
     for (std::size_t t = 0; t < values_.points.size(); ++t)
       for (auto o = static_cast<std::size_t>(graph_.begin[t]);
            values_.points[t] && o < static_cast<std::size_t>(graph_.begin[t + 1]); ++o)
-        if (values_.kept[o])
-          distances.push_back(
-              (*values_.points[t] - values_.camera(graph_, graph_.observations[o].image)->centre).norm());
-    if (distances.empty()) return 0;
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
+        if (values_.kept[o]) {
+          const Pose camera = *values_.camera(graph_, graph_.observations[o].image);
+          results.push_back(function(rays_[o], to_inside(camera, *values_.points[t])));
+        }
+    if (results.empty()) return 0;
+    const auto middle = results.begin() + static_cast<std::ptrdiff_t>(results.size() / 2);
+    std::nth_element(results.begin(), middle, results.end());
     return *middle;
   }
 

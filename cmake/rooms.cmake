@@ -49,5 +49,6 @@ function(megablock_tests target folder)
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE ${TESTS_LINK} GTest::gmock GTest::gtest_main)
   gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS ${TESTS_LABEL} TIMEOUT ${TESTS_TIMEOUT})
+                       PROPERTIES LABELS ${TESTS_LABEL} TIMEOUT ${TESTS_TIMEOUT}
+                                  ENVIRONMENT OPENBLAS_NUM_THREADS=1)  # as the program itself; more threads spin
 endfunction()

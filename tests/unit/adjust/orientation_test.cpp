@@ -283,6 +283,21 @@ TEST(Orientation, GivenPosesStayAndOrientTheOthers) {
   }
 }
 
+TEST(Orientation, ApproximateGivenPosesOrientTheOthersToTheirAccuracy) {
+  const SimulatedBlock scene = aerial(4, 6, {});
+  BlockState start = initial_state(scene.block);
+  std::mt19937_64 random(12);
+  for (std::int64_t f = 0; f < 24; f += 2) {
+    start.oriented[FrameIndex(f)] = 1;
+    Pose pose = scene.truth.frames[FrameIndex(f)];
+    pose.centre += 0.5 * normal_vector(random);
+    pose.rotation = rotation_update(pose.rotation, 0.5 * kDegree * normal_vector(random));
+    start.frames[FrameIndex(f)] = pose;
+  }
+  const auto result = orient_component(scene.block, start, all_frames(scene.block), pairs_of(scene), scene.tracks, {});
+  expect_oriented(scene, result, false, 3, 3);
+}
+
 TEST(Orientation, ReportsImagesThatNothingLinks) {
   SimulatedBlock scene = aerial(2, 6, {});
   scene.block.images.push_back({"alone", "", FrameIndex(12), 0, 0});
