@@ -105,7 +105,8 @@ std::vector<std::int64_t> observation_counts(const Job& job, const MergeInputs& 
 std::int64_t screen(Job& job, RankRunner& runner) {
   std::int64_t changed = 0;
   for (RankTile& tile : runner.tiles())
-    changed += screen_observations(tile.problem, tile.state, job.settings.adjustment.max_residual_sigmas,
+    changed += screen_observations(tile.problem, tile.state,
+                                   screening_threshold(tile.problem, tile.state, job.settings.adjustment),
                                    job.settings.adjustment);
   std::int64_t total = 0;
   for (const std::string& text : job.ranks.gather_all(std::to_string(changed))) total += std::stoll(text);

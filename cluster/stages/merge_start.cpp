@@ -38,10 +38,13 @@ void align(TileAdjustment& tile, const BlockState& oriented) {
 
 }  // namespace
 
+// Three points fix the pose of a camera; a frame with fewer than twice as many would hang on single observations.
+constexpr std::int64_t kFewestObservations = 6;
+
 BlockState merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted) {
   const bool datum = has_datum(job);
   BlockState start = oriented;
-  IndexedVector<FrameIndex, std::int64_t> richest(job.block.frames.size(), 0);
+  IndexedVector<FrameIndex, std::int64_t> richest(job.block.frames.size(), 0), total(job.block.frames.size(), 0);
   std::vector<std::array<double, kIntrinsicCount>> sums(job.block.cameras.size());
   std::vector<double> weights(job.block.cameras.size(), 0);
   for (const std::string& name : adjusted) {
@@ -49,6 +52,7 @@ BlockState merge_start(const Job& job, const BlockState& oriented, const std::ve
     TileAdjustment tile = read_adjustment(job.store.verified_path(name));
     if (!datum) align(tile, oriented);
     for (std::size_t i = 0; i < tile.frames.size(); ++i) {
+      total[tile.frames[i]] += tile.observations[i];
       if (tile.observations[i] <= richest[tile.frames[i]]) continue;
       richest[tile.frames[i]] = tile.observations[i];
       start.frames[tile.frames[i]] = tile.poses[i];
@@ -66,7 +70,7 @@ BlockState merge_start(const Job& job, const BlockState& oriented, const std::ve
         start.cameras[CameraIndex(static_cast<std::int64_t>(c))][p] = sums[c][p] / weights[c];
   for (std::size_t f = 0; f < richest.size(); ++f) {
     const FrameIndex frame(static_cast<std::int64_t>(f));
-    if (richest[frame] == 0) start.oriented[frame] = 0;
+    if (total[frame] < kFewestObservations) start.oriented[frame] = 0;
   }
   return start;
 }

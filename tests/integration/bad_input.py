@@ -39,12 +39,14 @@ def status(job):
 
 
 def events(job):
-    return [json.loads(line) for file in sorted((job / "events").iterdir()) for line in file.open()]
+    return [json.loads(line) for file in sorted((job / "events").iterdir()) for line in file.read_text().splitlines()]
 
 
 def setUpModule():
-    megablock("simulate", "--rendered", "--frames", 12, "--width", 640, "--image-height", 480, "--focal", 500,
+    megablock("simulate", "--rendered", "--frames", 12, "--width", 480, "--image-height", 360, "--focal", 375,
               "-o", work / "clean")
+    with (work / "clean/block.yaml").open("a") as f:
+        f.write("features:\n  max_features: 1200\n")
     megablock("run", work / "clean/block.yaml", "-j", work / "clean_job", "-q")
 
 
