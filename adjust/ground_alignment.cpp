@@ -56,7 +56,8 @@ Eigen::Vector3d which_points_down(const OrientationGraph& graph, const Orientati
 
 struct KnownPositions {
   std::vector<Eigen::Vector3d> from, to;
-  std::vector<double> sigma;
+  std::vector<double> sigma;  // allows for the bend of first centres
+  double stated_sigma = 0;    // mean of the priors
 };
 
 double median_of(std::vector<double> values) {
@@ -72,8 +73,10 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
     known.from.push_back(values.frames[f]->centre);
     known.to.push_back(node.position->position);
     known.sigma.push_back(node.position->sigma.mean());
+    known.stated_sigma += node.position->sigma.mean();
   }
   if (known.to.empty()) return known;
+  known.stated_sigma /= static_cast<double>(known.to.size());
   // First centres bend over the block: allow for a twentieth of its (robust) extent.
   Eigen::Vector3d middle;
   for (int axis = 0; axis < 3; ++axis) {
@@ -99,13 +102,13 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   // Spread of the positions that agree; a line when nothing across it exceeds its noise.
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  double count = 0, sigma = 0;
+  double count = 0;
   for (int pass = 0; pass < 2; ++pass)
     for (std::size_t i = 0; i < known.to.size(); ++i) {
       if (((*similarity)(known.from[i]) - known.to[i]).norm() > 4 * known.sigma[i]) continue;
       const Eigen::Vector3d moved = (*similarity)(known.from[i]);
       if (pass == 0)
-        mean += moved, sigma += known.sigma[i], ++count;
+        mean += moved, ++count;
       else
         spread += (moved - mean / count) * (moved - mean / count).transpose() / count;
     }
@@ -113,7 +116,7 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
   const double length = std::sqrt(std::max(0.0, eigen.eigenvalues()(2)));
   const double width = std::sqrt(std::max(0.0, eigen.eigenvalues()(1)));
-  const bool line = count < 3 || width < std::max(0.03 * length, sigma / count);
+  const bool line = count < 3 || width < std::max(0.03 * length, 2 * known.stated_sigma / std::sqrt(count));
   if (!line) return similarity;
 
   const Eigen::Vector3d axis = eigen.eigenvectors().col(2);

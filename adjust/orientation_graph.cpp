@@ -126,7 +126,8 @@ void add_tracks(const TrackSet& tracks, const Rows& rows, std::int64_t tracks_pe
             static_cast<std::uint64_t>(track.rows[i][0]) << 32 | static_cast<std::uint64_t>(track.rows[j][0]);
         if (used[key]++ < tracks_per_pair) wanted = true;
       }
-    if (!wanted) continue;
+    constexpr std::size_t kFewTracks = 20000;  // a block of few pairs can afford more of each
+    if (!wanted && graph.begin.size() > kFewTracks) continue;
     for (const auto& [image, x, y] : track.rows)
       graph.observations.push_back({image, {from_fixed_pixel(x), from_fixed_pixel(y)}});
     graph.begin.push_back(static_cast<std::int64_t>(graph.observations.size()));

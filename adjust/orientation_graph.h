@@ -51,7 +51,7 @@ struct OrientationGraph {
   std::int32_t frame_count() const { return static_cast<std::int32_t>(frames.size()); }
 };
 
-// Keeps the longest tracks until every pair of images has `tracks_per_pair` of them.
+// Keeps the longest tracks until every pair of images has `tracks_per_pair` of them and there are 20 000 in all.
 OrientationGraph make_orientation_graph(const Block& block, const BlockState& start,
                                         const std::vector<FrameIndex>& frames, const std::vector<VerifiedPair>& pairs,
                                         const TrackSet& tracks, const OrientationOptions& options);
