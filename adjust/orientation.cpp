@@ -355,6 +355,7 @@ OrientationResult orient_component(const Block& block, const BlockState& start, 
                                    const std::vector<VerifiedPair>& pairs, const TrackSet& tracks,
                                    const OrientationOptions& options) {
   options.check();
+  if (frames.size() < 2) throw ComputeError("orientation: a component needs at least two frames");
   Orientation orientation(block, start, options, make_orientation_graph(block, start, frames, pairs, tracks, options));
   orientation.run();
   return orientation.result(start);

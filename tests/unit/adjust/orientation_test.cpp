@@ -317,6 +317,7 @@ TEST(Orientation, ReportsImagesThatNothingLinks) {
 TEST(Orientation, RefusesWhatCannotBeOriented) {
   const SimulatedBlock scene = aerial(1, 3, {});
   EXPECT_THROW(orient(scene, {}), ComputeError);
+  EXPECT_THROW(orient_component(scene.block, initial_state(scene.block), {}, {}, scene.tracks, {}), ComputeError);
   SimulatedBlock empty = scene;
   empty.tracks = {};
   empty.tracks.begin = {0};
