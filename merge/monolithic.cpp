@@ -10,6 +10,11 @@
 #include "adjust/ceres_problem.h"
 #include "io/error.h"
 
+extern "C" {
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+}
+
 namespace megablock {
 
 namespace {
@@ -99,9 +104,14 @@ Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system) {
   reduced -= Eigen::MatrixXd(Eigen::SparseMatrix<double>(coupling.transpose() * inverse * coupling));
 
   const Eigen::VectorXd scale = reduced.diagonal().cwiseMax(0).cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<Eigen::MatrixXd> solver(scale.asDiagonal() * reduced * scale.asDiagonal());
-  if (solver.info() != Eigen::Success) throw ComputeError("monolithic reference: the datum of the block is free");
-  return scale.asDiagonal() * solver.solve(Eigen::MatrixXd::Identity(n, n)) * scale.asDiagonal();
+  reduced = scale.asDiagonal() * reduced * scale.asDiagonal();
+  const int size = static_cast<int>(n);
+  int failed = 0;
+  dpotrf_("L", &size, reduced.data(), &size, &failed);
+  if (failed == 0) dpotri_("L", &size, reduced.data(), &size, &failed);
+  if (failed != 0) throw ComputeError("monolithic reference: the datum of the block is free");
+  reduced.triangularView<Eigen::StrictlyUpper>() = reduced.transpose();
+  return scale.asDiagonal() * reduced * scale.asDiagonal();
 }
 
 double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state) {

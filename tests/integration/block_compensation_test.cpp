@@ -1,0 +1,67 @@
+// Blocks of 500 images in eight and more tiles: the optimum of the block-wise compensation is that of one monolithic
+// problem.
+#include <ceres/solver.h>
+#include <gtest/gtest.h>
+
+#include "adjust/ceres_problem.h"
+#include "adjust/linearise.h"
+#include "merge/monolithic.h"
+#include "tests/unit/merge/tiled_block.h"
+
+namespace megablock {
+namespace {
+
+double cost_after_ceres(const TileProblem& problem, const TileState& state) {
+  CeresTile tile(problem, state);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;
+  options.max_num_iterations = 10;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &tile.problem(), &summary);
+  return summary.final_cost;
+}
+
+void expect_same_optimum(const SimulationOptions& options, std::int64_t tile_max_frames) {
+  const SimulatedBlock simulated = simulate_block(options);
+  ASSERT_EQ(simulated.block.images.size(), 500u);
+  const TiledBlock block(simulated, tile_max_frames, {}, 0.3);
+  ASSERT_GE(block.tiles.tile_count, 8);
+  ASSERT_GE(block.levels(), 3);
+  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  GlobalOptions exact;
+  exact.max_decrement = 1e-7;
+  GlobalState state = start_global(exact);
+  adjust_globally(runner, exact, state);
+  EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
+
+  const TileState solution = block.gathered(runner.problems(), runner.states());
+  EXPECT_LE(max_pose_difference_sigmas(block.whole, solution), 1e-6);
+  const double cost = evaluate_cost(block.whole, solution);
+  EXPECT_NEAR(cost_after_ceres(block.whole, solution), cost, 1e-9 * cost);
+
+  runner.final_up();
+  for (const SeamReport& seam : runner.seams()) EXPECT_FALSE(seam.alarm()) << "node " << seam.node;
+}
+
+TEST(BlockCompensation, AerialEqualsOneMonolithicProblem) {
+  SimulationOptions options;
+  options.frames = 500;
+  options.points_per_frame = 100;
+  options.control_points = 6;
+  options.gps_sigma_m = 0.1;
+  expect_same_optimum(options, 64);
+}
+
+TEST(BlockCompensation, StreetEqualsOneMonolithicProblem) {
+  SimulationOptions options;
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 250;
+  options.rig_cameras = 2;
+  options.points_per_frame = 150;
+  options.relative_position_sigma_m = 0.02;
+  expect_same_optimum(options, 32);
+}
+
+}  // namespace
+}  // namespace megablock
