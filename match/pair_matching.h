@@ -12,7 +12,7 @@ namespace megablock {
 
 struct MatchOptions {
   int k_best = 1;                // neighbours kept per feature: 1, or 3 on repeated facades (CN-12)
-  double ratio = 0.8;            // a neighbour passes when its distance < ratio x distance of neighbour k + 1
+  double ratio = 0.85;           // a neighbour passes when its distance < ratio x distance of neighbour k + 1
   double max_residual_px = 3.0;  // of verification: epipolar (Sampson) or transfer residual
   int min_inliers = 20;          // fewer: the pair is not verified
   void check() const;            // throws InputError

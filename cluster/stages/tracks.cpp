@@ -101,6 +101,26 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
   return names;
 }
 
+// A track of two images adds no check to its point. Such tracks stay only where one of their images has few longer ones.
+constexpr std::int64_t kEnoughLongTracks = 200;
+
+TrackSet without_needless_pairs(const TrackSet& tracks, std::size_t images) {
+  const auto length = [&](std::int64_t t) { return tracks.begin[t + 1] - tracks.begin[t]; };
+  IndexedVector<ImageIndex, std::int64_t> long_tracks(images, 0);
+  for (std::int64_t t = 0; t < tracks.track_count(); ++t)
+    if (length(t) > 2)
+      for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o) ++long_tracks[tracks.image[o]];
+  TrackSet kept;
+  kept.begin.push_back(0);
+  for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
+    const std::int64_t first = tracks.begin[t];
+    if (length(t) > 2 || long_tracks[tracks.image[first]] < kEnoughLongTracks ||
+        long_tracks[tracks.image[first + 1]] < kEnoughLongTracks)
+      append_track(kept, tracks, t);
+  }
+  return kept;
+}
+
 TrackSet build_block_tracks(const Job& job, const std::vector<std::string>& matches, const Tiles& tiles) {
   std::set<std::pair<FrameIndex, FrameIndex>> dropped;
   for (const FrameEdge& edge : tiles.dropped_links) dropped.insert({edge.a, edge.b});
@@ -109,7 +129,8 @@ TrackSet build_block_tracks(const Job& job, const std::vector<std::string>& matc
     const FrameIndex a = job.block.images[pair.a].frame, b = job.block.images[pair.b].frame;
     return dropped.contains({std::min(a, b), std::max(a, b)});
   });
-  TrackSet tracks = build_tracks(read_keypoints(job), pairs, job.settings.tracks);
+  TrackSet tracks = without_needless_pairs(build_tracks(read_keypoints(job), pairs, job.settings.tracks),
+                                           job.block.images.size());
   for (std::int64_t t = 0; t < tracks.track_count(); ++t)
     tracks.id[t] = TrackIndex(track_key(tracks.image[tracks.begin[t]], tracks.feature[tracks.begin[t]]));
   return tracks;
