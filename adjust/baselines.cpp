@@ -268,74 +268,128 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
   return result;
 }
 
+namespace {
+
+// The reweighted least squares of step 3 over the nodes that a prior, or the largest part, reaches.
+class CentreNetwork {
+ public:
+  CentreNetwork(std::int32_t nodes, const std::vector<CentreDifference>& differences,
+                const std::vector<std::optional<CentrePrior>>& priors)
+      : differences_(differences),
+        priors_(priors),
+        reached_(row(nodes), 0),
+        unknown_(row(nodes), -1),
+        centre_(row(nodes), Eigen::Vector3d::Zero()) {
+    DisjointSets sets(nodes);
+    for (const auto& d : differences) sets.join(d.a, d.b);
+    std::vector<std::int32_t> size(row(nodes), 0);
+    std::vector<std::uint8_t> anchored(row(nodes), 0);
+    bool any_prior = false;
+    for (std::int32_t i = 0; i < nodes; ++i) {
+      ++size[row(sets.find(i))];
+      if (priors[row(i)]) anchored[row(sets.find(i))] = 1, any_prior = true;
+    }
+    const auto origin = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
+    if (!any_prior) anchored[row(origin)] = 1;
+    for (std::int32_t i = 0; i < nodes; ++i) {
+      reached_[row(i)] = anchored[row(sets.find(i))];
+      if (reached_[row(i)] && (any_prior || i != origin)) unknown_[row(i)] = unknowns_++;
+    }
+    for (const auto& d : differences) extent_ = std::max(extent_, d.offset.norm());
+  }
+
+  void start(const std::vector<std::optional<Eigen::Vector3d>>& values) {
+    weighted_ = !values.empty();
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (values[i]) centre_[i] = *values[i];
+  }
+
+  // One solution with weights from the present residuals (none in the first without a start); the largest change.
+  std::optional<double> iterate() {
+    std::vector<double> of_difference, of_prior(priors_.size(), 0.0);
+    for (const auto& d : differences_)
+      of_difference.push_back(weight((centre_[row(d.b)] - centre_[row(d.a)] - d.offset).norm() / d.sigma));
+    for (std::size_t i = 0; i < priors_.size(); ++i)
+      if (priors_[i])
+        of_prior[i] = weight((centre_[i] - priors_[i]->position).cwiseQuotient(priors_[i]->sigma).norm() / 3);
+    std::vector<Eigen::Vector3d> next = centre_;
+    for (int axis = 0; axis < 3; ++axis)
+      if (!solve_axis(axis, of_difference, of_prior, next)) return std::nullopt;
+    double largest = 0;
+    for (std::size_t i = 0; i < next.size(); ++i) largest = std::max(largest, (next[i] - centre_[i]).norm());
+    centre_ = std::move(next);
+    weighted_ = true;
+    return largest;
+  }
+
+  bool run() {
+    constexpr int kIterations = 50;
+    for (int i = 0; i < kIterations && unknowns_ > 0; ++i) {
+      const auto change = iterate();
+      if (!change) return false;
+      if (*change < 1e-10 * extent_) break;
+    }
+    return true;
+  }
+
+  std::vector<std::optional<Eigen::Vector3d>> centres() const {
+    std::vector<std::optional<Eigen::Vector3d>> result(centre_.size());
+    for (std::size_t i = 0; i < result.size(); ++i)
+      if (reached_[i]) result[i] = centre_[i];
+    return result;
+  }
+
+ private:
+  double weight(double error) const { return weighted_ ? 1 / (1 + error * error) : 1; }  // Cauchy
+
+  bool solve_axis(int axis, const std::vector<double>& of_difference, const std::vector<double>& of_prior,
+                  std::vector<Eigen::Vector3d>& next) const {
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns_);
+    for (std::size_t k = 0; k < differences_.size(); ++k) {
+      const CentreDifference& d = differences_[k];
+      const std::int32_t a = unknown_[row(d.a)], b = unknown_[row(d.b)];
+      const double w = of_difference[k] / (d.sigma * d.sigma);
+      if (a >= 0) entries.emplace_back(a, a, w), right[a] -= w * d.offset[axis];
+      if (b >= 0) entries.emplace_back(b, b, w), right[b] += w * d.offset[axis];
+      if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -w);
+    }
+    for (std::size_t i = 0; i < priors_.size(); ++i) {
+      if (!priors_[i] || unknown_[i] < 0) continue;
+      const double w = of_prior[i] / (priors_[i]->sigma[axis] * priors_[i]->sigma[axis]);
+      entries.emplace_back(unknown_[i], unknown_[i], w);
+      right[unknown_[i]] += w * priors_[i]->position[axis];
+    }
+    Eigen::SparseMatrix<double> normal(unknowns_, unknowns_);
+    normal.setFromTriplets(entries.begin(), entries.end());
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(normal);
+    if (solver.info() != Eigen::Success) return false;
+    const Eigen::VectorXd solution = solver.solve(right);
+    for (std::size_t i = 0; i < unknown_.size(); ++i)
+      if (unknown_[i] >= 0) next[i][axis] = solution[unknown_[i]];
+    return true;
+  }
+
+  const std::vector<CentreDifference>& differences_;
+  const std::vector<std::optional<CentrePrior>>& priors_;
+  std::vector<std::uint8_t> reached_;
+  std::vector<std::int32_t> unknown_;  // number of the node's unknown; -1: none
+  std::int32_t unknowns_ = 0;
+  std::vector<Eigen::Vector3d> centre_;
+  double extent_ = 0;
+  bool weighted_ = false;
+};
+
+}  // namespace
+
 std::vector<std::optional<Eigen::Vector3d>> solve_centres(std::int32_t nodes,
                                                           const std::vector<CentreDifference>& differences,
                                                           const std::vector<std::optional<CentrePrior>>& priors,
                                                           const std::vector<std::optional<Eigen::Vector3d>>& start) {
-  DisjointSets sets(nodes);
-  for (const auto& d : differences) sets.join(d.a, d.b);
-  std::vector<std::int32_t> size(row(nodes), 0);
-  std::vector<std::uint8_t> anchored(row(nodes), 0);
-  bool any_prior = false;
-  for (std::int32_t i = 0; i < nodes; ++i) {
-    ++size[row(sets.find(i))];
-    if (priors[row(i)]) anchored[row(sets.find(i))] = 1, any_prior = true;
-  }
-  const auto largest = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
-  if (!any_prior) anchored[row(largest)] = 1;
-
-  std::vector<std::int32_t> unknown(row(nodes), -1);
-  std::int32_t unknowns = 0;
-  for (std::int32_t i = 0; i < nodes; ++i)
-    if (anchored[row(sets.find(i))] && (any_prior || i != largest)) unknown[row(i)] = unknowns++;
-
-  std::vector<Eigen::Vector3d> centre(row(nodes), Eigen::Vector3d::Zero());
-  constexpr int kIterations = 50;
-  bool first = start.empty();
-  for (std::size_t i = 0; i < start.size(); ++i)
-    if (start[i]) centre[i] = *start[i];
-  for (int iteration = 0; iteration < kIterations && unknowns > 0; ++iteration) {
-    double largest_step = 0;
-    std::vector<Eigen::Vector3d> next = centre;
-    for (int axis = 0; axis < 3; ++axis) {
-      std::vector<Eigen::Triplet<double>> entries;
-      Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
-      for (const auto& d : differences) {
-        const std::int32_t a = unknown[row(d.a)], b = unknown[row(d.b)];
-        if (a < 0 && b < 0) continue;
-        const double error = (centre[row(d.b)] - centre[row(d.a)] - d.offset).norm() / d.sigma;
-        const double weight = 1 / (d.sigma * d.sigma) / (first ? 1 : 1 + error * error);
-        if (a >= 0) entries.emplace_back(a, a, weight), right[a] -= weight * d.offset[axis];
-        if (b >= 0) entries.emplace_back(b, b, weight), right[b] += weight * d.offset[axis];
-        if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -weight);
-      }
-      for (std::size_t i = 0; i < priors.size(); ++i)
-        if (priors[i] && unknown[i] >= 0) {
-          const double error = (centre[i] - priors[i]->position).cwiseQuotient(priors[i]->sigma).norm() / 3;
-          const double sigma = priors[i]->sigma[axis];
-          const double weight = 1 / (sigma * sigma) / (first ? 1 : 1 + error * error);
-          entries.emplace_back(unknown[i], unknown[i], weight);
-          right[unknown[i]] += weight * priors[i]->position[axis];
-        }
-      Eigen::SparseMatrix<double> normal(unknowns, unknowns);
-      normal.setFromTriplets(entries.begin(), entries.end());
-      const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(normal);
-      if (solver.info() != Eigen::Success) return std::vector<std::optional<Eigen::Vector3d>>(row(nodes));
-      const Eigen::VectorXd solution = solver.solve(right);
-      for (std::size_t i = 0; i < unknown.size(); ++i)
-        if (unknown[i] >= 0) next[i][axis] = solution[unknown[i]];
-    }
-    for (std::size_t i = 0; i < next.size(); ++i) largest_step = std::max(largest_step, (next[i] - centre[i]).norm());
-    centre = std::move(next);
-    first = false;
-    double extent = 0;
-    for (const auto& d : differences) extent = std::max(extent, d.offset.norm());
-    if (largest_step < 1e-10 * extent) break;
-  }
-  std::vector<std::optional<Eigen::Vector3d>> result(row(nodes));
-  for (std::int32_t i = 0; i < nodes; ++i)
-    if (anchored[row(sets.find(i))]) result[row(i)] = centre[row(i)];
-  return result;
+  CentreNetwork network(nodes, differences, priors);
+  network.start(start);
+  if (!network.run()) return std::vector<std::optional<Eigen::Vector3d>>(row(nodes));
+  return network.centres();
 }
 
 }  // namespace megablock
