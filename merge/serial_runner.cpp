@@ -20,10 +20,7 @@ SerialRunner::SerialRunner(const MergeTree& tree, std::vector<TileProblem> probl
   for (std::size_t t = 0; t < problems_.size(); ++t)
     tile_plans_.push_back(make_tile_plan(problems_[t], plan_.nodes[at(plan_.node_of_leaf[t])]));
   steps_.resize(problems_.size());
-  std::vector<TileGauge> gauges;
-  for (std::size_t t = 0; t < problems_.size(); ++t)
-    gauges.push_back(tile_gauge(problems_[t], tile_plans_[t], states_[t]));
-  block_gauge_ = make_gauge(gauges);
+  block_gauge_ = find_gauge();
 }
 
 SerialRunner::~SerialRunner() = default;
@@ -56,6 +53,13 @@ UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, double lambda, 
   return update;
 }
 
+BlockGauge SerialRunner::find_gauge() const {
+  std::vector<TileGauge> gauges;
+  for (std::size_t t = 0; t < problems_.size(); ++t)
+    gauges.push_back(tile_gauge(problems_[t], tile_plans_[t], states_[t]));
+  return make_gauge(gauges);
+}
+
 TileDatum SerialRunner::datum_of(std::size_t t) const {
   return tile_datum(block_gauge_, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t], states_[t],
                     with_columns_);
@@ -63,6 +67,8 @@ TileDatum SerialRunner::datum_of(std::size_t t) const {
 
 UpReport SerialRunner::pass(double lambda, bool final_pass) {
   factors_.clear();
+  // Of the state at hand, not of the first one: a resumed run gets the same bits.
+  if (block_gauge_.free()) block_gauge_ = find_gauge();
   with_columns_ = final_pass && block_gauge_.free();
   if (final_pass) seams_.clear();
   return {condense_subtree(plan_.root(), lambda, final_pass).sums};

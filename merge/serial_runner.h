@@ -51,6 +51,7 @@ class SerialRunner : public TreeRunner {
   const NodeFactors& inner_factor(std::int64_t node, double lambda);
   void down_from(std::int64_t node, double lambda, const Step& parent);
   void covariances_from(std::int64_t node, const CovarianceMatrix& parent, std::vector<TileCovariance>& result);
+  BlockGauge find_gauge() const;
   TileDatum datum_of(std::size_t tile) const;
   UpReport pass(double lambda, bool final_pass);
   void inner_constraints(std::vector<TileCovariance>& covariances);
