@@ -74,7 +74,9 @@ void add_edges(const std::vector<VerifiedPair>& pairs, const Rows& rows, Orienta
       continue;
     const auto& q = pair.rotation_wxyz;
     OrientationGraph::PairEdge edge;
-    edge.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+    edge.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    if (!(edge.rotation.norm() > 0.5)) continue;  // not a rotation, or not a number
+    edge.rotation.normalize();
     const Eigen::Vector3d translation(pair.translation[0], pair.translation[1], pair.translation[2]);
     edge.inliers = static_cast<double>(pair.feature_a.size());
     // X_b = R X_a + t: centre of b in a is -R' t, of a in b it is t.

@@ -314,6 +314,15 @@ TEST(Orientation, ReportsImagesThatNothingLinks) {
   EXPECT_EQ(errors_of(scene, result, true).oriented, 12u);
 }
 
+TEST(Orientation, PairsWithoutARotationAreLeftOut) {
+  const SimulatedBlock scene = aerial(2, 6, {});
+  auto pairs = pairs_of(scene);
+  pairs[3].rotation_wxyz = {0, 0, 0, 0};
+  pairs[7].rotation_wxyz[0] = std::nan("");
+  pairs[9].translation[1] = std::nan("");
+  expect_oriented(scene, orient(scene, pairs), true, 0.3, 0.3);
+}
+
 TEST(Orientation, RefusesWhatCannotBeOriented) {
   const SimulatedBlock scene = aerial(1, 3, {});
   EXPECT_THROW(orient(scene, {}), ComputeError);
