@@ -43,7 +43,7 @@ constexpr double kSiftOffset = 0.25;
 
 struct Detection {
   Keypoint keypoint;
-  int row;  // of the descriptor matrix
+  int row;  // in the order of detection
 };
 
 // Index of the grid cell of a detection in a grid of roughly square cells.
@@ -113,13 +113,14 @@ bool is_masked(const cv::Mat& mask, const Keypoint& k) {
   return mask.at<std::uint8_t>(row, column) == 0;
 }
 
-std::vector<Detection> detect(const ReducedImage& image, const cv::Mat& mask, const FeatureOptions& options,
-                              cv::Mat& descriptors) {
+cv::Ptr<cv::SIFT> make_sift(const FeatureOptions& options) {
   constexpr int kLayers = 3;
   constexpr double kEdgeThreshold = 10, kSigma = 1.6;
-  const auto sift = cv::SIFT::create(0, kLayers, options.contrast_threshold, kEdgeThreshold, kSigma);
-  std::vector<cv::KeyPoint> found;
-  sift->detectAndCompute(image.pixels, cv::noArray(), found, descriptors);
+  return cv::SIFT::create(0, kLayers, options.contrast_threshold, kEdgeThreshold, kSigma);
+}
+
+// Where OpenCV's keypoints lie in the full image; those under the mask are left out.
+std::vector<Detection> place(const std::vector<cv::KeyPoint>& found, const ReducedImage& image, const cv::Mat& mask) {
   std::vector<Detection> detections;
   detections.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -133,6 +134,31 @@ std::vector<Detection> detect(const ReducedImage& image, const cv::Mat& mask, co
     if (!is_masked(mask, d.keypoint)) detections.push_back(d);
   }
   return detections;
+}
+
+// Keypoints and descriptors of the features kept. Building the image pyramid a second time for the descriptors costs
+// less than describing the two thirds that are not kept.
+void detect_and_describe(const cv::Mat& pixels, const cv::Mat& mask, const FeatureOptions& options,
+                         ImageFeatures& features) {
+  const ReducedImage image = reduce(pixels, options.max_megapixels);
+  const auto sift = make_sift(options);
+  std::vector<cv::KeyPoint> found;
+  sift->detect(image.pixels, found);
+  std::vector<Detection> detections = place(found, image, mask);
+  keep_evenly(detections, options.max_features, pixels.cols, pixels.rows);
+  std::sort(detections.begin(), detections.end(),
+            [](const Detection& a, const Detection& b) { return position_key(a) < position_key(b); });
+  if (detections.empty()) return;
+
+  std::vector<cv::KeyPoint> kept;
+  for (const Detection& d : detections) kept.push_back(found[static_cast<std::size_t>(d.row)]);
+  cv::Mat descriptors;
+  sift->compute(image.pixels, kept, descriptors);
+  CV_Assert(descriptors.rows == static_cast<int>(detections.size()));
+  for (std::size_t i = 0; i < detections.size(); ++i) {
+    features.keypoints.push_back(detections[i].keypoint);
+    features.descriptors.push_back(quantise(descriptors.ptr<float>(static_cast<int>(i)), options.root_sift));
+  }
 }
 
 std::string load(const std::string& path, const std::string& mask_path, cv::Mat& pixels, cv::Mat& mask) {
@@ -159,29 +185,18 @@ ImageFeatures detect_features(const std::string& path, const std::string& mask_p
   use_one_opencv_thread();
   ImageFeatures features;
   features.image = image;
-  cv::Mat pixels, mask, descriptors;
+  cv::Mat pixels, mask;
   features.failure = load(path, mask_path, pixels, mask);
   if (!features.failure.empty()) return features;
-  features.width = pixels.cols;
-  features.height = pixels.rows;
-
-  std::vector<Detection> detections;
   try {
-    detections = detect(reduce(pixels, options.max_megapixels), mask, options, descriptors);
+    detect_and_describe(pixels, mask, options, features);
   } catch (const cv::Exception& e) {
-    features.width = features.height = 0;
+    features.keypoints.clear();
     features.failure = "feature detection failed: " + e.err;
     return features;
   }
-  keep_evenly(detections, options.max_features, pixels.cols, pixels.rows);
-  std::sort(detections.begin(), detections.end(),
-            [](const Detection& a, const Detection& b) { return position_key(a) < position_key(b); });
-  features.keypoints.reserve(detections.size());
-  features.descriptors.reserve(detections.size());
-  for (const Detection& d : detections) {
-    features.keypoints.push_back(d.keypoint);
-    features.descriptors.push_back(quantise(descriptors.ptr<float>(d.row), options.root_sift));
-  }
+  features.width = pixels.cols;
+  features.height = pixels.rows;
   features.global_descriptor = global_descriptor(features.descriptors);
   return features;
 }
