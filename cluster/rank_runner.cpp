@@ -35,6 +35,27 @@ std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const 
   return all;
 }
 
+// The same for values that make bytes of themselves.
+template <typename Value>
+std::vector<Value> gather_bytes_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<RankTile>& own,
+                                        const std::vector<Value>& values) {
+  ByteWriter writer;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    writer.value(own[i].tile);
+    writer.values(values[i].to_bytes());
+  }
+  std::vector<Value> all(tiles);
+  for (const std::string& text : ranks.gather_all(text_of(writer.take()))) {
+    const Bytes bytes = bytes_of(text);
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      const auto tile = reader.value<std::int64_t>();
+      all[static_cast<std::size_t>(tile)] = Value::from_bytes(reader.values<char>());
+    }
+  }
+  return all;
+}
+
 void write_unknowns(ByteWriter& writer, std::int64_t tile, const UnknownList& unknowns) {
   writer.value(tile);
   writer.values(unknowns);
@@ -70,6 +91,7 @@ RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<i
       if (node.tile.valid() && tiles_[i].tile == node.tile.value) own_tile_of_node_[n] = static_cast<std::int64_t>(i);
   }
   make_plans(tree, rank_of_tile.size());
+  gauge_ = gather_gauge();
 }
 
 RankRunner::~RankRunner() = default;
@@ -92,6 +114,29 @@ void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
   for (const RankTile& tile : tiles_)
     tile_plans_.push_back(make_tile_plan(
         tile.problem, plan_.nodes[static_cast<std::size_t>(plan_.node_of_leaf[static_cast<std::size_t>(tile.tile)])]));
+}
+
+BlockGauge RankRunner::gather_gauge() const {
+  std::vector<TileGauge> own;
+  for (std::size_t row = 0; row < tiles_.size(); ++row)
+    own.push_back(tile_gauge(tiles_[row].problem, tile_plans_[row], tiles_[row].state));
+  return make_gauge(gather_bytes_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
+}
+
+TileDatum RankRunner::datum_of(std::size_t row) const {
+  const RankTile& tile = tiles_[row];
+  return tile_datum(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, with_columns_);
+}
+
+InnerSums RankRunner::gather_inner_sums(const std::vector<TileStep>& steps) const {
+  std::vector<InnerSums> own;
+  for (std::size_t row = 0; row < tiles_.size(); ++row)
+    own.push_back(inner_sums(gauge_, tiles_[row].tile, tiles_[row].problem, tile_plans_[row], tiles_[row].state,
+                             steps[row].unknowns));
+  const std::vector<InnerSums> all = gather_bytes_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own);
+  InnerSums sums = all.front();
+  for (std::size_t t = 1; t < all.size(); ++t) sums.add(all[t]);
+  return sums;
 }
 
 bool RankRunner::mine(std::int64_t node) const {
@@ -118,7 +163,7 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
 
 UpdateMatrix RankRunner::condense_own(std::int64_t node, double lambda) {
   const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
-  TileCondensation condensation = condense_tile(tiles_[row].problem, tile_plans_[row], tiles_[row].state, lambda);
+  TileCondensation condensation = condense_tile(tiles_[row].problem, tile_plans_[row], tiles_[row].state, lambda, datum_of(row));
   tile_factors_[row] = std::move(condensation.factor);
   if (check_seams_) condensed_[tiles_[row].tile] = condensation.update;
   return std::move(condensation.update);
@@ -128,6 +173,8 @@ UpReport RankRunner::up(double lambda) {
   updates_.clear();
   seams_.clear();
   condensed_.clear();
+  // Of the state at hand, not of the first one: a resumed run gets the same bits.
+  if (gauge_.free()) gauge_ = gather_gauge();
   for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
     if (!mine(n)) continue;
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
@@ -174,12 +221,8 @@ Values RankRunner::from_parent(std::int64_t n) {
   return Values::from_bytes(bytes);
 }
 
-DownReport RankRunner::down(double lambda) {
-  struct Sums {
-    double damping_norm = 0, trial_cost = 0;
-  };
-  std::vector<Sums> sums(tiles_.size());
-  trial_.assign(tiles_.size(), {});
+std::vector<TileStep> RankRunner::steps_down(double lambda) {
+  std::vector<TileStep> steps(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
     const Step passed = from_parent<Step>(n);
@@ -190,12 +233,24 @@ DownReport RankRunner::down(double lambda) {
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
     const RankTile& tile = tiles_[row];
-    const TileStep step =
-        solve_tile_down(tile.problem, tile_plans_[row], tile.state, lambda, tile_factors_[row], passed);
-    trial_[row] = apply_step(tile.problem, tile.state, step);
-    sums[row] = {step.damping_norm, evaluate_cost(tile.problem, trial_[row])};
+    steps[row] = solve_tile_down(tile.problem, tile_plans_[row], tile.state, lambda, tile_factors_[row], passed,
+                                 datum_of(row));
   }
   ranks_.flush_sends();
+  return steps;
+}
+
+DownReport RankRunner::down(double lambda) {
+  struct Sums {
+    double damping_norm = 0, trial_cost = 0;
+  };
+  const std::vector<TileStep> steps = steps_down(lambda);
+  std::vector<Sums> sums(tiles_.size());
+  trial_.assign(tiles_.size(), {});
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    trial_[row] = apply_step(tiles_[row].problem, tiles_[row].state, steps[row]);
+    sums[row] = {steps[row].damping_norm, evaluate_cost(tiles_[row].problem, trial_[row])};
+  }
   DownReport report;
   for (const Sums& tile : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, sums)) {
     report.damping_norm += tile.damping_norm;
@@ -216,9 +271,16 @@ RankRunner::Posterior RankRunner::posterior() {
   check_seams_ = true;
   const auto inner = std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
   seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
+  with_columns_ = gauge_.free();
   posterior.sums = up(0).sums;
-  posterior.gauge = judge_gauge(posterior.sums);
+  posterior.gauge = judge_gauge(posterior.sums, gauge_);
   check_seams_ = false;
+  std::vector<TileStep> steps(tiles_.size());
+  InnerSums inner_constraints;
+  if (with_columns_) {
+    steps = steps_down(0);
+    inner_constraints = gather_inner_sums(steps);
+  }
 
   posterior.covariances.resize(tiles_.size());
   std::vector<TileCheck> checks(tiles_.size());
@@ -233,10 +295,15 @@ RankRunner::Posterior RankRunner::posterior() {
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
     const RankTile& tile = tiles_[row];
     posterior.covariances[row] =
-        covariance_tile(tile.problem, tile_plans_[row], tile.state, tile_factors_[row], passed);
+        covariance_tile(tile.problem, tile_plans_[row], tile.state, tile_factors_[row], passed, datum_of(row),
+                        steps[row].unknowns);
+    if (with_columns_)
+      to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, tile_plans_[row], tile.state,
+                           steps[row].unknowns, posterior.covariances[row]);
     checks[row] = check_tile(tile.tile, condensed_.at(tile.tile), passed, seam_probability_);
   }
   ranks_.flush_sends();
+  with_columns_ = false;
   posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
 
   ByteWriter writer;

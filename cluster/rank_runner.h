@@ -63,6 +63,11 @@ class RankRunner : public TreeRunner {
   Values from_parent(std::int64_t node);
   UpdateMatrix condense_own(std::int64_t node, double lambda);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
+  BlockGauge gather_gauge() const;
+  TileDatum datum_of(std::size_t row) const;
+  InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
+  // Down with the current factors: steps of this rank's tiles.
+  std::vector<TileStep> steps_down(double lambda);
 
   Communicator& ranks_;
   std::vector<RankTile> tiles_;
@@ -75,6 +80,8 @@ class RankRunner : public TreeRunner {
   std::vector<FrontFactor> node_factors_;        // [nodes], of this rank's inner nodes
   std::vector<TileFactor> tile_factors_;         // of tiles_; empty: recomputed on the way down
   std::map<std::int64_t, UpdateMatrix> updates_;      // waiting for their parent on this rank
+  BlockGauge gauge_;
+  bool with_columns_ = false;  // the pass carries the further right-hand sides of a free datum
   bool check_seams_ = false;
   double seam_probability_ = 0;
   std::vector<SeamReport> seams_;
