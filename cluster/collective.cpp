@@ -7,8 +7,8 @@ namespace megablock {
 namespace {
 
 [[noreturn]] void throw_error(char kind, const std::string& text) {
-  if (kind == 'i') throw InputError(text);
-  throw Error(text);
+  if (kind == 'i') throw AgreedError<InputError>(text);
+  throw AgreedError<Error>(text);
 }
 
 }  // namespace

@@ -5,8 +5,21 @@
 #include <string>
 
 #include "cluster/communicator.h"
+#include "io/error.h"
 
 namespace megablock {
+
+// Marks an error that every rank throws alike. Any other error is one rank's own: the others would wait for it for
+// ever, so that it ends the run (command_line.cpp).
+struct Agreed {
+  virtual ~Agreed() = default;
+};
+
+template <typename Kind>
+class AgreedError : public Kind, public Agreed {
+ public:
+  using Kind::Kind;
+};
 
 // Runs `work` on rank 0 and returns its text on every rank; an error of the project's family is rethrown everywhere.
 std::string on_first_rank(Communicator& ranks, const std::function<std::string()>& work);

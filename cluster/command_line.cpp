@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "cluster/arithmetic.h"
+#include "cluster/collective.h"
 #include "cluster/communicator.h"
 #include "cluster/exit_codes.h"
 #include "cluster/pipeline.h"
@@ -73,8 +74,13 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   command->add_option("-j,--job", options->directory, "Job directory; an unfinished one is resumed")->required();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--memory", options->memory_mib,
-                      "Memory per rank for factors of the merge, MiB; beyond it they are spilled or recomputed")
+  command
+      ->add_option("--memory", options->memory_mib,
+                   "Memory per rank for factors of the merge, MiB; beyond it they go to the job's scratch")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--scratch", options->scratch_mib,
+                   "Scratch per rank for such factors, MiB; beyond it (0: at once) they are computed again")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--strict", options->strict, "End at the first failed unit");
   command->add_flag("-q,--quiet", options->quiet, "No progress");
@@ -101,7 +107,7 @@ void add_status(CLI::App& app, Action& action) {
   command->callback([=, &action] {
     action = [options] {
       const JobStore store(options->job);
-      const std::string text = options->digest  ? status_digest(store) + "\n"
+      const std::string text = options->digest ? status_digest(store) + "\n"
                                : options->json ? status_json(store) + "\n"
                                                : status_text(store);
       std::printf("%s", text.c_str());
@@ -214,9 +220,12 @@ void add_simulate(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
   SimulationOptions& s = options->simulation;
   CLI::App* command = app.add_subcommand("simulate", "Make a block with known truth: tie points or rendered pictures");
-  command->footer("Example: megablock simulate --scene aerial --frames 500 -o simulated\n"
-                  "         megablock simulate --rendered --frames 24 -o rendered");
-  command->add_option("--scene", options->scene, "aerial | street")->check(CLI::IsMember({"aerial", "street"}))->capture_default_str();
+  command->footer(
+      "Example: megablock simulate --scene aerial --frames 500 -o simulated\n"
+      "         megablock simulate --rendered --frames 24 -o rendered");
+  command->add_option("--scene", options->scene, "aerial | street")
+      ->check(CLI::IsMember({"aerial", "street"}))
+      ->capture_default_str();
   command->add_flag("--rendered", options->rendered, "Render pictures (small blocks) instead of tie points");
   command->add_option("--frames", s.frames, "Frames")->capture_default_str();
   command->add_option("--seed", s.seed, "Seed")->capture_default_str();
@@ -233,9 +242,12 @@ void add_simulate(CLI::App& app, Action& action) {
   command->add_option("--outliers", s.outlier_share, "Share of wrong observations, 0..1")->capture_default_str();
   command->add_option("--gps-sigma", s.gps_sigma_m, "Position priors, m; 0 = none")->capture_default_str();
   command->add_option("--gps-share", s.gps_share, "Share of frames with a position prior")->capture_default_str();
-  command->add_option("--attitude-sigma", s.attitude_sigma_deg, "Attitude priors, degrees; 0 = none")->capture_default_str();
-  command->add_option("--relative-position-sigma", s.relative_position_sigma_m, "Relative poses, m; 0 = none")->capture_default_str();
-  command->add_option("--relative-rotation-sigma", s.relative_rotation_sigma_deg, "Relative poses, degrees")->capture_default_str();
+  command->add_option("--attitude-sigma", s.attitude_sigma_deg, "Attitude priors, degrees; 0 = none")
+      ->capture_default_str();
+  command->add_option("--relative-position-sigma", s.relative_position_sigma_m, "Relative poses, m; 0 = none")
+      ->capture_default_str();
+  command->add_option("--relative-rotation-sigma", s.relative_rotation_sigma_deg, "Relative poses, degrees")
+      ->capture_default_str();
   command->add_option("--control-points", s.control_points, "Control points")->capture_default_str();
   command->add_option("--check-points", s.check_points, "Check points")->capture_default_str();
   command->add_option("--control-sigma", s.control_sigma_m, "Sigma of control points, m")->capture_default_str();
@@ -259,21 +271,20 @@ void add_simulate(CLI::App& app, Action& action) {
   });
 }
 
-int run_action(const Action& action, const Communicator& ranks) {
-  const auto say = [&](const char* text) {
-    if (ranks.rank() == 0) std::fprintf(stderr, "megablock: %s\n", text);
-  };
+int exit_code_of(const std::exception& error) {
+  if (dynamic_cast<const Interrupted*>(&error)) return kExitInterrupted;
+  return dynamic_cast<const InputError*>(&error) ? kExitBadInput : kExitFailedUnits;
+}
+
+// An error all ranks agree on is said once; one that a single rank has ends the others, which would wait for it.
+int run_action(const Action& action, Communicator& ranks) {
   try {
     return action();
-  } catch (const Interrupted& error) {
-    say(error.what());
-    return kExitInterrupted;
-  } catch (const InputError& error) {
-    say(error.what());
-    return kExitBadInput;
-  } catch (const Error& error) {
-    say(error.what());
-    return kExitFailedUnits;
+  } catch (const std::exception& error) {
+    const bool agreed = dynamic_cast<const Agreed*>(&error) != nullptr;
+    if (!agreed || ranks.rank() == 0) std::fprintf(stderr, "megablock: %s\n", error.what());
+    if (!agreed && ranks.size() > 1) ranks.abort(exit_code_of(error));
+    return exit_code_of(error);
   }
 }
 
@@ -284,9 +295,10 @@ int command_line(int argc, char** argv) {
   app.name("megablock");
   app.set_version_flag("--version", "megablock 0.1.0 (arithmetic level avx2)");
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input, 75 interrupted and resumable.\n"
-             "Forms:\n  megablock init IMAGES -o block.yaml\n  megablock run block.yaml -j JOB      (again = resume)\n"
-             "  mpirun --bind-to none -n N megablock run block.yaml -j JOB\n  megablock status JOB [--json|--digest]\n");
+  app.footer(
+      "Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input, 75 interrupted and resumable.\n"
+      "Forms:\n  megablock init IMAGES -o block.yaml\n  megablock run block.yaml -j JOB      (again = resume)\n"
+      "  mpirun --bind-to none -n N megablock run block.yaml -j JOB\n  megablock status JOB [--json|--digest]\n");
   try {
     pin_arithmetic(argv);
     limit_libraries_to_one_thread();
@@ -312,12 +324,9 @@ int command_line(int argc, char** argv) {
       return code == 0 ? kExitDone : kExitBadInput;
     }
     return run_action(action, ranks);
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {  // before there are ranks
     std::fprintf(stderr, "megablock: %s\n", error.what());
-    return kExitBadInput;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "megablock: %s\n", error.what());
-    return kExitFailedUnits;
+    return exit_code_of(error);
   }
 }
 

@@ -69,6 +69,7 @@ std::string prepare(const RunOptions& options, const JobStore& store) {
   Project project = read_project(options.project);
   store.create();
   store.remove_temporaries();
+  read_options(project.settings);  // a bad value is said here, once
   const std::optional<Json> before = read_job_json(store);
   if (before) check_job_json(store, *before);
   if (project.block.images.empty())
@@ -121,11 +122,11 @@ void run_stages(Job& job, const std::string& tie_points) {
     tracks = run_given_tracks(job, tie_points, tiles);
   }
   if (tiles.tile_count == 0)
-    throw ComputeError("no two images could be matched: nothing to orient; check overlap, masks and the match options");
+    throw AgreedError<ComputeError>("no two images could be matched: nothing to orient; check overlap, masks and the match options");
   if (last == "match") return;
   const BlockState oriented = run_orientation(job, matches);
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
-    throw ComputeError("no image could be oriented; see the matches in the report of stage 'match'");
+    throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
   if (last == "orient") return;
   const std::vector<std::string> adjusted = run_adjustment(job, oriented, tiles, tracks);
   if (last == "adjust") return;

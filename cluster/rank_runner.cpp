@@ -80,7 +80,7 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
 
 RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile,
                        std::vector<RankTile> tiles, const MemoryOptions& memory)
-    : ranks_(ranks), tiles_(std::move(tiles)), memory_(memory) {
+    : ranks_(ranks), tiles_(std::move(tiles)), factors_(memory) {
   rank_of_node_.assign(tree.nodes.size(), 0);
   own_tile_of_node_.assign(tree.nodes.size(), -1);
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
@@ -109,8 +109,13 @@ void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
     }
   }
   plan_ = make_plan(tree, unknowns);
-  node_factors_.assign(plan_.nodes.size(), {});
-  tile_factors_.assign(tiles_.size(), {});
+  on_one_rank_.assign(plan_.nodes.size(), false);
+  for (std::size_t n = 0; n < plan_.nodes.size(); ++n) {
+    const PlanNode& node = plan_.nodes[n];
+    on_one_rank_[n] =
+        mine(static_cast<std::int64_t>(n)) && (node.leaf >= 0 || (on_one_rank_[static_cast<std::size_t>(node.left)] &&
+                                                                  on_one_rank_[static_cast<std::size_t>(node.right)]));
+  }
   for (const RankTile& tile : tiles_)
     tile_plans_.push_back(make_tile_plan(
         tile.problem, plan_.nodes[static_cast<std::size_t>(plan_.node_of_leaf[static_cast<std::size_t>(tile.tile)])]));
@@ -161,16 +166,40 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
   return update;
 }
 
-UpdateMatrix RankRunner::condense_own(std::int64_t node, double lambda) {
+UpdateMatrix RankRunner::condense_leaf(std::int64_t node, double lambda) {
   const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
-  TileCondensation condensation = condense_tile(tiles_[row].problem, tile_plans_[row], tiles_[row].state, lambda, datum_of(row));
-  tile_factors_[row] = std::move(condensation.factor);
-  if (check_seams_) condensed_[tiles_[row].tile] = condensation.update;
-  return std::move(condensation.update);
+  const RankTile& tile = tiles_[row];
+  TileCondensation condensed = condense_tile(tile.problem, tile_plans_[row], tile.state, lambda, datum_of(row));
+  factors_.put(node, {std::move(condensed.factor), {}}, FactorStore::Loss::kRecompute);
+  return std::move(condensed.update);
+}
+
+UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right,
+                                         double lambda) {
+  const auto n = static_cast<std::size_t>(node);
+  Front::Result result = eliminate_node(plan_.nodes[n], {&left, &right}, lambda);
+  factors_.put(node, {{}, std::move(result.factor)},
+               on_one_rank_[n] ? FactorStore::Loss::kRecompute : FactorStore::Loss::kNever);
+  return std::move(result.update);
+}
+
+UpdateMatrix RankRunner::condense_again(std::int64_t node, double lambda) {
+  const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
+  if (plan.leaf >= 0) return condense_leaf(node, lambda);
+  const UpdateMatrix left = condense_again(plan.left, lambda), right = condense_again(plan.right, lambda);
+  return eliminate_inner(node, left, right, lambda);
+}
+
+const NodeFactors& RankRunner::factors_of(std::int64_t node, double lambda) {
+  if (const NodeFactors* kept = factors_.get(node)) return *kept;
+  factors_.note_recomputed();
+  condense_again(node, lambda);
+  return *factors_.get(node);
 }
 
 UpReport RankRunner::up(double lambda) {
   updates_.clear();
+  factors_.clear();
   seams_.clear();
   condensed_.clear();
   // Of the state at hand, not of the first one: a resumed run gets the same bits.
@@ -179,14 +208,14 @@ UpReport RankRunner::up(double lambda) {
     if (!mine(n)) continue;
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf >= 0) {
-      pass_up(n, condense_own(n, lambda));
+      UpdateMatrix update = condense_leaf(n, lambda);
+      if (check_seams_) condensed_[node.leaf] = update;
+      pass_up(n, std::move(update));
       continue;
     }
     const UpdateMatrix left = child_update(node.left), right = child_update(node.right);
     if (check_seams_) seams_.push_back(check_seam(n, left, right, seam_probability_));
-    Front::Result result = eliminate_node(node, {&left, &right}, lambda);
-    node_factors_[static_cast<std::size_t>(n)] = std::move(result.factor);
-    pass_up(n, std::move(result.update));
+    pass_up(n, eliminate_inner(n, left, right, lambda));
   }
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
@@ -215,7 +244,8 @@ Values RankRunner::from_parent(std::int64_t n) {
   const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(n)].parent;
   if (parent < 0) return {};
   if (!mine(parent))
-    return Values::from_bytes(bytes_of(ranks_.receive(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(n))));
+    return Values::from_bytes(
+        bytes_of(ranks_.receive(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(n))));
   const Bytes bytes = std::move(downward_.at(n));
   downward_.erase(n);
   return Values::from_bytes(bytes);
@@ -228,12 +258,12 @@ std::vector<TileStep> RankRunner::steps_down(double lambda) {
     const Step passed = from_parent<Step>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf < 0) {
-      pass_down(n, back_substitute_node(node_factors_[static_cast<std::size_t>(n)], passed));
+      pass_down(n, back_substitute_node(factors_of(n, lambda).front, passed));
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
     const RankTile& tile = tiles_[row];
-    steps[row] = solve_tile_down(tile.problem, tile_plans_[row], tile.state, lambda, tile_factors_[row], passed,
+    steps[row] = solve_tile_down(tile.problem, tile_plans_[row], tile.state, lambda, factors_of(n, lambda).tile, passed,
                                  datum_of(row));
   }
   ranks_.flush_sends();
@@ -269,7 +299,8 @@ void RankRunner::reject() { trial_.clear(); }
 RankRunner::Posterior RankRunner::posterior() {
   Posterior posterior;
   check_seams_ = true;
-  const auto inner = std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
+  const auto inner =
+      std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
   seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
   with_columns_ = gauge_.free();
   posterior.sums = up(0).sums;
@@ -289,14 +320,13 @@ RankRunner::Posterior RankRunner::posterior() {
     const CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf < 0) {
-      pass_down(n, covariance_node(node_factors_[static_cast<std::size_t>(n)], passed));
+      pass_down(n, covariance_node(factors_of(n, 0).front, passed));
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
     const RankTile& tile = tiles_[row];
-    posterior.covariances[row] =
-        covariance_tile(tile.problem, tile_plans_[row], tile.state, tile_factors_[row], passed, datum_of(row),
-                        steps[row].unknowns);
+    posterior.covariances[row] = covariance_tile(tile.problem, tile_plans_[row], tile.state, factors_of(n, 0).tile,
+                                                 passed, datum_of(row), steps[row].unknowns);
     if (with_columns_)
       to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, tile_plans_[row], tile.state,
                            steps[row].unknowns, posterior.covariances[row]);

@@ -1,6 +1,10 @@
 // The merge tree over ranks: each rank condenses its own tiles; an inner node is eliminated by the rank of its left
 // child; update matrices go up and steps, covariances come down as messages. All sums are formed in tile or child
 // order, so that the bits do not depend on the ranks.
+//
+// Factors wait for the way down within the rank's memory, else in its scratch, else they are computed again
+// (merge/memory.h). Those of a node whose subtree lies on several ranks are never given up: computing them again would
+// need the other ranks.
 #pragma once
 
 #include <map>
@@ -41,16 +45,17 @@ class RankRunner : public TreeRunner {
 
   // Collective, at the solution: an upward pass with lambda = 0, seams and gauge, then covariances.
   struct Posterior {
-    SubtreeSums sums;                        // of the whole block
+    SubtreeSums sums;  // of the whole block
     GaugeReport gauge;
-    std::vector<SeamReport> seams;           // of all inner nodes, in node order; on every rank
-    std::vector<TileCheck> tile_checks;      // of all tiles, in tile order; on every rank
-    std::vector<TileCovariance> covariances; // of this rank's tiles
+    std::vector<SeamReport> seams;            // of all inner nodes, in node order; on every rank
+    std::vector<TileCheck> tile_checks;       // of all tiles, in tile order; on every rank
+    std::vector<TileCovariance> covariances;  // of this rank's tiles
   };
   Posterior posterior();
 
   std::vector<RankTile>& tiles() { return tiles_; }
   const std::vector<RankTile>& tiles() const { return tiles_; }
+  const MemoryStatistics& memory() const { return factors_.statistics(); }
 
  private:
   bool mine(std::int64_t node) const;
@@ -61,7 +66,11 @@ class RankRunner : public TreeRunner {
   void pass_down(std::int64_t node, const Values& front);
   template <typename Values>
   Values from_parent(std::int64_t node);
-  UpdateMatrix condense_own(std::int64_t node, double lambda);
+  UpdateMatrix condense_leaf(std::int64_t node, double lambda);
+  UpdateMatrix eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double lambda);
+  // The subtree of a node that lies on this rank alone, once more.
+  UpdateMatrix condense_again(std::int64_t node, double lambda);
+  const NodeFactors& factors_of(std::int64_t node, double lambda);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   BlockGauge gather_gauge() const;
   TileDatum datum_of(std::size_t row) const;
@@ -71,22 +80,21 @@ class RankRunner : public TreeRunner {
 
   Communicator& ranks_;
   std::vector<RankTile> tiles_;
-  MemoryOptions memory_;
-  std::vector<TilePlan> tile_plans_;     // of tiles_
-  std::vector<TileState> trial_;         // of tiles_
+  std::vector<TilePlan> tile_plans_;  // of tiles_
+  std::vector<TileState> trial_;      // of tiles_
   std::vector<int> rank_of_node_;
   std::vector<std::int64_t> own_tile_of_node_;  // row of tiles_, -1
   EliminationPlan plan_;
-  std::vector<FrontFactor> node_factors_;        // [nodes], of this rank's inner nodes
-  std::vector<TileFactor> tile_factors_;         // of tiles_; empty: recomputed on the way down
-  std::map<std::int64_t, UpdateMatrix> updates_;      // waiting for their parent on this rank
+  std::vector<bool> on_one_rank_;                 // [nodes]: the whole subtree is this rank's
+  FactorStore factors_;                           // of this rank's nodes
+  std::map<std::int64_t, UpdateMatrix> updates_;  // waiting for their parent on this rank
   BlockGauge gauge_;
   bool with_columns_ = false;  // the pass carries the further right-hand sides of a free datum
   bool check_seams_ = false;
   double seam_probability_ = 0;
   std::vector<SeamReport> seams_;
-  std::map<std::int64_t, UpdateMatrix> condensed_;    // of this rank's tiles, while seams are checked
-  std::map<std::int64_t, Bytes> downward_;            // what a parent on this rank left for its child
+  std::map<std::int64_t, UpdateMatrix> condensed_;  // of this rank's tiles, while seams are checked
+  std::map<std::int64_t, Bytes> downward_;          // what a parent on this rank left for its child
 };
 
 }  // namespace megablock

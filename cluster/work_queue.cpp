@@ -103,7 +103,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   }
   share_error(job.ranks, 'i', fatal);
   if (job.ranks.any(stop_requested()))
-    throw Interrupted("stopped in stage '" + stage + "' as asked; run the same command to resume");
+    throw AgreedError<Interrupted>("stopped in stage '" + stage + "' as asked; run the same command to resume");
 
   StageOutcome outcome;
   StageStatistics statistics{stage, 0, 0, static_cast<std::int64_t>(units.size()), 0};
@@ -121,7 +121,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   job.statistics.push_back(statistics);
   job.failures.insert(job.failures.end(), outcome.failures.begin(), outcome.failures.end());
   if (job.options.strict && !failures.empty())
-    throw ComputeError("stage '" + stage + "', unit " + outcome.failures.front().unit + ": " +
+    throw AgreedError<ComputeError>("stage '" + stage + "', unit " + outcome.failures.front().unit + ": " +
                        outcome.failures.front().reason);
   return outcome;
 }

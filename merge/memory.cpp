@@ -1,9 +1,9 @@
 #include "merge/memory.h"
 
-#include <unistd.h>
-
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "io/error.h"
 
@@ -37,11 +37,10 @@ FactorStore::FactorStore(MemoryOptions options) : options_(std::move(options)) {
 FactorStore::~FactorStore() { clear(); }
 
 std::string FactorStore::scratch_path(std::int64_t node) const {
-  return options_.scratch_directory + "/factor-" + std::to_string(::getpid()) + "-" +
-         std::to_string(reinterpret_cast<std::uintptr_t>(this)) + "-" + std::to_string(node) + ".tmp";
+  return options_.scratch_directory + "/factor-" + std::to_string(node) + ".bin";
 }
 
-void FactorStore::put(std::int64_t node, NodeFactors factors) {
+void FactorStore::put(std::int64_t node, NodeFactors factors, Loss loss) {
   if (const auto old = kept_.find(node); old != kept_.end()) {
     bytes_ -= old->second.byte_count();
     node_by_time_.erase(time_of_node_[node]);
@@ -50,30 +49,52 @@ void FactorStore::put(std::int64_t node, NodeFactors factors) {
   kept_[node] = std::move(factors);
   time_of_node_[node] = clock_;
   node_by_time_[clock_++] = node;
-  ++statistics_.kept;
-  while (bytes_ > options_.factor_bytes && kept_.size() > 1) evict_oldest();
+  if (loss == Loss::kNever) never_lost_.insert(node);
+  ++statistics_.put;
+  make_room();
   statistics_.peak_bytes = std::max(statistics_.peak_bytes, bytes_);
 }
 
-void FactorStore::evict_oldest() {
-  const std::int64_t node = node_by_time_.begin()->second;
-  const auto entry = kept_.find(node);
-  if (options_.scratch_directory.empty()) {
-    ++statistics_.dropped;
-  } else if (!spilled_.contains(node)) {
-    const std::string path = scratch_path(node);
-    const Bytes bytes = entry->second.to_bytes();
-    std::ofstream file(path, std::ios::binary);
-    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (!file) throw InputError("cannot write " + path + " (is the scratch directory full?)");
-    spilled_[node] = path;
-    ++statistics_.spilled;
+// The oldest leave first; the newest stays.
+void FactorStore::make_room() {
+  for (auto oldest = node_by_time_.begin();
+       bytes_ > options_.factor_bytes && std::next(oldest) != node_by_time_.end();) {
+    const std::int64_t node = oldest->second;
+    const auto entry = kept_.find(node);
+    if (!spill(node, entry->second)) {
+      if (never_lost_.contains(node)) {
+        ++oldest;
+        continue;
+      }
+      ++statistics_.dropped;
+    }
+    bytes_ -= entry->second.byte_count();
+    kept_.erase(entry);
+    time_of_node_.erase(node);
+    oldest = node_by_time_.erase(oldest);
   }
-  bytes_ -= entry->second.byte_count();
-  kept_.erase(entry);
-  node_by_time_.erase(node_by_time_.begin());
-  time_of_node_.erase(node);
+}
+
+bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
+  if (spilled_.contains(node)) return true;
+  if (options_.scratch_directory.empty() || scratch_full_ ||
+      scratch_bytes_ + factors.byte_count() > options_.scratch_bytes)
+    return false;
+  const std::string path = scratch_path(node);
+  const Bytes bytes = factors.to_bytes();
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) {  // the disk is full: what is there stays, the rest is computed again
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+    scratch_full_ = true;
+    return false;
+  }
+  spilled_[node] = path;
+  scratch_bytes_ += factors.byte_count();
+  ++statistics_.spilled;
+  return true;
 }
 
 const NodeFactors* FactorStore::get(std::int64_t node) {
@@ -97,7 +118,9 @@ void FactorStore::clear() {
   kept_.clear();
   node_by_time_.clear();
   time_of_node_.clear();
-  bytes_ = 0;
+  never_lost_.clear();
+  bytes_ = scratch_bytes_ = 0;
+  scratch_full_ = false;
   loaded_ = NodeFactors();
 }
 

@@ -1,12 +1,15 @@
 // Keeping factors between the upward and the downward pass within a byte budget: in memory while they fit, else in a
-// scratch directory, else not at all (recomputed on the way down). The choice never changes tiles or bits.
+// scratch directory while its own budget and its disk last, else not at all (recomputed on the way down). The choice
+// never changes tiles or bits.
 //
 // The downward pass visits nodes in the reverse order of the upward pass, so the earliest factor is needed last and
 // leaves first.
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
+#include <set>
 #include <string>
 
 #include "merge/condense.h"
@@ -15,11 +18,12 @@ namespace megablock {
 
 struct MemoryOptions {
   std::int64_t factor_bytes = std::int64_t{4} << 30;  // budget of kept factors; the newest is kept in any case
-  std::string scratch_directory;                      // for spilling; empty: recompute instead
+  std::string scratch_directory;                      // of this process alone; empty: recompute instead of spilling
+  std::int64_t scratch_bytes = std::numeric_limits<std::int64_t>::max();  // budget of spilled factors
 };
 
 struct MemoryStatistics {
-  std::int64_t kept = 0, spilled = 0, dropped = 0;  // factors put, moved to scratch, given up
+  std::int64_t put = 0, spilled = 0, dropped = 0;   // factors put, moved to scratch, given up
   std::int64_t recomputed = 0;                      // subtrees condensed again
   std::int64_t peak_bytes = 0;                      // of kept factors
 };
@@ -40,7 +44,9 @@ class FactorStore {
   FactorStore(const FactorStore&) = delete;
   FactorStore& operator=(const FactorStore&) = delete;
 
-  void put(std::int64_t node, NodeFactors factors);
+  // What may happen to factors that fit neither in memory nor in scratch.
+  enum class Loss { kRecompute, kNever };
+  void put(std::int64_t node, NodeFactors factors, Loss loss = Loss::kRecompute);
   // nullptr: dropped, compute it again. The pointer holds until the next put or get.
   const NodeFactors* get(std::int64_t node);
   void clear();
@@ -49,14 +55,17 @@ class FactorStore {
 
  private:
   std::string scratch_path(std::int64_t node) const;
-  void evict_oldest();
+  bool spill(std::int64_t node, const NodeFactors& factors);  // false: no room
+  void make_room();
 
   MemoryOptions options_;
   MemoryStatistics statistics_;
-  std::int64_t bytes_ = 0, clock_ = 0;
+  std::int64_t bytes_ = 0, scratch_bytes_ = 0, clock_ = 0;
+  bool scratch_full_ = false;  // its disk
   std::map<std::int64_t, NodeFactors> kept_;           // by node
   std::map<std::int64_t, std::int64_t> node_by_time_;  // of kept ones
   std::map<std::int64_t, std::int64_t> time_of_node_;
+  std::set<std::int64_t> never_lost_;
   std::map<std::int64_t, std::string> spilled_;  // node -> file
   NodeFactors loaded_;                           // last one read back
 };

@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "adjust/tile_adjustment.h"
+#include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
@@ -94,7 +95,7 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
   }
   const StageOutcome outcome = run_stage(job, "adjustment", units);
   for (const FailedUnit& failure : outcome.failures) std::erase(names, failure.unit);
-  if (names.empty()) throw ComputeError("no tile could be adjusted: " + outcome.failures.front().reason);
+  if (names.empty()) throw AgreedError<ComputeError>("no tile could be adjusted: " + outcome.failures.front().reason);
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const std::string name = unit_name("adjust", static_cast<std::int64_t>(t));
     if (std::find(names.begin(), names.end(), name) == names.end()) names.insert(names.begin() + static_cast<long>(t), "");

@@ -80,7 +80,7 @@ FeatureStage run_features(Job& job) {
     units.push_back(std::move(unit));
   }
   const StageOutcome outcome = run_stage(job, "features", units);
-  if (!outcome.failures.empty()) throw ComputeError("features: " + outcome.failures.front().reason);
+  if (!outcome.failures.empty()) throw AgreedError<ComputeError>("features: " + outcome.failures.front().reason);
   list_unreadable(job, stage);
   return stage;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 
 #include "adjust/tile_adjustment.h"
@@ -116,8 +117,37 @@ std::int64_t screen(Job& job, RankRunner& runner) {
 MemoryOptions memory_options(const Job& job) {
   MemoryOptions memory;
   memory.factor_bytes = static_cast<std::int64_t>(job.options.memory_mib * 1024 * 1024);
-  memory.scratch_directory = job.store.path("scratch");
+  memory.scratch_directory = job.store.path("scratch/rank-" + std::to_string(job.ranks.rank()));
+  if (job.options.scratch_mib >= 0)
+    memory.scratch_bytes = static_cast<std::int64_t>(job.options.scratch_mib * 1024 * 1024);
   return memory;
+}
+
+// Before a run (a killed one may have left files) and after it.
+void clear_scratch(Job& job) {
+  on_first_rank(job.ranks, [&] {
+    std::filesystem::remove_all(job.store.path("scratch"));
+    return std::string();
+  });
+}
+
+// Collective: what `--memory` led to, over all ranks.
+void say_memory(Job& job, const MemoryStatistics& mine) {
+  MemoryStatistics all;
+  for (const std::string& text : job.ranks.gather_all(std::string(reinterpret_cast<const char*>(&mine), sizeof mine))) {
+    MemoryStatistics some;
+    std::memcpy(&some, text.data(), sizeof some);
+    all.put += some.put;
+    all.spilled += some.spilled;
+    all.recomputed += some.recomputed;
+    all.peak_bytes = std::max(all.peak_bytes, some.peak_bytes);
+  }
+  if (!job.is_first_rank() || job.options.quiet) return;
+  std::fprintf(stderr,
+               "merge        factors: %lld made, %lld spilled to scratch, %lld subtrees computed again, at most %.1f "
+               "MiB on a rank\n",
+               static_cast<long long>(all.put), static_cast<long long>(all.spilled),
+               static_cast<long long>(all.recomputed), static_cast<double>(all.peak_bytes) / (1 << 20));
 }
 
 struct Adjusted {
@@ -134,7 +164,8 @@ void say_iteration(const Job& job, const GlobalState& state) {
 }
 
 Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& checkpoint) {
-  const std::vector<int> rank_of_tile = distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
+  const std::vector<int> rank_of_tile =
+      distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   GlobalOptions options;
   options.max_decrement = job.settings.merge.decrement;
   options.max_iterations = job.settings.merge.max_iterations;
@@ -159,13 +190,14 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
         checkpoint.write(position, runner.tiles(), gather_state(job, start, runner.tiles()));
       }
       if (job.ranks.any(stop_requested()))
-        throw Interrupted("stopped in stage 'merge' as asked; run the same command to resume");
+        throw AgreedError<Interrupted>("stopped in stage 'merge' as asked; run the same command to resume");
     });
     adjusted.converged = position.global.outcome == GlobalOutcome::kConverged ||
                          position.global.outcome == GlobalOutcome::kRoundingFloor;
     const bool last = position.round >= job.settings.merge.screening_rounds;
     if (last || screen(job, runner) == 0) {
       adjusted.posterior = runner.posterior();
+      say_memory(job, runner.memory());
       adjusted.tiles = std::move(runner.tiles());
       break;
     }
@@ -213,7 +245,8 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
   std::vector<TileResult> parts(inputs.tracks.size());
   const auto part_of = [&](std::size_t row) {
     const RankTile& tile = adjusted.tiles[row];
-    MergeTile merge{TileIndex(tile.tile), read_tracks(job.store.verified_path(inputs.tracks[static_cast<std::size_t>(tile.tile)])),
+    MergeTile merge{TileIndex(tile.tile),
+                    read_tracks(job.store.verified_path(inputs.tracks[static_cast<std::size_t>(tile.tile)])),
                     tile.problem, tile.state};
     return make_tile_result(merge, adjusted.posterior.covariances[row].points);
   };
@@ -228,10 +261,12 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
     job.ranks.flush_sends();
     return parts;
   }
-  const std::vector<int> rank_of_tile = distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
+  const std::vector<int> rank_of_tile =
+      distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   for (std::size_t t = 0, own = 0; t < parts.size(); ++t)
-    parts[t] = rank_of_tile[t] == 0 ? part_of(own++)
-                                    : tile_result_from_bytes(job.ranks.receive(rank_of_tile[t], kTag + static_cast<int>(t)));
+    parts[t] = rank_of_tile[t] == 0
+                   ? part_of(own++)
+                   : tile_result_from_bytes(job.ranks.receive(rank_of_tile[t], kTag + static_cast<int>(t)));
   for (int r = 1; r < job.ranks.size(); ++r) {
     const std::string text = job.ranks.receive(r, kTag - 1);
     const Bytes bytes(text.begin(), text.end());
@@ -251,7 +286,8 @@ MergeOutcome make_outcome(const Adjusted& adjusted) {
   outcome.state = adjusted.state;
   const SubtreeSums& sums = adjusted.posterior.sums;
   outcome.chi2 = sums.weighted_squares;
-  outcome.degrees_of_freedom = sums.residuals - sums.unknowns + static_cast<std::int64_t>(sums.held.size()) + sums.held_points;
+  outcome.degrees_of_freedom =
+      sums.residuals - sums.unknowns + static_cast<std::int64_t>(sums.held.size()) + sums.held_points;
   outcome.global_iterations = adjusted.position.global.accepted;
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
   outcome.gauge = adjusted.posterior.gauge.text;
@@ -291,11 +327,14 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   if (!current.empty()) return;
 
   MergeCheckpoint checkpoint(job, fingerprint);
+  clear_scratch(job);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
+  clear_scratch(job);
   MergeOutcome outcome = make_outcome(adjusted);
   const std::vector<TileResult> parts = gather_parts(job, inputs, adjusted, outcome);
   double peak = 0;
-  for (const std::string& text : job.ranks.gather_all(std::to_string(peak_rss_mib()))) peak = std::max(peak, std::stod(text));
+  for (const std::string& text : job.ranks.gather_all(std::to_string(peak_rss_mib())))
+    peak = std::max(peak, std::stod(text));
   job.statistics.push_back({"merge", monotonic_seconds() - start, peak, tiles.tile_count, 0});
   on_first_rank(job.ranks, [&] {
     write_final(job, inputs, fingerprint, adjusted, outcome, parts);

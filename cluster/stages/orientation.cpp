@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
@@ -73,7 +74,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   BlockState state = initial_state(job.block);
   if (std::all_of(state.oriented.begin(), state.oriented.end(), [](std::uint8_t o) { return o != 0; })) return state;
   if (matches.empty())
-    throw InputError("images without pose cannot be oriented from given tie points alone; give poses in the project file");
+    throw AgreedError<InputError>("images without pose cannot be oriented from given tie points alone; give poses in the project file");
   std::uint64_t previous = 0;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     // A cell belongs to the generation of its latest image.
@@ -95,7 +96,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
     unit.fingerprint = hasher.value();
     unit.write = [&](const std::string& path) { write_state(path, orient(job, state, pairs)); };
     const StageOutcome outcome = run_stage(job, "orientation", {unit});
-    if (!outcome.failures.empty()) throw ComputeError("orientation failed: " + outcome.failures.front().reason);
+    if (!outcome.failures.empty()) throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
     state = read_state(job.store.verified_path(unit.name));
     previous = job.store.seal(unit.name)->content_hash;
   }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "adjust/tile_problem.h"
+#include "cluster/collective.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -97,7 +98,7 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
   if (job.is_first_rank() && !index_holds(job, unit.name, names)) job.store.remove(unit.name);
   job.ranks.barrier();
   run_stage(job, "tracks", {unit});
-  if (!job.store.seal(unit.name)) throw ComputeError("no tracks could be built: " + job.failures.back().reason);
+  if (!job.store.seal(unit.name)) throw AgreedError<ComputeError>("no tracks could be built: " + job.failures.back().reason);
   return names;
 }
 

@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Factors of the merge in memory, in scratch or computed again: the same bits, on one rank and on three, and each way is
+# really gone (the run says how many). usage: memory.sh MEGABLOCK
+set -euo pipefail
+megablock=$1
+work=$(mktemp -d); trap 'rm -rf "$work"' EXIT
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+"$megablock" simulate --scene aerial --frames 160 --outliers 0.01 -o "$work/block" >/dev/null
+printf 'tiles:\n  tile_max_frames: 20\n' >> "$work/block/block.yaml"
+"$megablock" run "$work/block/block.yaml" -j "$work/reference" --quiet >/dev/null
+reference=$("$megablock" status "$work/reference" --digest)
+
+# run NAME RANKS PATTERN SWITCHES...: the same digest, and a line that fits the pattern
+run() {
+  local name=$1 ranks=$2 pattern=$3; shift 3
+  mpirun --bind-to none --oversubscribe --mca mpi_yield_when_idle 1 -n "$ranks" \
+    "$megablock" run "$work/block/block.yaml" -j "$work/$name" "$@" >/dev/null 2>"$work/$name.log"
+  local line digest
+  line=$(grep -o 'factors: .*' "$work/$name.log")
+  digest=$("$megablock" status "$work/$name" --digest)
+  echo "$name: $digest, $line"
+  [ "$digest" = "$reference" ] || { echo "digest differs, $reference in memory"; exit 1; }
+  [[ $line =~ $pattern ]] || { echo "expected: $pattern"; exit 1; }
+  [ -z "$(ls -A "$work/$name/scratch" 2>/dev/null)" ] || { echo "files left in scratch"; exit 1; }
+}
+run kept 1 ' 0 spilled .* 0 subtrees'
+run spilled_1 1 ' [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
+run spilled_3 3 ' [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
+run recomputed_1 1 ' 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
+run recomputed_3 3 ' 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
+run both_2 2 ' [1-9][0-9]* spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 1
