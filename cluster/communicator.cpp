@@ -50,6 +50,8 @@ struct Communicator::Mpi {
 
 Communicator::Communicator(int* argc, char*** argv) {
   if (!started_by_launcher()) return;
+  // Open MPI takes this component for windows over TCP, though it refuses MPI_THREAD_MULTIPLE; others can serve it.
+  setenv("OMPI_MCA_osc", "^pt2pt", 0);
   int provided = 0;
   MPI_Init_thread(argc, argv, MPI_THREAD_MULTIPLE, &provided);
   if (provided < MPI_THREAD_MULTIPLE) throw std::runtime_error("MPI library lacks MPI_THREAD_MULTIPLE");

@@ -182,7 +182,8 @@ class BadInput(unittest.TestCase):
 
     def test_two_runs_on_one_job(self):
         first = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stderr=subprocess.DEVNULL)
-        while not (self.job / "lock").exists():
+        lock = self.job / "lock"
+        while not (lock.exists() and lock.read_text()):  # it says who holds it once it does
             self.assertIsNone(first.poll())
             time.sleep(0.01)
         first.send_signal(signal.SIGSTOP)  # it holds the lock for as long as we like

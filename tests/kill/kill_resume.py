@@ -1,0 +1,135 @@
+#!/usr/bin/env python3
+"""A run killed by SIGKILL at random moments and started again gives the same bits, and computes no unit twice.
+
+usage: kill_resume.py MEGABLOCK [--kills 10] [--ranks 2] [--project FILE] [--seed 4711]
+
+Moments are drawn evenly over the measured length of an undisturbed run. A unit has its event once its file is sealed,
+so that a unit with two events was computed again although it was there; a kill may lose the event of a unit that was
+just sealed, one a rank.
+"""
+import argparse
+import contextlib
+import json
+import os
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+LONGEST_RUN_S = 300  # a run that takes longer hangs: its stacks are printed
+
+parser = argparse.ArgumentParser()
+parser.add_argument("megablock")
+parser.add_argument("--kills", type=int, default=10)
+parser.add_argument("--ranks", type=int, default=2)
+parser.add_argument("--project", type=pathlib.Path)
+parser.add_argument("--seed", type=int, default=4711)
+options = parser.parse_args()
+
+
+def processes_of(session):
+    """Living processes of a session: mpirun gives its ranks process groups of their own, but keeps its session."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        try:
+            state, _, _, its_session = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
+        except (OSError, ValueError):
+            continue  # not a process, or gone
+        if int(its_session) == session and state not in "ZX":
+            found.append(int(entry.name))
+    return found
+
+
+def kill_all(session):
+    while processes := processes_of(session):
+        for process in processes:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+
+
+def print_stacks(session):
+    if not shutil.which("gdb"):
+        return
+    for process in processes_of(session):
+        subprocess.run(["gdb", "-p", str(process), "-batch", "-ex", "thread apply all bt 12"], stderr=subprocess.STDOUT)
+
+
+def start(project, job, log):
+    command = ["mpirun", "--bind-to", "none", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1",
+               "-n", str(options.ranks), options.megablock, "run", str(project), "-j", str(job), "--quiet"]
+    environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+    return subprocess.Popen(command, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL,
+                            start_new_session=True)
+
+
+def run(project, job, log):
+    process = start(project, job, log)
+    try:
+        status = process.wait(timeout=LONGEST_RUN_S)
+    except subprocess.TimeoutExpired:
+        print_stacks(process.pid)
+        kill_all(process.pid)
+        sys.exit(f"a run of {job} did not end in {LONGEST_RUN_S} s")
+    if status != 0:
+        sys.exit(f"a run of {job} ended with {status}: {pathlib.Path(log.name).read_text()[-2000:]}")
+
+
+def kill_after(project, job, log, moment_s):
+    process = start(project, job, log)
+    try:
+        process.wait(timeout=moment_s)
+    except subprocess.TimeoutExpired:
+        pass
+    kill_all(process.pid)
+    process.wait()
+
+
+def events(job):
+    found = []
+    for path in sorted((job / "events").glob("*.jsonl")):
+        for line in path.read_text().splitlines():
+            try:
+                found.append(json.loads(line))
+            except json.JSONDecodeError:
+                pass  # the line a kill tore
+    return found
+
+
+def digest(job):
+    return subprocess.check_output([options.megablock, "status", str(job), "--digest"], text=True).strip()
+
+
+with tempfile.TemporaryDirectory() as folder:
+    work = pathlib.Path(folder)
+    project = options.project
+    if project is None:
+        subprocess.run([options.megablock, "simulate", "--scene", "aerial", "--frames", "120", "--outliers", "0.01",
+                        "-o", str(work / "block")], check=True, stdout=subprocess.DEVNULL)
+        project = work / "block" / "block.yaml"
+        with project.open("a") as file:
+            file.write("tiles:\n  tile_max_frames: 15\n")
+    with (work / "log").open("w") as log:
+        before = time.monotonic()
+        run(project, work / "reference", log)
+        length_s = time.monotonic() - before
+        moments = random.Random(options.seed)
+        for _ in range(options.kills):
+            kill_after(project, work / "job", log, length_s * moments.random())
+        run(project, work / "job", log)
+    reference, resumed = digest(work / "reference"), digest(work / "job")
+    wanted = {event["unit"] for event in events(work / "reference")}
+    done = [event["unit"] for event in events(work / "job")]
+    twice = sorted({unit for unit in done if done.count(unit) > 1})
+    unseen = wanted - set(done)
+    print(f"undisturbed {length_s:.1f} s, digest {reference}, {len(wanted)} units; after {options.kills} kills digest "
+          f"{resumed}, {len(done)} units computed, {len(twice)} of them twice")
+    if resumed != reference:
+        sys.exit("digest differs after kills")
+    if twice:
+        sys.exit(f"computed again although finished: {', '.join(twice)}")
+    if len(unseen) > options.ranks * options.kills:
+        sys.exit(f"without an event: {', '.join(sorted(unseen))}")
