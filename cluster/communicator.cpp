@@ -209,11 +209,8 @@ std::int64_t Communicator::claim() {
 
 std::int64_t Communicator::counter() const {
   if (!mpi_) return local_counter_;
-  const std::int64_t unused = 0;
-  std::int64_t number = 0;
-  MPI_Fetch_and_op(&unused, &number, MPI_INT64_T, 0, 0, MPI_NO_OP, mpi_->window);
-  MPI_Win_flush(0, mpi_->window);
-  return number;
+  // Its memory is read as it is: the progress display asks from a thread of its own and must not enter the window.
+  return rank_ == 0 ? std::atomic_ref<std::int64_t>(*mpi_->counter).load() : 0;
 }
 
 void Communicator::abort(int exit_code) {

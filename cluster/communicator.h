@@ -43,7 +43,7 @@ class Communicator {
   // The shared counter from which units are claimed. reset() is collective.
   void reset_counter();
   std::int64_t claim();           // next number, from 0; never given twice between resets
-  std::int64_t counter() const;   // numbers given so far (no claim)
+  std::int64_t counter() const;   // numbers given so far, for display; on rank 0 only, 0 elsewhere
 
   // Ends all ranks at once with this exit code (a rank that fails alone must not leave the others waiting).
   [[noreturn]] void abort(int exit_code);
