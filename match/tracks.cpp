@@ -9,8 +9,6 @@
 
 namespace megablock {
 
-namespace {
-
 // Every feature is a node; nodes of one image follow one another. Sets are linked lists of nodes in ascending order,
 // which is ascending order of images.
 class FeatureSets {
@@ -31,6 +29,7 @@ class FeatureSets {
     }
     return node;
   }
+  bool is_root(std::int64_t node) const { return parent_[at(node)] == node; }
 
   // Unites two sets unless the union would see an image twice.
   void unite(std::int64_t node_a, std::int64_t node_b) {
@@ -43,6 +42,11 @@ class FeatureSets {
 
   std::int64_t first(std::int64_t root_node) const { return head_[at(root_node)]; }
   std::int64_t next(std::int64_t node) const { return next_[at(node)]; }
+  int length(std::int64_t root_node) const {
+    int length = 0;
+    for (std::int64_t n = first(root_node); n >= 0; n = next(n)) ++length;
+    return length;
+  }
   std::size_t image_of(std::int64_t node) const {
     const auto above = std::upper_bound(image_begin_.begin(), image_begin_.end(), node);
     return static_cast<std::size_t>(above - image_begin_.begin()) - 1;
@@ -83,6 +87,8 @@ class FeatureSets {
 
   std::vector<std::int64_t> image_begin_, parent_, next_, head_;
 };
+
+namespace {
 
 // The lowest row with the same position: SIFT reports a keypoint once per dominant orientation, but it is one point.
 std::vector<std::vector<std::int32_t>> rows_by_position(
@@ -138,38 +144,50 @@ std::vector<std::size_t> order_of_pairs(const std::vector<VerifiedPair>& pairs) 
 
 }  // namespace
 
-TrackSet build_tracks(const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints,
-                      const std::vector<VerifiedPair>& pairs, const TrackOptions& options) {
-  if (options.min_length < 2) throw InputError("min_length of tracks must be at least 2");
+TrackBuilder::TrackBuilder(const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints)
+    : keypoints_(keypoints), canonical_(rows_by_position(keypoints)) {
   std::vector<std::int64_t> image_begin{0};
   for (const auto& points : keypoints)
     image_begin.push_back(image_begin.back() + static_cast<std::int64_t>(points.size()));
-  FeatureSets sets(std::move(image_begin));
-  const auto canonical = rows_by_position(keypoints);
+  sets_ = std::make_unique<FeatureSets>(std::move(image_begin));
+}
 
+TrackBuilder::~TrackBuilder() = default;
+
+void TrackBuilder::add(const std::vector<VerifiedPair>& pairs) {
   for (const std::size_t i : order_of_pairs(pairs)) {
     const VerifiedPair& pair = pairs[i];
-    check_pair(pair, keypoints);
-    const auto &rows_a = canonical[static_cast<std::size_t>(pair.a.value)],
-               &rows_b = canonical[static_cast<std::size_t>(pair.b.value)];
+    check_pair(pair, keypoints_);
+    const auto &rows_a = canonical_[static_cast<std::size_t>(pair.a.value)],
+               &rows_b = canonical_[static_cast<std::size_t>(pair.b.value)];
     for (std::size_t m = 0; m < pair.feature_a.size(); ++m) {
-      sets.unite(sets.node(pair.a, rows_a[static_cast<std::size_t>(pair.feature_a[m])]),
-                 sets.node(pair.b, rows_b[static_cast<std::size_t>(pair.feature_b[m])]));
+      sets_->unite(sets_->node(pair.a, rows_a[static_cast<std::size_t>(pair.feature_a[m])]),
+                   sets_->node(pair.b, rows_b[static_cast<std::size_t>(pair.feature_b[m])]));
     }
   }
+}
 
+IndexedVector<ImageIndex, std::int64_t> TrackBuilder::long_tracks() const {
+  IndexedVector<ImageIndex, std::int64_t> count(keypoints_.size(), 0);
+  for (std::int64_t root = 0; root < sets_->size(); ++root) {
+    if (!sets_->is_root(root) || sets_->length(root) < 3) continue;
+    for (std::int64_t n = sets_->first(root); n >= 0; n = sets_->next(n))
+      ++count[ImageIndex(static_cast<std::int64_t>(sets_->image_of(n)))];
+  }
+  return count;
+}
+
+TrackSet TrackBuilder::tracks(const TrackOptions& options) const {
+  if (options.min_length < 2) throw InputError("min_length of tracks must be at least 2");
   // A root is the lowest node of its set, so ascending roots are ordered by first image, then first feature.
   TrackSet tracks;
   tracks.begin.push_back(0);
-  for (std::int64_t root = 0; root < sets.size(); ++root) {
-    if (sets.root(root) != root) continue;
-    int length = 0;
-    for (std::int64_t n = sets.first(root); n >= 0; n = sets.next(n)) ++length;
-    if (length < options.min_length) continue;
-    for (std::int64_t n = sets.first(root); n >= 0; n = sets.next(n)) {
-      const ImageIndex image(static_cast<std::int64_t>(sets.image_of(n)));
-      const std::int64_t row = sets.row(n);
-      const Keypoint& keypoint = keypoints[image][static_cast<std::size_t>(row)];
+  for (std::int64_t root = 0; root < sets_->size(); ++root) {
+    if (!sets_->is_root(root) || sets_->length(root) < options.min_length) continue;
+    for (std::int64_t n = sets_->first(root); n >= 0; n = sets_->next(n)) {
+      const ImageIndex image(static_cast<std::int64_t>(sets_->image_of(n)));
+      const std::int64_t row = sets_->row(n);
+      const Keypoint& keypoint = keypoints_[image][static_cast<std::size_t>(row)];
       tracks.image.push_back(image);
       tracks.x.push_back(keypoint.x);
       tracks.y.push_back(keypoint.y);
@@ -179,6 +197,13 @@ TrackSet build_tracks(const IndexedVector<ImageIndex, std::vector<Keypoint>>& ke
     tracks.begin.push_back(static_cast<std::int64_t>(tracks.image.size()));
   }
   return tracks;
+}
+
+TrackSet build_tracks(const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints,
+                      const std::vector<VerifiedPair>& pairs, const TrackOptions& options) {
+  TrackBuilder builder(keypoints);
+  builder.add(pairs);
+  return builder.tracks(options);
 }
 
 }  // namespace megablock

@@ -3,7 +3,7 @@
 
 #include "adjust/tile_adjustment.h"
 #include "cluster/collective.h"
-#include "cluster/stages/block_hash.h"
+#include "cluster/stages/problem_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -13,13 +13,25 @@ namespace megablock {
 
 namespace {
 
-TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
-                          const std::string& tracks_unit) {
-  const AdjustOptions& options = job.settings.adjustment;
+struct TileStart {
+  TileProblem problem;
+  TileState state;
+};
+
+TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
+                     const std::string& tracks_unit) {
   const TrackSet tracks = read_tracks(job.store.verified_path(tracks_unit));
-  TileProblem problem = make_tile_problem(job.block, oriented, tiles, tile, tracks, options.observations);
+  TileStart start;
+  start.problem = make_tile_problem(job.block, oriented, tiles, tile, tracks, job.settings.adjustment.observations);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  TileState state = make_tile_state(problem, oriented, std::vector<Eigen::Vector3d>(problem.points.size(), unknown));
+  start.state =
+      make_tile_state(start.problem, oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
+  return start;
+}
+
+TileAdjustment adjust_one(TileStart start, const AdjustOptions& options) {
+  TileProblem& problem = start.problem;
+  TileState& state = start.state;
   const AdjustSummary summary = adjust_tile(problem, state, options);
 
   TileAdjustment result;
@@ -41,35 +53,6 @@ TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tile
   return result;
 }
 
-// Everything of the block that can reach a tile's adjustment: its frames' values and priors, its cameras, its control.
-void add_tile_values(Hasher& hasher, const Job& job, const BlockState& state, const Tiles& tiles, TileIndex tile,
-                     const TrackSet& tracks) {
-  std::vector<FrameIndex> frames;
-  for (const ImageIndex image : tracks.image) frames.push_back(job.block.images[image].frame);
-  for (std::size_t f = 0; f < tiles.tile_of_frame.size(); ++f)
-    if (tiles.tile_of_frame[FrameIndex(static_cast<std::int64_t>(f))] == tile)
-      frames.push_back(FrameIndex(static_cast<std::int64_t>(f)));
-  std::sort(frames.begin(), frames.end());
-  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-  for (const FrameIndex f : frames) {
-    hasher.add(f.value).add(state.oriented[f]).add(tiles.tile_of_frame[f].value);
-    add_to_hash(hasher, state.frames[f]);
-    add_priors_to_hash(hasher, job.block.frames[f]);
-  }
-  for (std::size_t c = 0; c < state.cameras.size(); ++c) {
-    const CameraIndex camera(static_cast<std::int64_t>(c));
-    for (const double value : state.cameras[camera]) hasher.add(value);
-    for (const double value : job.block.cameras[camera].prior_sigma) hasher.add(value);
-  }
-  for (const ControlPoint& point : job.block.control_points) {
-    hasher.add(point.name).add(point.role);
-    add_to_hash(hasher, point.position);
-    add_to_hash(hasher, point.sigma);
-    for (const ImageMeasurement& m : point.measurements)
-      hasher.add(m.image.value).add(m.pixel.x()).add(m.pixel.y()).add(m.sigma_px);
-  }
-}
-
 }  // namespace
 
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
@@ -78,17 +61,17 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
   std::vector<std::string> names;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const TileIndex tile(static_cast<std::int64_t>(t));
-    const TrackSet owned = read_tracks(job.store.verified_path(tracks[t]));
+    const TileStart start = make_start(job, oriented, tiles, tile, tracks[t]);
     Hasher hasher;
-    hasher.add(algorithm::kAdjustment).add(job.store.seal(tracks[t])->content_hash);
+    hasher.add(algorithm::kAdjustment);
     add_to_hash(hasher, job.settings.adjustment);
-    add_tile_values(hasher, job, oriented, tiles, tile, owned);
+    add_to_hash(hasher, start.problem, start.state);
     Unit unit;
     unit.name = unit_name("adjust", tile.value);
     unit.fingerprint = hasher.value();
-    unit.cost = static_cast<double>(owned.observation_count());
+    unit.cost = static_cast<double>(start.problem.observation_count());
     unit.write = [&job, &oriented, &tiles, tile, track = tracks[t]](const std::string& path) {
-      write_adjustment(path, adjust_one(job, oriented, tiles, tile, track));
+      write_adjustment(path, adjust_one(make_start(job, oriented, tiles, tile, track), job.settings.adjustment));
     };
     names.push_back(unit.name);
     units.push_back(std::move(unit));

@@ -1,6 +1,5 @@
-#include <algorithm>
-
 #include "cluster/stages/block_hash.h"
+#include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
@@ -9,7 +8,6 @@
 namespace megablock {
 
 namespace {
-
 
 GlobalDescriptors read_descriptors(const Job& job, const FeatureStage& features) {
   GlobalDescriptors all;
@@ -35,18 +33,6 @@ std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& feature
     if (frame.given_pose) add_to_hash(hasher.add('g'), *frame.given_pose);
   }
   return hasher.value();
-}
-
-// The first n images of the block and the frames they belong to (frames are in order of their first image).
-Block first_images(const Block& block, std::int64_t n) {
-  Block part = block;
-  part.images.resize(static_cast<std::size_t>(n));
-  std::int64_t frames = 0;
-  for (const Image& image : part.images) frames = std::max(frames, image.frame.value + 1);
-  part.frames.resize(static_cast<std::size_t>(frames));
-  part.relative_poses.clear();
-  part.control_points.clear();
-  return part;
 }
 
 }  // namespace

@@ -21,6 +21,18 @@ namespace {
 
 std::uint64_t mask_hash(const std::string& path) { return path.empty() ? 0 : hash_file(path); }
 
+struct Shard {
+  std::string name;
+  std::int64_t first = 0;                         // image
+  std::vector<std::uint64_t> image_fingerprints;  // of its images
+};
+
+std::uint64_t shard_fingerprint(const std::vector<std::uint64_t>& image_fingerprints) {
+  Hasher hasher;
+  for (const std::uint64_t fingerprint : image_fingerprints) hasher.add(fingerprint);
+  return hasher.value();
+}
+
 std::vector<std::uint64_t> image_fingerprints(const Job& job) {
   IndexedVector<CameraIndex, std::uint64_t> masks;
   for (const Camera& camera : job.block.cameras) masks.push_back(mask_hash(camera.mask_path));
@@ -36,16 +48,34 @@ std::vector<std::uint64_t> image_fingerprints(const Job& job) {
   return fingerprints;
 }
 
-void write_shard(const Job& job, std::int64_t first, std::int64_t end, const std::string& path) {
-  std::vector<ImageFeatures> shard(static_cast<std::size_t>(end - first));
+// A shard that grew at its end keeps the features of its first images: as many as the file there was made of.
+std::vector<ImageFeatures> features_to_keep(const JobStore& store, const std::string& name,
+                                            const std::vector<std::uint64_t>& fingerprints) {
+  for (std::size_t count = fingerprints.size() - 1; count > 0; --count) {
+    const std::uint64_t fingerprint = shard_fingerprint({fingerprints.begin(), fingerprints.begin() + count});
+    if (!store.up_to_date(name, fingerprint)) continue;
+    try {
+      return read_features(store.verified_path(name));
+    } catch (const StoreError&) {
+      return {};  // damaged: computed again
+    }
+  }
+  return {};
+}
+
+void write_shard(const Job& job, const Shard& shard, const std::string& path) {
+  std::vector<ImageFeatures> images = features_to_keep(job.store, shard.name, shard.image_fingerprints);
+  const auto kept = static_cast<std::int64_t>(images.size());
+  const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());
+  images.resize(shard.image_fingerprints.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
-  for (std::int64_t i = first; i < end; ++i) {
-    const ImageIndex image(i);
+  for (std::int64_t i = kept; i < count; ++i) {
+    const ImageIndex image(shard.first + i);
     const std::string& mask = job.block.cameras[job.block.camera_of(image)].mask_path;
-    shard[static_cast<std::size_t>(i - first)] =
+    images[static_cast<std::size_t>(i)] =
         detect_features(job.block.images[image].path, mask, image, job.settings.features);
   }
-  write_features(path, shard);
+  write_features(path, images);
 }
 
 // Images without features become failures of the run, with their reasons.
@@ -69,13 +99,13 @@ FeatureStage run_features(Job& job) {
   std::vector<Unit> units;
   for (std::int64_t first = 0; first < images; first += kShardImages) {
     const std::int64_t end = std::min(images, first + kShardImages);
-    Hasher hasher;
-    for (std::int64_t i = first; i < end; ++i) hasher.add(stage.image_fingerprint[static_cast<std::size_t>(i)]);
+    const Shard shard{unit_name("features", first / kShardImages), first,
+                      {stage.image_fingerprint.begin() + first, stage.image_fingerprint.begin() + end}};
     Unit unit;
-    unit.name = unit_name("features", first / kShardImages);
-    unit.fingerprint = hasher.value();
+    unit.name = shard.name;
+    unit.fingerprint = shard_fingerprint(shard.image_fingerprints);
     unit.cost = static_cast<double>(end - first);
-    unit.write = [&job, first, end](const std::string& path) { write_shard(job, first, end, path); };
+    unit.write = [&job, shard](const std::string& path) { write_shard(job, shard, path); };
     stage.shards.push_back(unit.name);
     units.push_back(std::move(unit));
   }

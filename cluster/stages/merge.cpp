@@ -332,12 +332,17 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   clear_scratch(job);
   MergeOutcome outcome = make_outcome(adjusted);
   const std::vector<TileResult> parts = gather_parts(job, inputs, adjusted, outcome);
-  double peak = 0;
+  UnitEvent event;
+  event.stage = "merge";
+  event.unit = kResult;
   for (const std::string& text : job.ranks.gather_all(std::to_string(peak_rss_mib())))
-    peak = std::max(peak, std::stod(text));
-  job.statistics.push_back({"merge", monotonic_seconds() - start, peak, tiles.tile_count, 0});
+    event.peak_rss_mib = std::max(event.peak_rss_mib, std::stod(text));
+  event.seconds = monotonic_seconds() - start;
+  job.statistics.push_back({event.stage, event.seconds, event.peak_rss_mib, tiles.tile_count, 0});
   on_first_rank(job.ranks, [&] {
     write_final(job, inputs, fingerprint, adjusted, outcome, parts);
+    event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);
+    job.events.append(event);
     checkpoint.clear();
     return std::string();
   });

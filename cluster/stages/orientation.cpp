@@ -4,10 +4,12 @@
 #include "adjust/orientation.h"
 
 #include <algorithm>
-#include <numeric>
+#include <map>
+#include <set>
 
 #include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
+#include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -18,89 +20,155 @@ namespace megablock {
 
 namespace {
 
-void add_block_values(Hasher& hasher, const Block& block, std::int64_t images) {
-  for (std::int64_t i = 0; i < images; ++i) {
-    const Image& image = block.images[ImageIndex(i)];
-    hasher.add(image.frame.value).add(image.mount).add(block.camera_of(ImageIndex(i)).value);
-    const Frame& frame = block.frames[image.frame];
+using Frames = std::set<FrameIndex>;
+using Links = std::map<FrameIndex, Frames>;  // of frames with a verified pair
+
+void add_block_values(Hasher& hasher, const Block& block) {
+  for (const Image& image : block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
+  for (const Frame& frame : block.frames) {
+    hasher.add(frame.name).add(frame.rig.value);
     add_priors_to_hash(hasher, frame);
-    if (frame.given_pose) add_to_hash(hasher, *frame.given_pose);
+    if (frame.given_pose) add_to_hash(hasher.add('g'), *frame.given_pose);
   }
+  for (const Rig& rig : block.rigs)
+    for (const Mount& mount : rig.mounts) add_to_hash(hasher.add(mount.camera.value), mount.pose);
   for (const Camera& camera : block.cameras) {
+    hasher.add(camera.width).add(camera.height).add(camera.focal_known);
     for (const double value : camera.intrinsics) hasher.add(value);
     for (const double value : camera.prior_sigma) hasher.add(value);
   }
 }
 
-// The frames of each connected component of the pairs, by first frame.
-std::vector<std::vector<FrameIndex>> components(const Block& block, const std::vector<VerifiedPair>& pairs) {
-  std::vector<std::int64_t> parent(block.frames.size());
-  std::iota(parent.begin(), parent.end(), std::int64_t{0});
-  const auto root = [&](std::int64_t f) {
-    while (parent[f] != f) f = parent[f] = parent[parent[f]];
-    return f;
-  };
+Links links_of(const Block& block, const std::vector<VerifiedPair>& pairs) {
+  Links links;
   for (const VerifiedPair& pair : pairs) {
-    const std::int64_t a = root(block.images[pair.a].frame.value), b = root(block.images[pair.b].frame.value);
-    parent[std::max(a, b)] = std::min(a, b);
+    const FrameIndex a = block.images[pair.a].frame, b = block.images[pair.b].frame;
+    if (a == b) continue;
+    links[a].insert(b);
+    links[b].insert(a);
   }
-  std::vector<std::vector<FrameIndex>> by_root(block.frames.size());
-  for (std::size_t f = 0; f < parent.size(); ++f)
-    by_root[root(static_cast<std::int64_t>(f))].push_back(FrameIndex(static_cast<std::int64_t>(f)));
-  std::erase_if(by_root, [](const auto& frames) { return frames.size() < 2; });
-  return by_root;
+  return links;
 }
 
-BlockState orient(const Job& job, BlockState state, const std::vector<VerifiedPair>& pairs) {
-  const auto keypoints = read_keypoints(job);
-  for (const std::vector<FrameIndex>& frames : components(job.block, pairs)) {
-    if (std::all_of(frames.begin(), frames.end(), [&](FrameIndex f) { return state.oriented[f] != 0; })) continue;
-    std::vector<VerifiedPair> own;
-    for (const VerifiedPair& pair : pairs)
-      if (std::binary_search(frames.begin(), frames.end(), job.block.images[pair.a].frame)) own.push_back(pair);
-    const TrackSet tracks = build_tracks(keypoints, own, job.settings.tracks);
-    try {
-      state = orient_component(job.block, state, frames, own, tracks, job.settings.orientation).state;
-    } catch (const ComputeError&) {
-      // A component that cannot be oriented stays without poses; the result lists its images.
+// Sets of frames without a pose that hang together by pairs and of which one is new, by first frame.
+std::vector<Frames> sets_to_orient(const BlockState& state, const Frames& new_frames, const Links& links) {
+  std::vector<Frames> sets;
+  Frames seen;
+  for (const FrameIndex start : new_frames) {
+    if (state.oriented[start] || !links.contains(start) || !seen.insert(start).second) continue;
+    Frames set;
+    std::vector<FrameIndex> open{start};
+    while (!open.empty()) {
+      const FrameIndex frame = open.back();
+      open.pop_back();
+      set.insert(frame);
+      for (const FrameIndex next : links.at(frame))
+        if (!state.oriented[next] && seen.insert(next).second) open.push_back(next);
     }
+    sets.push_back(std::move(set));
   }
-  return state;
+  return sets;
+}
+
+// With the frames they are linked to and those these are linked to: enough to intersect the points they see.
+Frames with_surroundings(const Frames& set, const Links& links) {
+  Frames all = set;
+  for (int ring = 0; ring < 2; ++ring) {
+    const Frames inner = all;
+    for (const FrameIndex frame : inner) all.insert(links.at(frame).begin(), links.at(frame).end());
+  }
+  return all;
+}
+
+// Orients one set; frames that had a pose keep it, and the cameras with them.
+void orient_set(const Job& job, const Block& block, const std::vector<VerifiedPair>& pairs, const Frames& set,
+                const Links& links, BlockState& state) {
+  const Frames frames = with_surroundings(set, links);
+  std::vector<VerifiedPair> own;
+  for (const VerifiedPair& pair : pairs)
+    if (frames.contains(block.images[pair.a].frame) && frames.contains(block.images[pair.b].frame)) own.push_back(pair);
+  BlockState oriented;
+  try {
+    const TrackSet tracks = build_tracks(read_keypoints(job), own, job.settings.tracks);
+    oriented =
+        orient_component(block, state, {frames.begin(), frames.end()}, own, tracks, job.settings.orientation).state;
+  } catch (const ComputeError&) {
+    return;  // stays without poses; the result lists its images
+  }
+  for (const FrameIndex frame : set) {
+    state.frames[frame] = oriented.frames[frame];
+    state.oriented[frame] = oriented.oriented[frame];
+  }
+  if (frames.size() == set.size()) state.cameras = oriented.cameras;
+}
+
+Frames frames_from(const Block& block, std::int64_t first_image) {
+  Frames frames;
+  for (ImageIndex i(first_image); block.images.contains(i); ++i.value) frames.insert(block.images[i].frame);
+  return frames;
+}
+
+// The state of a block that grew: what it had, and start values for the rest.
+BlockState grow(const BlockState& state, const Block& block) {
+  BlockState grown = initial_state(block);
+  std::copy(state.frames.begin(), state.frames.end(), grown.frames.begin());
+  std::copy(state.oriented.begin(), state.oriented.end(), grown.oriented.begin());
+  std::copy(state.cameras.begin(), state.cameras.end(), grown.cameras.begin());
+  std::copy(state.mounts.begin(), state.mounts.end(), grown.mounts.begin());
+  return grown;
+}
+
+// Pairs of the cells that belong to a generation (a cell is of the generation of its latest image) or an earlier one;
+// cells without a verified pair say nothing.
+std::vector<VerifiedPair> pairs_of_generation(const Job& job, const std::vector<std::string>& matches,
+                                              std::int64_t images, Hasher& hasher) {
+  std::vector<VerifiedPair> pairs;
+  for (const std::string& name : matches) {
+    std::vector<VerifiedPair> cell = read_matches(job.store.verified_path(name));
+    const auto later = [&](const VerifiedPair& pair) { return pair.b.value >= images; };
+    if (cell.empty() || std::any_of(cell.begin(), cell.end(), later)) continue;
+    hasher.add(job.store.seal(name)->content_hash);
+    std::move(cell.begin(), cell.end(), std::back_inserter(pairs));
+  }
+  return pairs;
 }
 
 }  // namespace
 
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
-  BlockState state = initial_state(job.block);
-  if (std::all_of(state.oriented.begin(), state.oriented.end(), [](std::uint8_t o) { return o != 0; })) return state;
+  const BlockState start = initial_state(job.block);
+  if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) return start;
   if (matches.empty())
-    throw AgreedError<InputError>("images without pose cannot be oriented from given tie points alone; give poses in the project file");
+    throw AgreedError<InputError>(
+        "images without pose cannot be oriented from given tie points alone; give poses in the project file");
+  BlockState state;
   std::uint64_t previous = 0;
+  std::int64_t images_before = 0;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
-    // A cell belongs to the generation of its latest image.
-    std::vector<VerifiedPair> pairs;
+    const Block block = first_images(job.block, job.generations[g]);
     Hasher hasher;
-    hasher.add(algorithm::kOrientation).add(previous);
+    hasher.add(algorithm::kOrientation).add(previous).add(images_before).add(job.settings.tracks.min_length);
     add_to_hash(hasher, job.settings.orientation);
-    add_block_values(hasher, job.block, job.generations[g]);
-    for (const std::string& name : matches) {
-      std::vector<VerifiedPair> cell = read_matches(job.store.verified_path(name));
-      const bool later = std::any_of(cell.begin(), cell.end(),
-                                     [&](const VerifiedPair& p) { return p.b.value >= job.generations[g]; });
-      if (later) continue;
-      hasher.add(job.store.seal(name)->content_hash);
-      std::move(cell.begin(), cell.end(), std::back_inserter(pairs));
-    }
+    add_block_values(hasher, block);
+    const std::vector<VerifiedPair> pairs = pairs_of_generation(job, matches, job.generations[g], hasher);
     Unit unit;
     unit.name = unit_name("orient", static_cast<std::int64_t>(g));
     unit.fingerprint = hasher.value();
-    unit.write = [&](const std::string& path) { write_state(path, orient(job, state, pairs)); };
+    unit.write = [&](const std::string& path) {
+      BlockState grown = grow(state, block);
+      const Links links = links_of(block, pairs);
+      for (const Frames& set : sets_to_orient(grown, frames_from(block, images_before), links))
+        orient_set(job, block, pairs, set, links, grown);
+      write_state(path, grown);
+    };
     const StageOutcome outcome = run_stage(job, "orientation", {unit});
-    if (!outcome.failures.empty()) throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
+    if (!outcome.failures.empty())
+      throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
     state = read_state(job.store.verified_path(unit.name));
     previous = job.store.seal(unit.name)->content_hash;
+    images_before = job.generations[g];
   }
-  return state;
+  return grow(state, job.block);
 }
 
 }  // namespace megablock

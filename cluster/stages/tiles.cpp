@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 
+#include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
@@ -25,17 +26,12 @@ FrameGraph graph_of(const PairWeights& weights, std::int64_t frames) {
   return graph;
 }
 
-std::int64_t frames_of_first_images(const Block& block, std::int64_t images) {
-  std::int64_t frames = 0;
-  for (std::int64_t i = 0; i < images; ++i) frames = std::max(frames, block.images[ImageIndex(i)].frame.value + 1);
-  return frames;
-}
-
 // Grown as the block grew, so that earlier frames keep their tiles.
 Tiles grow_tiles(const Job& job, const PairWeights& weights) {
   Tiles tiles;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
-    const FrameGraph graph = graph_of(weights, frames_of_first_images(job.block, job.generations[g]));
+    const Block part = first_images(job.block, job.generations[g]);
+    const FrameGraph graph = graph_of(weights, static_cast<std::int64_t>(part.frames.size()));
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);
   }
   return tiles;

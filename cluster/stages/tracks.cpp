@@ -9,6 +9,7 @@
 
 #include "adjust/tile_problem.h"
 #include "cluster/collective.h"
+#include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -102,39 +103,44 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
   return names;
 }
 
-// A track of two images adds no check to its point. Such tracks stay only where one of their images has few longer ones.
-constexpr std::int64_t kEnoughLongTracks = 200;
-
-TrackSet without_needless_pairs(const TrackSet& tracks, std::size_t images) {
-  const auto length = [&](std::int64_t t) { return tracks.begin[t + 1] - tracks.begin[t]; };
-  IndexedVector<ImageIndex, std::int64_t> long_tracks(images, 0);
-  for (std::int64_t t = 0; t < tracks.track_count(); ++t)
-    if (length(t) > 2)
-      for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o) ++long_tracks[tracks.image[o]];
-  TrackSet kept;
-  kept.begin.push_back(0);
-  for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
-    const std::int64_t first = tracks.begin[t];
-    if (length(t) > 2 || long_tracks[tracks.image[first]] < kEnoughLongTracks ||
-        long_tracks[tracks.image[first + 1]] < kEnoughLongTracks)
-      append_track(kept, tracks, t);
-  }
-  return kept;
-}
-
-TrackSet build_block_tracks(const Job& job, const std::vector<std::string>& matches, const Tiles& tiles) {
+// Pairs that take part, by the generation of their later image.
+std::vector<std::vector<VerifiedPair>> pairs_by_generation(const Job& job, const std::vector<std::string>& matches,
+                                                           const Tiles& tiles) {
   std::set<std::pair<FrameIndex, FrameIndex>> dropped;
   for (const FrameEdge& edge : tiles.dropped_links) dropped.insert({edge.a, edge.b});
-  std::vector<VerifiedPair> pairs = read_all_matches(job, matches);
-  std::erase_if(pairs, [&](const VerifiedPair& pair) {
+  std::vector<std::vector<VerifiedPair>> pairs(job.generations.size());
+  for (VerifiedPair& pair : read_all_matches(job, matches)) {
     const FrameIndex a = job.block.images[pair.a].frame, b = job.block.images[pair.b].frame;
-    return dropped.contains({std::min(a, b), std::max(a, b)});
-  });
-  TrackSet tracks = without_needless_pairs(build_tracks(read_keypoints(job), pairs, job.settings.tracks),
-                                           job.block.images.size());
-  for (std::int64_t t = 0; t < tracks.track_count(); ++t)
-    tracks.id[t] = TrackIndex(track_key(tracks.image[tracks.begin[t]], tracks.feature[tracks.begin[t]]));
-  return tracks;
+    if (!dropped.contains({std::min(a, b), std::max(a, b)}))
+      pairs[generation_of(job.generations, pair.b)].push_back(std::move(pair));
+  }
+  return pairs;
+}
+
+// A track of two images adds no check to its point. Such tracks stay only where one of their images has few longer ones
+// by the time the later image comes; so a block that grows keeps the tracks it has.
+constexpr std::int64_t kEnoughLongTracks = 200;
+
+TrackSet build_block_tracks(const Job& job, const std::vector<std::string>& matches, const Tiles& tiles) {
+  const auto keypoints = read_keypoints(job);
+  TrackBuilder builder(keypoints);
+  std::vector<IndexedVector<ImageIndex, std::int64_t>> long_tracks;  // by generation
+  for (const std::vector<VerifiedPair>& pairs : pairs_by_generation(job, matches, tiles)) {
+    builder.add(pairs);
+    long_tracks.push_back(builder.long_tracks());
+  }
+  const TrackSet all = builder.tracks(job.settings.tracks);
+  TrackSet kept;
+  kept.begin.push_back(0);
+  for (std::int64_t t = 0; t < all.track_count(); ++t) {
+    const std::int64_t first = all.begin[t], length = all.begin[t + 1] - first;
+    const auto& so_far = long_tracks[generation_of(job.generations, all.image[first + 1])];
+    if (length > 2 || so_far[all.image[first]] < kEnoughLongTracks || so_far[all.image[first + 1]] < kEnoughLongTracks)
+      append_track(kept, all, t);
+  }
+  for (std::int64_t t = 0; t < kept.track_count(); ++t)
+    kept.id[t] = TrackIndex(track_key(kept.image[kept.begin[t]], kept.feature[kept.begin[t]]));
+  return kept;
 }
 
 }  // namespace
@@ -150,7 +156,7 @@ IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job) 
 
 std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& matches, const Tiles& tiles) {
   Hasher hasher;
-  hasher.add(job.settings.tracks.min_length);
+  hasher.add(job.settings.tracks.min_length).add(job.generations);
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
   return run_tracks_unit(job, hasher.value(), tiles, [&] { return build_block_tracks(job, matches, tiles); });
 }

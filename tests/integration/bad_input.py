@@ -11,35 +11,13 @@ import pathlib
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
-MEGABLOCK = sys.argv.pop(1)
-DONE, FAILED_UNITS, BAD_INPUT, INTERRUPTED = 0, 1, 2, 75
+from program import BAD_INPUT, DONE, FAILED_UNITS, INTERRUPTED, MEGABLOCK, events, megablock, one_line, status
+
 work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-bad-input-"))
-
-
-def megablock(*arguments, expect=DONE):
-    """Runs the program; checks the exit code; returns what it wrote to standard error."""
-    done = subprocess.run([MEGABLOCK, *map(str, arguments)], capture_output=True, text=True)
-    assert done.returncode == expect, f"{arguments}: exit code {done.returncode}, not {expect}\n{done.stdout}\n{done.stderr}"
-    return done.stderr + (done.stdout if expect == DONE else "")
-
-
-def one_line(text):
-    lines = [line for line in text.splitlines() if line.startswith("megablock: ")]
-    assert len(lines) == 1, text
-    return lines[0]
-
-
-def status(job):
-    return json.loads(subprocess.check_output([MEGABLOCK, "status", str(job), "--json"]))
-
-
-def events(job):
-    return [json.loads(line) for file in sorted((job / "events").iterdir()) for line in file.read_text().splitlines()]
 
 
 def setUpModule():

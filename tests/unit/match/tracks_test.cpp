@@ -50,6 +50,29 @@ std::vector<Track> to_lists(const TrackSet& set) {
   return tracks;
 }
 
+TEST(Tracks, LaterBatchesDoNotUndoEarlierOnes) {
+  const Keypoints keypoints = make_keypoints(4, 2);
+  TrackBuilder builder(keypoints);
+  builder.add({make_pair(0, 1, {{0, 0}}), make_pair(1, 2, {{0, 0}})});
+  EXPECT_EQ(builder.long_tracks(), (IndexedVector<ImageIndex, std::int64_t>({1, 1, 1, 0})));
+  // Surer pairs that would split the first track if they came with it: image 3 sees 0 and 2 at two places.
+  builder.add({make_pair(0, 3, {{0, 0}, {1, 1}}), make_pair(2, 3, {{0, 1}, {1, 0}})});
+  const std::vector<Track> tracks = to_lists(builder.tracks({}));
+  EXPECT_EQ(tracks.front(), (Track{{0, 0}, {1, 0}, {2, 0}, {3, 0}}));
+  EXPECT_EQ(builder.long_tracks()[ImageIndex(3)], 1);
+}
+
+TEST(Tracks, OneBatchIsBuildTracks) {
+  const Keypoints keypoints = make_keypoints(4, 5);
+  const std::vector<VerifiedPair> pairs = {make_pair(2, 3, {{1, 1}}), make_pair(0, 2, {{4, 1}, {0, 0}}),
+                                           make_pair(0, 1, {{4, 2}})};
+  TrackBuilder one(keypoints), several(keypoints);
+  one.add(pairs);
+  for (const VerifiedPair& pair : pairs) several.add({pair});
+  EXPECT_EQ(to_lists(one.tracks({})), to_lists(build_tracks(keypoints, pairs, {})));
+  EXPECT_EQ(to_lists(several.tracks({})), to_lists(one.tracks({}))) << "nothing here depends on the order";
+}
+
 TEST(Tracks, JoinMatchesOverImages) {
   const Keypoints keypoints = make_keypoints(4, 5);
   const TrackSet set = build_tracks(

@@ -1,0 +1,28 @@
+#include "cluster/stages/growth.h"
+
+#include <algorithm>
+
+namespace megablock {
+
+Block first_images(const Block& block, std::int64_t n) {
+  Block part = block;
+  part.images.resize(static_cast<std::size_t>(n));
+  std::int64_t frames = 0, rigs = 0, cameras = 0;
+  for (const Image& image : part.images) frames = std::max(frames, image.frame.value + 1);
+  part.frames.resize(static_cast<std::size_t>(frames));
+  for (const Frame& frame : part.frames) rigs = std::max(rigs, frame.rig.value + 1);
+  part.rigs.resize(static_cast<std::size_t>(rigs));
+  for (const Rig& rig : part.rigs)
+    for (const Mount& mount : rig.mounts) cameras = std::max(cameras, mount.camera.value + 1);
+  part.cameras.resize(static_cast<std::size_t>(cameras));
+  part.relative_poses.clear();
+  part.control_points.clear();
+  return part;
+}
+
+std::size_t generation_of(const std::vector<std::int64_t>& generations, ImageIndex image) {
+  return static_cast<std::size_t>(std::upper_bound(generations.begin(), generations.end(), image.value) -
+                                  generations.begin());
+}
+
+}  // namespace megablock

@@ -1,0 +1,146 @@
+#!/usr/bin/env python3
+"""What is computed again when an image is added to a finished job, and when an option changes: what depends on it, and
+nothing else.
+
+usage: growth.py MEGABLOCK [unittest arguments]
+Works on a rendered block of four tiles; needs nothing but the program and the standard library (and mpirun, if there).
+"""
+import os
+import pathlib
+import re
+import shutil
+import tempfile
+import unittest
+
+from program import events, megablock, status
+
+work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-growth-"))
+ADDED = ["f000000.jpg", "f000005.jpg"]  # corners of the block, so that one lies far from some of the tiles
+
+
+def write_project(folder, sections):
+    text = (folder / "rendered.yaml").read_text()
+    for section, values in sections.items():
+        text += f"{section}: {{{', '.join(f'{key}: {value}' for key, value in values.items())}}}\n"
+    (folder / "block.yaml").write_text(text)
+
+
+def run(folder, *ranks):
+    """Runs the job of a folder; returns the units computed by stage."""
+    before = len(events(folder / "job")) if (folder / "job").exists() else 0
+    environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+    megablock("run", folder / "block.yaml", "-j", folder / "job", "-q", before=ranks, env=environment)
+    units = {}
+    for event in events(folder / "job")[before:]:
+        units.setdefault(event["stage"], []).append(event["unit"])
+    return units
+
+
+def unit_files(folder):
+    """Content and time of every unit file."""
+    return {str(file.relative_to(folder / "job")): (file.read_bytes(), file.stat().st_mtime_ns)
+            for file in (folder / "job").rglob("*") if re.fullmatch(r"\d{6}\.h5", file.name)}
+
+
+def add_image(folder, name):
+    shutil.copy(work / "all/images" / name, folder / "images")
+
+
+def simulate(frames, name, *options):
+    megablock("simulate", "--rendered", "--frames", frames, "--forward-overlap", 0.7, "--side-overlap", 0.45,
+              "--width", 400, "--image-height", 300, "--focal", 312, *options, "-o", work / name)
+
+
+OPTIONS = {"features": {"max_features": 1000}, "tiles": {"min_tiles": 4, "min_tiles_from": 20}}
+
+
+def setUpModule():
+    simulate(36, "all")
+    (work / "all/block.yaml").rename(work / "all/rendered.yaml")
+    shutil.copytree(work / "all", work / "first")
+    for name in ADDED:
+        (work / "first/images" / name).unlink()
+    write_project(work / "first", OPTIONS)
+    run(work / "first")
+    assert status(work / "first/job")["tiles"] == 4
+
+
+def tearDownModule():
+    shutil.rmtree(work)
+
+
+class Growth(unittest.TestCase):
+    def setUp(self):
+        self.folder = work / self.id().split(".")[-1]
+        shutil.copytree(work / "first", self.folder)
+
+    def test_an_added_image_touches_its_own_units_only(self):
+        for generation, name in enumerate(ADDED, 1):
+            before = unit_files(self.folder)
+            add_image(self.folder, name)
+            units = run(self.folder)
+            after = unit_files(self.folder)
+            self.assertEqual(status(self.folder / "job")["oriented"], 34 + generation)
+
+            self.assertEqual(units["features"], ["features/000000.h5"])
+            self.assertEqual(units["orientation"], [f"orient/{generation:06}.h5"])
+            new_cells = [file for file in sorted(after) if file.startswith("matches/") and file not in before]
+            self.assertEqual(sorted(units["matching"]), new_cells)
+            changed_tracks = [file for file in after if file.startswith("tracks/") and after[file] != before[file]]
+            self.assertIn(len(changed_tracks), (1, 2))
+            self.assertEqual(sorted(units["adjustment"]), sorted(f.replace("tracks", "adjust") for f in changed_tracks))
+            self.assertIn("result/block.h5", units["merge"])
+            self.assertEqual(units["candidates"] + units["tiles"] + units["tracks"],
+                             ["graph.h5", "tiles.h5", "tracks/index.txt"])
+
+            computed = {unit for stage in units.values() for unit in stage} | set(changed_tracks)
+            self.assertEqual({file for file in after if after[file] != before.get(file)}, computed & set(after))
+            self.assertEqual(set(before) - set(after), set())
+
+    def test_an_added_image_without_overlap_touches_nothing_of_the_others(self):
+        before = unit_files(self.folder)
+        simulate(2, "elsewhere", "--seed", 9)
+        shutil.copy(work / "elsewhere/images/f000000.jpg", self.folder / "images/stranger.jpg")
+        units = run(self.folder)
+        self.assertEqual(status(self.folder / "job")["oriented"], 34)
+        self.assertNotIn("adjustment", units)
+        after = unit_files(self.folder)
+        self.assertEqual({file for file in before if after[file] != before[file]}, {"features/000000.h5"})
+
+    def test_the_result_is_the_same_on_two_ranks(self):
+        if not shutil.which("mpirun"):
+            self.skipTest("needs mpirun")
+        other = work / "two_ranks"
+        shutil.copytree(self.folder, other)
+        for folder, ranks in ((self.folder, []), (other, ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", "2"])):
+            add_image(folder, ADDED[0])
+            run(folder, *ranks)
+        self.assertEqual(status(self.folder / "job")["digest"], status(other / "job")["digest"])
+        self.assertEqual({file: content for file, (content, _) in unit_files(self.folder).items()},
+                         {file: content for file, (content, _) in unit_files(other).items()})
+
+    def test_a_changed_option_touches_what_depends_on_it(self):
+        options = {section: dict(values) for section, values in OPTIONS.items()}
+        # From the end of the pipeline to its beginning. First set: what must be computed; second: what may be, where
+        # the first one's results differ.
+        for section, key, value, must, may in (
+                ("merge", "scale_sigma", "true", {"merge"}, set()),
+                ("adjustment", "max_residual_sigmas", 3.5, {"adjustment", "merge"}, set()),
+                ("adjustment", "image_sigma_px", 0.4, {"orientation", "adjustment", "merge"}, set()),
+                ("orientation", "max_rotation_error_deg", 8, {"orientation"}, {"adjustment", "merge"}),
+                ("tiles", "weak_link_tracks", 9, {"tiles"}, {"tracks", "adjustment", "merge"}),
+                ("matching", "min_track_length", 3, {"tracks", "orientation", "adjustment", "merge"}, set()),
+                ("matching", "ratio", 0.8, {"matching", "tiles", "tracks", "orientation", "adjustment", "merge"}, set()),
+                ("candidates", "order_neighbours", 3, {"candidates"},
+                 {"matching", "tiles", "tracks", "orientation", "adjustment", "merge"})):
+            with self.subTest(option=f"{section}.{key}"):
+                options.setdefault(section, {})[key] = value
+                write_project(self.folder, options)
+                stages = set(run(self.folder))
+                self.assertLessEqual(must, stages)
+                self.assertLessEqual(stages, must | may)
+        self.assertEqual(run(self.folder), {})
+
+
+if __name__ == "__main__":
+    unittest.main()
