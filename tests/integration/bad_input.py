@@ -72,6 +72,7 @@ class BadInput(unittest.TestCase):
             self.skipTest("root reads everything; needs setpriv")
         self.images.chmod(0)
         work.chmod(0o755)
+        self.folder.chmod(0o777)
         line = one_line(megablock("init", self.images, "-o", self.folder / "x.yaml", expect=BAD_INPUT, before=nobody))
         self.assertIn("images", line)
         self.assertIn("permission", line.lower())
