@@ -141,11 +141,36 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("job", options->job, "Job directory")->required();
   command->add_option("--format", options->format, "Format")
       ->required()
-      ->check(CLI::IsMember({"colmap-text", "colmap-bin", "bal", "bundler", "ply", "geojson", "csv", "h5"}));
+      ->check(CLI::IsMember(export_formats()));
   command->add_option("-o,--output", options->output, "File or folder to write")->required();
   command->callback([=, &action] {
     action = [options] {
       export_result(finished_result(options->job), options->format, options->output);
+      return kExitDone;
+    };
+  });
+}
+
+void add_import(CLI::App& app, Action& action) {
+  struct Options {
+    std::string format, path, output;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("import", "Make a project of another program's model");
+  command->footer(
+      "Example: megablock import colmap-bin sparse/0 -o imported\n"
+      "         megablock run imported/block.yaml -j job");
+  command->add_option("format", options->format, "Format")->required()->check(CLI::IsMember(import_formats()));
+  command->add_option("path", options->path, "COLMAP: folder of the model; BAL, Bundler: file")->required();
+  command->add_option("-o,--output", options->output, "Folder of the project to write")->required();
+  command->callback([=, &action] {
+    action = [options] {
+      const ImportedBlock imported = import_block(options->format, options->path);
+      write_imported(imported, options->output);
+      std::printf("%s/block.yaml: %zu images, %zu cameras, %lld points, %lld observations\n", options->output.c_str(),
+                  imported.block.images.size(), imported.block.cameras.size(),
+                  static_cast<long long>(imported.tracks.track_count()),
+                  static_cast<long long>(imported.tracks.observation_count()));
       return kExitDone;
     };
   });
@@ -314,6 +339,7 @@ int command_line(int argc, char** argv) {
     add_status(app, action);
     add_report(app, action);
     add_export(app, action);
+    add_import(app, action);
     add_evaluate(app, action);
     add_simulate(app, action);
     add_check(app, action);

@@ -4,6 +4,7 @@
 
 #include "io/error.h"
 #include "io/import_bal.h"
+#include "io/import_colmap.h"
 #include "io/text_writer.h"
 #include "io/unit_files.h"
 
@@ -11,11 +12,38 @@ namespace megablock {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+struct Format {
+  std::string name;
+  ImportedBlock (*read)(const std::string&);
+};
+
+const std::vector<Format>& formats() {
+  static const std::vector<Format> all = {{"colmap-text", import_colmap_text},
+                                          {"colmap-bin", import_colmap_binary},
+                                          {"bal", import_bal},
+                                          {"bundler", import_bundler}};
+  return all;
+}
+
+}  // namespace
+
+const std::vector<std::string>& import_formats() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> list;
+    for (const Format& format : formats()) list.push_back(format.name);
+    return list;
+  }();
+  return names;
+}
+
 ImportedBlock import_block(const std::string& format, const std::string& path) {
-  if (format == "bal") return import_bal(path);
-  if (format == "bundler") return import_bundler(path);
-  if (format == "colmap-text") return import_colmap_text(path);
-  throw InputError("'" + format + "' is no import format; they are bal, bundler, colmap-text");
+  for (const Format& known : formats())
+    if (known.name == format) return known.read(path);
+  std::string list;
+  for (const std::string& name : import_formats()) list += (list.empty() ? "" : ", ") + name;
+  throw InputError("'" + format + "' is no import format; they are " + list);
 }
 
 void write_imported(const ImportedBlock& imported, const std::string& folder) {

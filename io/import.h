@@ -16,8 +16,12 @@ struct ImportedBlock {
   std::vector<Eigen::Vector3d> points;  // [tracks]
 };
 
-// The formats: "bal", "bundler" (one file each; image names from <path>.list.txt when it is there) and "colmap-text" (a
-// folder). InputError with file:line for malformed files and indices out of range, InputError for an unknown format.
+// The formats: "colmap-text" and "colmap-bin" (a folder), "bal" and "bundler" (one file each; image names from
+// <path>.list.txt when it is there).
+const std::vector<std::string>& import_formats();
+
+// InputError with file:line (binary files: the byte) for malformed files and indices out of range, InputError for an
+// unknown format.
 //
 // BAL and Bundler keep neither image sizes nor principal points: the image is taken as the smallest one, with its
 // centre as principal point, that holds all observations of the camera; principal point, k3, p1, p2 are held. COLMAP

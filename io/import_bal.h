@@ -27,6 +27,5 @@ ImportedBlock block_from_bal(const BalProblem& problem, const std::vector<std::s
 
 ImportedBlock import_bal(const std::string& path);
 ImportedBlock import_bundler(const std::string& path);
-ImportedBlock import_colmap_text(const std::string& folder);
 
 }  // namespace megablock

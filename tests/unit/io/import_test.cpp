@@ -77,6 +77,88 @@ TEST(Import, WritesAProjectThatReads) {
   EXPECT_EQ(read_tracks(project.tie_points).x, imported.tracks.x);
 }
 
+// An imported model as if it were the result of a job.
+BlockResult as_result(const ImportedBlock& imported) {
+  BlockResult result;
+  result.block = imported.block;
+  result.state = imported.state;
+  result.tracks = imported.tracks;
+  result.points = imported.points;
+  result.kept.assign(imported.tracks.image.size(), 1);
+  result.residual_x.assign(result.kept.size(), 0.f);
+  result.residual_y.assign(result.kept.size(), 0.f);
+  result.tiles.tile_count = 1;
+  result.tiles.tile_of_frame.assign(imported.block.frames.size(), TileIndex(0));
+  result.tiles.component.assign(imported.block.frames.size(), 0);
+  result.boundary.assign(imported.block.frames.size(), 0);
+  return result;
+}
+
+// The same but for the rounding of C = -R' t and back.
+void expect_same_model(const ImportedBlock& a, const ImportedBlock& b) {
+  ASSERT_EQ(a.block.images.size(), b.block.images.size());
+  for (ImageIndex i(0); a.block.images.contains(i); ++i.value) {
+    EXPECT_EQ(a.block.images[i].name, b.block.images[i].name);
+    EXPECT_EQ(a.block.camera_of(i), b.block.camera_of(i));
+    const Pose &p = a.state.frames[FrameIndex(i.value)], &q = b.state.frames[FrameIndex(i.value)];
+    EXPECT_LT((p.centre - q.centre).norm(), 1e-12);
+    EXPECT_LT(rotation_angle(p.rotation, q.rotation), 1e-12);
+  }
+  EXPECT_TRUE(a.state.cameras == b.state.cameras && a.points == b.points);
+  EXPECT_TRUE(a.tracks.begin == b.tracks.begin && a.tracks.image == b.tracks.image);
+  EXPECT_TRUE(a.tracks.x == b.tracks.x && a.tracks.y == b.tracks.y);
+}
+
+TEST(Import, WhatWasImportedIsExportedAgainAlike) {
+  TemporaryFolder folder;
+  for (const std::string& format : import_formats()) {
+    SCOPED_TRACE(format);
+    // The first import rounds observations about the principal point (BAL, Bundler) and forgets rigs and residuals.
+    export_result(small_result(format.starts_with("colmap")), format, folder / (format + "0"));
+    const ImportedBlock first = import_block(format, folder / (format + "0"));
+    export_result(as_result(first), format, folder / (format + "1"));
+    expect_same_model(import_block(format, folder / (format + "1")), first);
+  }
+}
+
+TEST(Import, ColmapBinaryIsColmapText) {
+  TemporaryFolder folder;
+  for (const std::string format : {"colmap-text", "colmap-bin"}) export_result(small_result(), format, folder / format);
+  const ImportedBlock text = import_block("colmap-text", folder / "colmap-text");
+  const ImportedBlock binary = import_block("colmap-bin", folder / "colmap-bin");
+  write_imported(text, folder / "a");
+  write_imported(binary, folder / "b");
+  for (const std::string name : {"given.h5", "tie_points.h5"})
+    EXPECT_EQ(read_file(folder / ("a/" + name)), read_file(folder / ("b/" + name))) << name;
+  EXPECT_EQ(text.points, binary.points);
+}
+
+TEST(Import, BadBinaryModelsAreRefusedByByte) {
+  TemporaryFolder folder;
+  export_result(small_result(), "colmap-bin", folder / "model");
+  const auto refusal = [&](const std::string& name, auto change) {
+    const std::string file = folder / ("model/" + name), before = read_file(file);
+    std::string content = before;
+    change(content);
+    write_file(file, content);
+    const std::string message = message_of<InputError>([&] { import_block("colmap-bin", folder / "model"); });
+    write_file(file, before);
+    return message;
+  };
+  const auto cut = [](std::string& content) { content.resize(content.size() - 5); };
+  for (const std::string name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+    EXPECT_THAT(refusal(name, cut), HasSubstr(name + ", byte "));
+    EXPECT_THAT(refusal(name, cut), HasSubstr("ends before"));
+    EXPECT_THAT(refusal(name, [](std::string& content) { content.clear(); }), HasSubstr("ends before the count"));
+    EXPECT_THAT(refusal(name, [](std::string& content) { content += 'x'; }), HasSubstr("more bytes"));
+    EXPECT_THAT(refusal(name, [](std::string& content) { content[7] = '\x7f'; }), HasSubstr("ends before"));
+  }
+  EXPECT_THAT(refusal("cameras.bin", [](std::string& content) { content[12] = 5; }),
+              HasSubstr("camera model 'number 5' is not supported"));
+  EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-bin", folder / "none"); }),
+              HasSubstr("cannot be read"));
+}
+
 TEST(Import, ASmallBundlerFileByHand) {
   TemporaryFolder folder;
   // A camera at (0, 0, 10) that looks down -z, another not oriented; the point at (1, 2, 0) is seen at f / 10 * (1, 2).

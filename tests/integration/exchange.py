@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""Models of other programs: out of a job, into a project, through a job of its own, out again.
+
+usage: exchange.py MEGABLOCK [unittest arguments]
+"""
+import pathlib
+import shutil
+import tempfile
+import unittest
+
+from program import BAD_INPUT, megablock, one_line, status
+
+work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-exchange-"))
+FORMATS = ("colmap-text", "colmap-bin", "bal", "bundler")
+
+
+def setUpModule():
+    megablock("simulate", "--frames", 30, "--points-per-frame", 150, "--control-points", 0, "--check-points", 0,
+              "-o", work / "block")
+    megablock("run", work / "block/block.yaml", "-j", work / "job", "-q")
+
+
+def tearDownModule():
+    shutil.rmtree(work)
+
+
+class Exchange(unittest.TestCase):
+    def test_a_model_goes_out_and_comes_back(self):
+        before = status(work / "job")
+        for form in FORMATS:
+            with self.subTest(form):
+                model, project, job = work / form, work / f"{form}-project", work / f"{form}-job"
+                megablock("export", work / "job", "--format", form, "-o", model)
+                said = megablock("import", form, model, "-o", project)
+                self.assertIn(f"{project}/block.yaml: 30 images", said)
+                megablock("run", project / "block.yaml", "-j", job, "-q")
+                after = status(job)
+                self.assertEqual(after["oriented"], 30)
+                self.assertEqual(after["points"], before["points"])
+                # Without positions and the priors of the camera the same observations fit at least as well.
+                self.assertLess(after["mean_reprojection_px"], 1.02 * before["mean_reprojection_px"])
+                megablock("export", job, "--format", form, "-o", work / f"{form}-again")
+
+    def test_a_broken_model_gets_one_line(self):
+        megablock("export", work / "job", "--format", "bal", "-o", work / "whole.txt")
+        broken, project = work / "broken.txt", work / "broken-project"
+        broken.write_text((work / "whole.txt").read_text()[:5000])
+        self.assertIn("broken.txt:", one_line(megablock("import", "bal", broken, "-o", project, expect=BAD_INPUT)))
+        for form in FORMATS:
+            line = one_line(megablock("import", form, work / "nowhere", "-o", project, expect=BAD_INPUT))
+            self.assertIn("nowhere", line)
+            self.assertIn("cannot be read", line)
+        self.assertFalse(project.exists())
+
+    def test_an_unknown_format_is_refused(self):
+        self.assertIn("colmap-bin", megablock("import", "nvm", "x", "-o", work / "x", expect=BAD_INPUT))
+
+
+if __name__ == "__main__":
+    unittest.main()
