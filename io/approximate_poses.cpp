@@ -1,10 +1,12 @@
 #include "io/approximate_poses.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <set>
 
+#include "geometry/body_attitude.h"
 #include "io/csv_table.h"
 #include "io/error.h"
 #include "io/ground_change.h"
@@ -15,23 +17,48 @@ namespace megablock {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+constexpr double kGimbalDoubt = 20 * kRadiansPerDegree;  // of pitch -90: an aircraft does not stand on its nose
 
-Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, bool photogrammetric) {
+// The three ways in which a file gives attitudes.
+enum class Angles { kPhotogrammetric, kGimbal, kBody };
+
+Angles angles_of(const CsvTable& csv) {
+  if (csv.has("omega_deg")) return Angles::kPhotogrammetric;
+  return csv.has("gimbal_pitch_deg") ? Angles::kGimbal : Angles::kBody;
+}
+
+void require_angles(const CsvTable& csv, Angles angles) {
+  switch (angles) {
+    case Angles::kPhotogrammetric:
+      return csv.require({"omega_deg", "phi_deg", "kappa_deg"});
+    case Angles::kGimbal:
+      return csv.require({"gimbal_yaw_deg", "gimbal_pitch_deg", "gimbal_roll_deg"});
+    case Angles::kBody:
+      return csv.require({"yaw_deg", "pitch_deg", "roll_deg"});
+  }
+}
+
+Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, Angles angles) {
   const auto angle = [&](const char* column) { return csv.needed_number(row, column) * kRadiansPerDegree; };
-  if (photogrammetric) return rotation_from(OmegaPhiKappa{angle("omega_deg"), angle("phi_deg"), angle("kappa_deg")});
-  return rotation_from(YawPitchRoll{angle("yaw_deg"), angle("pitch_deg"), angle("roll_deg")});
+  if (angles == Angles::kPhotogrammetric)
+    return rotation_from(OmegaPhiKappa{angle("omega_deg"), angle("phi_deg"), angle("kappa_deg")});
+  if (angles == Angles::kGimbal)
+    return rotation_from(YawPitchRoll{angle("gimbal_yaw_deg"), angle("gimbal_pitch_deg"), angle("gimbal_roll_deg")});
+  if (std::abs(angle("pitch_deg") + std::numbers::pi / 2) < kGimbalDoubt)
+    throw InputError(csv.where(row) +
+                     ": pitch_deg near -90 looks like a gimbal's angles (-90 = nadir); name the columns "
+                     "gimbal_yaw_deg, gimbal_pitch_deg, gimbal_roll_deg (pitch_deg is 0 at nadir)");
+  return rotation_from(BodyAttitude{angle("yaw_deg"), angle("pitch_deg"), angle("roll_deg")});
 }
 
 ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column) {
-  const bool geodetic = csv.has("latitude_deg"), photogrammetric = csv.has("omega_deg");
+  const bool geodetic = csv.has("latitude_deg");
+  const Angles angles = angles_of(csv);
   if (geodetic)
     csv.require({"latitude_deg", "longitude_deg", "height_m"});
   else
     csv.require({"x_m", "y_m", "z_m"});
-  if (photogrammetric)
-    csv.require({"omega_deg", "phi_deg", "kappa_deg"});
-  else
-    csv.require({"yaw_deg", "pitch_deg", "roll_deg"});
+  require_angles(csv, angles);
   ApproximatePoses poses;
   std::set<std::string> seen;
   for (std::size_t row = 0; row < csv.row_count(); ++row) {
@@ -45,7 +72,7 @@ ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column
                         csv.needed_number(row, "height_m")};
     else
       entry.pose.centre = {csv.needed_number(row, "x_m"), csv.needed_number(row, "y_m"), csv.needed_number(row, "z_m")};
-    entry.pose.rotation = rotation_of(csv, row, photogrammetric);
+    entry.pose.rotation = rotation_of(csv, row, angles);
     poses.rows.push_back(std::move(entry));
   }
   return poses;

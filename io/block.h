@@ -1,7 +1,7 @@
 // The block: cameras, rigs, frames, images, priors, control. What the project file and the image headers say;
 // results (poses, points) are kept apart, in BlockState.
 //
-// Frames of reference and conventions: architecture.md section 3 (restated in docs/conventions.md).
+// Frames of reference and conventions: docs/design.md, Conventions.
 #pragma once
 
 #include <Eigen/Core>

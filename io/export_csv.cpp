@@ -1,6 +1,8 @@
+#include <cmath>
 #include <filesystem>
 #include <numbers>
 
+#include "geometry/body_attitude.h"
 #include "io/crs.h"
 #include "io/export_tables.h"
 #include "io/export_view.h"
@@ -17,16 +19,37 @@ constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
   const OmegaPhiKappa o = omega_phi_kappa(rotation);
-  const YawPitchRoll y = yaw_pitch_roll(rotation);
+  const BodyAttitude y = body_attitude(rotation);
   for (const double angle : {o.omega, o.phi, o.kappa, y.yaw, y.pitch, y.roll})
     writer.print(",{:.12g}", angle * kDegreesPerRadian);
 }
 
+// Of (rotation about the ground axes, position) of the image's projection centre, from its frame's covariance: the
+// centre is C + R' c with the camera's place c in the rig, which a rotation w of the frame moves by [R' c]x w. The
+// mount's own covariance is not in it.
+BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i) {
+  const FrameIndex frame = view.image(i).frame;
+  BlockResult::Matrix6 move = BlockResult::Matrix6::Identity();
+  move.bottomLeftCorner<3, 3>() = skew<double>(view.pose(i).centre - view.result.state.frames[frame].centre);
+  return move * view.result.frame_covariance[frame] * move.transpose();
+}
+
+constexpr const char* kSigmaColumns = ",sigma_{0}_m,sigma_{1}_m,sigma_{2}_m,sigma_rotation_deg";
+
+// Along the axes that `to_axes` turns the ground's to.
+void print_sigmas(TextWriter& writer, const BlockResult::Matrix6& covariance, const Eigen::Quaterniond& to_axes) {
+  const Eigen::Matrix3d r = to_axes.toRotationMatrix();
+  const Eigen::Vector3d position = (r * covariance.bottomRightCorner<3, 3>() * r.transpose()).diagonal();
+  for (const double variance : position) writer.print(",{:.6g}", std::sqrt(variance));
+  writer.print(",{:.6g}", std::sqrt(covariance.topLeftCorner<3, 3>().diagonal().mean()) * kDegreesPerRadian);
+}
+
 void write_local(const ExportView& view, const std::string& path) {
-  const auto& covariance = view.result.frame_covariance;
+  const bool sigmas = !view.result.frame_covariance.empty();
   TextWriter writer(path);
   writer.print("image,frame,camera,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
-  writer.print("{}\n", covariance.empty() ? "" : ",sigma_x_m,sigma_y_m,sigma_z_m,sigma_rotation_deg");
+  if (sigmas) writer.print(kSigmaColumns, "x", "y", "z");
+  writer.print("\n");
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Image& image = view.image(i);
     const Pose pose = view.pose(i);
@@ -34,11 +57,7 @@ void write_local(const ExportView& view, const std::string& path) {
                  view.result.block.cameras[view.camera_index(i)].name, pose.centre.x(), pose.centre.y(),
                  pose.centre.z());
     print_angles(writer, pose.rotation);
-    if (!covariance.empty()) {
-      const Eigen::Matrix<double, 6, 1> variance = covariance[image.frame].diagonal();
-      for (int a = 3; a < 6; ++a) writer.print(",{:.6g}", std::sqrt(variance[a]));
-      writer.print(",{:.6g}", std::sqrt(variance.head<3>().mean()) * kDegreesPerRadian);
-    }
+    if (sigmas) print_sigmas(writer, image_covariance(view, i), Eigen::Quaterniond::Identity());
     writer.print("\n");
   }
   writer.close();
@@ -47,13 +66,18 @@ void write_local(const ExportView& view, const std::string& path) {
 void write_wgs84(const ExportView& view, const std::string& path) {
   const Georeference georeference(view.result.block.ground);
   TextWriter writer(path);
-  writer.print("image,latitude_deg,longitude_deg,height_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg\n");
+  const bool sigmas = !view.result.frame_covariance.empty();
+  writer.print("image,latitude_deg,longitude_deg,height_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
+  if (sigmas) writer.print(kSigmaColumns, "east", "north", "up");
+  writer.print("\n");
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Pose pose = view.pose(i);
     const Geodetic position = georeference.to_geodetic(pose.centre);
     writer.print("{},{:.11f},{:.11f},{:.5f}", view.image(i).name, position.latitude_deg, position.longitude_deg,
                  position.height_m);
-    print_angles(writer, pose.rotation * georeference.own_from_block(position).conjugate());
+    const Eigen::Quaterniond own = georeference.own_from_block(position);
+    print_angles(writer, pose.rotation * own.conjugate());
+    if (sigmas) print_sigmas(writer, image_covariance(view, i), own);
     writer.print("\n");
   }
   writer.close();

@@ -10,13 +10,12 @@ namespace megablock {
 // A folder with
 //   frames.csv        name,qw,qx,qy,qz,x,y,z,pass of each oriented frame (io/pose_csv.h: reads back to the same bits)
 //   images_local.csv  image,frame,camera,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg
-//                     of each oriented image in the block's frame, and the sigmas of its frame when there are
-//                     covariances
-//   images_wgs84.csv  image,latitude_deg,longitude_deg,height_m and the angles in the image's own vertical (east,
-//   north,
-//                     up at its position); only of georeferenced blocks
+//                     of each oriented image in the block's frame, and the sigmas of its projection centre and rotation
+//                     when there are covariances
+//   images_wgs84.csv  image,latitude_deg,longitude_deg,height_m, the angles and the sigmas in the image's own vertical
+//                     (east, north, up at its position); only of georeferenced blocks
 //   cameras.csv       name,width,height,f,cx,cy,k1,k2,k3,p1,p2 and sigmas
-// omega, phi, kappa and yaw, pitch, roll as in geometry/rotation.h.
+// omega, phi, kappa as in geometry/rotation.h; yaw, pitch, roll as in geometry/body_attitude.h.
 void export_csv(const BlockResult& result, const std::string& folder);
 
 // Binary little-endian PLY: points (grey) and projection centres (red) as vertices with double coordinates in the

@@ -84,7 +84,7 @@ TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
   write_picture(folder / "images/b.jpg", 64, 48, 2);
   write_file(folder / "images/broken.jpg", "");
   write_file(folder / "poses.csv",
-             "image,latitude_deg,longitude_deg,height_m,yaw_deg,pitch_deg,roll_deg,note\n"
+             "image,latitude_deg,longitude_deg,height_m,gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg,note\n"
              "a.jpg,52.5201,13.4002,140,90,-90,0,first\nbroken.jpg,52.52,13.4,140,0,0,0,\n");
   write_file(folder / "block.yaml", "images: images\nposes: poses.csv\n");
   const Project project = read_project(folder / "block.yaml");
@@ -97,6 +97,23 @@ TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
   EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, -1, 0)).norm(), 1e-4);
   EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d(0, 0, -1)).norm(), 1e-4);
   EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("broken.jpg")));
+}
+
+// The same nadir photo, its top to the east, in the three kinds of angles.
+TEST(ApproximatePoses, AnglesOfBodyGimbalAndPhotoAgree) {
+  TemporaryFolder folder;
+  const std::vector<std::string> tables = {"yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,90,0,0\n",
+                                           "gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg\nframe0/0.jpg,1,2,3,90,-90,0\n",
+                                           "omega_deg,phi_deg,kappa_deg\nframe0/0.jpg,1,2,3,0,0,-90\n"};
+  for (const std::string& table : tables) {
+    write_file(folder / "p.csv", "image,x_m,y_m,z_m," + table);
+    Block block = small_result().block;
+    std::vector<std::string> warnings;
+    set_given_poses(read_approximate_poses(folder / "p.csv"), {}, block, warnings);
+    const Eigen::Quaterniond& rotation = block.frames[FrameIndex(0)].given_pose->rotation;
+    EXPECT_LT((rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, -1, 0)).norm(), 1e-12) << table;
+    EXPECT_LT((rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d(0, 0, -1)).norm(), 1e-12) << table;
+  }
 }
 
 TEST(ApproximatePoses, Refusals) {
@@ -119,6 +136,8 @@ TEST(ApproximatePoses, Refusals) {
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,,3,0,0,0\n"), HasSubstr("p.csv:2: y_m is empty"));
   EXPECT_THAT(refusal(local + "none.jpg,1,2,3,0,0,0\n"), HasSubstr("p.csv:2: pose of 'none.jpg', which is no image"));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,2,3,0,0,0\nframe0/0.jpg,1,2,3,0,0,0\n"), HasSubstr("appears twice"));
+  EXPECT_THAT(refusal("image,x_m,y_m,z_m,yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,0,-85,0\n"),
+              HasSubstr("p.csv:2: pitch_deg near -90 looks like a gimbal's angles"));
   EXPECT_THAT(
       refusal("image,latitude_deg,longitude_deg,height_m,yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,97,1,1,0,0,0\n"),
       HasSubstr("p.csv:2"));

@@ -2,12 +2,15 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <random>
 #include <sstream>
 
+#include "geometry/body_attitude.h"
 #include "image_files.h"
 #include "io/crs.h"
 #include "io/error.h"
@@ -304,14 +307,57 @@ TEST(Export, BalKeepsTheRaysOfCamerasItCannotDescribe) {
         << "within the rounding of stored observations";
 }
 
+// The sigmas of a camera off the frame's centre against many drawn poses of the frame.
+TEST(Export, CsvSigmasAreThoseOfTheProjectionCentre) {
+  TemporaryFolder folder;
+  BlockResult result = small_result();
+  result.block.rigs[RigIndex(0)].mounts[1].pose.centre = {3, -1, 2};
+  result.state.mounts[RigIndex(0)][1].centre = {3, -1, 2};
+  const Geodetic far{46.99, -90.0, 350};  // the vertical turned by more than a degree
+  const Georeference reference(result.block.ground);
+  result.state.frames[FrameIndex(0)].centre = reference.to_local(far);
+  BlockResult::Matrix6 c = BlockResult::Matrix6::Zero();
+  c.diagonal() << 0.02, 0.03, 0.01, 0.05, 0.02, 0.1;
+  c(0, 4) = c(4, 0) = 0.01;
+  c(2, 3) = c(3, 2) = -0.008;
+  c *= 1e-4;
+  result.frame_covariance.assign(result.block.frames.size(), c);
+  export_result(result, "csv", folder / "tables");
+  const Eigen::LLT<BlockResult::Matrix6> factor(c);
+  std::mt19937_64 engine(8);
+  std::normal_distribution<double> normal;
+  const Eigen::Quaterniond own = reference.own_from_block(far);
+  Eigen::Vector3d local = Eigen::Vector3d::Zero(), world = Eigen::Vector3d::Zero();
+  const int draws = 40000;
+  const Pose frame = result.state.frames[FrameIndex(0)];
+  const Pose mount = result.state.mounts[RigIndex(0)][1];
+  for (int i = 0; i < draws; ++i) {
+    Eigen::Matrix<double, 6, 1> unit;
+    for (double& u : unit) u = normal(engine);
+    const Eigen::Matrix<double, 6, 1> d = factor.matrixL() * unit;
+    const Pose moved{rotation_update(frame.rotation, d.head<3>()), frame.centre + d.tail<3>()};
+    const Eigen::Vector3d error = camera_pose(moved, mount).centre - camera_pose(frame, mount).centre;
+    local += error.cwiseAbs2() / draws;
+    world += (own * error).cwiseAbs2() / draws;
+  }
+  const auto local_row = words_of(folder / "tables/images_local.csv", ',')[2];
+  const auto world_row = words_of(folder / "tables/images_wgs84.csv", ',')[2];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto axis = static_cast<Eigen::Index>(k);
+    EXPECT_NEAR(std::stod(local_row[12 + k]), std::sqrt(local[axis]), 0.02 * std::sqrt(local[axis]));
+    EXPECT_NEAR(std::stod(world_row[10 + k]), std::sqrt(world[axis]), 0.02 * std::sqrt(world[axis]));
+  }
+  EXPECT_NEAR(std::stod(world_row[13]), std::sqrt(0.02) * 0.01 * 180 / std::numbers::pi, 1e-6);
+}
+
 TEST(Export, CsvGivesPosesInBothFrames) {
   TemporaryFolder folder;
   BlockResult result = small_result();
-  // An image 10 km north, nadir in its own vertical, yaw 30 degrees.
+  // An image 10 km north, near nadir in its own vertical, its top 30 degrees east of north.
   const Georeference reference(result.block.ground);
   const Geodetic far{46.93, -91.99, 350};
   const double degree = std::numbers::pi / 180;
-  const Eigen::Quaterniond own = rotation_from(YawPitchRoll{30 * degree, -60 * degree, 2 * degree});
+  const Eigen::Quaterniond own = rotation_from(BodyAttitude{30 * degree, 5 * degree, 2 * degree});
   result.state.frames[FrameIndex(0)] = {own * reference.own_from_block(far), reference.to_local(far)};
   export_result(result, "csv", folder / "tables");
   const auto world = words_of(folder / "tables/images_wgs84.csv", ',');
@@ -321,7 +367,7 @@ TEST(Export, CsvGivesPosesInBothFrames) {
   EXPECT_NEAR(std::stod(world[1][2]), -91.99, 1e-10);
   EXPECT_NEAR(std::stod(world[1][3]), 350, 1e-4);
   EXPECT_NEAR(std::stod(world[1][7]), 30, 1e-8);
-  EXPECT_NEAR(std::stod(world[1][8]), -60, 1e-8);
+  EXPECT_NEAR(std::stod(world[1][8]), 5, 1e-8);
   EXPECT_NEAR(std::stod(world[1][9]), 2, 1e-8);
   const auto local = words_of(folder / "tables/images_local.csv", ',');
   ASSERT_EQ(local.size(), 7u);
@@ -333,7 +379,7 @@ TEST(Export, CsvGivesPosesInBothFrames) {
     EXPECT_EQ(Eigen::Vector3d(v[0], v[1], v[2]), pose.centre);
     EXPECT_LT(rotation_angle(rotation_from(OmegaPhiKappa{v[3] * degree, v[4] * degree, v[5] * degree}), pose.rotation),
               1e-9);
-    EXPECT_LT(rotation_angle(rotation_from(YawPitchRoll{v[6] * degree, v[7] * degree, v[8] * degree}), pose.rotation),
+    EXPECT_LT(rotation_angle(rotation_from(BodyAttitude{v[6] * degree, v[7] * degree, v[8] * degree}), pose.rotation),
               1e-9);
   }
   const PoseTable frames = read_pose_csv(folder / "tables/frames.csv");

@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""What the documents name is there: links and their headings, paths, ctest patterns. usage: docs_test.py SOURCE_FOLDER"""
+import pathlib
+import re
+import sys
+
+source = pathlib.Path(sys.argv[1])
+documents = [source / "README.md", *sorted((source / "docs").glob("*.md"))]
+sources = [path for room in ("geometry", "io", "partition", "match", "adjust", "merge", "cluster", "tests")
+           for path in sorted((source / room).rglob("*")) if path.suffix in (".h", ".cpp")]
+problems, checked = [], 0
+
+
+def headings(path):
+    """The anchors of a document, as GitHub makes them."""
+    titles = re.findall(r"^#+ +(.*)$", path.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_names():
+    """Suite.Name of every GoogleTest case and label.name of every script, with the labels."""
+    names, labels = set(), set()
+    for path in (source / "tests").rglob("*.cpp"):
+        cases = re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)\)", path.read_text(), re.MULTILINE)
+        names |= {f"{suite}.{case}" for suite, case in cases}
+    text = (source / "tests/CMakeLists.txt").read_text()
+    labels |= set(re.findall(r"LABELS? (\w+)", text))
+    for label, name in re.findall(r"megablock_script\((\w+) (\w+)", text):
+        names.add(f"{label}.{name}")
+        labels.add(label)
+    names |= set(re.findall(r"add_test\(NAME (\w+\.\w+)", text))
+    return names, labels
+
+
+def complain(path, line, what):
+    problems.append(f"{path.relative_to(source)}:{line}: {what}")
+
+
+for path in documents:
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        for link in re.findall(r"\]\(([^)\s]+)\)", line):
+            if "://" in link:
+                continue
+            checked += 1
+            file, _, anchor = link.partition("#")
+            target = (path.parent / file) if file else path
+            if not target.exists():
+                complain(path, number, f"no such file: {link}")
+            elif anchor and anchor not in headings(target):
+                complain(path, number, f"no such heading: {link}")
+
+for path in documents + sources:
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        for name in re.findall(r"(?<![\w./-])((?:tests|docs)/[\w./-]*[\w/])", line):
+            checked += 1
+            if not (source / name).exists():
+                complain(path, number, f"no such file: {name}")
+
+names, labels = test_names()
+for path in documents:
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        for kind, quoted, plain in re.findall(r"ctest[^`]*? -(R|L) (?:\"([^\"]+)\"|([^\s`\"]+))", line):
+            checked += 1
+            pattern = re.compile((quoted or plain).replace("\\|", "|"))  # in a table a bar is written \|
+            if not any(pattern.search(name) for name in (names if kind == "R" else labels)):
+                complain(path, number, f"ctest -{kind} {pattern.pattern} finds no test")
+
+print("\n".join(problems) or f"{checked} names of the documents are there")
+sys.exit(1 if problems or checked < 40 else 0)
