@@ -44,7 +44,9 @@ void pin_arithmetic(char** argv) {
   for (const Setting& setting : kSettings) pinned = set(setting) && pinned;
   if (__builtin_cpu_supports("avx512f")) pinned = set(kWithoutAvx512) && pinned;
   if (pinned) return;
-  execv("/proc/self/exe", argv);  // returns only when it failed: go on unpinned rather than not at all
+  execv("/proc/self/exe", argv);  // returns only when it failed
+  throw ComputeError(std::string("cannot start anew with pinned arithmetic (/proc/self/exe: ") + std::strerror(errno) +
+                     "): the result could differ from other machines'; is /proc mounted?");
 }
 
 void limit_libraries_to_one_thread() {

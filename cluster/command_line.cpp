@@ -1,9 +1,13 @@
 #include "cluster/command_line.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <thread>
 
 #include "cluster/arithmetic.h"
 #include "cluster/collective.h"
@@ -93,10 +97,21 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   });
 }
 
+int watch(const JobStore& store) {
+  const bool terminal = isatty(STDOUT_FILENO) != 0;
+  for (;;) {
+    const bool done = job_is_done(store);  // before the text, which then shows the end
+    std::printf("%s%s", terminal ? "\033[H\033[J" : "", status_text(store).c_str());
+    std::fflush(stdout);
+    if (done) return kExitDone;
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+  }
+}
+
 void add_status(CLI::App& app, Action& action) {
   struct Options {
     std::string job;
-    bool json = false, digest = false;
+    bool json = false, digest = false, watch = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("status", "What a job has done, and its figures");
@@ -104,9 +119,11 @@ void add_status(CLI::App& app, Action& action) {
   command->add_option("job", options->job, "Job directory")->required();
   command->add_flag("--json", options->json, "All figures as JSON");
   command->add_flag("--digest", options->digest, "Hash of the exact bits of the result");
+  command->add_flag("--watch", options->watch, "Again every two seconds until the job is done");
   command->callback([=, &action] {
     action = [options] {
       const JobStore store(options->job);
+      if (options->watch) return watch(store);
       const std::string text = options->digest ? status_digest(store) + "\n"
                                : options->json ? status_json(store) + "\n"
                                                : status_text(store);

@@ -207,6 +207,17 @@ std::int64_t Communicator::claim() {
   return number;
 }
 
+void Communicator::use_up_counter() {
+  const std::int64_t beyond = std::int64_t{1} << 62;
+  if (!mpi_) {
+    local_counter_ = beyond;
+    return;
+  }
+  std::int64_t before = 0;
+  MPI_Fetch_and_op(&beyond, &before, MPI_INT64_T, 0, 0, MPI_REPLACE, mpi_->window);
+  MPI_Win_flush(0, mpi_->window);
+}
+
 std::int64_t Communicator::counter() const {
   if (!mpi_) return local_counter_;
   // Its memory is read as it is: the progress display asks from a thread of its own and must not enter the window.

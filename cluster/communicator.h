@@ -42,8 +42,9 @@ class Communicator {
 
   // The shared counter from which units are claimed. reset() is collective.
   void reset_counter();
-  std::int64_t claim();           // next number, from 0; never given twice between resets
-  std::int64_t counter() const;   // numbers given so far, for display; on rank 0 only, 0 elsewhere
+  std::int64_t claim();          // next number, from 0; never given twice between resets
+  void use_up_counter();         // every later claim gets a number beyond any list
+  std::int64_t counter() const;  // numbers given so far, for display; on rank 0 only, 0 elsewhere
 
   // Ends all ranks at once with this exit code (a rank that fails alone must not leave the others waiting).
   [[noreturn]] void abort(int exit_code);

@@ -7,6 +7,7 @@
 
 #include "cluster/communicator.h"
 #include "cluster/job_options.h"
+#include "cluster/stage_record.h"
 #include "io/block.h"
 #include "io/events.h"
 #include "io/job_store.h"
@@ -32,10 +33,10 @@ struct Job {
   JobOptions settings;
   EventLog events;
   Block block;
-  std::vector<std::int64_t> generations;    // image counts at which the block grew; the last is its size
-  std::vector<StageStatistics> statistics;  // of this run, in order
-  std::vector<FailedUnit> failures;         // of all stages so far
-  std::vector<std::string> notes;           // warnings for the report
+  std::vector<std::int64_t> generations;  // image counts at which the block grew; the last is its size
+  std::vector<StageRecord> records;       // of the stages so far, in order
+  std::vector<FailedUnit> failures;       // of all stages so far
+  std::vector<std::string> notes;         // warnings for the report
 
   bool is_first_rank() const { return ranks.rank() == 0; }
 };

@@ -111,6 +111,49 @@ class HashVisitor {
   Hasher& hasher_;
 };
 
+// Visitor that writes every described value down.
+class TextVisitor {
+ public:
+  TextVisitor(std::string section, std::vector<OptionValue>& values) : section_(std::move(section)), values_(values) {}
+  void number(const std::string& key, double value) {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << value;
+    values_.push_back({section_, key, text.str()});
+  }
+  void integer(const std::string& key, std::int64_t value) {
+    values_.push_back({section_, key, std::to_string(value)});
+  }
+  void flag(const std::string& key, bool value) { values_.push_back({section_, key, value ? "true" : "false"}); }
+  void choice(const std::string& key, const std::vector<std::string>& names, int value) {
+    values_.push_back({section_, key, names[static_cast<std::size_t>(value)]});
+  }
+
+ private:
+  std::string section_;
+  std::vector<OptionValue>& values_;
+};
+
+template <typename Options>
+void write_down(std::vector<OptionValue>& values, const std::string& section, Options options) {
+  TextVisitor visitor(section, values);
+  describe(visitor, options);
+}
+
+// A value that is wrong for itself, with the place where the project file sets it.
+template <typename Options>
+void check_section(const StageSettings& settings, const std::string& section, const Options& options) {
+  try {
+    options.check();
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    for (const auto& entry : settings.entries)
+      if (entry.section == section && message.find(entry.key) != std::string::npos)
+        throw InputError(entry.where + ": " + section + ": " + message);
+    throw;
+  }
+}
+
 template <typename Options>
 void hash_options(Hasher& hasher, Options options) {
   HashVisitor visitor(hasher);
@@ -120,9 +163,9 @@ void hash_options(Hasher& hasher, Options options) {
 }  // namespace
 
 void MergeSettings::check() const {
-  if (max_iterations < 1) throw InputError("merge: max_iterations must be at least 1");
-  if (!(decrement > 0)) throw InputError("merge: decrement must be positive");
-  if (screening_rounds < 0) throw InputError("merge: screening_rounds must not be negative");
+  if (max_iterations < 1) throw InputError("max_iterations must be at least 1");
+  if (!(decrement > 0)) throw InputError("decrement must be positive");
+  if (screening_rounds < 0) throw InputError("screening_rounds must not be negative");
 }
 
 JobOptions read_options(const StageSettings& settings) {
@@ -138,14 +181,27 @@ JobOptions read_options(const StageSettings& settings) {
   read_section(settings, "adjustment", o.adjustment);
   read_section(settings, "merge", o.merge);
   o.orientation.observations = o.adjustment.observations;  // one description of the observations for all stages
-  o.features.check();
-  o.candidates.check();
-  o.matching.check();
-  o.tiles.check();
-  o.orientation.check();
-  o.adjustment.check();
-  o.merge.check();
+  check_section(settings, "features", o.features);
+  check_section(settings, "candidates", o.candidates);
+  check_section(settings, "matching", o.matching);
+  check_section(settings, "tiles", o.tiles);
+  check_section(settings, "orientation", o.orientation);
+  check_section(settings, "adjustment", o.adjustment);
+  check_section(settings, "merge", o.merge);
   return o;
+}
+
+std::vector<OptionValue> option_values(const JobOptions& options) {
+  std::vector<OptionValue> values;
+  write_down(values, "features", options.features);
+  write_down(values, "candidates", options.candidates);
+  write_down(values, "matching", options.matching);
+  write_down(values, "matching", options.tracks);
+  write_down(values, "tiles", options.tiles);
+  write_down(values, "orientation", options.orientation);
+  write_down(values, "adjustment", options.adjustment);
+  write_down(values, "merge", options.merge);
+  return values;
 }
 
 void add_to_hash(Hasher& hasher, const FeatureOptions& options) { hash_options(hasher, options); }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "adjust/orientation.h"
 #include "adjust/tile_adjustment.h"
@@ -17,11 +19,11 @@ namespace megablock {
 
 // Options of the merge that a project file can set.
 struct MergeSettings {
-  int max_iterations = 200;          // global Levenberg-Marquardt steps per round
-  double decrement = 1e-2;           // Newton decrement at which the block is adjusted (merge.md, 5)
-  int screening_rounds = 2;          // re-tests of kept/rejected after convergence
-  bool scale_sigma = false;          // posterior sigmas multiplied by the a-posteriori sigma
-  void check() const;                // throws InputError
+  int max_iterations = 200;  // global Levenberg-Marquardt steps per round
+  double decrement = 1e-2;   // Newton decrement at which the block is adjusted (merge.md, 5)
+  int screening_rounds = 2;  // re-tests of kept/rejected after convergence
+  bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
+  void check() const;        // throws InputError
 };
 
 struct JobOptions {
@@ -37,6 +39,12 @@ struct JobOptions {
 
 // Defaults, overridden by the project file; InputError with file:line for unknown keys and bad values.
 JobOptions read_options(const StageSettings& settings);
+
+// The values in force, in the order of the docs.
+struct OptionValue {
+  std::string section, key, value;
+};
+std::vector<OptionValue> option_values(const JobOptions& options);
 
 // The values that matter to a stage's results.
 void add_to_hash(Hasher& hasher, const FeatureOptions& options);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "cluster/arithmetic.h"
 #include "cluster/collective.h"
@@ -64,12 +65,18 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::
   return generations;
 }
 
-// Rank 0 reads the project and leaves block.h5 and job.json; returns what the other ranks need to know besides.
-std::string prepare(const RunOptions& options, const JobStore& store) {
+// Before anything is written: what is wrong with the project is said here, once.
+Project read_whole_project(const RunOptions& options) {
+  if (!std::filesystem::exists(options.project))
+    throw InputError(options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
   Project project = read_project(options.project);
-  store.create();
+  read_options(project.settings);
+  return project;
+}
+
+// Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
+std::string prepare(const RunOptions& options, const JobStore& store, Project project) {
   store.remove_temporaries();
-  read_options(project.settings);  // a bad value is said here, once
   const std::optional<Json> before = read_job_json(store);
   if (before) check_job_json(store, *before);
   if (project.block.images.empty())
@@ -82,14 +89,12 @@ std::string prepare(const RunOptions& options, const JobStore& store) {
 
   Json settings = Json::array();
   for (const auto& e : project.settings.entries) settings.push_back({e.section, e.key, e.value, e.where});
-  Json job{{"version", kJobVersion},
-           {"program", "megablock 0.1.0"},
-           {"arithmetic", kArithmeticLevel},
-           {"project", project.file},
-           {"generations", generations},
-           {"settings", settings},
-           {"tie_points", project.tie_points},
-           {"unreadable", project.unreadable},
+  Json effective = Json::object();
+  for (const OptionValue& option : option_values(read_options(project.settings)))
+    effective[option.section][option.key] = option.value;
+  Json job{{"version", kJobVersion},      {"program", "megablock 0.1.0"},     {"arithmetic", kArithmeticLevel},
+           {"project", project.file},     {"generations", generations},       {"settings", settings},
+           {"options", effective},        {"tie_points", project.tie_points}, {"unreadable", project.unreadable},
            {"warnings", project.warnings}};
   const std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
   store.write_text("job.json", text);
@@ -103,6 +108,17 @@ StageSettings settings_of(const Json& json) {
 }
 
 int default_threads(const Communicator& ranks) { return std::max(1, host_cores() / ranks.ranks_on_host()); }
+
+// Unit files of an earlier state of the block that no stage asks for any more (rank 0, when all stages are done).
+void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
+  if (!job.is_first_rank()) return;
+  std::set<std::string> wanted(tracks.begin(), tracks.end());
+  for (const StageRecord& record : job.records)
+    for (const auto& unit : record.units) wanted.insert(unit.first);
+  for (const char* folder : {"features", "matches", "orient", "tracks", "adjust"})
+    for (const std::string& name : job.store.list(folder))
+      if (!wanted.contains(name)) job.store.remove(name);
+}
 
 void run_stages(Job& job, const std::string& tie_points) {
   const std::string& last = job.options.last_stage;
@@ -122,7 +138,8 @@ void run_stages(Job& job, const std::string& tie_points) {
     tracks = run_given_tracks(job, tie_points, tiles);
   }
   if (tiles.tile_count == 0)
-    throw AgreedError<ComputeError>("no two images could be matched: nothing to orient; check overlap, masks and the match options");
+    throw AgreedError<ComputeError>(
+        "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   if (last == "match") return;
   const BlockState oriented = run_orientation(job, matches);
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
@@ -131,6 +148,7 @@ void run_stages(Job& job, const std::string& tie_points) {
   const std::vector<std::string> adjusted = run_adjustment(job, oriented, tiles, tracks);
   if (last == "adjust") return;
   run_merge(job, oriented, tiles, tracks, adjusted);
+  remove_surplus(job, tracks);
 }
 
 }  // namespace
@@ -139,16 +157,22 @@ int run_job(const RunOptions& run_options, Communicator& ranks) {
   JobStore store(run_options.directory);
   std::optional<JobLock> lock;
   const std::string text = on_first_rank(ranks, [&] {
-    if (!std::filesystem::exists(run_options.project))
-      throw InputError(run_options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
+    Project project = read_whole_project(run_options);
     store.create();
     lock.emplace(store);
-    return prepare(run_options, store);
+    return prepare(run_options, store, std::move(project));
   });
   const Json json = Json::parse(text);
-  Job job{.options = run_options, .ranks = ranks, .store = store, .settings = read_options(settings_of(json)),
-          .events = EventLog(store, ranks.rank()), .block = read_block(store.verified_path("block.h5")),
-          .generations = json.at("generations"), .statistics = {}, .failures = {}, .notes = json.at("warnings")};
+  Job job{.options = run_options,
+          .ranks = ranks,
+          .store = store,
+          .settings = read_options(settings_of(json)),
+          .events = EventLog(store, ranks.rank()),
+          .block = read_block(store.verified_path("block.h5")),
+          .generations = json.at("generations"),
+          .records = {},
+          .failures = {},
+          .notes = json.at("warnings")};
   if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
   for (const auto& [file, reason] : json.at("unreadable").get<std::vector<std::pair<std::string, std::string>>>())

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "cluster/progress.h"
+#include "cluster/stage_record.h"
 #include "io/error.h"
 #include "io/events.h"
 #include "io/result.h"
@@ -19,119 +21,112 @@ using Json = nlohmann::json;
 
 constexpr const char* kResult = "result/block.h5";
 
-struct StageState {
-  std::string name;
-  std::int64_t expected = -1;  // units; -1: not known yet
-  std::int64_t there = 0;
-};
-
-std::int64_t count(const JobStore& store, const std::string& folder) {
-  std::int64_t sealed = 0;
-  for (const std::string& unit : store.list(folder)) sealed += store.seal(unit) ? 1 : 0;
-  return sealed;
-}
-
-std::int64_t exists(const JobStore& store, const std::string& unit) { return store.seal(unit) ? 1 : 0; }
-
-std::vector<StageState> stage_states(const JobStore& store, bool given_tie_points) {
-  std::vector<StageState> stages;
-  const auto images = exists(store, "block.h5")
-                          ? static_cast<std::int64_t>(read_block(store.verified_path("block.h5")).images.size())
-                          : 0;
-  if (!given_tie_points) {
-    constexpr std::int64_t kShard = 64;
-    stages.push_back({"features", (images + kShard - 1) / kShard, count(store, "features")});
-    stages.push_back({"candidates", 1, exists(store, "graph.h5")});
-    StageState matching{"matching", -1, count(store, "matches")};
-    if (stages.back().there)
-      matching.expected =
-          static_cast<std::int64_t>(read_candidates(store.verified_path("graph.h5")).cell_begin.size()) - 1;
-    stages.push_back(matching);
-  }
-  stages.push_back({"tiles", 1, exists(store, "tiles.h5")});
-  const std::int64_t tiles = stages.back().there ? read_tiles(store.verified_path("tiles.h5")).tile_count : -1;
-  stages.push_back({"tracks", tiles, std::max<std::int64_t>(0, count(store, "tracks") - exists(store, "tracks/index.txt"))});
-  if (!given_tie_points) stages.push_back({"orientation", 1, std::min<std::int64_t>(1, count(store, "orient"))});
-  stages.push_back({"adjustment", tiles, count(store, "adjust")});
-  stages.push_back({"merge", 1, exists(store, kResult)});
-  return stages;
-}
-
-std::string state_name(const StageState& stage, bool finished) {
-  if (finished || (stage.expected >= 0 && stage.there >= stage.expected)) return "done";
-  return stage.there > 0 ? "partial" : "waiting";
-}
-
 Json job_json(const JobStore& store) {
   std::ifstream in(store.path("job.json"));
-  if (!in) throw InputError(store.directory() + ": is not a job directory (no job.json); name the folder given to 'run -j'");
+  if (!in)
+    throw InputError(store.directory() + ": is not a job directory (no job.json); name the folder given to 'run -j'");
   return Json::parse(in, nullptr, false);
 }
 
-Json stages_json(const JobStore& store, const Json& job, const std::optional<BlockResult>& result) {
-  const bool given = job.is_object() && !job.value("tie_points", std::string()).empty();
-  Json stages = Json::array();
-  for (const StageState& stage : stage_states(store, given)) {
-    Json entry{{"name", stage.name}, {"state", state_name(stage, result.has_value())}, {"units", stage.there},
-               {"units_expected", stage.expected}, {"seconds", nullptr}, {"peak_rss_mib", nullptr}, {"failed", 0}};
-    if (result) {
-      for (const StageStatistics& s : result->stages) {
-        if (s.name != stage.name) continue;
-        entry["seconds"] = s.seconds;
-        entry["peak_rss_mib"] = s.peak_rss_mib;
-        entry["failed"] = s.failed;
-      }
-    }
-    stages.push_back(entry);
-  }
-  return stages;
+std::vector<StageStatus> stages_of(const JobStore& store, const Json& job) {
+  return stage_status(store, job.is_object() && !job.value("tie_points", std::string()).empty());
 }
 
+Json stages_json(const JobStore& store, const std::vector<StageStatus>& stages) {
+  const std::vector<UnitEvent> events = read_events(store);
+  Json list = Json::array();
+  for (const StageStatus& stage : stages) {
+    const StageStatistics statistics = stage_statistics(stage.record, events);
+    list.push_back({{"name", stage.record.stage},
+                    {"state", name_of(stage.state)},
+                    {"units", stage.done},
+                    {"units_expected", stage.record.units.size()},
+                    {"seconds", statistics.seconds},
+                    {"peak_rss_mib", statistics.peak_rss_mib},
+                    {"failed", statistics.failed}});
+  }
+  return list;
+}
+
+Json failures_json(const Json& job, const std::vector<StageStatus>& stages, const std::optional<BlockResult>& result) {
+  Json list = Json::array();
+  const auto add = [&](const std::string& stage, const std::string& unit, const std::string& reason) {
+    list.push_back({{"stage", stage}, {"unit", unit}, {"reason", reason}});
+  };
+  if (result) {  // with the images that got no pose
+    for (const FailedUnit& failure : result->failures) add(failure.stage, failure.unit, failure.reason);
+    return list;
+  }
+  for (const auto& [file, reason] : job.value("unreadable", std::vector<std::pair<std::string, std::string>>()))
+    add("init", file, reason);
+  for (const StageStatus& stage : stages)
+    for (const FailedUnit& failure : stage.record.failures) add(failure.stage, failure.unit, failure.reason);
+  return list;
+}
+
+void add_figures(Json& json, const BlockResult& result) {
+  const ReprojectionStatistics statistics = reprojection_statistics(result);
+  json["images"] = result.block.images.size();
+  json["oriented"] = statistics.oriented_images;
+  json["points"] = statistics.points;
+  json["observations"] = statistics.observations;
+  json["mean_track_length"] = statistics.mean_track_length;
+  json["mean_reprojection_px"] = statistics.mean_px;
+  json["rms_reprojection_px"] = statistics.rms_px;
+  json["chi2_per_dof"] = result.variance_factor;
+  json["tiles"] = result.tiles.tile_count;
+  json["boundary_frames"] = std::count(result.boundary.begin(), result.boundary.end(), 1);
+  json["global_iterations"] = result.global_iterations;
+  json["newton_decrement"] = result.newton_decrement;
+  json["gauge"] = result.gauge;
+  json["digest"] = result.digest;
+}
+
+// All keys from the start; null where nothing is known yet.
 Json status(const JobStore& store) {
   const Json job = job_json(store);
+  const std::vector<StageStatus> stages = stages_of(store, job);
   std::optional<BlockResult> result;
   if (store.seal(kResult)) result = read_result(store.verified_path(kResult));
-  Json json{{"job", store.directory()}, {"stages", stages_json(store, job, result)}};
-  if (result) {
-    const ReprojectionStatistics statistics = reprojection_statistics(*result);
-    json["images"] = result->block.images.size();
-    json["oriented"] = statistics.oriented_images;
-    json["points"] = statistics.points;
-    json["observations"] = statistics.observations;
-    json["mean_track_length"] = statistics.mean_track_length;
-    json["mean_reprojection_px"] = statistics.mean_px;
-    json["rms_reprojection_px"] = statistics.rms_px;
-    json["chi2_per_dof"] = result->variance_factor;
-    json["tiles"] = result->tiles.tile_count;
-    json["boundary_frames"] = std::count(result->boundary.begin(), result->boundary.end(), 1);
-    json["global_iterations"] = result->global_iterations;
-    json["newton_decrement"] = result->newton_decrement;
-    json["gauge"] = result->gauge;
-    json["failed"] = result->failures.size();
-    json["digest"] = result->digest;
-  } else {
-    json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
-    json["digest"] = nullptr;
-  }
+  Json json{{"job", store.directory()}, {"stages", stages_json(store, stages)}};
+  for (const char* key :
+       {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px", "rms_reprojection_px",
+        "chi2_per_dof", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest"})
+    json[key] = nullptr;
+  json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
+  const bool current = stages.back().state == StageState::kDone;
+  json["result"] = !result ? "none" : current ? "current" : "stale";
+  if (result) add_figures(json, *result);
+  json["failures"] = failures_json(job, stages, current ? result : std::nullopt);
+  json["failed"] = json["failures"].size();
   return json;
 }
 
-}  // namespace
+std::string stage_line(const Json& stage) {
+  std::string name = stage["name"];
+  name.resize(14, ' ');
+  const auto expected = stage["units_expected"].get<std::int64_t>();
+  std::string line = "  " + name + stage["state"].get<std::string>();
+  if (expected > 0)
+    line += ", " + std::to_string(stage["units"].get<std::int64_t>()) + " of " + std::to_string(expected) + " units";
+  if (const double seconds = stage["seconds"]; seconds > 0) line += ", " + duration_text(seconds);
+  if (const auto failed = stage["failed"].get<std::int64_t>(); failed > 0)
+    line += ", " + std::to_string(failed) + " failed";
+  return line + "\n";
+}
 
-std::string status_json(const JobStore& store) { return status(store).dump(1, ' ', false, Json::error_handler_t::replace); }
+std::string failure_lines(const Json& failures) {
+  constexpr std::size_t kShown = 10;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kShown, failures.size()); ++i)
+    text += "  failed: " + failures[i]["stage"].get<std::string>() + " " + failures[i]["unit"].get<std::string>() +
+            ": " + failures[i]["reason"].get<std::string>() + "\n";
+  if (failures.size() > kShown)
+    text += "  ... and " + std::to_string(failures.size() - kShown) + " more, all in 'megablock status --json'\n";
+  return text;
+}
 
-std::string status_text(const JobStore& store) {
-  const Json json = status(store);
-  std::string text = "job " + store.directory() + "\n";
-  for (const Json& stage : json["stages"]) {
-    std::string name = stage["name"];
-    name.resize(14, ' ');
-    text += "  " + name + stage["state"].get<std::string>() + ", " + std::to_string(stage["units"].get<std::int64_t>());
-    if (stage["units_expected"].get<std::int64_t>() >= 0)
-      text += " of " + std::to_string(stage["units_expected"].get<std::int64_t>());
-    text += " units\n";
-  }
-  if (json["digest"].is_null()) return text + "  no result yet: run the same command again to resume\n";
+std::string figures_text(const Json& json) {
   char line[512];
   std::snprintf(line, sizeof line,
                 "  %lld of %lld images oriented, %lld points, %lld observations, mean residual %.3f px\n"
@@ -141,8 +136,27 @@ std::string status_text(const JobStore& store) {
                 json["chi2_per_dof"].get<double>(), json["tiles"].get<long long>(),
                 json["boundary_frames"].get<long long>(), json["global_iterations"].get<long long>(),
                 json["digest"].get<std::string>().c_str());
-  return text + line;
+  return line;
 }
+
+}  // namespace
+
+std::string status_json(const JobStore& store) {
+  return status(store).dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string status_text(const JobStore& store) {
+  const Json json = status(store);
+  std::string text = "job " + store.directory() + "\n";
+  for (const Json& stage : json["stages"]) text += stage_line(stage);
+  text += failure_lines(json["failures"]);
+  if (json["result"] == "none") return text + "  no result yet: run the same command again to resume\n";
+  if (json["result"] == "stale")
+    text += "  the result is older than what was asked of the job since: run it to the end again\n";
+  return text + figures_text(json);
+}
+
+bool job_is_done(const JobStore& store) { return stages_of(store, job_json(store)).back().state == StageState::kDone; }
 
 std::string status_digest(const JobStore& store) {
   job_json(store);

@@ -29,6 +29,13 @@ struct StageOutcome {
 
 // Collective. Throws Interrupted (on every rank) after a graceful stop. With job.options.strict a failed unit ends the
 // run with ComputeError.
+// The stage's record (stage_record.h) grows by these units.
 StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units);
+
+// What run_stage does around its units, for a stage that has another way of computing: its units join the record of
+// the stage, which rank 0 writes.
+void begin_stage(Job& job, const std::string& stage, const std::vector<Unit>& units);
+// Failures found after a stage, such as images of a unit: listed with the job's, recorded by rank 0.
+void add_failures(Job& job, const std::vector<FailedUnit>& failures);
 
 }  // namespace megablock

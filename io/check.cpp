@@ -54,7 +54,8 @@ class Check {
     std::vector<std::string> names;
     for (const std::string& name : store_.list("")) {
       const bool top = name.find('/') == std::string::npos;
-      const bool text = name.starts_with("events/") || (name.starts_with("result/") && name != kResult);
+      const bool text = name.starts_with("events/") || name.starts_with("stages/") ||
+                        name.starts_with("scratch/") || (name.starts_with("result/") && name != kResult);
       if (top ? name.ends_with(".h5") : !text) names.push_back(name);
     }
     return names;

@@ -81,7 +81,8 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
   if (names.empty()) throw AgreedError<ComputeError>("no tile could be adjusted: " + outcome.failures.front().reason);
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const std::string name = unit_name("adjust", static_cast<std::int64_t>(t));
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.insert(names.begin() + static_cast<long>(t), "");
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      names.insert(names.begin() + static_cast<long>(t), "");
   }
   return names;
 }

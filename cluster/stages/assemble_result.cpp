@@ -46,9 +46,8 @@ std::vector<TrackRow> ordered_tracks(const std::vector<TileResult>& parts) {
 
 void append_tracks(BlockResult& result, const std::vector<TileResult>& parts) {
   result.tracks.begin.push_back(0);
-  const bool covariances = std::all_of(parts.begin(), parts.end(), [](const TileResult& part) {
-    return part.covariances.size() == part.points.size();
-  });
+  const bool covariances = std::all_of(
+      parts.begin(), parts.end(), [](const TileResult& part) { return part.covariances.size() == part.points.size(); });
   std::int64_t dense = 0;
   for (const TrackRow& row : ordered_tracks(parts)) {
     const TileResult& part = parts[row.part];
@@ -73,8 +72,9 @@ void append_tracks(BlockResult& result, const std::vector<TileResult>& parts) {
 void append_control(BlockResult& result, const std::vector<TileResult>& parts) {
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNaN);
   for (const ControlPoint& point : result.block.control_points)
-    result.control.push_back({unknown, Eigen::Matrix3d::Constant(kNaN),
-                              std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kNaN))});
+    result.control.push_back(
+        {unknown, Eigen::Matrix3d::Constant(kNaN),
+         std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kNaN))});
   for (const TileResult& part : parts) {
     for (std::size_t p = 0; p < part.points.size(); ++p) {
       if (part.points[p].role == PointRole::kTie) continue;
@@ -183,9 +183,8 @@ TileResult make_tile_result(const MergeTile& tile, std::vector<Eigen::Matrix3d> 
   // A frame is touched by observations that take part.
   for (std::size_t o = 0; o < result.kept.size(); ++o)
     if (result.kept[o])
-      result.frames.push_back(
-          tile.problem.frames[static_cast<std::size_t>(
-              tile.problem.images[static_cast<std::size_t>(tile.problem.image[o].value)].frame.value)]);
+      result.frames.push_back(tile.problem.frames[static_cast<std::size_t>(
+          tile.problem.images[static_cast<std::size_t>(tile.problem.image[o].value)].frame.value)]);
   std::sort(result.frames.begin(), result.frames.end());
   result.frames.erase(std::unique(result.frames.begin(), result.frames.end()), result.frames.end());
   return result;
@@ -210,7 +209,6 @@ BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutco
   result.newton_decrement = outcome.newton_decrement;
   result.gauge = outcome.gauge;
   result.seams = outcome.seams;
-  result.stages = job.statistics;
   result.notes = job.notes;
   list_failures(job, result);
   result.digest = result_digest(result);

@@ -1,9 +1,10 @@
+#include "partition/candidates.h"
+
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
-#include "partition/candidates.h"
 
 namespace megablock {
 
@@ -12,7 +13,8 @@ namespace {
 GlobalDescriptors read_descriptors(const Job& job, const FeatureStage& features) {
   GlobalDescriptors all;
   for (const std::string& shard : features.shards)
-    for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard))) all.push_back(image.global_descriptor);
+    for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard)))
+      all.push_back(image.global_descriptor);
   return all;
 }
 

@@ -1,3 +1,5 @@
+#include "match/features.h"
+
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -7,7 +9,6 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
-#include "match/features.h"
 
 namespace megablock {
 
@@ -87,7 +88,9 @@ void list_unreadable(Job& job, const FeatureStage& stage) {
         if (!image.failure.empty()) failed.push_back({job.block.images[image.image].name, image.failure});
     return failed.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   });
-  for (const auto& entry : nlohmann::json::parse(text)) job.failures.push_back({"features", entry[0], entry[1]});
+  std::vector<FailedUnit> failures;
+  for (const auto& entry : nlohmann::json::parse(text)) failures.push_back({"features", entry[0], entry[1]});
+  add_failures(job, failures);
 }
 
 }  // namespace
@@ -99,7 +102,8 @@ FeatureStage run_features(Job& job) {
   std::vector<Unit> units;
   for (std::int64_t first = 0; first < images; first += kShardImages) {
     const std::int64_t end = std::min(images, first + kShardImages);
-    const Shard shard{unit_name("features", first / kShardImages), first,
+    const Shard shard{unit_name("features", first / kShardImages),
+                      first,
                       {stage.image_fingerprint.begin() + first, stage.image_fingerprint.begin() + end}};
     Unit unit;
     unit.name = shard.name;

@@ -1,6 +1,7 @@
 // The merge: exact block-wise compensation of all tiles over all ranks (design: merge.md), then the result.
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -295,13 +296,24 @@ MergeOutcome make_outcome(const Adjusted& adjusted) {
   return outcome;
 }
 
+// Of all stages, this one as far as `event`, which ends it, says.
+std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
+  std::vector<UnitEvent> events = read_events(job.store);
+  event.time_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  events.push_back(event);
+  std::vector<StageStatistics> statistics;
+  for (const StageRecord& record : job.records) statistics.push_back(stage_statistics(record, events));
+  return statistics;
+}
+
 void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
-                 const MergeOutcome& outcome, const std::vector<TileResult>& parts) {
+                 const MergeOutcome& outcome, const std::vector<TileResult>& parts, const UnitEvent& event) {
   if (!adjusted.converged)
     job.notes.push_back("the global adjustment did not converge: " + describe(adjusted.position.global));
   for (const SeamCheck& seam : outcome.seams)
     if (!seam.note.empty()) job.notes.push_back(seam.note);
-  const BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
+  BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
+  result.stages = statistics_of(job, event);
   std::filesystem::create_directories(job.store.path("result"));
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result); });
   job.store.write_text("result/report.html", report_html(result));
@@ -315,6 +327,7 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   reset_peak_rss();
   const MergeInputs inputs{oriented, tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
+  begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
     if (!job.store.up_to_date(kResult, fingerprint)) return "";
     try {
@@ -338,9 +351,8 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   for (const std::string& text : job.ranks.gather_all(std::to_string(peak_rss_mib())))
     event.peak_rss_mib = std::max(event.peak_rss_mib, std::stod(text));
   event.seconds = monotonic_seconds() - start;
-  job.statistics.push_back({event.stage, event.seconds, event.peak_rss_mib, tiles.tile_count, 0});
   on_first_rank(job.ranks, [&] {
-    write_final(job, inputs, fingerprint, adjusted, outcome, parts);
+    write_final(job, inputs, fingerprint, adjusted, outcome, parts, event);
     event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);
     job.events.append(event);
     checkpoint.clear();

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "cluster/collective.h"
+#include "cluster/process_memory.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -89,12 +90,14 @@ void MergeCheckpoint::write(const MergePosition& position, const std::vector<Ran
     UnitEvent event;
     event.stage = "merge";
     event.unit = here;
-    event.rank = 0;
+    event.seconds = monotonic_seconds() - last_s_;
+    event.peak_rss_mib = peak_rss_mib();
     job_.events.append(event);
     if (!before.empty() && before != here) std::filesystem::remove_all(job_.store.path(before));
     return std::string();
   });
   current_ = here;
+  last_s_ = monotonic_seconds();
 }
 
 std::optional<MergePosition> MergeCheckpoint::find() {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "cluster/job.h"
+#include "cluster/progress.h"
 #include "cluster/rank_runner.h"
 #include "merge/global_adjustment.h"
 
@@ -38,6 +39,7 @@ class MergeCheckpoint {
   Job& job_;
   std::uint64_t inputs_;
   std::string current_;  // folder of the last checkpoint written or found
+  double last_s_ = monotonic_seconds();  // when it was written
 };
 
 }  // namespace megablock

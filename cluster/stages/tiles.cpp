@@ -1,3 +1,5 @@
+#include "partition/tiles.h"
+
 #include <algorithm>
 #include <map>
 
@@ -5,7 +7,6 @@
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
-#include "partition/tiles.h"
 
 namespace megablock {
 

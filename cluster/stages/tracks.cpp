@@ -2,6 +2,8 @@
 // unit of the stage, lists the content hash of every tile's file. A tile's file is rewritten only when its tracks
 // changed, so that adding an image touches only the tiles it is seen in.
 
+#include "match/tracks.h"
+
 #include <algorithm>
 #include <fstream>
 #include <set>
@@ -14,7 +16,6 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
-#include "match/tracks.h"
 
 namespace megablock {
 
@@ -40,8 +41,8 @@ std::vector<TrackSet> deal_to_tiles(const Job& job, const TrackSet& tracks, cons
   std::vector<TrackSet> dealt(static_cast<std::size_t>(tiles.tile_count));
   for (TrackSet& set : dealt) set.begin.push_back(0);
   for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
-    const TileIndex owner = owner_tile(job.block, tiles, tracks.image.data() + tracks.begin[t],
-                                       tracks.image.data() + tracks.begin[t + 1]);
+    const TileIndex owner =
+        owner_tile(job.block, tiles, tracks.image.data() + tracks.begin[t], tracks.image.data() + tracks.begin[t + 1]);
     if (owner.valid()) append_track(dealt[static_cast<std::size_t>(owner.value)], tracks, t);
   }
   return dealt;
@@ -99,7 +100,8 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
   if (job.is_first_rank() && !index_holds(job, unit.name, names)) job.store.remove(unit.name);
   job.ranks.barrier();
   run_stage(job, "tracks", {unit});
-  if (!job.store.seal(unit.name)) throw AgreedError<ComputeError>("no tracks could be built: " + job.failures.back().reason);
+  if (!job.store.seal(unit.name))
+    throw AgreedError<ComputeError>("no tracks could be built: " + job.failures.back().reason);
   return names;
 }
 

@@ -1,8 +1,7 @@
-#include "cluster/job_options.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cluster/job_options.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -47,7 +46,19 @@ TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("block.yaml:7"));
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("ratio"));
   EXPECT_THAT(message(setting("adjustment", "image_sigma_px", "0.5 mm")), testing::HasSubstr("block.yaml:7"));
-  EXPECT_NE(message(setting("merge", "decrement", "-1")), "");
+  EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::StartsWith("block.yaml:7: merge: decrement"));
+}
+
+TEST(JobOptions, ValuesInForceAreWrittenDownWithTheirDefaults) {
+  bool found = false;
+  for (const OptionValue& option : option_values(read_options(setting("matching", "ratio", "0.7")))) {
+    if (option.key == "ratio") {
+      EXPECT_EQ(option.value, "0.7");
+    }
+    found = found || (option.section == "tiles" && option.key == "tile_max_frames" &&
+                      option.value == std::to_string(TileOptions().tile_max_frames));
+  }
+  EXPECT_TRUE(found);
 }
 
 TEST(JobOptions, EveryOptionReachesItsStagesFingerprintAndNoOther) {
