@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A run killed by SIGKILL at random moments and started again gives the same bits, and computes no unit twice.
 
-usage: kill_resume.py MEGABLOCK [--kills 10] [--ranks 2] [--project FILE] [--seed 4711]
+usage: kill_resume.py MEGABLOCK [--kills 10] [--ranks 2] [--rendered | --project FILE] [--seed 4711]
 
 Moments are drawn evenly over the measured length of an undisturbed run. A unit has its event once its file is sealed,
 so that a unit with two events was computed again although it was there; a kill may lose the event of a unit that was
@@ -26,6 +26,7 @@ parser = argparse.ArgumentParser()
 parser.add_argument("megablock")
 parser.add_argument("--kills", type=int, default=10)
 parser.add_argument("--ranks", type=int, default=2)
+parser.add_argument("--rendered", action="store_true", help="pictures: features and matches are killed too")
 parser.add_argument("--project", type=pathlib.Path)
 parser.add_argument("--seed", type=int, default=4711)
 options = parser.parse_args()
@@ -107,11 +108,14 @@ with tempfile.TemporaryDirectory() as folder:
     work = pathlib.Path(folder)
     project = options.project
     if project is None:
-        subprocess.run([options.megablock, "simulate", "--scene", "aerial", "--frames", "120", "--outliers", "0.01",
-                        "-o", str(work / "block")], check=True, stdout=subprocess.DEVNULL)
+        scene = (["--rendered", "--frames", "12", "--width", "400", "--image-height", "320", "--focal", "320"]
+                 if options.rendered else ["--scene", "aerial", "--frames", "120", "--outliers", "0.01"])
+        subprocess.run([options.megablock, "simulate", *scene, "-o", str(work / "block")], check=True,
+                       stdout=subprocess.DEVNULL)
         project = work / "block" / "block.yaml"
         with project.open("a") as file:
-            file.write("tiles:\n  tile_max_frames: 15\n")
+            file.write("tiles:\n  tile_max_frames: 3\ncandidates:\n  cell_pairs: 10\n" if options.rendered
+                       else "tiles:\n  tile_max_frames: 15\n")
     with (work / "log").open("w") as log:
         before = time.monotonic()
         run(project, work / "reference", log)

@@ -1,19 +1,35 @@
 #!/usr/bin/env bash
-# Same bits for any number of ranks: runs one simulated block on 1, 2, 3 and 4 ranks and compares the digests.
-# usage: digests.sh MEGABLOCK SCENE FRAMES
+# Same bits for any number of ranks and threads: runs one simulated block on 1, 2, 3 and 4 ranks, and on 1 rank with 1 and
+# 3 threads, and compares the digests. usage: digests.sh MEGABLOCK aerial|street|rendered FRAMES
+# `rendered` makes pictures, so that features, matches and the initial orientation are compared too.
 set -euo pipefail
 megablock=$1 scene=$2 frames=$3
 work=$(mktemp -d); trap 'rm -rf "$work"' EXIT
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-"$megablock" simulate --scene "$scene" --frames "$frames" --outliers 0.01 -o "$work/block" >/dev/null
-printf 'tiles:\n  tile_max_frames: %d\n' $((frames / 8)) >> "$work/block/block.yaml"
-"$megablock" run "$work/block/block.yaml" -j "$work/job1" --quiet
-reference=$("$megablock" status "$work/job1" --digest)
-echo "1 rank: $reference"
+if [ "$scene" = rendered ]; then
+  "$megablock" simulate --rendered --frames "$frames" --width 400 --image-height 320 --focal 320 -o "$work/block" >/dev/null
+  printf 'tiles:\n  tile_max_frames: %d\ncandidates:\n  cell_pairs: 10\n' $((frames / 4)) >> "$work/block/block.yaml"
+else
+  "$megablock" simulate --scene "$scene" --frames "$frames" --outliers 0.01 -o "$work/block" >/dev/null
+  printf 'tiles:\n  tile_max_frames: %d\n' $((frames / 8)) >> "$work/block/block.yaml"
+fi
+
+reference=
+compare() {  # NAME COMMAND...: runs the command on a job of its own
+  local name=$1; shift
+  "$@" run "$work/block/block.yaml" -j "$work/$name" --quiet >/dev/null
+  local digest
+  digest=$("$megablock" status "$work/$name" --digest)
+  echo "$name: $digest, $(ls "$work/$name/adjust" | wc -l) tiles"
+  reference=${reference:-$digest}
+  [ "$digest" = "$reference" ] || { echo "digest differs"; exit 1; }
+  rm -rf "${work:?}/$name"
+}
+compare ranks-1 "$megablock"
 for ranks in 2 3 4; do
-  mpirun --bind-to none --oversubscribe --mca mpi_yield_when_idle 1 -n $ranks \
-    "$megablock" run "$work/block/block.yaml" -j "$work/job$ranks" --quiet
-  digest=$("$megablock" status "$work/job$ranks" --digest)
-  echo "$ranks ranks: $digest"
-  [ "$digest" = "$reference" ] || { echo "digest differs on $ranks ranks"; exit 1; }
+  compare ranks-$ranks mpirun --bind-to none --oversubscribe --mca mpi_yield_when_idle 1 -n $ranks "$megablock"
+done
+for threads in 1 3; do
+  compare_threads() { "$megablock" "$@" --threads $threads; }
+  compare threads-$threads compare_threads
 done

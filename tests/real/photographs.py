@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+"""Real photographs from the folder of images to the merged block, held against the figures asked for.
+
+usage: photographs.py MEGABLOCK DATA    (or the environment variable MEGABLOCK_DATA); skips (77) without the photographs
+"""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+megablock = sys.argv[1]
+data = pathlib.Path(os.environ.get("MEGABLOCK_DATA", sys.argv[2]))
+if not (data / "brighton_beach").is_dir():
+    print(f"skipped: no photographs in {data}")
+    sys.exit(77)
+
+
+def oriented(work, name, *init):
+    """Figures of a whole run with default options."""
+    project, job = work / f"{name}.yaml", work / name
+    subprocess.run([megablock, "init", str(data / name), "-o", str(project), *init], check=True,
+                   stdout=subprocess.DEVNULL)
+    start = time.monotonic()
+    subprocess.run([megablock, "run", str(project), "-j", str(job), "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    figures = json.loads(subprocess.check_output([megablock, "status", str(job), "--json"]))
+    print(f"{name}: {figures['oriented']} of {figures['images']} images, {figures['points']} points, "
+          f"{figures['observations']} observations, mean track {figures['mean_track_length']:.2f}, mean residual "
+          f"{figures['mean_reprojection_px']:.3f} px, decrement {figures['newton_decrement']:.1e}, "
+          f"{figures['global_iterations']} iterations, {time.monotonic() - start:.0f} s")
+    return figures
+
+
+failed = []
+
+
+def expect(condition, text):
+    if not condition:
+        failed.append(text)
+
+
+with tempfile.TemporaryDirectory() as folder:
+    work = pathlib.Path(folder)
+    brighton = oriented(work, "brighton_beach")
+    expect(brighton["oriented"] == 18, "brighton_beach: all 18 images")
+    expect(brighton["mean_reprojection_px"] <= 0.6, "brighton_beach: mean residual at most 0.6 px")
+    expect(brighton["observations"] >= 25000 and brighton["points"] >= 6000, "brighton_beach: 25 000 of 6 000 points")
+    expect(brighton["mean_track_length"] >= 3.5, "brighton_beach: mean track 3.5")
+    berlin = oriented(work, "berlin", "--control", str(data / "berlin" / "ground_control_points.json"))
+    expect(berlin["oriented"] == 3, "berlin: all 3 images")
+    for name, figures in ("brighton_beach", brighton), ("berlin", berlin):
+        expect(figures["newton_decrement"] <= 1e-2, f"{name}: converged to a decrement of 1e-2")
+sys.exit("not reached: " + "; ".join(failed) if failed else 0)
