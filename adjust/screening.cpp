@@ -21,6 +21,8 @@ namespace megablock {
 namespace {
 
 constexpr int kMaxPairs = 36;  // all pairs of nine rays
+constexpr double kGenerous =
+    1.5;  // times the threshold: for points of two rays, which are less exact than those of all
 const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 class PointSettler {
@@ -51,18 +53,21 @@ class PointSettler {
 
   void screen(std::int64_t p, double threshold) {
     load(p);
-    const Eigen::Vector3d& point = state_.points[p];
+    const Eigen::Vector3d before = state_.points[p];
     const auto kept = std::count(kept_.begin(), kept_.end(), 1);
     const bool enough = kept >= (prior_[p] ? 1 : 2);
-    if (enough && point.allFinite() && passes_all_kept(point, threshold)) {
-      for (std::size_t i = 0; i < views_.size(); ++i) kept_[i] = residual(i, point) <= threshold;
+    if (enough && before.allFinite() && passes_all_kept(before, threshold)) {
+      for (std::size_t i = 0; i < views_.size(); ++i) kept_[i] = residual(i, before) <= threshold;
     } else if (!settle_by_parts(p, threshold)) {
-      if (prior_[p] && point.allFinite() && views_.size() == 1)
-        kept_[0] = residual(0, point) <= threshold;
+      if (prior_[p] && before.allFinite() && views_.size() == 1)
+        kept_[0] = residual(0, before) <= threshold;
       else
         std::fill(kept_.begin(), kept_.end(), 0);
     }
     hold_out_narrow(p);
+    // The same verdicts at a point a little aside (without the robust weights): it stays where the adjustment put it.
+    if (before.allFinite() && same_verdicts() && passes_all_kept(before, kGenerous * threshold))
+      state_.points[p] = before;
     store_kept();
   }
 
@@ -82,6 +87,11 @@ class PointSettler {
       views_.push_back({camera, &intrinsics, {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row]});
       kept_.push_back(problem_.kept[row]);
     }
+  }
+  bool same_verdicts() const {
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      if (kept_[i] != problem_.kept[rows_[i]]) return false;
+    return true;
   }
   void store_kept() {
     for (std::size_t i = 0; i < rows_.size(); ++i) problem_.kept[rows_[i]] = kept_[i];
@@ -137,7 +147,6 @@ class PointSettler {
   // Refines with the rays that pass until they no longer change.
   bool keep_around(std::int64_t p, Eigen::Vector3d point, double threshold) {
     constexpr int kRounds = 4;
-    constexpr double kGenerous = 1.5;  // a point of two rays is less exact than one of all
     std::vector<std::uint8_t> passing(views_.size()), before;
     for (int round = 0; round < kRounds; ++round) {
       std::vector<PointView> used;

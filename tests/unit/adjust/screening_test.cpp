@@ -84,6 +84,19 @@ TEST_F(Screening, FindsAWrongObservationAndRestoresItWhenItIsRight) {
   EXPECT_EQ(kept(p), std::vector<std::uint8_t>(kept(p).size(), 1));
 }
 
+// One residual just beyond the threshold at the adjusted point, all within it at the least squares point.
+TEST_F(Screening, LeavesPointsInPlaceWhenNoVerdictChanges) {
+  const std::int64_t p = long_track(4);
+  screen();
+  const Eigen::Vector3d adjusted = tile_.state.points[p] + Eigen::Vector3d(0.17, 0, 0);
+  tile_.state.points[p] = adjusted;
+  EXPECT_EQ(screen(4), 0);
+  EXPECT_EQ(tile_.state.points[p], adjusted);
+  tile_.state.points[p].x() += 1;  // that is not a point of these rays
+  EXPECT_EQ(screen(4), 0);
+  EXPECT_LT((tile_.state.points[p] - tile_.truth().points[p]).norm(), 0.02);
+}
+
 TEST_F(Screening, KeepsTheLargerOfTwoConsistentParts) {
   const std::int64_t p = long_track(7), begin = tile_.problem.begin[p], count = tile_.problem.begin[p + 1] - begin;
   const Eigen::Vector3d other = tile_.state.points[p] + Eigen::Vector3d(8, 5, 1);
