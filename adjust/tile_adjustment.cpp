@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "adjust/image_sigma.h"
 #include "adjust/lost_frames.h"
 #include "io/error.h"
 
@@ -80,10 +81,13 @@ class TileAdjuster {
       screen(options_.max_residual_sigmas * std::pow(8, left));
       solve_rough(Stage::kAll);
     }
+    adopt_image_sigma();
     screen(options_.max_residual_sigmas);
     summary = solve_fine();
-    // What the last solve moved across the threshold.
-    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / 10000) summary = solve_fine();
+    // What the last solve moved across the threshold, or weighs otherwise.
+    const bool reweighted = adopt_image_sigma();
+    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / 10000 || reweighted)
+      summary = solve_fine();
     return count(summary);
   }
 
@@ -146,6 +150,14 @@ class TileAdjuster {
           ++covered[problem_.image[row].value];
       }
     }
+  }
+
+  // Whether the weights have changed enough to matter.
+  bool adopt_image_sigma() {
+    constexpr double kSettled = 0.02;
+    const double before = problem_.image_sigma_px;
+    if (options_.estimate_image_sigma) estimate_image_sigma(problem_, state_, options_);
+    return std::abs(problem_.image_sigma_px / before - 1) > kSettled;
   }
 
   std::vector<std::uint8_t> active_points() const {

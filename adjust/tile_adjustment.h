@@ -12,6 +12,7 @@ namespace megablock {
 struct AdjustOptions {
   ObservationOptions observations;
   double min_intersection_deg = 1.5;  // points below are held out of the adjustment and kept in the store
+  bool estimate_image_sigma = true;   // of tie points, from their residuals (image_sigma.h); image_sigma_px is the start
   double max_residual_sigmas = 4.0;   // screening threshold at the end; starts at 8 x and falls
   int screening_rounds = 3;           // re-tests every observation against the current solution, both ways
   int max_iterations = 50;            // of Ceres per round

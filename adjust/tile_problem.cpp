@@ -92,6 +92,7 @@ class TileBuilder {
       : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options) {}
 
   TileProblem build() {
+    problem_.image_sigma_px = options_.image_sigma_px;
     problem_.image_loss = options_.image_loss;
     problem_.position_loss = options_.position_loss;
     problem_.relative_loss = options_.relative_loss;

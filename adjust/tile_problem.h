@@ -68,6 +68,7 @@ struct TileProblem {
   std::vector<LocalImage> image;          // [observations]; -1 where the frame has no pose (never kept)
   std::vector<double> x, y;               // px
   std::vector<double> inverse_sigma;      // 1/px
+  double image_sigma_px = 0.5;            // of the measurements of tie points, per axis (set_image_sigma)
   // 1 = takes part. Points with fewer than two kept observations and no prior take no part at all.
   std::vector<std::uint8_t> kept;
 

@@ -224,12 +224,13 @@ std::string to_text(const Evaluation& e) {
                 "frames compared             %lld (%lld of the truth have no pose)%s\n"
                 "position                    rms %.4f m, largest %.4f m; between neighbours rms %.4f m\n"
                 "rotation                    rms %.5f deg\n"
-                "error / stated sigma        position %.3f, rotation %.3f (1 = the stated sigmas are true)\n"
-                "check points                %lld, rms %.4f m",
+                "check points                %lld, rms %.4f m horizontal, %.4f m vertical\n"
+                "error / stated sigma        position %.3f, rotation %.3f, check points %.3f (1: the sigmas are true)",
                 static_cast<long long>(e.frames), static_cast<long long>(e.frames_missing),
                 e.aligned ? ", after a similarity" : "", e.position_rms_m, e.position_max_m, e.relative_position_rms_m,
-                e.rotation_rms_deg, e.normalised_error_position, e.normalised_error_rotation,
-                static_cast<long long>(e.check_points), e.check_rms_m);
+                e.rotation_rms_deg, static_cast<long long>(e.check_points), e.check_rms_horizontal_m,
+                e.check_rms_vertical_m, e.normalised_error_position, e.normalised_error_rotation,
+                e.normalised_error_check);
   return text;
 }
 
@@ -237,16 +238,19 @@ void add_evaluate(CLI::App& app, Action& action) {
   struct Options {
     std::string job, truth;
     bool json = false;
+    EvaluateOptions evaluation;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("evaluate", "Compare a job with known poses");
   command->footer("Example: megablock evaluate job truth.csv --json");
   command->add_option("job", options->job, "Job directory")->required();
   command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV")->required();
+  command->add_flag("--scale-sigma", options->evaluation.scale_sigma,
+                    "Multiply the posterior sigmas by the a-posteriori sigma");
   command->add_flag("--json", options->json, "Figures as JSON");
   command->callback([=, &action] {
     action = [options] {
-      const Evaluation evaluation = evaluate(finished_result(options->job), options->truth);
+      const Evaluation evaluation = evaluate(finished_result(options->job), options->truth, options->evaluation);
       std::printf("%s\n", (options->json ? to_json(evaluation) : to_text(evaluation)).c_str());
       return kExitDone;
     };
@@ -296,6 +300,7 @@ void add_simulate(CLI::App& app, Action& action) {
   command->add_option("--width", s.image_width, "Image width, px")->capture_default_str();
   command->add_option("--image-height", s.image_height, "Image height, px")->capture_default_str();
   command->add_option("--focal", s.focal_px, "Focal length, px")->capture_default_str();
+  command->add_flag("!--no-distortion", s.distortion, "A camera without lens distortion");
   command->add_flag("!--no-calibration", s.calibrate, "Hold the camera at the truth");
   command->add_option("-o,--output", options->output, "Folder to write")->required();
   command->callback([=, &action] {

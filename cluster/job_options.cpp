@@ -77,6 +77,7 @@ void describe(Visitor& visit, OrientationOptions& o) {
 template <typename Visitor>
 void describe(Visitor& visit, AdjustOptions& o) {
   describe(visit, o.observations);
+  visit.flag("estimate_image_sigma", o.estimate_image_sigma);
   visit.number("min_intersection_deg", o.min_intersection_deg);
   visit.number("max_residual_sigmas", o.max_residual_sigmas);
   visit.integer("screening_rounds", o.screening_rounds);

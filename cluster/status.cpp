@@ -74,6 +74,7 @@ void add_figures(Json& json, const BlockResult& result) {
   json["mean_reprojection_px"] = statistics.mean_px;
   json["rms_reprojection_px"] = statistics.rms_px;
   json["chi2_per_dof"] = result.variance_factor;
+  json["image_sigma_px"] = result.image_sigma_px;
   json["tiles"] = result.tiles.tile_count;
   json["boundary_frames"] = std::count(result.boundary.begin(), result.boundary.end(), 1);
   json["global_iterations"] = result.global_iterations;
@@ -130,12 +131,13 @@ std::string figures_text(const Json& json) {
   char line[512];
   std::snprintf(line, sizeof line,
                 "  %lld of %lld images oriented, %lld points, %lld observations, mean residual %.3f px\n"
-                "  sigma0 squared %.4f, %lld tiles, %lld boundary frames, %lld global iterations\n  digest %s\n",
+                "  sigma0 squared %.4f with %.3f px per tie point measurement, %lld tiles, %lld boundary frames, %lld "
+                "global iterations\n  digest %s\n",
                 json["oriented"].get<long long>(), json["images"].get<long long>(), json["points"].get<long long>(),
                 json["observations"].get<long long>(), json["mean_reprojection_px"].get<double>(),
-                json["chi2_per_dof"].get<double>(), json["tiles"].get<long long>(),
-                json["boundary_frames"].get<long long>(), json["global_iterations"].get<long long>(),
-                json["digest"].get<std::string>().c_str());
+                json["chi2_per_dof"].get<double>(), json["image_sigma_px"].get<double>(),
+                json["tiles"].get<long long>(), json["boundary_frames"].get<long long>(),
+                json["global_iterations"].get<long long>(), json["digest"].get<std::string>().c_str());
   return line;
 }
 

@@ -12,6 +12,7 @@ void write_adjustment(const std::string& path, const TileAdjustment& adjustment)
     intrinsics.insert(intrinsics.end(), values.begin(), values.end());
   Hdf5Writer file(path, "adjustment");
   file.attribute("/", "summary", adjustment.summary);
+  file.attribute("/", "image_sigma_px", adjustment.image_sigma_px);
   file.group("frames", "frames the tile's residuals touch");
   file.vector("frames/index", plain(adjustment.frames), {"", "frame index in the block"});
   write_poses(file, "frames", adjustment.poses, "rig", "ground frame");
@@ -33,6 +34,7 @@ TileAdjustment read_adjustment(const std::string& path) {
   const Hdf5Reader file(path, "adjustment");
   TileAdjustment adjustment;
   adjustment.summary = file.text_attribute("/", "summary");
+  adjustment.image_sigma_px = file.attribute<double>("/", "image_sigma_px");
   adjustment.frames = indices<FrameIndex>(file.vector<std::int64_t>("frames/index"));
   const auto frames = static_cast<std::int64_t>(adjustment.frames.size());
   adjustment.poses = read_poses(file, "frames", frames);

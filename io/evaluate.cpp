@@ -155,8 +155,9 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   evaluation.normalised_error_rotation = normalised_rotation.value();
 }
 
-void evaluate_control(const BlockResult& result, Evaluation& evaluation) {
+void evaluate_control(const BlockResult& result, double variance_factor, Evaluation& evaluation) {
   RootMeanSquare control, check, horizontal, vertical;
+  NormalisedError normalised;
   for (std::size_t i = 0; i < result.control.size(); ++i) {
     const ControlPoint& point = result.block.control_points[i];
     const Eigen::Vector3d error = result.control[i].adjusted - point.position;
@@ -165,6 +166,8 @@ void evaluate_control(const BlockResult& result, Evaluation& evaluation) {
     if (point.role != PointRole::kCheck) continue;
     horizontal.add(error.head<2>().squaredNorm());
     vertical.add(error.z() * error.z());
+    const Eigen::Matrix3d stated = point.sigma.cwiseAbs2().asDiagonal();
+    normalised.add(error, variance_factor * result.control[i].covariance + stated);
   }
   evaluation.check_points = check.count();
   evaluation.control_points = control.count();
@@ -172,6 +175,7 @@ void evaluate_control(const BlockResult& result, Evaluation& evaluation) {
   evaluation.check_rms_horizontal_m = horizontal.value();
   evaluation.check_rms_vertical_m = vertical.value();
   evaluation.control_rms_m = control.value();
+  evaluation.normalised_error_check = normalised.value();
 }
 
 }  // namespace
@@ -183,10 +187,10 @@ Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const Eva
   evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
                        (options.align == EvaluateOptions::Align::kAuto && is_free(result));
   const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
-  const double variance_factor = options.scale_sigma ? result.variance_factor : 1;
+  const double variance_factor = options.scale_sigma && !result.sigma_scaled ? result.variance_factor : 1;
   evaluate_frames(result, matches, similarity, variance_factor, evaluation);
   // The positions of check points are in the ground frame of the block: nothing to compare with when it is free.
-  if (!evaluation.aligned) evaluate_control(result, evaluation);
+  if (!evaluation.aligned) evaluate_control(result, variance_factor, evaluation);
   return evaluation;
 }
 
@@ -219,6 +223,7 @@ std::string to_json(const Evaluation& e) {
   json["check_rms_m"] = e.check_rms_m;
   json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;
   json["check_rms_vertical_m"] = e.check_rms_vertical_m;
+  json["normalised_error_check"] = e.normalised_error_check;
   json["control_points"] = e.control_points;
   json["control_rms_m"] = e.control_rms_m;
   return json.dump(2);

@@ -2,7 +2,8 @@
 //
 // With e the error of a frame's position and C its posterior covariance, e'C^-1 e is chi-square distributed with three
 // degrees of freedom: sqrt(mean over frames of e'C^-1 e / 3) is 1 when the stated sigmas are true. Likewise for the
-// rotation increment w of R_true = R_adjusted Exp(w).
+// rotation increment w of R_true = R_adjusted Exp(w), and for check points, where C is the sum of the posterior
+// covariance and that of the stated position.
 #pragma once
 
 #include <limits>
@@ -16,7 +17,8 @@ namespace megablock {
 struct EvaluateOptions {
   // Similarity between result and truth removed first: kAuto = when nothing fixes the datum of the result.
   enum class Align { kAuto, kNever, kAlways } align = Align::kAuto;
-  bool scale_sigma = false;  // multiply covariances by the a-posteriori variance factor
+  // Multiply posterior covariances by the a-posteriori variance factor, unless the job has done so.
+  bool scale_sigma = false;
 };
 
 struct Evaluation {
@@ -33,6 +35,7 @@ struct Evaluation {
   std::int64_t check_points = 0, control_points = 0;                            // with an adjusted position
   double check_rms_m = kNone, check_rms_horizontal_m = kNone, check_rms_vertical_m = kNone;
   double control_rms_m = kNone;
+  double normalised_error_check = kNone;
 };
 
 // Frames are matched by name (a frame's own, else the name of its first image). A truth with another origin is brought

@@ -61,6 +61,8 @@ struct BlockResult {
   double variance_factor = 1;       // a-posteriori, = chi2_per_dof
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
+  double image_sigma_px = 0;        // of tie point measurements per axis, as adjusted with (stated or estimated)
+  bool sigma_scaled = false;        // covariances are multiplied by variance_factor
   int global_iterations = 0;
   double newton_decrement = 0;
   std::string gauge;                // "fixed by priors" or "free, inner constraints over N frames" ...

@@ -153,6 +153,8 @@ void put_figures(Hdf5Writer& file, const BlockResult& result) {
   file.attribute("/", "variance_factor", result.variance_factor);
   file.attribute("/", "chi2", result.chi2);
   file.attribute("/", "degrees_of_freedom", result.degrees_of_freedom);
+  file.attribute("/", "image_sigma_px", result.image_sigma_px);
+  file.attribute("/", "sigma_scaled", static_cast<std::uint8_t>(result.sigma_scaled));
   file.attribute("/", "global_iterations", result.global_iterations);
   file.attribute("/", "newton_decrement", result.newton_decrement);
   file.attribute("/", "gauge", result.gauge);
@@ -163,6 +165,8 @@ void get_figures(const Hdf5Reader& file, BlockResult& result) {
   result.variance_factor = file.attribute<double>("/", "variance_factor");
   result.chi2 = file.attribute<double>("/", "chi2");
   result.degrees_of_freedom = file.attribute<std::int64_t>("/", "degrees_of_freedom");
+  result.image_sigma_px = file.attribute<double>("/", "image_sigma_px");
+  result.sigma_scaled = file.attribute<std::uint8_t>("/", "sigma_scaled") != 0;
   result.global_iterations = file.attribute<int>("/", "global_iterations");
   result.newton_decrement = file.attribute<double>("/", "newton_decrement");
   result.gauge = file.text_attribute("/", "gauge");

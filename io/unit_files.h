@@ -47,6 +47,7 @@ struct TileAdjustment {
   std::vector<std::int64_t> camera_observations; // [cameras]
   std::vector<Eigen::Vector3d> points;           // [tracks + control points]; NaN = not triangulated
   std::vector<std::uint8_t> kept;                // [observations of tracks, then of control points] 1 = kept
+  double image_sigma_px = 0;                     // of tie point measurements, with which the tile was adjusted
   std::string summary;                           // one line for the log and the report
 };
 void write_adjustment(const std::string& path, const TileAdjustment& adjustment);

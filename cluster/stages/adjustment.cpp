@@ -49,6 +49,7 @@ TileAdjustment adjust_one(TileStart start, const AdjustOptions& options) {
   }
   result.points = std::move(state.points);
   result.kept = std::move(problem.kept);
+  result.image_sigma_px = problem.image_sigma_px;
   result.summary = summary.text;
   return result;
 }

@@ -190,6 +190,18 @@ TileResult make_tile_result(const MergeTile& tile, std::vector<Eigen::Matrix3d> 
   return result;
 }
 
+namespace {
+
+void scale_covariances(BlockResult& result, double factor) {
+  for (auto& covariance : result.frame_covariance) covariance *= factor;
+  for (auto& covariance : result.camera_covariance) covariance *= factor;
+  for (auto& covariance : result.point_covariance) covariance *= factor;
+  for (auto& control : result.control) control.covariance *= factor;
+  result.sigma_scaled = true;
+}
+
+}  // namespace
+
 BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutcome& outcome,
                             const std::vector<TileResult>& parts) {
   BlockResult result;
@@ -205,6 +217,8 @@ BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutco
   result.degrees_of_freedom = outcome.degrees_of_freedom;
   result.variance_factor =
       outcome.degrees_of_freedom > 0 ? outcome.chi2 / static_cast<double>(outcome.degrees_of_freedom) : 1;
+  if (job.settings.merge.scale_sigma) scale_covariances(result, result.variance_factor);
+  result.image_sigma_px = outcome.image_sigma_px;
   result.global_iterations = outcome.global_iterations;
   result.newton_decrement = outcome.newton_decrement;
   result.gauge = outcome.gauge;

@@ -15,6 +15,7 @@ struct MergeOutcome {
   IndexedVector<CameraIndex, BlockResult::Matrix8> camera_covariance;
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
+  double image_sigma_px = 0;  // of tie point measurements, as adjusted with
   int global_iterations = 0;
   double newton_decrement = 0;
   std::string gauge;

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "adjust/tile_adjustment.h"
+#include "adjust/image_sigma.h"
 #include "cluster/collective.h"
 #include "cluster/matrix_bytes.h"
 #include "cluster/process_memory.h"
@@ -15,6 +15,7 @@
 #include "cluster/rank_runner.h"
 #include "cluster/signals.h"
 #include "cluster/stages/assemble_result.h"
+#include "cluster/stages/block_image_sigma.h"
 #include "cluster/stages/merge_checkpoint.h"
 #include "cluster/stages/merge_start.h"
 #include "cluster/stages/stages.h"
@@ -154,6 +155,7 @@ void say_memory(Job& job, const MemoryStatistics& mine) {
 struct Adjusted {
   std::vector<RankTile> tiles;
   RankRunner::Posterior posterior;
+  double image_sigma_px = 0;  // of tie point measurements
   MergePosition position;
   BlockState state;
   bool converged = false;
@@ -174,8 +176,12 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
   std::optional<MergePosition> found = checkpoint.find();
   const BlockState start = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
   std::vector<RankTile> tiles = load_own_tiles(job, inputs, start, rank_of_tile);
-  if (found)
+  if (found) {
     for (RankTile& tile : tiles) checkpoint.load_tile(tile);
+  } else {
+    const double sigma = start_image_sigma(job, inputs.adjusted);
+    for (RankTile& tile : tiles) set_image_sigma(tile.problem, sigma);
+  }
 
   Adjusted adjusted;
   MergePosition& position = adjusted.position;
@@ -196,7 +202,8 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
     adjusted.converged = position.global.outcome == GlobalOutcome::kConverged ||
                          position.global.outcome == GlobalOutcome::kRoundingFloor;
     const bool last = position.round >= job.settings.merge.screening_rounds;
-    if (last || screen(job, runner) == 0) {
+    const bool reweighted = !last && adopt_image_sigma(job, runner.tiles(), rank_of_tile.size(), start);
+    if (last || (screen(job, runner) == 0 && !reweighted)) {
       adjusted.posterior = runner.posterior();
       say_memory(job, runner.memory());
       adjusted.tiles = std::move(runner.tiles());
@@ -210,6 +217,7 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
     checkpoint.write(position, tiles, gather_state(job, start, tiles));
   }
   adjusted.state = gather_state(job, start, adjusted.tiles);
+  adjusted.image_sigma_px = common_image_sigma(job, adjusted.tiles);
   return adjusted;
 }
 
@@ -289,6 +297,7 @@ MergeOutcome make_outcome(const Adjusted& adjusted) {
   outcome.chi2 = sums.weighted_squares;
   outcome.degrees_of_freedom =
       sums.residuals - sums.unknowns + static_cast<std::int64_t>(sums.held.size()) + sums.held_points;
+  outcome.image_sigma_px = adjusted.image_sigma_px;
   outcome.global_iterations = adjusted.position.global.accepted;
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
   outcome.gauge = adjusted.posterior.gauge.text;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "adjust/image_sigma.h"
 #include "cluster/collective.h"
 #include "cluster/process_memory.h"
 #include "cluster/stages/stages.h"
@@ -30,6 +31,7 @@ TileAdjustment snapshot(const RankTile& tile) {
   snapshot.camera_observations.assign(snapshot.cameras.size(), 0);
   snapshot.points = tile.state.points;
   snapshot.kept = tile.problem.kept;
+  snapshot.image_sigma_px = tile.problem.image_sigma_px;
   return snapshot;
 }
 
@@ -135,6 +137,7 @@ BlockState MergeCheckpoint::state() const { return read_state(job_.store.verifie
 void MergeCheckpoint::load_tile(RankTile& tile) const {
   const TileAdjustment snapshot = read_adjustment(job_.store.verified_path(tile_unit(current_, tile.tile)));
   tile.problem.kept = snapshot.kept;
+  set_image_sigma(tile.problem, snapshot.image_sigma_px);
   tile.state.frames = snapshot.poses;
   tile.state.cameras = snapshot.intrinsics;
   tile.state.points = snapshot.points;

@@ -80,6 +80,7 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
                {"mean_track_length", number(f.reprojection.mean_track_length)},
                {"chi2_per_dof", result.degrees_of_freedom > 0 ? number(result.variance_factor) : Json(nullptr)},
                {"degrees_of_freedom", result.degrees_of_freedom},
+               {"image_sigma_px", result.image_sigma_px},
                {"tiles", result.tiles.tile_count},
                {"components", f.components},
                {"boundary_frames", f.boundary_frames},

@@ -212,7 +212,8 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
 
 std::string accuracy_section(const BlockResult& result, const Figures& f) {
   if (!std::isfinite(f.sigma_east.median) && !std::isfinite(f.point_sigma_horizontal.median)) return "";
-  const double scale = result.degrees_of_freedom > 0 ? std::sqrt(std::max(0.0, result.variance_factor)) : kUnknown;
+  const double s0 = result.degrees_of_freedom > 0 ? std::sqrt(std::max(0.0, result.variance_factor)) : kUnknown;
+  const double scale = result.sigma_scaled ? 1 : s0;
   double most = 0;
   for (const Spread* s : {&f.sigma_east, &f.sigma_north, &f.sigma_up, &f.point_sigma_horizontal, &f.point_sigma_up})
     if (std::isfinite(s->p95)) most = std::max(most, s->p95);
@@ -231,8 +232,10 @@ std::string accuracy_section(const BlockResult& result, const Figures& f) {
   add(in_unit("tie points, up", unit), f.point_sigma_up, unit.factor, unit.decimals);
   return section(
       "accuracy", "Accuracy from the adjustment",
-      paragraph("Standard deviations from the covariance of the whole block, a-priori variance factor 1; the last "
-                "column multiplies by σ₀ a posteriori. Rotation: the largest of the three axes.") +
+      paragraph(std::string("Standard deviations from the covariance of the whole block, ") +
+                (result.sigma_scaled ? "multiplied by σ₀ a posteriori, as is the last column."
+                                     : "a-priori variance factor 1; the last column multiplies by σ₀ a posteriori.") +
+                " Rotation: the largest of the three axes.") +
           table.html("compact"));
 }
 

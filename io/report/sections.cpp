@@ -59,7 +59,8 @@ std::string headline(const BlockResult& result, const Figures& f) {
   cards += card(result.degrees_of_freedom > 0 ? fixed(std::sqrt(std::max(0.0, result.variance_factor)), 3) : kMissing,
                 "σ₀ a posteriori",
                 result.degrees_of_freedom > 0 ? "variance factor " + significant(result.variance_factor) + ", " +
-                                                    count(result.degrees_of_freedom) + " degrees of freedom"
+                                                    count(result.degrees_of_freedom) + " degrees of freedom, " +
+                                                    fixed(result.image_sigma_px, 3) + " px per tie point measurement"
                                               : "");
   if (std::isfinite(f.ground_resolution_m)) {
     const LengthUnit unit = length_unit(f.ground_resolution_m);

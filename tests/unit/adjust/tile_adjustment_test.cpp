@@ -267,12 +267,35 @@ TEST_P(Blocks, FindsLostFrames) {
   EXPECT_LT(tile.position_rms(), 0.1);
 }
 
+// The sigma of tie point measurements follows the images, whatever it is said to be; that of control points stays.
+TEST(Sigmas, AreEstimatedFromTheResiduals) {
+  for (const double noise : {0.12, 1.5}) {
+    SimulationOptions simulation = aerial(40, 19);
+    simulation.image_noise_px = noise;
+    simulation.outlier_share = 0.03;
+    simulation.control_points = 4;
+    SimulatedBlock simulated = simulate_block(simulation);
+    for (ControlPoint& point : simulated.block.control_points)
+      for (ImageMeasurement& m : point.measurements) m.sigma_px = 0.8;
+    SingleTile tile(std::move(simulated));
+    const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options);
+    EXPECT_NEAR(tile.problem.image_sigma_px, noise, 0.02 * noise);
+    EXPECT_NEAR(summary.sigma0, 1, 0.03);
+    EXPECT_LT(verdicts(tile).good_lost, 0.01);
+    EXPECT_GE(verdicts(tile).outliers_found, 0.98);
+    EXPECT_EQ(tile.problem.inverse_sigma.front(), 1 / tile.problem.image_sigma_px);
+    EXPECT_EQ(tile.problem.inverse_sigma.back(), 1 / 0.8);
+  }
+}
+
 // Images noisier than their a-priori sigma says: the threshold follows, good observations stay.
 TEST(Sigmas, TooSmallOnesDoNotCostGoodObservations) {
   SimulationOptions simulation = aerial(40, 19);
   simulation.image_noise_px = 1.5;
   simulation.outlier_share = 0.03;
-  SingleTile tile(simulation);
+  AdjustOptions stated;
+  stated.estimate_image_sigma = false;
+  SingleTile tile(simulation, stated);
   const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options);
   EXPECT_NEAR(summary.sigma0, 3, 0.15);
   // Three times the four sigmas; the median of a robust solution is a little short.
@@ -283,7 +306,7 @@ TEST(Sigmas, TooSmallOnesDoNotCostGoodObservations) {
   EXPECT_GE(verdicts(tile).outliers_found, 0.98);
   // And the threshold never falls below what was asked for.
   simulation.image_noise_px = 0.1;
-  SingleTile sharp(simulation);
+  SingleTile sharp(simulation, stated);
   adjust_tile(sharp.problem, sharp.state, sharp.options);
   EXPECT_EQ(screening_threshold(sharp.problem, sharp.state, sharp.options), tile.options.max_residual_sigmas);
 }

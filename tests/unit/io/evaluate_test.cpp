@@ -176,6 +176,29 @@ TEST_F(EvaluateTest, CheckPointsAreCompared) {
   EXPECT_NEAR(e.control_rms_m, 0.01, 1e-12);
 }
 
+// Drawn with the sum of both covariances, of which the variance factor scales the adjusted one only.
+TEST_F(EvaluateTest, CheckPointsAreHeldAgainstBothSigmas) {
+  Random random(11, Random::Purpose::kNoise);
+  const Eigen::Vector3d adjusted_sigma(0.03, 0.04, 0.12), stated_sigma(0.05, 0.05, 0.1);
+  for (int i = 0; i < 2000; ++i) {
+    ControlPoint point;
+    point.role = PointRole::kCheck;
+    point.sigma = stated_sigma;
+    point.position = stated_sigma.cwiseProduct(random.normal3());
+    result_.block.control_points.push_back(point);
+    const Eigen::Matrix3d covariance = adjusted_sigma.cwiseAbs2().asDiagonal();
+    result_.control.push_back({adjusted_sigma.cwiseProduct(random.normal3()), covariance, {}});
+  }
+  EXPECT_NEAR(evaluate(result_, simulated_.truth).normalised_error_check, 1, 0.04);
+  for (auto& control : result_.control) control.covariance /= 4;
+  result_.variance_factor = 4;
+  EXPECT_GT(evaluate(result_, simulated_.truth).normalised_error_check, 1.15);
+  const EvaluateOptions scaled{EvaluateOptions::Align::kAuto, true};
+  EXPECT_NEAR(evaluate(result_, simulated_.truth, scaled).normalised_error_check, 1, 0.04);
+  result_.sigma_scaled = true;  // already done
+  EXPECT_GT(evaluate(result_, simulated_.truth, scaled).normalised_error_check, 1.15);
+}
+
 TEST_F(EvaluateTest, JsonHasNullForWhatDoesNotExist) {
   result_.frame_covariance.clear();
   const auto json = nlohmann::json::parse(to_json(evaluate(result_, simulated_.truth)));

@@ -186,6 +186,7 @@ TEST_F(GraphFiles, AdjustmentComesBack) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   adjustment.points = {{0.1, 0.2, 0.3}, {nan, nan, nan}};
   adjustment.kept = {1, 0, 1};
+  adjustment.image_sigma_px = 0.31;
   adjustment.summary = "2 frames, \xcf\x83\xe2\x82\x80 = 1.01";
   write_adjustment(path_, adjustment);
   const TileAdjustment back = read_adjustment(path_);
@@ -201,6 +202,7 @@ TEST_F(GraphFiles, AdjustmentComesBack) {
   EXPECT_TRUE(same_bits(back.points[0], adjustment.points[0]));
   EXPECT_TRUE(same_bits(back.points[1], adjustment.points[1]));
   EXPECT_EQ(back.kept, adjustment.kept);
+  EXPECT_EQ(back.image_sigma_px, 0.31);
   EXPECT_EQ(back.summary, adjustment.summary);
 }
 

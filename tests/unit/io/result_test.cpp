@@ -50,6 +50,8 @@ BlockResult example_result() {
   result.variance_factor = 1.0625;
   result.chi2 = 12345.678;
   result.degrees_of_freedom = 5000000000;
+  result.image_sigma_px = 0.31;
+  result.sigma_scaled = true;
   result.global_iterations = 4;
   result.newton_decrement = 1e-8;
   result.gauge = "fixed by priors";
@@ -100,6 +102,8 @@ TEST(ResultFile, EverythingComesBack) {
   EXPECT_EQ(back.variance_factor, result.variance_factor);
   EXPECT_EQ(back.chi2, result.chi2);
   EXPECT_EQ(back.degrees_of_freedom, result.degrees_of_freedom);
+  EXPECT_EQ(back.image_sigma_px, 0.31);
+  EXPECT_TRUE(back.sigma_scaled);
   EXPECT_EQ(back.global_iterations, 4);
   EXPECT_EQ(back.newton_decrement, result.newton_decrement);
   EXPECT_EQ(back.gauge, result.gauge);

@@ -1,0 +1,76 @@
+#include "adjust/image_sigma.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace megablock {
+
+namespace {
+
+constexpr double kFinestPx = 0.02;               // nobody measures tie points more exactly
+constexpr std::int64_t kFewestRedundancy = 100;  // the estimate is then good to 7 %
+
+std::int64_t unknowns_of(const TileProblem& problem) {
+  std::int64_t count = 6 * std::ssize(problem.frames);
+  for (const std::uint8_t mask : problem.camera_free) count += __builtin_popcount(mask);
+  for (const std::uint8_t free : problem.mount_free) count += free ? 6 : 0;
+  return count;
+}
+
+}  // namespace
+
+void ImageResiduals::add(const ImageResiduals& other) {
+  weighted_squares += other.weighted_squares;
+  observations += other.observations;
+  points += other.points;
+}
+
+ImageResiduals image_residuals(const TileProblem& problem, const TileState& state, const AdjustOptions& options) {
+  const double weight = 1 / (problem.image_sigma_px * problem.image_sigma_px);
+  const double largest = options.max_residual_sigmas * options.max_residual_sigmas;
+  ImageResiduals result;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (problem.points[p].role != PointRole::kTie || !problem.active(p)) continue;
+    ++result.points;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      const Eigen::Vector2d pixel =
+          project(state.cameras[image.camera.value],
+                  to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]));
+      const double squared = (pixel - Eigen::Vector2d(problem.x[row], problem.y[row])).squaredNorm();
+      if (!(weight * squared <= largest)) continue;
+      result.weighted_squares += problem.image_loss.evaluate(weight * squared)[1] * squared;
+      ++result.observations;
+    }
+  }
+  return result;
+}
+
+std::optional<double> image_sigma(const ImageResiduals& residuals, std::int64_t unknowns) {
+  const std::int64_t redundancy = 2 * residuals.observations - 3 * residuals.points - unknowns;
+  if (redundancy < kFewestRedundancy) return std::nullopt;
+  return std::max(kFinestPx, std::sqrt(residuals.weighted_squares / static_cast<double>(redundancy)));
+}
+
+void set_image_sigma(TileProblem& problem, double sigma_px) {
+  problem.image_sigma_px = sigma_px;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+    if (problem.points[p].role == PointRole::kTie)
+      std::fill(problem.inverse_sigma.begin() + problem.begin[p], problem.inverse_sigma.begin() + problem.begin[p + 1],
+                1 / sigma_px);
+}
+
+void estimate_image_sigma(TileProblem& problem, const TileState& state, const AdjustOptions& options) {
+  constexpr int kMaxRounds = 20;
+  constexpr double kSettled = 1e-3;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const auto sigma = image_sigma(image_residuals(problem, state, options), unknowns_of(problem));
+    if (!sigma) return;
+    const double change = std::abs(*sigma / problem.image_sigma_px - 1);
+    set_image_sigma(problem, *sigma);
+    if (change < kSettled) return;
+  }
+}
+
+}  // namespace megablock

@@ -1,0 +1,89 @@
+#include "cluster/stages/block_image_sigma.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "adjust/image_sigma.h"
+#include "io/unit_files.h"
+#include "merge/bytes.h"
+
+namespace megablock {
+
+namespace {
+
+std::int64_t orientation_unknowns(const Block& block, const BlockState& state) {
+  std::int64_t count = 6 * std::count(state.oriented.begin(), state.oriented.end(), std::uint8_t{1});
+  for (const Camera& camera : block.cameras)
+    count +=
+        std::count_if(camera.prior_sigma.begin(), camera.prior_sigma.end(), [](double sigma) { return sigma != 0; });
+  for (const Rig& rig : block.rigs)
+    count += 6 * std::count_if(rig.mounts.begin(), rig.mounts.end(), [](const Mount& mount) { return !mount.held(); });
+  return count;
+}
+
+// Sums in tile order, whatever the ranks.
+ImageResiduals block_image_residuals(Job& job, const std::vector<RankTile>& own, std::size_t tile_count) {
+  ByteWriter writer;
+  for (const RankTile& tile : own) {
+    writer.value(tile.tile);
+    writer.value(image_residuals(tile.problem, tile.state, job.settings.adjustment));
+  }
+  const Bytes mine = writer.take();
+  std::vector<ImageResiduals> by_tile(tile_count);
+  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
+    const Bytes bytes(text.begin(), text.end());
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      const auto tile = reader.value<std::int64_t>();
+      by_tile[static_cast<std::size_t>(tile)] = reader.value<ImageResiduals>();
+    }
+  }
+  ImageResiduals sum;
+  for (const ImageResiduals& tile : by_tile) sum.add(tile);
+  return sum;
+}
+
+}  // namespace
+
+double start_image_sigma(const Job& job, const std::vector<std::string>& adjusted) {
+  const AdjustOptions& options = job.settings.adjustment;
+  if (!options.estimate_image_sigma) return options.observations.image_sigma_px;
+  double sum = 0, weight = 0;
+  for (const std::string& name : adjusted) {
+    if (name.empty()) continue;
+    const TileAdjustment tile = read_adjustment(job.store.verified_path(name));
+    const auto kept = static_cast<double>(std::count(tile.kept.begin(), tile.kept.end(), std::uint8_t{1}));
+    sum += kept * tile.image_sigma_px * tile.image_sigma_px;
+    weight += kept;
+  }
+  return weight > 0 ? std::sqrt(sum / weight) : options.observations.image_sigma_px;
+}
+
+bool adopt_image_sigma(Job& job, std::vector<RankTile>& own, std::size_t tile_count, const BlockState& oriented) {
+  constexpr double kSettled = 0.02;
+  if (!job.settings.adjustment.estimate_image_sigma) return false;
+  const auto sigma =
+      image_sigma(block_image_residuals(job, own, tile_count), orientation_unknowns(job.block, oriented));
+  if (!sigma) return false;
+  bool changed = false;
+  for (RankTile& tile : own) {
+    if (std::abs(*sigma / tile.problem.image_sigma_px - 1) < kSettled) continue;
+    set_image_sigma(tile.problem, *sigma);
+    changed = true;
+  }
+  return job.ranks.any(changed);
+}
+
+double common_image_sigma(Job& job, const std::vector<RankTile>& own) {
+  ByteWriter writer;
+  writer.value(own.empty() ? 0.0 : own.front().problem.image_sigma_px);
+  const Bytes mine = writer.take();
+  double sigma = 0;
+  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
+    const Bytes bytes(text.begin(), text.end());
+    sigma = std::max(sigma, ByteReader(bytes).value<double>());
+  }
+  return sigma;
+}
+
+}  // namespace megablock
