@@ -49,7 +49,7 @@ void add_init(CLI::App& app, Action& action) {
   command->add_option("images", options->images, "Folder of images, searched recursively")->required();
   command->add_option("-o,--output", options->output, "Project file to write")->capture_default_str();
   command->add_option("--control", options->gcp_file, "Control points: gcp_list.txt, OpenSfM JSON or CSV");
-  command->add_option("--masks", options->mask_folder, "Folder of PNG masks, one per camera or image");
+  command->add_option("--masks", options->mask_folder, "Folder of PNG masks, one per camera: <camera>.png");
   command->add_option("--cameras", options->camera_grouping, "How images share a camera")
       ->check(CLI::IsMember({"exif", "folder", "one"}))
       ->capture_default_str();
@@ -156,9 +156,7 @@ void add_export(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("export", "Write the result in another format");
   command->footer("Example: megablock export job --format colmap-text -o model");
   command->add_option("job", options->job, "Job directory")->required();
-  command->add_option("--format", options->format, "Format")
-      ->required()
-      ->check(CLI::IsMember(export_formats()));
+  command->add_option("--format", options->format, "Format")->required()->check(CLI::IsMember(export_formats()));
   command->add_option("-o,--output", options->output, "File or folder to write")->required();
   command->callback([=, &action] {
     action = [options] {
@@ -300,8 +298,10 @@ void add_simulate(CLI::App& app, Action& action) {
   command->add_option("--width", s.image_width, "Image width, px")->capture_default_str();
   command->add_option("--image-height", s.image_height, "Image height, px")->capture_default_str();
   command->add_option("--focal", s.focal_px, "Focal length, px")->capture_default_str();
-  command->add_flag("!--no-distortion", s.distortion, "A camera without lens distortion");
-  command->add_flag("!--no-calibration", s.calibrate, "Hold the camera at the truth");
+  command->add_flag_callback(
+      "--no-distortion", [options] { options->simulation.distortion = false; }, "A camera without lens distortion");
+  command->add_flag_callback(
+      "--no-calibration", [options] { options->simulation.calibrate = false; }, "Hold the camera at the truth");
   command->add_option("-o,--output", options->output, "Folder to write")->required();
   command->callback([=, &action] {
     action = [options] {
@@ -342,6 +342,9 @@ int command_line(int argc, char** argv) {
   app.name("megablock");
   app.set_version_flag("--version", "megablock 0.1.0 (arithmetic level avx2)");
   app.require_subcommand(1);
+  app.failure_message([](const CLI::App* command, const CLI::Error& error) {
+    return "megablock: " + std::string(error.what()) + "; see '" + command->get_name() + " --help'\n";
+  });
   app.footer(
       "Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input, 75 interrupted and resumable.\n"
       "Forms:\n  megablock init IMAGES -o block.yaml\n  megablock run block.yaml -j JOB      (again = resume)\n"

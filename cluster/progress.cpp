@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 
@@ -25,7 +26,8 @@ Progress::Progress(std::string stage, std::int64_t units, std::function<std::int
       units_(units),
       units_begun_(std::move(units_begun)),
       terminal_(isatty(STDERR_FILENO) != 0),
-      start_s_(monotonic_seconds()) {
+      start_s_(monotonic_seconds()),
+      history_{{start_s_, 0}} {
   if (quiet || units == 0) return;
   thread_ = std::thread([this] {
     const double interval_s = terminal_ ? 0.25 : 5;
@@ -46,6 +48,16 @@ Progress::~Progress() {
   if (terminal_) print(units_, true);
 }
 
+// Of the last half minute: units that were there already, which a resumed run passes at once, do not count for long.
+double Progress::units_per_second(std::int64_t done) {
+  constexpr double kWindow_s = 30;
+  const double now_s = monotonic_seconds();
+  history_.emplace_back(now_s, done);
+  while (history_.size() > 2 && history_[1].first < now_s - kWindow_s) history_.pop_front();
+  const double seconds = now_s - history_.front().first;
+  return seconds > 0 ? static_cast<double>(done - history_.front().second) / seconds : 0;
+}
+
 void Progress::print(std::int64_t begun, bool last) {
   const std::int64_t done = std::clamp<std::int64_t>(last ? units_ : begun - 1, 0, units_);
   const double elapsed = monotonic_seconds() - start_s_;
@@ -59,7 +71,13 @@ void Progress::print(std::int64_t begun, bool last) {
     if (width > 4) line += " [" + std::string(filled, '#') + std::string(width - filled, '.') + "]";
   }
   line += " " + std::to_string(done) + "/" + std::to_string(units_) + " units, " + duration_text(elapsed);
-  if (!last && done > 0) line += ", " + duration_text(elapsed / double(done) * double(units_ - done)) + " left";
+  const double rate = units_per_second(done);
+  if (!last && rate > 0) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), rate >= 1 ? ", %.1f/s" : ", %.1f/min", rate >= 1 ? rate : 60 * rate);
+    line += text.data();
+    line += ", " + duration_text(static_cast<double>(units_ - done) / rate) + " left";
+  }
   if (terminal_) {
     const std::string padding(printed_width_ > line.size() ? printed_width_ - line.size() : 0, ' ');
     printed_width_ = line.size();

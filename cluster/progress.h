@@ -3,9 +3,11 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 
 namespace megablock {
 
@@ -19,12 +21,14 @@ class Progress {
 
  private:
   void print(std::int64_t begun, bool last);
+  double units_per_second(std::int64_t done);
 
   std::string stage_;
   std::int64_t units_;
   std::function<std::int64_t()> units_begun_;
   bool terminal_ = false;
   double start_s_ = 0;
+  std::deque<std::pair<double, std::int64_t>> history_;  // time, units done
   std::size_t printed_width_ = 0;
   std::atomic<bool> stop_{false};
   std::thread thread_;
