@@ -1,6 +1,7 @@
 // What every stage of a run shares: the store, the ranks, the options, the record of what happened.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct Job {
   std::vector<std::int64_t> generations;  // image counts at which the block grew; the last is its size
   std::vector<StageRecord> records;       // of the stages so far, in order
   std::vector<FailedUnit> failures;       // of all stages so far
+  std::map<FrameIndex, std::string> not_oriented;  // by the initial orientation, and why
   std::vector<std::string> notes;         // warnings for the report
 
   bool is_first_rank() const { return ranks.rank() == 0; }

@@ -172,6 +172,7 @@ int run_job(const RunOptions& run_options, Communicator& ranks) {
           .generations = json.at("generations"),
           .records = {},
           .failures = {},
+          .not_oriented = {},
           .notes = json.at("warnings")};
   if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();

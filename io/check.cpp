@@ -54,8 +54,8 @@ class Check {
     std::vector<std::string> names;
     for (const std::string& name : store_.list("")) {
       const bool top = name.find('/') == std::string::npos;
-      const bool text = name.starts_with("events/") || name.starts_with("stages/") ||
-                        name.starts_with("scratch/") || (name.starts_with("result/") && name != kResult);
+      const bool text = name.starts_with("events/") || name.starts_with("stages/") || name.starts_with("scratch/") ||
+                        (name.starts_with("result/") && name != kResult);
       if (top ? name.ends_with(".h5") : !text) names.push_back(name);
     }
     return names;
@@ -72,7 +72,8 @@ class Check {
           {"block", [&] { check(read_block(path)); }},    {"features", [&] { read_features(path); }},
           {"candidates", [&] { read_candidates(path); }}, {"matches", [&] { read_matches(path); }},
           {"tiles", [&] { read_tiles(path); }},           {"tracks", [&] { read_tracks(path); }},
-          {"state", [&] { read_state(path); }},           {"adjustment", [&] { read_adjustment(path); }}};
+          {"state", [&] { read_state(path); }},           {"orientation", [&] { read_orientation(path); }},
+          {"adjustment", [&] { read_adjustment(path); }}};
       if (const auto reader = readers.find(kind); reader != readers.end()) reader->second();
     }
   }

@@ -37,16 +37,43 @@ BlockState get_state(const Hdf5Reader& file) {
   return state;
 }
 
-void write_state(const std::string& path, const BlockState& state) {
-  Hdf5Writer file(path, "state");
+namespace {
+
+void put_whole_state(Hdf5Writer& file, const BlockState& state) {
   for (const char* group : {"frames", "cameras", "rigs", "mounts"}) file.group(group);
   file.vector("rigs/mounts",
               column(state.mounts, [](const std::vector<Pose>& rig) { return static_cast<std::int32_t>(rig.size()); }),
               {"", "number of mounts: rows of the group 'mounts', in the order of the rigs"});
   put_state(file, state);
+}
+
+}  // namespace
+
+void write_state(const std::string& path, const BlockState& state) {
+  Hdf5Writer file(path, "state");
+  put_whole_state(file, state);
   file.close();
 }
 
 BlockState read_state(const std::string& path) { return get_state(Hdf5Reader(path, "state")); }
+
+void write_orientation(const std::string& path, const InitialOrientation& orientation) {
+  Hdf5Writer file(path, "orientation");
+  put_whole_state(file, orientation.state);
+  file.group("failed");
+  file.vector("failed/frame", column(orientation.failed, [](const auto& failed) { return failed.first.value; }),
+              {"", "frames without a pose"});
+  file.texts("failed/reason", column(orientation.failed, [](const auto& failed) { return failed.second; }), {"", "why"});
+  file.close();
+}
+
+InitialOrientation read_orientation(const std::string& path) {
+  const Hdf5Reader file(path, "orientation");
+  InitialOrientation orientation{get_state(file), {}};
+  const auto frames = file.vector<std::int64_t>("failed/frame");
+  const auto reasons = file.texts("failed/reason", static_cast<std::int64_t>(frames.size()));
+  for (std::size_t f = 0; f < frames.size(); ++f) orientation.failed.emplace_back(FrameIndex(frames[f]), reasons[f]);
+  return orientation;
+}
 
 }  // namespace megablock

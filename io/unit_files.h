@@ -36,6 +36,14 @@ TrackSet read_tracks(const std::string& path);
 void write_state(const std::string& path, const BlockState& state);
 BlockState read_state(const std::string& path);
 
+// The initial orientation: a state, and why frames got no pose.
+struct InitialOrientation {
+  BlockState state;
+  std::vector<std::pair<FrameIndex, std::string>> failed;
+};
+void write_orientation(const std::string& path, const InitialOrientation& orientation);
+InitialOrientation read_orientation(const std::string& path);
+
 // What a tile's adjustment leaves: its view of the unknowns, its points and the verdict on each observation, aligned
 // with the rows of the tile's track file (then its control points in block order).
 struct TileAdjustment {

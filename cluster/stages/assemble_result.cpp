@@ -108,10 +108,12 @@ void list_failures(const Job& job, BlockResult& result) {
       return failure.unit == job.block.images[image].name;
     });
     if (known != job.failures.end()) continue;
+    const auto reason = job.not_oriented.find(frame);
     const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
     result.failures.push_back({linked ? "orientation" : "matching", job.block.images[image].name,
-                               linked ? "matched, but too few consistent points to give it a pose"
-                                      : "no other image shares enough verified matches with it"});
+                               linked && reason != job.not_oriented.end() ? reason->second
+                               : linked ? "oriented at first, but too few of its observations hold in the adjustment"
+                                        : "no other image shares enough verified matches with it"});
   }
 }
 

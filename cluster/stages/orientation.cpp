@@ -82,24 +82,27 @@ Frames with_surroundings(const Frames& set, const Links& links) {
 
 // Orients one set; frames that had a pose keep it, and the cameras with them.
 void orient_set(const Job& job, const Block& block, const std::vector<VerifiedPair>& pairs, const Frames& set,
-                const Links& links, BlockState& state) {
+                const Links& links, InitialOrientation& orientation) {
+  BlockState& state = orientation.state;
   const Frames frames = with_surroundings(set, links);
   std::vector<VerifiedPair> own;
   for (const VerifiedPair& pair : pairs)
     if (frames.contains(block.images[pair.a].frame) && frames.contains(block.images[pair.b].frame)) own.push_back(pair);
-  BlockState oriented;
+  OrientationResult oriented;
   try {
     const TrackSet tracks = build_tracks(read_keypoints(job), own, job.settings.tracks);
-    oriented =
-        orient_component(block, state, {frames.begin(), frames.end()}, own, tracks, job.settings.orientation).state;
-  } catch (const ComputeError&) {
-    return;  // stays without poses; the result lists its images
+    oriented = orient_component(block, state, {frames.begin(), frames.end()}, own, tracks, job.settings.orientation);
+  } catch (const ComputeError& error) {  // stays without poses; the result lists its images
+    for (const FrameIndex frame : set) orientation.failed.emplace_back(frame, error.what());
+    return;
   }
   for (const FrameIndex frame : set) {
-    state.frames[frame] = oriented.frames[frame];
-    state.oriented[frame] = oriented.oriented[frame];
+    state.frames[frame] = oriented.state.frames[frame];
+    state.oriented[frame] = oriented.state.oriented[frame];
   }
-  if (frames.size() == set.size()) state.cameras = oriented.cameras;
+  for (const auto& failed : oriented.failed)
+    if (set.contains(failed.first)) orientation.failed.push_back(failed);
+  if (frames.size() == set.size()) state.cameras = oriented.state.cameras;
 }
 
 Frames frames_from(const Block& block, std::int64_t first_image) {
@@ -155,16 +158,18 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
     unit.name = unit_name("orient", static_cast<std::int64_t>(g));
     unit.fingerprint = hasher.value();
     unit.write = [&](const std::string& path) {
-      BlockState grown = grow(state, block);
+      InitialOrientation grown{grow(state, block), {}};
       const Links links = links_of(block, pairs);
-      for (const Frames& set : sets_to_orient(grown, frames_from(block, images_before), links))
+      for (const Frames& set : sets_to_orient(grown.state, frames_from(block, images_before), links))
         orient_set(job, block, pairs, set, links, grown);
-      write_state(path, grown);
+      write_orientation(path, grown);
     };
     const StageOutcome outcome = run_stage(job, "orientation", {unit});
     if (!outcome.failures.empty())
       throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
-    state = read_state(job.store.verified_path(unit.name));
+    const InitialOrientation done = read_orientation(job.store.verified_path(unit.name));
+    state = done.state;
+    for (const auto& [frame, reason] : done.failed) job.not_oriented[frame] = reason;
     previous = job.store.seal(unit.name)->content_hash;
     images_before = job.generations[g];
   }

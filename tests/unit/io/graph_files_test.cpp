@@ -1,4 +1,5 @@
 // Round trips of features, candidates, matches, tiles and adjustments, full and empty.
+#include <filesystem>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -210,6 +211,19 @@ TEST_F(GraphFiles, EmptyAdjustmentComesBack) {
   write_adjustment(path_, {});
   EXPECT_TRUE(read_adjustment(path_).frames.empty());
   EXPECT_EQ(read_adjustment(path_).summary, "");
+}
+
+TEST(OrientationFile, KeepsWhyFramesGotNoPose) {
+  const std::string path = testing::TempDir() + "orientation_with_reasons.h5";
+  InitialOrientation orientation;
+  orientation.state.frames.resize(2);
+  orientation.state.oriented.resize(2);
+  orientation.failed = {{FrameIndex(1), "only 3 of its points could be intersected"}};
+  write_orientation(path, orientation);
+  const InitialOrientation read = read_orientation(path);
+  EXPECT_EQ(read.state.frames.size(), 2u);
+  EXPECT_EQ(read.failed, orientation.failed);
+  std::filesystem::remove(path);
 }
 
 }  // namespace
