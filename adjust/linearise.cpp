@@ -98,6 +98,15 @@ MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& t
   return result;
 }
 
+Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState& state, std::int64_t point,
+                                    std::int64_t row) {
+  const TileImage& image = problem.images[problem.image[row].value];
+  const Eigen::Vector2d pixel =
+      project(state.cameras[image.camera.value],
+              to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[point]));
+  return pixel - Eigen::Vector2d(problem.x[row], problem.y[row]);
+}
+
 namespace {
 
 double image_cost(const TileProblem& problem, const TileState& state) {

@@ -17,6 +17,10 @@ struct ImageResidual {
 ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrinsics& intrinsics,
                               const Eigen::Vector3d& point, const Eigen::Vector2d& measured, double inverse_sigma);
 
+// Adjusted minus measured position of one observation (a row of the problem) of a point, pixels.
+Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState& state, std::int64_t point,
+                                    std::int64_t row);
+
 struct FrameResidual3 {
   Eigen::Vector3d residual;
   Eigen::Matrix<double, 3, 6> by_frame;

@@ -26,12 +26,7 @@ void add_images(const TileProblem& problem, const TileState& state, ResidualSum&
     ++sum.points;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      const TileImage& image = problem.images[problem.image[row].value];
-      const Eigen::Vector2d pixel =
-          project(state.cameras[image.camera.value],
-                  to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]));
-      sum.squares +=
-          (problem.inverse_sigma[row] * (pixel - Eigen::Vector2d(problem.x[row], problem.y[row]))).squaredNorm();
+      sum.squares += (problem.inverse_sigma[row] * image_difference_px(problem, state, p, row)).squaredNorm();
       ++sum.observations;
     }
   }

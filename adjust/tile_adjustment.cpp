@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "adjust/image_sigma.h"
+#include "adjust/linearise.h"
 #include "adjust/lost_frames.h"
 #include "io/error.h"
 
@@ -32,12 +33,7 @@ double robust_sigma(const TileProblem& problem, const TileState& state) {
     if (!problem.active(p)) continue;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      const TileImage& image = problem.images[problem.image[row].value];
-      const Eigen::Vector2d pixel =
-          project(state.cameras[image.camera.value],
-                  to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]));
-      const double length =
-          problem.inverse_sigma[row] * (pixel - Eigen::Vector2d(problem.x[row], problem.y[row])).norm();
+      const double length = problem.inverse_sigma[row] * image_difference_px(problem, state, p, row).norm();
       lengths.push_back(std::isfinite(length) ? length : std::numeric_limits<double>::max());
     }
   }

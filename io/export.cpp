@@ -1,12 +1,12 @@
 #include "io/export.h"
 
-#include <algorithm>
 #include <filesystem>
 
 #include "io/error.h"
 #include "io/export_bal.h"
 #include "io/export_colmap.h"
 #include "io/export_tables.h"
+#include "io/format_list.h"
 
 namespace megablock {
 
@@ -37,28 +37,18 @@ const std::vector<Format>& formats() {
 }  // namespace
 
 const std::vector<std::string>& export_formats() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> list;
-    for (const Format& format : formats()) list.push_back(format.name);
-    return list;
-  }();
+  static const std::vector<std::string> names = names_of(formats());
   return names;
 }
 
 void export_result(const BlockResult& result, const std::string& format, const std::string& out) {
-  const auto found =
-      std::find_if(formats().begin(), formats().end(), [&](const Format& f) { return f.name == format; });
-  if (found == formats().end()) {
-    std::string list;
-    for (const std::string& name : export_formats()) list += (list.empty() ? "" : ", ") + name;
-    throw InputError("'" + format + "' is no export format; they are " + list);
-  }
-  const fs::path folder = found->folder ? fs::path(out) : fs::absolute(out).parent_path();
+  const Format& found = format_named(formats(), format, "export");
+  const fs::path folder = found.folder ? fs::path(out) : fs::absolute(out).parent_path();
   std::error_code error;
   fs::create_directories(folder, error);
   if (!fs::is_directory(folder))
     throw InputError(folder.string() + ": the folder cannot be made; check the path and its permissions");
-  found->write(result, out);
+  found.write(result, out);
 }
 
 }  // namespace megablock

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "io/error.h"
+#include "io/format_list.h"
 #include "io/import_bal.h"
 #include "io/import_colmap.h"
 #include "io/text_writer.h"
@@ -30,20 +31,12 @@ const std::vector<Format>& formats() {
 }  // namespace
 
 const std::vector<std::string>& import_formats() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> list;
-    for (const Format& format : formats()) list.push_back(format.name);
-    return list;
-  }();
+  static const std::vector<std::string> names = names_of(formats());
   return names;
 }
 
 ImportedBlock import_block(const std::string& format, const std::string& path) {
-  for (const Format& known : formats())
-    if (known.name == format) return known.read(path);
-  std::string list;
-  for (const std::string& name : import_formats()) list += (list.empty() ? "" : ", ") + name;
-  throw InputError("'" + format + "' is no import format; they are " + list);
+  return format_named(formats(), format, "import").read(path);
 }
 
 void write_imported(const ImportedBlock& imported, const std::string& folder) {

@@ -1,26 +1,14 @@
 // Blocks of 500 images in eight and more tiles: the optimum of the block-wise compensation is that of one monolithic
 // problem.
-#include <ceres/solver.h>
 #include <gtest/gtest.h>
 
-#include "adjust/ceres_problem.h"
 #include "adjust/linearise.h"
 #include "merge/monolithic.h"
+#include "tests/unit/merge/ceres_cost.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
 namespace {
-
-double cost_after_ceres(const TileProblem& problem, const TileState& state) {
-  CeresTile tile(problem, state);
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_SCHUR;
-  options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;
-  options.max_num_iterations = 10;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &tile.problem(), &summary);
-  return summary.final_cost;
-}
 
 void expect_same_optimum(const SimulationOptions& options, std::int64_t tile_max_frames) {
   const SimulatedBlock simulated = simulate_block(options);
@@ -38,7 +26,7 @@ void expect_same_optimum(const SimulationOptions& options, std::int64_t tile_max
   const TileState solution = block.gathered(runner.problems(), runner.states());
   EXPECT_LE(max_pose_difference_sigmas(block.whole, solution), 1e-6);
   const double cost = evaluate_cost(block.whole, solution);
-  EXPECT_NEAR(cost_after_ceres(block.whole, solution), cost, 1e-9 * cost);
+  EXPECT_NEAR(cost_after_ceres(block.whole, solution, 10), cost, 1e-9 * cost);
 
   runner.final_up();
   for (const SeamReport& seam : runner.seams()) EXPECT_FALSE(seam.alarm()) << "node " << seam.node;

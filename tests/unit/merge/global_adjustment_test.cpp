@@ -1,14 +1,13 @@
 // The global iteration ends at the optimum of one monolithic Ceres problem; memory modes change no bit.
 #include "merge/global_adjustment.h"
 
-#include <ceres/solver.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "adjust/ceres_problem.h"
 #include "adjust/linearise.h"
 #include "merge/monolithic.h"
+#include "tests/unit/merge/ceres_cost.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
@@ -29,17 +28,6 @@ GlobalOptions exact() {
   return options;
 }
 
-double ceres_cost(const TileProblem& problem, TileState state) {
-  CeresTile tile(problem, state);
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_SCHUR;
-  options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;
-  options.max_num_iterations = 100;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &tile.problem(), &summary);
-  return summary.final_cost;
-}
-
 class SameOptimum : public testing::TestWithParam<SimulationOptions::Scene> {};
 
 TEST_P(SameOptimum, AsOneCeresProblem) {
@@ -52,7 +40,7 @@ TEST_P(SameOptimum, AsOneCeresProblem) {
   const TileState solution = block.gathered(runner.problems(), runner.states());
   EXPECT_LE(max_pose_difference_sigmas(block.whole, solution), 1e-6);
   const double cost = evaluate_cost(block.whole, solution);
-  EXPECT_NEAR(ceres_cost(block.whole, solution), cost, 1e-9 * cost);
+  EXPECT_NEAR(cost_after_ceres(block.whole, solution, 100), cost, 1e-9 * cost);
 }
 
 TEST_P(SameOptimum, BoundaryFramesAgreeToTheBit) {

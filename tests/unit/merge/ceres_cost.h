@@ -1,0 +1,22 @@
+// What Ceres makes of a tile's problem: the reference for our own optimum.
+#pragma once
+
+#include <ceres/ceres.h>
+
+#include "adjust/ceres_problem.h"
+
+namespace megablock {
+
+// Cost after so many steps from a state, until no tolerance of double precision is left.
+inline double cost_after_ceres(const TileProblem& problem, const TileState& state, int max_iterations) {
+  CeresTile tile(problem, state);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;
+  options.max_num_iterations = max_iterations;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &tile.problem(), &summary);
+  return summary.final_cost;
+}
+
+}  // namespace megablock
