@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "adjust/linearise.h"
+
 namespace megablock {
 
 namespace {
@@ -34,11 +36,7 @@ ImageResiduals image_residuals(const TileProblem& problem, const TileState& stat
     ++result.points;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      const TileImage& image = problem.images[problem.image[row].value];
-      const Eigen::Vector2d pixel =
-          project(state.cameras[image.camera.value],
-                  to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]));
-      const double squared = (pixel - Eigen::Vector2d(problem.x[row], problem.y[row])).squaredNorm();
+      const double squared = image_difference_px(problem, state, p, row).squaredNorm();
       if (!(weight * squared <= largest)) continue;
       result.weighted_squares += problem.image_loss.evaluate(weight * squared)[1] * squared;
       ++result.observations;

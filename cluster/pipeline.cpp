@@ -96,7 +96,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
            {"project", project.file},     {"generations", generations},       {"settings", settings},
            {"options", effective},        {"tie_points", project.tie_points}, {"unreadable", project.unreadable},
            {"warnings", project.warnings}};
-  const std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
+  std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
   store.write_text("job.json", text);
   return text;
 }

@@ -229,7 +229,7 @@ void JobStore::verify(const std::string& unit) const {
 }
 
 std::string JobStore::verified_path(const std::string& unit) const {
-  const std::string name = path(unit);
+  std::string name = path(unit);
   struct stat status {};
   std::pair<std::int64_t, std::int64_t> version(-1, -1);
   if (::stat(name.c_str(), &status) == 0)

@@ -139,7 +139,7 @@ std::vector<VerifiedPair> pairs_of_generation(const Job& job, const std::vector<
 }  // namespace
 
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
-  const BlockState start = initial_state(job.block);
+  BlockState start = initial_state(job.block);
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) return start;
   if (matches.empty())
     throw AgreedError<InputError>(

@@ -13,7 +13,7 @@ void add_tables(Hasher& hasher, const TileProblem& p) {
   for (const TileImage& image : p.images)
     hasher.add(image.image.value).add(image.frame.value).add(image.camera.value).add(image.mount);
   for (const TilePoint& point : p.points) hasher.add(point.role);
-  hasher.add(p.begin).add(p.image).add(p.x).add(p.y).add(p.inverse_sigma).add(p.kept);
+  hasher.add(p.begin).add(p.image).add(p.x).add(p.y).add(p.inverse_sigma).add(p.kept).add(p.image_sigma_px);
 }
 
 void add_frame_terms(Hasher& hasher, const TileProblem& p) {
