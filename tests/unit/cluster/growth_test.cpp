@@ -1,0 +1,102 @@
+#include "cluster/stages/growth.h"
+
+#include <gtest/gtest.h>
+
+#include "cluster/stages/problem_hash.h"
+#include "io/simulate/simulate.h"
+
+namespace megablock {
+namespace {
+
+TEST(Growth, GenerationOfAnImage) {
+  const std::vector<std::int64_t> generations = {10, 11, 20};
+  EXPECT_EQ(generation_of(generations, ImageIndex(0)), 0u);
+  EXPECT_EQ(generation_of(generations, ImageIndex(9)), 0u);
+  EXPECT_EQ(generation_of(generations, ImageIndex(10)), 1u);
+  EXPECT_EQ(generation_of(generations, ImageIndex(11)), 2u);
+  EXPECT_EQ(generation_of(generations, ImageIndex(19)), 2u);
+}
+
+TEST(Growth, FirstImagesAreABlockOfTheirOwn) {
+  SimulationOptions options;
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 6;
+  options.rig_cameras = 3;
+  Block block = simulate_block(options).block;
+  Camera later = block.cameras[CameraIndex(0)];
+  later.name = "later";
+  block.rigs.push_back({"later", {Mount{block.cameras.next_index(), {}}}});
+  block.cameras.push_back(later);
+  block.images.push_back({"later.jpg", "", block.frames.next_index(), 0, 0});
+  Frame frame;
+  frame.name = "later";
+  frame.rig = RigIndex(1);
+  block.frames.push_back(frame);
+  check(block);
+
+  const Block part = first_images(block, 6);
+  EXPECT_NO_THROW(check(part));
+  EXPECT_EQ(part.images.size(), 6u);
+  EXPECT_EQ(part.frames.size(), 2u);
+  EXPECT_EQ(part.rigs.size(), 1u);
+  EXPECT_EQ(part.cameras.size(), 3u);
+  EXPECT_EQ(first_images(block, std::ssize(block.images)).cameras.size(), 4u);
+}
+
+std::uint64_t hash_of(const TileProblem& problem, const TileState& state) {
+  Hasher hasher;
+  add_to_hash(hasher, problem, state);
+  return hasher.value();
+}
+
+TEST(ProblemHash, HoldsEveryTermAndStartValue) {
+  SimulationOptions options;
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 12;
+  options.points_per_frame = 40;
+  options.attitude_sigma_deg = 1;
+  options.relative_position_sigma_m = 0.05;
+  options.control_points = 8;
+  SimulatedBlock simulated = simulate_block(options);
+  for (Mount& mount : simulated.block.rigs[RigIndex(0)].mounts) mount.rotation_sigma_rad = 0.01;
+  simulated.block.rigs[RigIndex(0)].mounts[0].rotation_sigma_rad = 0;
+  for (Camera& camera : simulated.block.cameras) camera.prior_sigma[kFocal] = 20;
+  Tiles tiles;
+  tiles.tile_count = 1;
+  tiles.tile_of_frame.assign(simulated.block.frames.size(), TileIndex(0));
+  const BlockState start = initial_state(simulated.block);
+  const TileProblem problem = make_tile_problem(simulated.block, start, tiles, TileIndex(0), simulated.tracks, {});
+  const TileState state =
+      make_tile_state(problem, start, std::vector<Eigen::Vector3d>(problem.points.size(), Eigen::Vector3d::Zero()));
+  for (const std::size_t terms :
+       {problem.positions.size(), problem.attitudes.size(), problem.relatives.size(), problem.point_priors.size(),
+        problem.intrinsic_priors.size(), problem.mount_priors.size()})
+    ASSERT_GT(terms, 0u) << "the block must have every kind of term";
+  const std::uint64_t reference = hash_of(problem, state);
+  EXPECT_EQ(hash_of(problem, state), reference);
+
+  const auto differs = [&](auto change) {
+    TileProblem p = problem;
+    TileState s = state;
+    change(p, s);
+    return hash_of(p, s) != reference;
+  };
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.x[0] += 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.inverse_sigma.back() *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.kept[0] ^= 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.positions.at(0).prior.position.x() += 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.attitudes.at(0).prior.sigma_rad.x() *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.relatives.at(0).position_sigma_m *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.point_priors.at(0).position.z() += 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.intrinsic_priors.at(0).sigma[0] *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.mount_priors.at(0).rotation_sigma_rad *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.camera_free.at(0) ^= 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.image_loss.scale *= 2; }));
+  EXPECT_TRUE(differs([](auto&, auto& s) { s.frames[0].centre.x() += 1e-9; }));
+  EXPECT_TRUE(differs([](auto&, auto& s) { s.cameras[0][kRadial1] += 1e-9; }));
+  EXPECT_TRUE(differs([](auto&, auto& s) { s.mounts[0].centre.x() += 1e-9; }));
+  EXPECT_FALSE(differs([](auto& p, auto&) { p.points.back().index += 1; })) << "only the place in the block";
+}
+
+}  // namespace
+}  // namespace megablock
