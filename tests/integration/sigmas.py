@@ -1,0 +1,57 @@
+#!/usr/bin/python3
+"""What the options on sigmas do to a whole run. usage: sigmas.py MEGABLOCK"""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+NOISE_PX = 0.2
+
+
+def megablock(*command):
+    done = subprocess.run([sys.argv[1], *map(str, command)], capture_output=True, text=True)
+    assert done.returncode == 0, (command, done.stderr)
+    return done.stdout
+
+
+def run(folder, name, settings):
+    """Runs the block with these lines in its project; status, evaluation as it is, evaluation with --scale-sigma."""
+    project, job = os.path.join(folder, name + ".yaml"), os.path.join(folder, name)
+    with open(os.path.join(folder, "block.yaml")) as block, open(project, "w") as out:
+        out.write(block.read() + settings)
+    megablock("run", project, "-j", job, "--quiet")
+    truth = os.path.join(folder, "truth.csv")
+    return (json.loads(megablock("status", job, "--json")), json.loads(megablock("evaluate", job, truth, "--json")),
+            json.loads(megablock("evaluate", job, truth, "--json", "--scale-sigma")))
+
+
+def near(value, expected, tolerance):
+    assert abs(value - expected) <= tolerance, (value, expected, tolerance)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        megablock("simulate", "--frames", 16, "--noise", NOISE_PX, "--control-points", 3, "--check-points", 4, "-o", folder)
+
+        status, plain, scaled = run(folder, "estimated", "")
+        near(status["image_sigma_px"], NOISE_PX, 0.05 * NOISE_PX)
+        near(status["chi2_per_dof"], 1, 0.05)
+        near(scaled["normalised_error_position"],
+             plain["normalised_error_position"] / status["chi2_per_dof"] ** 0.5, 1e-9)
+
+        # The guess of 0.5 px holds: the variance factor tells that it is wrong.
+        status, plain, scaled = run(folder, "stated", "adjustment:\n  estimate_image_sigma: false\n")
+        assert status["image_sigma_px"] == 0.5, status["image_sigma_px"]
+        near(status["chi2_per_dof"], (NOISE_PX / 0.5) ** 2, 0.02)
+
+        # The job scales its covariances: 'evaluate' does not scale them again.
+        status, once, twice = run(folder, "scaled", "adjustment:\n  estimate_image_sigma: false\n"
+                                                    "merge:\n  scale_sigma: true\n")
+        for key in ("normalised_error_position", "normalised_error_rotation", "normalised_error_check"):
+            near(once[key], scaled[key], 1e-6 * scaled[key])
+            assert twice[key] == once[key], key
+        assert once["normalised_error_rotation"] > 2 * plain["normalised_error_rotation"]
+
+
+main()
