@@ -22,6 +22,7 @@ template <typename Visitor>
 void describe(Visitor& visit, CandidateOptions& o) {
   visit.integer("neighbours", o.neighbours);
   visit.number("max_pair_distance_m", o.max_pair_distance_m);
+  visit.number("max_view_angle_deg", o.max_view_angle_deg);
   visit.integer("order_neighbours", o.order_neighbours);
   visit.integer("descriptor_neighbours", o.descriptor_neighbours);
   visit.integer("exhaustive_below", o.exhaustive_below);

@@ -31,6 +31,34 @@ struct SeamCheck {
   std::string note;           // names the suspected tile on alarm
 };
 
+// One option of the job, as a project file would say it.
+struct OptionRecord {
+  std::string name;  // "section.key"
+  std::string value, default_value;
+};
+
+// What made the result. No times: equal results are equal files.
+struct Provenance {
+  std::string project;     // name of the project file
+  std::string program;     // "megablock 0.1.0"
+  std::string arithmetic;  // level
+  std::vector<OptionRecord> options;
+};
+
+// A connected part of the block whose place nothing fixes completely.
+struct FreePart {
+  FrameIndex frame;         // its first one
+  std::int32_t defect = 0;  // of its datum: 7 = place, direction and scale are its own
+};
+
+// What the stages before the adjustment made of an image; -1 = not known.
+struct ImageRecord {
+  std::int32_t width = -1, height = -1;  // of the decoded image, px
+  std::int64_t features = -1;
+  std::int64_t matched_images = -1;  // with verified matches
+  std::int64_t matches = -1;         // in all of these pairs
+};
+
 struct BlockResult {
   Block block;
   BlockState state;
@@ -65,6 +93,10 @@ struct BlockResult {
   bool sigma_scaled = false;        // covariances are multiplied by variance_factor
   int global_iterations = 0;
   double newton_decrement = 0;
+  double decrement_limit = 0;       // at which the block counts as adjusted; 0: not known
+  std::vector<FreePart> free_parts;
+  IndexedVector<ImageIndex, ImageRecord> image_records;  // empty when the job did not start from images
+  Provenance provenance;
   std::string gauge;                // "fixed by priors" or "free, inner constraints over N frames" ...
   std::vector<SeamCheck> seams;
   std::vector<FailedUnit> failures; // images and units, with reasons

@@ -50,6 +50,8 @@ void check_sizes(const BlockResult& result) {
   for (std::size_t p = 0; p < result.control.size(); ++p)
     require_size(result.control[p].residual_px.size(), result.block.control_points[p].measurements.size(),
                  "residuals of a control point");
+  if (!result.image_records.empty())
+    require_size(result.image_records.size(), result.block.images.size(), "image records");
 }
 
 std::int64_t rows(const auto& items) { return static_cast<std::int64_t>(items.size()); }
@@ -157,6 +159,7 @@ void put_figures(Hdf5Writer& file, const BlockResult& result) {
   file.attribute("/", "sigma_scaled", static_cast<std::uint8_t>(result.sigma_scaled));
   file.attribute("/", "global_iterations", result.global_iterations);
   file.attribute("/", "newton_decrement", result.newton_decrement);
+  file.attribute("/", "newton_decrement_limit", result.decrement_limit);
   file.attribute("/", "gauge", result.gauge);
   file.attribute("/", "digest", result.digest);
 }
@@ -169,6 +172,8 @@ void get_figures(const Hdf5Reader& file, BlockResult& result) {
   result.sigma_scaled = file.attribute<std::uint8_t>("/", "sigma_scaled") != 0;
   result.global_iterations = file.attribute<int>("/", "global_iterations");
   result.newton_decrement = file.attribute<double>("/", "newton_decrement");
+  if (file.has_attribute("/", "newton_decrement_limit"))
+    result.decrement_limit = file.attribute<double>("/", "newton_decrement_limit");
   result.gauge = file.text_attribute("/", "gauge");
   result.digest = file.text_attribute("/", "digest");
 }
@@ -227,13 +232,78 @@ void get_record(const Hdf5Reader& file, BlockResult& result) {
   result.notes = file.texts("notes");
 }
 
+void put_provenance(Hdf5Writer& file, const Provenance& provenance) {
+  file.attribute("/", "project", provenance.project);
+  file.attribute("/", "program", provenance.program);
+  file.attribute("/", "arithmetic", provenance.arithmetic);
+  const std::vector<OptionRecord>& options = provenance.options;
+  file.group("options", "of the stages, as a project file would give them");
+  file.texts("options/name", column(options, [](const OptionRecord& o) { return o.name; }), {"", "section.key"});
+  file.texts("options/value", column(options, [](const OptionRecord& o) { return o.value; }));
+  file.texts("options/default", column(options, [](const OptionRecord& o) { return o.default_value; }));
+}
+
+// Results of earlier programs have none.
+void get_provenance(const Hdf5Reader& file, Provenance& provenance) {
+  if (!file.has("options")) return;
+  provenance.project = file.text_attribute("/", "project");
+  provenance.program = file.text_attribute("/", "program");
+  provenance.arithmetic = file.text_attribute("/", "arithmetic");
+  const std::vector<std::string> name = file.texts("options/name");
+  const std::vector<std::string> value = file.texts("options/value", rows(name));
+  const std::vector<std::string> standard = file.texts("options/default", rows(name));
+  for (std::size_t i = 0; i < name.size(); ++i) provenance.options.push_back({name[i], value[i], standard[i]});
+}
+
+void put_image_records(Hdf5Writer& file, const IndexedVector<ImageIndex, ImageRecord>& records) {
+  if (records.empty()) return;
+  std::vector<std::int32_t> size;
+  for (const ImageRecord& record : records) size.insert(size.end(), {record.width, record.height});
+  file.matrix("images/size", size, 2, {"px", "width, height of the decoded image; -1: not known"});
+  const auto put = [&](const char* name, std::int64_t ImageRecord::*member, const char* description) {
+    file.vector(name, column(records, [&](const ImageRecord& r) { return r.*member; }), {"", description});
+  };
+  put("images/features", &ImageRecord::features, "number of keypoints");
+  put("images/matched_images", &ImageRecord::matched_images, "number of images with verified matches");
+  put("images/matches", &ImageRecord::matches, "number of verified matches in these pairs");
+}
+
+void get_image_records(const Hdf5Reader& file, BlockResult& result) {
+  if (!file.has("images/matched_images")) return;
+  const std::int64_t count = rows(result.block.images);
+  const auto size = file.matrix<std::int32_t>("images/size", 2, count);
+  const auto features = file.vector<std::int64_t>("images/features", count);
+  const auto matched = file.vector<std::int64_t>("images/matched_images", count);
+  const auto matches = file.vector<std::int64_t>("images/matches", count);
+  for (std::size_t i = 0; i < features.size(); ++i)
+    result.image_records.push_back({size[2 * i], size[2 * i + 1], features[i], matched[i], matches[i]});
+}
+
+void put_free_parts(Hdf5Writer& file, const std::vector<FreePart>& parts) {
+  file.group("free_parts", "connected parts of the block whose place nothing fixes completely");
+  file.vector("free_parts/frame", column(parts, [](const FreePart& p) { return p.frame.value; }), {"", "its first one"});
+  file.vector("free_parts/defect", column(parts, [](const FreePart& p) { return p.defect; }), {"", "of its datum"});
+}
+
+void get_free_parts(const Hdf5Reader& file, BlockResult& result) {
+  if (!file.has("free_parts")) return;
+  const auto frame = file.vector<std::int64_t>("free_parts/frame");
+  const auto defect = file.vector<std::int32_t>("free_parts/defect", rows(frame));
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    if (frame[i] < 0 || frame[i] >= rows(result.block.frames)) file.fail("free_parts/frame", "names a frame that is not there");
+    result.free_parts.push_back({FrameIndex(frame[i]), defect[i]});
+  }
+}
+
 }  // namespace
 
 void write_result(const std::string& path, const BlockResult& result) {
   check_sizes(result);
   Hdf5Writer file(path, "result");
   put_figures(file, result);
+  put_provenance(file, result.provenance);
   put_block(file, result.block);
+  put_image_records(file, result.image_records);
   put_state(file, result.state);
   file.vector("frames/boundary", result.boundary, {"", "1: touched by observations of two or more tiles"});
   put_tiles(file, result.tiles);
@@ -241,6 +311,7 @@ void write_result(const std::string& path, const BlockResult& result) {
   put_precision(file, result);
   put_points(file, result);
   put_control_results(file, result.control);
+  put_free_parts(file, result.free_parts);
   put_seams(file, result.seams);
   put_record(file, result);
   file.close();
@@ -250,7 +321,9 @@ BlockResult read_result(const std::string& path) {
   const Hdf5Reader file(path, "result");
   BlockResult result;
   get_figures(file, result);
+  get_provenance(file, result.provenance);
   result.block = get_block(file);
+  get_image_records(file, result);
   result.state = get_state(file);
   result.boundary =
       IndexedVector<FrameIndex, std::uint8_t>(file.vector<std::uint8_t>("frames/boundary", rows(result.block.frames)));
@@ -258,6 +331,7 @@ BlockResult read_result(const std::string& path) {
   get_precision(file, result);
   get_points(file, result);
   result.control = get_control_results(file, result.block);
+  get_free_parts(file, result);
   result.seams = get_seams(file);
   get_record(file, result);
   return result;

@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <map>
+
 #include "cluster/job_options.h"
 #include "io/error.h"
 
@@ -67,6 +70,28 @@ TEST(JobOptions, EveryOptionReachesItsStagesFingerprintAndNoOther) {
   EXPECT_NE(hash_of(defaults.matching), hash_of(changed.matching));
   EXPECT_EQ(hash_of(defaults.features), hash_of(changed.features));
   EXPECT_EQ(hash_of(defaults.adjustment), hash_of(changed.adjustment));
+}
+
+// The rows "| `section.key` | default | ..." of the project file's documentation.
+std::map<std::string, std::string> documented_options() {
+  std::ifstream in(MEGABLOCK_SOURCE "/docs/project-file.md");
+  EXPECT_TRUE(in);
+  std::map<std::string, std::string> rows;
+  bool section = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("#")) section = line == "## Options of the stages";
+    if (!section || !line.starts_with("| `")) continue;
+    const std::size_t name = line.find('`') + 1, name_end = line.find('`', name);
+    const std::size_t value = line.find(" | ", name_end) + 3, value_end = line.find(" | ", value);
+    rows[line.substr(name, name_end - name)] = line.substr(value, value_end - value);
+  }
+  return rows;
+}
+
+TEST(JobOptions, AreDocumentedWithTheirDefaults) {
+  std::map<std::string, std::string> options;
+  for (const OptionValue& option : option_values({})) options[option.section + "." + option.key] = option.value;
+  EXPECT_EQ(documented_options(), options);
 }
 
 }  // namespace
