@@ -15,6 +15,7 @@
 #include "cluster/exit_codes.h"
 #include "cluster/pipeline.h"
 #include "cluster/status.h"
+#include "cluster/version.h"
 #include "io/check.h"
 #include "io/error.h"
 #include "io/evaluate.h"
@@ -202,8 +203,12 @@ void add_report(CLI::App& app, Action& action) {
   command->add_option("-o,--output", options->output, "Page to write; default: result/report.html of the job");
   command->callback([=, &action] {
     action = [options] {
-      const std::string page = report_html(finished_result(options->job));
       const JobStore store(options->job);
+      const BlockResult result = finished_result(options->job);
+      const auto written =
+          std::filesystem::file_time_type::clock::to_sys(std::filesystem::last_write_time(store.path(kResult)));
+      const std::string page = report_html(
+          result, {options->job, std::chrono::duration<double>(written.time_since_epoch()).count()});
       if (options->output.empty()) {
         store.write_text("result/report.html", page);
       } else {
@@ -340,7 +345,7 @@ int run_action(const Action& action, Communicator& ranks) {
 int command_line(int argc, char** argv) {
   CLI::App app{"megablock orients image blocks of any size: tiles on ranks, exact block-wise compensation, resumable."};
   app.name("megablock");
-  app.set_version_flag("--version", "megablock 0.1.0 (arithmetic level avx2)");
+  app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + kArithmeticLevel + ")");
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* command, const CLI::Error& error) {
     return "megablock: " + std::string(error.what()) + "; see '" + command->get_name() + " --help'\n";

@@ -12,6 +12,7 @@
 #include "cluster/exit_codes.h"
 #include "cluster/process_memory.h"
 #include "cluster/stages/stages.h"
+#include "cluster/version.h"
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/project.h"
@@ -92,7 +93,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   Json effective = Json::object();
   for (const OptionValue& option : option_values(read_options(project.settings)))
     effective[option.section][option.key] = option.value;
-  Json job{{"version", kJobVersion},      {"program", "megablock 0.1.0"},     {"arithmetic", kArithmeticLevel},
+  Json job{{"version", kJobVersion},      {"program", kProgram},     {"arithmetic", kArithmeticLevel},
            {"project", project.file},     {"generations", generations},       {"settings", settings},
            {"options", effective},        {"tie_points", project.tie_points}, {"unreadable", project.unreadable},
            {"warnings", project.warnings}};

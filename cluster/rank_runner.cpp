@@ -304,7 +304,7 @@ RankRunner::Posterior RankRunner::posterior() {
   seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
   with_columns_ = gauge_.free();
   posterior.sums = up(0).sums;
-  posterior.gauge = judge_gauge(posterior.sums, gauge_);
+  posterior.gauge = gauge_;
   check_seams_ = false;
   std::vector<TileStep> steps(tiles_.size());
   InnerSums inner_constraints;

@@ -46,7 +46,7 @@ class RankRunner : public TreeRunner {
   // Collective, at the solution: an upward pass with lambda = 0, seams and gauge, then covariances.
   struct Posterior {
     SubtreeSums sums;  // of the whole block
-    GaugeReport gauge;
+    BlockGauge gauge;
     std::vector<SeamReport> seams;            // of all inner nodes, in node order; on every rank
     std::vector<TileCheck> tile_checks;       // of all tiles, in tile order; on every rank
     std::vector<TileCovariance> covariances;  // of this rank's tiles

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "io/report/figures.h"
 #include "io/report/html.h"
 #include "io/report/page.h"
@@ -9,20 +11,47 @@
 
 namespace megablock {
 
-std::string report_html(const BlockResult& result) {
+namespace {
+
+// The line below the title: how large, made from what, when and by what.
+std::string subtitle_of(const BlockResult& result, const report::Figures& figures, const ReportContext& context) {
+  using namespace report;
+  std::string text =
+      fmt::format("{} images, {} frames, {} {}", count(static_cast<std::int64_t>(result.block.images.size())),
+                  count(figures.frames), count(static_cast<std::int64_t>(result.block.cameras.size())),
+                  result.block.cameras.size() == 1 ? "camera" : "cameras");
+  const auto add = [&](const std::string& part) {
+    if (!part.empty()) text += " &middot; " + part;
+  };
+  add(escape(result.provenance.project));
+  add(time_text(context.computed_s));
+  add(escape(result.provenance.program));
+  if (!result.digest.empty()) add("digest <code>" + escape(result.digest) + "</code>");
+  return text;
+}
+
+// The name of the job's directory, also of one given as "job/" or ".".
+std::string name_of(const std::string& job) {
+  if (job.empty()) return "";
+  const std::filesystem::path path = std::filesystem::absolute(job).lexically_normal();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
+}
+
+}  // namespace
+
+std::string report_html(const BlockResult& result, const ReportContext& context) {
   using namespace report;
   const Figures figures = figures_of(result);
-  std::string body = headline(result, figures) + assessment(result, figures) + map_section(result, figures) +
-                     tie_points_section(result, figures) + residuals_section(result, figures) +
-                     positions_section(result, figures) + control_section(result, figures) +
-                     cameras_section(result, figures) + accuracy_section(result, figures) +
-                     tiles_section(result, figures) + failures_section(result, figures) + stages_section(result);
-  const std::string digest = result.digest.empty() ? "" : " &middot; digest <code>" + escape(result.digest) + "</code>";
-  const std::string subtitle =
-      fmt::format("{} images, {} frames, {} {}{}", count(static_cast<std::int64_t>(result.block.images.size())),
-                  count(figures.frames), count(static_cast<std::int64_t>(result.block.cameras.size())),
-                  result.block.cameras.size() == 1 ? "camera" : "cameras", digest);
-  return page("Block report", subtitle, body, figures_json(result, figures));
+  const std::string body =
+      headline(result, figures) + assessment(result, figures) + map_section(result, figures) +
+      coverage_section(result, figures) + tie_points_section(result, figures) + residuals_section(result, figures) +
+      images_section(result, figures) + positions_section(result, figures) + attitudes_section(result, figures) +
+      control_section(result, figures) + cameras_section(result, figures) + accuracy_section(result, figures) +
+      tiles_section(result, figures) + failures_section(result, figures) + stages_section(result) +
+      provenance_section(result, context);
+  const std::string name = name_of(context.job);
+  return page(name.empty() ? "Block report" : "Block report: " + escape(name), subtitle_of(result, figures, context),
+              body, figures_json(result, figures));
 }
 
 }  // namespace megablock

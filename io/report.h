@@ -2,15 +2,22 @@
 // fetched), for the screen, a phone and paper.
 #pragma once
 
+#include <limits>
 #include <string>
 
 #include "io/result.h"
 
 namespace megablock {
 
+// What the page says that is not in the result, whose bits tell no time and no place.
+struct ReportContext {
+  std::string job;                                               // directory
+  double computed_s = std::numeric_limits<double>::quiet_NaN();  // when the result was written, since 1970
+};
+
 // Works for any result, however incomplete: what was not computed is left out or said to be missing, and no figure that
 // is not a number is printed. The page carries its figures as JSON in <script type="application/json" id="figures">
 // (keys as `status --json` where they are the same; metres, radians as named, pixels; null where unknown).
-std::string report_html(const BlockResult& result);
+std::string report_html(const BlockResult& result, const ReportContext& context = {});
 
 }  // namespace megablock

@@ -281,7 +281,8 @@ void get_image_records(const Hdf5Reader& file, BlockResult& result) {
 
 void put_free_parts(Hdf5Writer& file, const std::vector<FreePart>& parts) {
   file.group("free_parts", "connected parts of the block whose place nothing fixes completely");
-  file.vector("free_parts/frame", column(parts, [](const FreePart& p) { return p.frame.value; }), {"", "its first one"});
+  file.vector("free_parts/frame", column(parts, [](const FreePart& p) { return p.frame.value; }),
+              {"", "its first one"});
   file.vector("free_parts/defect", column(parts, [](const FreePart& p) { return p.defect; }), {"", "of its datum"});
 }
 
@@ -290,7 +291,8 @@ void get_free_parts(const Hdf5Reader& file, BlockResult& result) {
   const auto frame = file.vector<std::int64_t>("free_parts/frame");
   const auto defect = file.vector<std::int32_t>("free_parts/defect", rows(frame));
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    if (frame[i] < 0 || frame[i] >= rows(result.block.frames)) file.fail("free_parts/frame", "names a frame that is not there");
+    if (frame[i] < 0 || frame[i] >= rows(result.block.frames))
+      file.fail("free_parts/frame", "names a frame that is not there");
     result.free_parts.push_back({FrameIndex(frame[i]), defect[i]});
   }
 }

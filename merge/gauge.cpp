@@ -530,7 +530,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
   }
 }
 
-GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge) {
+GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge, const UnknownName& name) {
   GaugeReport report;
   report.defect = gauge.defect();
   for (const HeldUnknown& held : root.held) {
@@ -539,17 +539,19 @@ GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge) {
     (datum ? report.defect : report.undetermined) += 1;
   }
   if (!gauge.free() && report.defect > 0)
-    report.text = "free: defect " + std::to_string(report.defect) + ", held at " + describe(root.held.back().id);
+    report.text = "free: defect " + std::to_string(report.defect) + ", held at " + name(root.held.back().id);
   if (gauge.free()) {
     report.text = "free, inner constraints:";
-    for (const FreeComponent& c : gauge.components)
-      report.text += " defect " + std::to_string(c.defect) + " of the component of " +
-                     describe({UnknownKind::kFrame, 0, c.lowest_frame}) + ";";
-    report.text.pop_back();
+    constexpr std::size_t kNamed = 5;
+    for (std::size_t i = 0; i < std::min(kNamed, gauge.components.size()); ++i)
+      report.text += (i > 0 ? ", defect " : " defect ") + std::to_string(gauge.components[i].defect) +
+                     " of the part that holds " + name({UnknownKind::kFrame, 0, gauge.components[i].lowest_frame});
+    if (gauge.components.size() > kNamed)
+      report.text += " and " + std::to_string(gauge.components.size() - kNamed) + " more parts";
   }
   if (report.undetermined > 0)
     report.text += "; " + std::to_string(report.undetermined) + " parameters held that too little observes, first of " +
-                   describe(root.held.front().id);
+                   name(root.held.front().id);
   if (root.held_points > 0)
     report.text += "; " + std::to_string(root.held_points) + " undetermined point coordinates held";
   return report;

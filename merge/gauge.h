@@ -23,6 +23,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -112,6 +113,7 @@ struct GaugeReport {
   std::int64_t undetermined = 0;  // scalar unknowns held because too little observes them
   std::string text = "fixed by priors";
 };
-GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge = {});
+using UnknownName = std::function<std::string(const UnknownId&)>;
+GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge = {}, const UnknownName& name = describe);
 
 }  // namespace megablock

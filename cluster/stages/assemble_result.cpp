@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "cluster/matrix_bytes.h"
+#include "cluster/stages/provenance.h"
 #include "geometry/camera.h"
 #include "geometry/pose.h"
 
@@ -223,6 +224,10 @@ BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutco
   result.image_sigma_px = outcome.image_sigma_px;
   result.global_iterations = outcome.global_iterations;
   result.newton_decrement = outcome.newton_decrement;
+  result.decrement_limit = job.settings.merge.decrement;
+  result.free_parts = outcome.free_parts;
+  result.image_records = image_records(job);
+  result.provenance = provenance_of(job);
   result.gauge = outcome.gauge;
   result.seams = outcome.seams;
   result.notes = job.notes;

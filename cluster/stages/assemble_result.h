@@ -19,6 +19,7 @@ struct MergeOutcome {
   int global_iterations = 0;
   double newton_decrement = 0;
   std::string gauge;
+  std::vector<FreePart> free_parts;
   std::vector<SeamCheck> seams;
 };
 

@@ -18,6 +18,7 @@
 #include "cluster/stages/block_image_sigma.h"
 #include "cluster/stages/merge_checkpoint.h"
 #include "cluster/stages/merge_start.h"
+#include "cluster/stages/provenance.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -290,7 +291,7 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
   return parts;
 }
 
-MergeOutcome make_outcome(const Adjusted& adjusted) {
+MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {
   MergeOutcome outcome;
   outcome.state = adjusted.state;
   const SubtreeSums& sums = adjusted.posterior.sums;
@@ -300,15 +301,22 @@ MergeOutcome make_outcome(const Adjusted& adjusted) {
   outcome.image_sigma_px = adjusted.image_sigma_px;
   outcome.global_iterations = adjusted.position.global.accepted;
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
-  outcome.gauge = adjusted.posterior.gauge.text;
+  const BlockGauge& gauge = adjusted.posterior.gauge;
+  outcome.gauge = judge_gauge(sums, gauge, names_of(block)).text;
+  for (const FreeComponent& part : gauge.components)
+    outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
   outcome.seams = seam_checks(adjusted.posterior);
   return outcome;
+}
+
+double seconds_since_1970() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 // Of all stages, this one as far as `event`, which ends it, says.
 std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
   std::vector<UnitEvent> events = read_events(job.store);
-  event.time_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  event.time_s = seconds_since_1970();
   events.push_back(event);
   std::vector<StageStatistics> statistics;
   for (const StageRecord& record : job.records) statistics.push_back(stage_statistics(record, events));
@@ -325,7 +333,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   result.stages = statistics_of(job, event);
   std::filesystem::create_directories(job.store.path("result"));
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result); });
-  job.store.write_text("result/report.html", report_html(result));
+  job.store.write_text("result/report.html", report_html(result, {job.options.directory, seconds_since_1970()}));
 }
 
 }  // namespace
@@ -352,7 +360,7 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   clear_scratch(job);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
   clear_scratch(job);
-  MergeOutcome outcome = make_outcome(adjusted);
+  MergeOutcome outcome = make_outcome(adjusted, job.block);
   const std::vector<TileResult> parts = gather_parts(job, inputs, adjusted, outcome);
   UnitEvent event;
   event.stage = "merge";

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "io/report/figures.h"
+#include "io/report/plane.h"
 
 namespace megablock::report {
 
@@ -30,10 +31,19 @@ FieldDrawing draw(const ResidualField& field, const Camera& camera);
 std::string draw_horizontal(const std::vector<PositionResidual>& residuals);
 std::string draw_vertical(const std::vector<PositionResidual>& residuals);
 
-// Images coloured by tile, boundary frames ringed, images not oriented, control and check points, tie points as a
-// background, links between frames. Layers carry classes that the page's script shows and hides.
-std::string draw_map(const BlockResult& result, const Figures& figures);
+// Of the selected frames: coloured by tile, boundary frames ringed, those not oriented; tie points as a background,
+// links between frames; control and check points when the frames are `placed` in the ground frame. Layers carry classes
+// that the page's script shows and hides. `unit`: of lengths.
+std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed);
 std::string map_legend(const BlockResult& result, const Figures& figures);
+
+// Images that see tie points in each cell of the ground, and the mean number of rays to these.
+std::string draw_coverage(const BlockResult& result, const FrameSelection& selected, const char* unit);
+std::string coverage_legend();
+
+// Horizontal error ellipses of the frames' positions and bars for the sigma of the height, exaggerated; the caption
+// says how much. Empty without covariances.
+FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit);
 
 // A step of 1, 2 or 5 times a power of ten that divides `range` into at most `parts`.
 double round_step(double range, int parts);

@@ -32,12 +32,6 @@ Track track_of(const BlockResult& result, std::size_t row) {
   return track;
 }
 
-Eigen::Vector3d projection_centre(const BlockResult& result, ImageIndex image) {
-  const Image& i = result.block.images[image];
-  const std::vector<Pose>& mounts = result.state.mounts[result.block.frames[i.frame].rig];
-  return camera_pose(result.state.frames[i.frame], mounts[static_cast<std::size_t>(i.mount)]).centre;
-}
-
 class Gatherer {
  public:
   explicit Gatherer(const BlockResult& result) : result_(result), block_(result.block) {}
@@ -48,6 +42,7 @@ class Gatherer {
     prepare();
     frames();
     if (sound) observations();
+    find_parts(result_, f_);
     positions();
     points();
     accuracy();
@@ -70,6 +65,9 @@ class Gatherer {
     const double rms = f_.reprojection.rms_px > 0 ? f_.reprojection.rms_px : 1;
     f_.residual_px = {-4 * rms / std::sqrt(2.0), 8 * rms / std::sqrt(2.0) / 41, std::vector<std::int64_t>(41, 0)};
     f_.observations.assign(block_.images.size(), 0);
+    f_.measured.assign(block_.images.size(), 0);
+    f_.image_squares.assign(block_.images.size(), 0);
+    for (const ImageIndex image : result_.tracks.image) ++f_.measured[image];
     f_.camera_images.assign(block_.cameras.size(), 0);
     for (const Camera& camera : block_.cameras) {
       ResidualField field;
@@ -146,6 +144,7 @@ class Gatherer {
     const ImageIndex image = result_.tracks.image[o];
     const Eigen::Vector2d residual(result_.residual_x[o], result_.residual_y[o]);
     ++f_.observations[image];
+    f_.image_squares[image] += residual.squaredNorm();
     f_.residual_px.add(residual.x());
     f_.residual_px.add(residual.y());
     const CameraIndex camera = block_.camera_of(image);
@@ -170,7 +169,7 @@ class Gatherer {
     for (std::size_t o : track.kept) {
       if (static_cast<std::int64_t>(rays.size()) == kRayLimit) break;
       const ImageIndex image = result_.tracks.image[o];
-      const Eigen::Vector3d ray = result_.points[row] - projection_centre(result_, image);
+      const Eigen::Vector3d ray = result_.points[row] - image_pose(result_, image).centre;
       resolution.push_back(ray.norm() / result_.state.cameras[block_.camera_of(image)][kFocal]);
       rays.push_back(ray.normalized());
     }
@@ -189,25 +188,45 @@ class Gatherer {
         f_.positions.push_back({frame, antenna - prior->position, prior->sigma});
       }
       if (const auto& prior = block_.frames[frame].attitude_prior)
-        f_.attitude_deg.push_back(pose.rotation.angularDistance(prior->rotation_cw) * kDegrees);
+        f_.attitudes.push_back(
+            {frame, rotation_log<double>(pose.rotation * prior->rotation_cw.conjugate()), prior->sigma_rad});
     }
   }
 
   void points() {
     for (std::size_t p = 0; p < block_.control_points.size() && p < result_.control.size(); ++p) {
       const BlockResult::ControlResult& control = result_.control[p];
+      const ControlPoint& given = block_.control_points[p];
       PointResidual residual;
       residual.point = p;
-      residual.difference = control.adjusted - block_.control_points[p].position;
-      double squares = 0;
-      for (const Eigen::Vector2d& r : control.residual_px) {
-        if (!r.allFinite()) continue;
-        ++residual.images;
-        squares += r.squaredNorm();
+      residual.difference = control.adjusted - given.position;
+      const bool check = given.role == PointRole::kCheck;
+      const double factor = result_.sigma_scaled && !check ? result_.variance_factor : 1;  // as the covariance has it
+      for (int k = 0; k < 3; ++k) {
+        const double given_variance = factor * given.sigma[k] * given.sigma[k];
+        const double variance = given_variance + (check ? 1 : -1) * control.covariance(k, k);
+        if (variance > 1e-4 * given_variance) residual.sigma[k] = std::sqrt(variance);
+        const double ratio = std::abs(residual.difference[k]) / residual.sigma[k];
+        if (std::isfinite(ratio) && !(residual.ratio >= ratio)) residual.ratio = ratio;
       }
-      if (residual.images) residual.rms_px = std::sqrt(squares / residual.images);
+      measurements(p, residual);
       f_.points.push_back(residual);
     }
+    std::stable_sort(f_.measurements.begin(), f_.measurements.end(),
+                     [](const auto& a, const auto& b) { return a.ratio > b.ratio; });
+  }
+
+  void measurements(std::size_t p, PointResidual& residual) {
+    const ControlPoint& given = block_.control_points[p];
+    double squares = 0;
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), result_.control[p].residual_px.size()); ++m) {
+      const Eigen::Vector2d& r = result_.control[p].residual_px[m];
+      if (!r.allFinite()) continue;
+      ++residual.images;
+      squares += r.squaredNorm();
+      f_.measurements.push_back({p, m, r, r.cwiseAbs().maxCoeff() / given.measurements[m].sigma_px});
+    }
+    if (residual.images) residual.rms_px = std::sqrt(squares / residual.images);
   }
 
   void accuracy() {
@@ -271,6 +290,17 @@ Eigen::Vector2d ResidualField::mean(int row, int column) const {
 
 bool oriented(const BlockResult& result, FrameIndex frame) {
   return result.state.oriented.contains(frame) && result.state.oriented[frame] != 0;
+}
+
+double image_rms(const Figures& figures, ImageIndex image) {
+  const std::int64_t n = figures.observations[image];
+  return n ? std::sqrt(figures.image_squares[image] / static_cast<double>(n)) : kUnknown;
+}
+
+Pose image_pose(const BlockResult& result, ImageIndex image) {
+  const Image& i = result.block.images[image];
+  const std::vector<Pose>& mounts = result.state.mounts[result.block.frames[i.frame].rig];
+  return camera_pose(result.state.frames[i.frame], mounts[static_cast<std::size_t>(i.mount)]);
 }
 
 Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values) {

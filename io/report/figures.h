@@ -41,11 +41,36 @@ struct PositionResidual {
   Eigen::Vector3d sigma;       // stated
 };
 
+struct AttitudeResidual {
+  FrameIndex frame;
+  Eigen::Vector3d difference;  // adjusted after observed attitude: rotation about the rig's x, y, z, radians
+  Eigen::Vector3d sigma;       // stated
+};
+
 struct PointResidual {
   std::size_t point;           // in block.control_points
   Eigen::Vector3d difference;  // adjusted minus given, metres; NaN where unknown
-  int images = 0;              // with a residual
+  // Of the difference: of a check point sqrt(adjusted + given variance), of a control point, which took part,
+  // sqrt(given - adjusted variance). NaN where unknown.
+  Eigen::Vector3d sigma = Eigen::Vector3d::Constant(kUnknown);
+  double ratio = kUnknown;  // largest |difference| / sigma of the axes
+  int images = 0;           // with a residual
   double rms_px = kUnknown;
+};
+
+// An image measurement of a control or check point.
+struct MeasurementResidual {
+  std::size_t point, measurement;  // in block.control_points
+  Eigen::Vector2d residual;        // px, adjusted minus measured
+  double ratio;                    // larger component / stated sigma
+};
+
+// What hangs together by kept observations and relative poses.
+struct BlockPart {
+  std::int64_t frames = 0, images = 0;  // oriented
+  int defect = 0;                       // of its datum
+  // Its place in the ground frame is observed; else place, direction or more are its own.
+  bool placed() const { return defect < 3; }
 };
 
 struct Figures {
@@ -59,7 +84,12 @@ struct Figures {
   double ground_resolution_m = kUnknown;                     // median of distance over focal length
   std::vector<PositionResidual> positions;                   // frames with GNSS and pose, block order
   std::vector<PointResidual> points;                         // control and check points seen
-  std::vector<double> attitude_deg;                          // angle between adjusted and observed attitude
+  std::vector<MeasurementResidual> measurements;             // of these, worst first
+  std::vector<AttitudeResidual> attitudes;                   // frames with observed attitude and pose, block order
+  IndexedVector<ImageIndex, double> image_squares;           // sum of squared kept residuals, px^2
+  IndexedVector<ImageIndex, std::int64_t> measured;          // observations in tracks, rejected ones included
+  std::vector<BlockPart> parts;                              // largest first
+  IndexedVector<FrameIndex, std::int32_t> part_of_frame;     // row of parts; -1: not oriented
   Spread sigma_east, sigma_north, sigma_up, sigma_rotation;  // frames; metres, radians (largest of the three axes)
   Spread point_sigma_horizontal, point_sigma_up;
   std::vector<std::int64_t> tile_frames, tile_boundary, tile_observations;
@@ -70,6 +100,12 @@ struct Figures {
 Figures figures_of(const BlockResult& result);
 
 bool oriented(const BlockResult& result, FrameIndex frame);
+
+// Fills in parts and part_of_frame.
+void find_parts(const BlockResult& result, Figures& figures);
+
+double image_rms(const Figures& figures, ImageIndex image);  // px; unknown without observations
+Pose image_pose(const BlockResult& result, ImageIndex image);
 
 // Root mean square of the components, each over its finite values; unknown without any.
 Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values);

@@ -37,6 +37,8 @@ Json points(const BlockResult& result, const Figures& f) {
     list.push_back({{"name", point.name},
                     {"role", point.role == PointRole::kCheck ? "check" : "control"},
                     {"difference_m", vector(r.difference)},
+                    {"difference_sigma_m", vector(r.sigma)},
+                    {"largest_over_sigma", number(r.ratio)},
                     {"images", r.images},
                     {"rms_px", number(r.rms_px)}});
   }
@@ -86,6 +88,10 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
                {"boundary_frames", f.boundary_frames},
                {"global_iterations", result.global_iterations},
                {"newton_decrement", number(result.newton_decrement)},
+               {"newton_decrement_limit", result.decrement_limit > 0 ? number(result.decrement_limit) : Json(nullptr)},
+               {"program", result.provenance.program},
+               {"arithmetic", result.provenance.arithmetic},
+               {"parts", f.parts.size()},
                {"ground_resolution_m", number(f.ground_resolution_m)},
                {"gauge", result.gauge},
                {"digest", result.digest},

@@ -104,6 +104,21 @@ LengthUnit length_unit(double largest_m) {
   return {1, "m", largest_m < 10 ? 3 : 2};
 }
 
+std::string in_unit(const std::string& name, const LengthUnit& unit) { return name + " [" + unit.name + "]"; }
+
+double largest(const std::vector<Eigen::Vector3d>& values) {
+  double result = 0;
+  for (const Eigen::Vector3d& v : values)
+    for (double c : v)
+      if (std::isfinite(c)) result = std::max(result, std::abs(c));
+  return result;
+}
+
+void axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std::vector<std::string>& cells) {
+  for (double c : v)
+    cells.push_back(sign ? with_sign(c * unit.factor, unit.decimals) : fixed(c * unit.factor, unit.decimals));
+}
+
 Table::Table(std::vector<std::string> headings, std::size_t text_columns)
     : headings_(std::move(headings)), text_columns_(text_columns) {}
 
@@ -123,6 +138,15 @@ std::string Table::html(const std::string& table_class) const {
   for (std::size_t c = 0; c < headings_.size(); ++c) head += cell("th", headings_[c], c);
   return "<div class=wide><table class=\"" + table_class + "\"><thead><tr>" + head + "</tr></thead><tbody>\n" + body_ +
          "</tbody></table></div>\n";
+}
+
+std::string more(std::size_t all, std::size_t listed) {
+  return all > listed ? paragraph("… and " + count(static_cast<std::int64_t>(all - listed)) + " more.", "muted") : "";
+}
+
+std::string details(const std::string& summary, const std::string& body, bool open) {
+  return std::string("<details") + (open ? " open" : "") + "><summary>" + summary + "</summary>\n" + body +
+         "</details>\n";
 }
 
 std::string section(const std::string& id, const std::string& title, const std::string& body) {

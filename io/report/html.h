@@ -1,6 +1,7 @@
 // Text and numbers for the report's HTML.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -28,6 +29,11 @@ struct LengthUnit {
 };
 LengthUnit length_unit(double largest_m);
 
+std::string in_unit(const std::string& name, const LengthUnit& unit);  // "ΔE [mm]"
+double largest(const std::vector<Eigen::Vector3d>& values);            // component by size, finite ones; else 0
+// One cell per component.
+void axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std::vector<std::string>& cells);
+
 // Rows of cells under headings. The first column is text, the others are aligned as numbers unless said otherwise.
 class Table {
  public:
@@ -42,6 +48,12 @@ class Table {
   std::size_t text_columns_, rows_ = 0;
   std::string body_;
 };
+
+// A list that is cut after `listed` of its `all` rows says so.
+std::string more(std::size_t all, std::size_t listed);
+
+// Hidden until asked for.
+std::string details(const std::string& summary, const std::string& body, bool open = false);
 
 // A titled part of the page.
 std::string section(const std::string& id, const std::string& title, const std::string& body);

@@ -8,52 +8,18 @@
 
 #include "io/report/drawing.h"
 #include "io/report/html.h"
+#include "io/report/plane.h"
 
 namespace megablock::report {
 
 namespace {
 
-constexpr double kWidth = 1000, kMostHeight = 900, kLeastHeight = 320, kMargin = 28;
-constexpr double kFoot = 30;                // strip below the map for the scale
 constexpr std::size_t kSingleMarks = 3000;  // frames drawn one by one, with their names
 constexpr std::size_t kBackgroundPoints = 6000;
 constexpr std::size_t kLinks = 20000;
 constexpr std::size_t kMostMarks = 200000;
 constexpr std::array<const char*, 10> kColours = {"#4e79a7", "#f28e2b", "#59a14f", "#b07aa1", "#76b7b2",
                                                   "#d4a017", "#e15759", "#9c755f", "#ff7f9f", "#7a8b99"};
-
-struct Plane {
-  Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Ones();  // metres
-  double scale = 1, height = kLeastHeight;                                        // drawing units per metre
-  Eigen::Vector2d at(const Eigen::Vector2d& ground) const {
-    const Eigen::Vector2d middle = (low + high) / 2;
-    return {kWidth / 2 + (ground.x() - middle.x()) * scale, height / 2 - (ground.y() - middle.y()) * scale};
-  }
-  bool shows(const Eigen::Vector2d& drawn) const {
-    return drawn.x() >= 0 && drawn.x() <= kWidth && drawn.y() >= 0 && drawn.y() <= height;
-  }
-};
-
-Plane plane_over(const std::vector<Eigen::Vector2d>& places) {
-  Plane plane;
-  if (places.empty()) return plane;
-  plane.low = plane.high = places.front();
-  for (const Eigen::Vector2d& p : places) {
-    plane.low = plane.low.cwiseMin(p);
-    plane.high = plane.high.cwiseMax(p);
-  }
-  const Eigen::Vector2d size = (plane.high - plane.low).cwiseMax(1e-3);
-  plane.height = std::clamp(2 * kMargin + (kWidth - 2 * kMargin) * size.y() / size.x(), kLeastHeight, kMostHeight);
-  plane.scale = std::min((kWidth - 2 * kMargin) / size.x(), (plane.height - 2 * kMargin) / size.y());
-  return plane;
-}
-
-// Where a frame is drawn: its pose, else its GNSS position.
-std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex frame) {
-  if (oriented(result, frame)) return result.state.frames[frame].centre.head<2>();
-  if (const auto& prior = result.block.frames[frame].position_prior) return prior->position.head<2>();
-  return std::nullopt;
-}
 
 // Colours such that tiles that share tie points differ, as far as ten colours go.
 std::vector<std::size_t> tile_colours(const BlockResult& result) {
@@ -86,37 +52,38 @@ std::vector<std::size_t> tile_colours(const BlockResult& result) {
 
 class MapDrawing {
  public:
-  MapDrawing(const BlockResult& result, const Figures& figures) : result_(result), figures_(figures) {
-    std::vector<Eigen::Vector2d> shown;
-    const bool any = figures.oriented_frames > 0;
-    for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
-      places_.push_back(place_of(result, f));
-      if (places_.back() && (!any || oriented(result, f))) shown.push_back(*places_.back());
-    }
-    for (const ControlPoint& point : result.block.control_points)
-      if (point.position.head<2>().allFinite()) shown.emplace_back(point.position.head<2>());
-    empty_ = shown.empty();
-    plane_ = plane_over(shown);
+  MapDrawing(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed)
+      : result_(result), unit_(unit), placed_(placed), drawn_(plane_of(result, selected, placed)) {
+    if (drawn_) plane_ = *drawn_;
+    for (FrameIndex f(0); result.block.frames.contains(f); ++f.value)
+      places_.push_back(selected(f) ? place_of(result, f) : std::nullopt);
   }
 
   std::string svg() {
-    if (empty_) return paragraph("No image has a position.", "muted");
-    std::string body = background() + links() + frames() + control_points() + scale_bar();
-    if (result_.block.ground.georeferenced) body += north();
-    return fmt::format(
-        "<svg id=map viewBox=\"0 0 {:.0f} {:.0f}\" role=img aria-label=\"Map of the block\">"
-        "<rect width={:.0f} height={:.0f} class=frame />{}</svg>",
-        kWidth, plane_.height + kFoot, kWidth, plane_.height + kFoot, body);
+    if (!drawn_) return paragraph("No image has a position.", "muted");
+    std::string body = coordinate_grid(plane_, unit_) + background() + links() + frames();
+    if (placed_) body += control_points();
+    body += scale_bar(plane_, unit_);
+    if (placed_ && result_.block.ground.georeferenced) body += north_arrow();
+    return open_map(plane_, "Map of the block") + body + "</svg>";
   }
 
  private:
   static std::string dot(const Eigen::Vector2d& p) { return fmt::format("M{:.1f} {:.1f}h0", p.x(), p.y()); }
 
+  // A tie point of the frames that are drawn: its first image tells.
+  bool here(std::size_t track) const {
+    if (track + 1 >= result_.tracks.begin.size() || result_.tracks.begin[track] == result_.tracks.begin[track + 1])
+      return false;
+    const ImageIndex image = result_.tracks.image[static_cast<std::size_t>(result_.tracks.begin[track])];
+    return places_[result_.block.images[image].frame].has_value();
+  }
+
   std::string background() const {
     std::string path;
     const std::size_t step = 1 + result_.points.size() / kBackgroundPoints;
     for (std::size_t i = 0; i < result_.points.size(); i += step) {
-      if (!result_.points[i].allFinite()) continue;
+      if (!result_.points[i].allFinite() || !here(i)) continue;
       const Eigen::Vector2d p = plane_.at(result_.points[i].head<2>());
       if (plane_.shows(p)) path += dot(p);
     }
@@ -139,7 +106,7 @@ class MapDrawing {
     std::size_t drawn = 0;
     for (const auto& [pair, tracks] : shared) {
       const FrameIndex a(pair.first), b(pair.second);
-      if (!oriented(result_, a) || !oriented(result_, b) || ++drawn > kLinks) continue;
+      if (!oriented(result_, a) || !oriented(result_, b) || !places_[a] || !places_[b] || ++drawn > kLinks) continue;
       const Eigen::Vector2d p = plane_.at(*places_[a]), q = plane_.at(*places_[b]);
       const bool crosses = result_.tiles.tile_of_frame.contains(a) && result_.tiles.tile_of_frame.contains(b) &&
                            result_.tiles.tile_of_frame[a] != result_.tiles.tile_of_frame[b];
@@ -206,33 +173,19 @@ class MapDrawing {
     return svg;
   }
 
-  std::string scale_bar() const {
-    const double length = round_step((plane_.high - plane_.low).maxCoeff() / 5, 1);
-    const double drawn = length * plane_.scale, y = plane_.height + kFoot - 14;
-    const std::string label = length >= 1000 ? significant(length / 1000, 2) + " km" : significant(length, 2) + " m";
-    return fmt::format(
-        "<g class=scale><rect x=8 y={:.1f} width={:.1f} height=26 rx=4 />"
-        "<path d=\"M16 {:.1f}v-6m0 3h{:.1f}m0 3v-6\"/><text x={:.1f} y={:.1f}>{}</text></g>",
-        y - 16, drawn + 90, y, drawn, drawn + 24, y + 2, label);
-  }
-
-  std::string north() const {
-    return fmt::format(
-        "<g class=scale transform=\"translate({:.0f} 34)\"><path class=needle d=\"M0 -22l7 24l-7 -5l-7 5z\"/>"
-        "<text y=18 text-anchor=middle>N</text></g>",
-        kWidth - 24);
-  }
-
   const BlockResult& result_;
-  const Figures& figures_;
-  IndexedVector<FrameIndex, std::optional<Eigen::Vector2d>> places_;
+  const char* unit_;
+  bool placed_;
+  std::optional<Plane> drawn_;
   Plane plane_;
-  bool empty_ = true;
+  IndexedVector<FrameIndex, std::optional<Eigen::Vector2d>> places_;
 };
 
 }  // namespace
 
-std::string draw_map(const BlockResult& result, const Figures& figures) { return MapDrawing(result, figures).svg(); }
+std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed) {
+  return MapDrawing(result, selected, unit, placed).svg();
+}
 
 std::string map_legend(const BlockResult& result, const Figures& figures) {
   std::string text = "<span class=key><i class=tilekey></i>frames, one colour per tile</span>";

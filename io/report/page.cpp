@@ -4,7 +4,7 @@ namespace megablock::report {
 
 namespace {
 
-constexpr const char* kStyle = R"(
+constexpr const char* kStyle = R"css(
 :root{--ink:#1c2733;--muted:#5f6c79;--line:#dfe5ea;--paper:#fff;--ground:#f4f6f8;--accent:#1f6f8b;--bar:#6fa3b5;
 --good:#2e7d4f;--look:#b26a00;--bad:#b3261e}
 *{box-sizing:border-box}
@@ -32,6 +32,7 @@ code{font:13px ui-monospace,Menlo,Consolas,monospace}
 .assessment .good::before{background:var(--good)}
 .assessment .look::before{background:var(--look);border-radius:1px}
 .assessment .bad::before{background:var(--bad);border-radius:0;transform:rotate(45deg)}
+.assessment .bad{color:var(--bad)}
 .row{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,430px),1fr));gap:14px 26px;align-items:start}
 figure{margin:0}
 figure svg{width:100%;height:auto;display:block}
@@ -47,7 +48,24 @@ th:first-child,td:first-child{padding-left:0}
 tr.sum td{font-weight:600}
 tr.bad td{color:var(--bad)}
 tr.look td{color:var(--look)}
-tr.muted td{color:var(--muted)}
+tr.muted td,tr.weak td{color:var(--muted)}
+tr.weak td:first-child::after{content:" (not significant)";font-size:12px}
+details{margin:8px 0 4px}
+summary{cursor:pointer;color:var(--accent)}
+.tall{max-height:70vh;overflow:auto}
+.tall .wide{overflow-x:visible}
+.tall thead th{position:sticky;top:0;background:var(--paper)}
+table.small{font-size:13px}
+table.small td.t{white-space:nowrap}
+.sortable th{cursor:pointer}
+.sortable th[aria-sort=ascending]::after{content:" ▲"}
+.sortable th[aria-sort=descending]::after{content:" ▼"}
+table.plain thead{display:none}
+table.plain td:first-child{color:var(--muted);width:11em}
+.correlation{width:auto;font-size:13px;margin-top:8px}
+.correlation .r{display:block;margin:-3px -8px;padding:3px 8px;background:rgba(178,106,0,calc(var(--r)*var(--r)*.6))}
+figure+figure{margin-top:12px}
+.row figure+figure{margin-top:0}
 .stages td:nth-child(2){width:45%}
 .time{display:block;height:10px;background:var(--bar);border-radius:2px;min-width:1px}
 .names{font-size:13px;overflow-wrap:anywhere}
@@ -64,19 +82,23 @@ svg .title{fill:var(--ink);font-size:12px}
 .dot{fill:var(--accent);fill-opacity:.65}
 .out{fill:none;stroke:var(--bad)}
 .stem{stroke:var(--bar);fill:none}
-#map{border-radius:6px;touch-action:pan-y;cursor:grab}
-#map .points{stroke:#b9c3cc;stroke-width:1.6;stroke-linecap:round;fill:none}
-#map .dots,#map .boundary{stroke-linecap:round;fill:none}
-#map .boundary{stroke:#1c2733}
-#map .within{stroke:#8b98a5;stroke-width:.7;fill:none;opacity:.7}
-#map .across{stroke:#b3261e;stroke-width:.9;fill:none;opacity:.7}
-#map .lost{stroke:var(--bad);stroke-width:2;fill:none}
-#map .control{fill:#111;stroke:#fff}
-#map .check{fill:#fff;stroke:#111;stroke-width:1.5}
-#map .scale rect{fill:#fff;fill-opacity:.85}
-#map .scale path{stroke:#1c2733;stroke-width:1.5;fill:none}
-#map .scale .needle{fill:#1c2733;stroke:none}
-#map .scale text{font-size:14px;fill:#1c2733}
+.map{border-radius:6px;touch-action:pan-y;cursor:grab}
+.map .points{stroke:#b9c3cc;stroke-width:1.6;stroke-linecap:round;fill:none}
+.map .dots,.map .boundary{stroke-linecap:round;fill:none}
+.map .boundary{stroke:#1c2733}
+.map .meridian{stroke:#e3e9ee;fill:none}
+.map .coordinate text{fill:#7b8894}
+.map .ellipses{fill:none;stroke:#1c2733;stroke-width:1.1}
+.map .ellipses path{stroke:#b26a00}
+.map .within{stroke:#8b98a5;stroke-width:.7;fill:none;opacity:.7}
+.map .across{stroke:#b3261e;stroke-width:.9;fill:none;opacity:.7}
+.map .lost{stroke:var(--bad);stroke-width:2;fill:none}
+.map .control{fill:#111;stroke:#fff}
+.map .check{fill:#fff;stroke:#111;stroke-width:1.5}
+.map .scale rect{fill:#fff;fill-opacity:.85}
+.map .scale path{stroke:#1c2733;stroke-width:1.5;fill:none}
+.map .scale .needle{fill:#1c2733;stroke:none}
+.map .scale text{font-size:14px;fill:#1c2733}
 [hidden]{display:none}
 .legend,.controls{display:flex;flex-wrap:wrap;gap:4px 18px;font-size:13px;margin:2px 0 8px;align-items:center}
 .key{display:inline-flex;align-items:center;gap:6px}
@@ -91,51 +113,72 @@ footer{color:var(--muted);font-size:12px;padding:0 0 24px}
 .assessment{padding:8px 12px}td,th{padding:3px 5px}}
 @media print{body{background:#fff;font-size:11px}header{background:none;color:#000;padding:0}header p{color:#444}
 section,.card,.assessment{border-color:#bbb}figure,tr,.card{break-inside:avoid}h2,h3{break-after:avoid}.controls{display:none}
-main,header>div{max-width:none;padding:0}.row{grid-template-columns:1fr 1fr}#map{max-height:150mm}
+main,header>div{max-width:none;padding:0}.row{grid-template-columns:1fr 1fr}figure .map{max-height:150mm}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
-)";
+)css";
 
-// Layers on and off; the map enlarged by wheel or two fingers and moved by dragging (by changing its view box).
-constexpr const char* kScript = R"(
+// Layers on and off; maps enlarged by wheel or two fingers and moved by dragging (by changing their view box); tables
+// sorted by a click on a heading.
+constexpr const char* kScript = R"js(
 (() => {
-  const map = document.getElementById('map');
+  const maps = [...document.querySelectorAll('.map')];
   for (const box of document.querySelectorAll('[data-layer]'))
     box.addEventListener('change', () => {
-      if (map) map.querySelectorAll('.' + box.dataset.layer).forEach(e => e.toggleAttribute('hidden', !box.checked));
+      for (const e of document.querySelectorAll('.map .layer.' + box.dataset.layer)) e.toggleAttribute('hidden', !box.checked);
     });
-  if (!map) return;
-  const whole = map.getAttribute('viewBox').split(' ').map(Number);
-  let view = whole.slice();
-  const show = () => map.setAttribute('viewBox', view.join(' '));
-  const at = e => {
-    const r = map.getBoundingClientRect();
-    return [(e.clientX - r.left) / r.width, (e.clientY - r.top) / r.height];
+  const restore = [];
+  for (const map of maps) {
+    const whole = map.getAttribute('viewBox').split(' ').map(Number);
+    let view = whole.slice();
+    const show = () => map.setAttribute('viewBox', view.join(' '));
+    restore.push(() => { view = whole.slice(); show(); });
+    const at = e => {
+      const r = map.getBoundingClientRect();
+      return [(e.clientX - r.left) / r.width, (e.clientY - r.top) / r.height];
+    };
+    const enlarge = (factor, [x, y]) => {
+      const width = Math.min(whole[2], Math.max(whole[2] / 60, view[2] / factor)), height = width * whole[3] / whole[2];
+      view = [view[0] + x * (view[2] - width), view[1] + y * (view[3] - height), width, height];
+      show();
+    };
+    map.addEventListener('wheel', e => {
+      if (!e.ctrlKey && view[2] === whole[2] && e.deltaY > 0) return;
+      e.preventDefault();
+      enlarge(Math.exp(-e.deltaY / 400), at(e));
+    }, {passive: false});
+    const fingers = new Map();
+    map.addEventListener('pointerdown', e => { fingers.set(e.pointerId, at(e)); map.setPointerCapture(e.pointerId); });
+    map.addEventListener('pointermove', e => {
+      if (!fingers.has(e.pointerId)) return;
+      const before = [...fingers.values()], from = fingers.get(e.pointerId), to = at(e);
+      fingers.set(e.pointerId, to);
+      const after = [...fingers.values()];
+      const gap = p => Math.hypot(p[0][0] - p[1][0], p[0][1] - p[1][1]);
+      if (after.length === 2) enlarge(gap(after) / Math.max(1e-3, gap(before)), to);
+      else { view[0] -= (to[0] - from[0]) * view[2]; view[1] -= (to[1] - from[1]) * view[3]; show(); }
+    });
+    for (const end of ['pointerup', 'pointercancel']) map.addEventListener(end, e => fingers.delete(e.pointerId));
+  }
+  const whole = document.getElementById('whole');
+  if (whole) whole.addEventListener('click', () => restore.forEach(f => f()));
+  const numberIn = cell => {
+    const text = cell.textContent, number = parseFloat(text.replace(/\u202f/g, '').replace('\u2212', '-'));
+    return Number.isNaN(number) ? text : number;
   };
-  const enlarge = (factor, [x, y]) => {
-    const width = Math.min(whole[2], Math.max(whole[2] / 60, view[2] / factor)), height = width * whole[3] / whole[2];
-    view = [view[0] + x * (view[2] - width), view[1] + y * (view[3] - height), width, height];
-    show();
-  };
-  map.addEventListener('wheel', e => {
-    if (!e.ctrlKey && view[2] === whole[2] && e.deltaY > 0) return;
-    e.preventDefault();
-    enlarge(Math.exp(-e.deltaY / 400), at(e));
-  }, {passive: false});
-  const fingers = new Map();
-  map.addEventListener('pointerdown', e => { fingers.set(e.pointerId, at(e)); map.setPointerCapture(e.pointerId); });
-  map.addEventListener('pointermove', e => {
-    if (!fingers.has(e.pointerId)) return;
-    const before = [...fingers.values()], from = fingers.get(e.pointerId), to = at(e);
-    fingers.set(e.pointerId, to);
-    const after = [...fingers.values()];
-    const gap = p => Math.hypot(p[0][0] - p[1][0], p[0][1] - p[1][1]);
-    if (after.length === 2) enlarge(gap(after) / Math.max(1e-3, gap(before)), to);
-    else { view[0] -= (to[0] - from[0]) * view[2]; view[1] -= (to[1] - from[1]) * view[3]; show(); }
-  });
-  for (const end of ['pointerup', 'pointercancel']) map.addEventListener(end, e => fingers.delete(e.pointerId));
-  document.getElementById('whole').addEventListener('click', () => { view = whole.slice(); show(); });
+  const compare = (a, b) => typeof a === typeof b ? (a < b ? -1 : a > b ? 1 : 0) : typeof a === 'number' ? -1 : 1;
+  for (const table of document.querySelectorAll('table.sortable'))
+    [...table.tHead.rows[0].cells].forEach((heading, column) => heading.addEventListener('click', () => {
+      const up = heading.getAttribute('aria-sort') !== 'ascending', names = heading.classList.contains('t');
+      for (const cell of table.tHead.rows[0].cells) cell.removeAttribute('aria-sort');
+      heading.setAttribute('aria-sort', up ? 'ascending' : 'descending');
+      const key = row => names ? row.cells[column].textContent : numberIn(row.cells[column]);
+      const rows = [...table.tBodies[0].rows], sums = rows.filter(r => r.classList.contains('sum'));
+      const others = rows.filter(r => !r.classList.contains('sum'));
+      others.sort((a, b) => (up ? 1 : -1) * compare(key(a), key(b)));
+      table.tBodies[0].append(...others, ...sums);
+    }));
 })();
-)";
+)js";
 
 }  // namespace
 

@@ -3,22 +3,33 @@
 
 #include <string>
 
+#include "io/report.h"
 #include "io/report/figures.h"
 
 namespace megablock::report {
 
+inline constexpr double kGrossRatio = 3;  // differences beyond so many sigma are marked
+
+bool alarms(const SeamCheck& seam);
+std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty when unknown
+std::string ellipses_figure(const BlockResult& result, const Figures& figures);  // empty without covariances
+
 std::string headline(const BlockResult& result, const Figures& figures);
 std::string assessment(const BlockResult& result, const Figures& figures);  // what is well and what needs a look
 std::string map_section(const BlockResult& result, const Figures& figures);
+std::string coverage_section(const BlockResult& result, const Figures& figures);
+std::string images_section(const BlockResult& result, const Figures& figures);
 std::string tie_points_section(const BlockResult& result, const Figures& figures);
 std::string residuals_section(const BlockResult& result, const Figures& figures);
 std::string positions_section(const BlockResult& result, const Figures& figures);
+std::string attitudes_section(const BlockResult& result, const Figures& figures);
 std::string control_section(const BlockResult& result, const Figures& figures);
 std::string cameras_section(const BlockResult& result, const Figures& figures);
 std::string accuracy_section(const BlockResult& result, const Figures& figures);
 std::string tiles_section(const BlockResult& result, const Figures& figures);
 std::string failures_section(const BlockResult& result, const Figures& figures);
 std::string stages_section(const BlockResult& result);
+std::string provenance_section(const BlockResult& result, const ReportContext& context);
 std::string figures_json(const BlockResult& result, const Figures& figures);  // safe inside <script>
 
 }  // namespace megablock::report

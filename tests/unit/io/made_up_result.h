@@ -72,6 +72,7 @@ inline BlockResult made_up_result(const SimulationOptions& options, std::int64_t
   for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
     BlockResult::Matrix8 covariance = BlockResult::Matrix8::Identity() * 1e-10;
     covariance.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 0.04;
+    covariance(3, 4) = covariance(4, 3) = -0.9e-10;
     result.camera_covariance.push_back(covariance);
   }
   result.point_covariance.assign(result.points.size(), Eigen::Matrix3d::Identity() * 4e-4);
@@ -88,6 +89,13 @@ inline BlockResult made_up_result(const SimulationOptions& options, std::int64_t
   result.chi2 = result.variance_factor * static_cast<double>(result.degrees_of_freedom);
   result.global_iterations = 4;
   result.newton_decrement = 3.1e-4;
+  result.decrement_limit = 1e-2;
+  for (std::size_t i = 0; i < result.block.images.size(); ++i)
+    result.image_records.push_back({1920, 1280, 8000 + static_cast<std::int64_t>(i), 12, 3400});
+  result.provenance = {"block.yaml",
+                       "megablock 0.1.0",
+                       "avx2",
+                       {{"matching.ratio", "0.8", "0.85"}, {"merge.decrement", "0.01", "0.01"}}};
   result.gauge = "fixed by priors";
   result.seams = {{4, 31.2, 40, 81.4, ""}, {5, 96.0, 44, 87.1, "tile 2 disagrees with its neighbours"}};
   result.failures = {{"features", "IMG_0003.jpg", "truncated JPEG: 1 024 of 48 211 bytes can be read"}};

@@ -125,6 +125,110 @@ TEST(Report, WholeBlockWithFailures) {
   EXPECT_DOUBLE_EQ(json["rms_reprojection_px"], statistics.rms_px);
 }
 
+TEST(Report, SaysWhatTheResultComesFrom) {
+  const std::string page = report_html(made_up_result(small_block()), {"/data/jobs/harbour/", 1763719620});
+  expect_sound(page);
+  EXPECT_THAT(page, HasSubstr("Block report: harbour"));
+  EXPECT_THAT(page, HasSubstr("2025-11-21 10:07 UTC"));
+  for (const char* words : {"block.yaml", "megablock 0.1.0", "avx2", "matching.ratio", "merge.decrement"})
+    EXPECT_THAT(visible_text(page), HasSubstr(words));
+}
+
+TEST(Report, ABlockThatDidNotConvergeIsSaidFirstAndInRed) {
+  BlockResult result = made_up_result(small_block());
+  EXPECT_THAT(report_html(result), Not(HasSubstr("not converged")));
+  result.newton_decrement = 0.37;
+  const std::string page = report_html(result);
+  expect_sound(page);
+  EXPECT_THAT(page,
+              HasSubstr("<ul class=assessment>\n<li class=bad>The adjustment has <b>not converged</b>: the Newton "
+                        "decrement is 0.37, the limit 0.010"));
+  result.newton_decrement = std::nan("");
+  EXPECT_THAT(report_html(result), HasSubstr("not converged"));
+}
+
+// Two halves without a common tie point.
+BlockResult two_parts() {
+  BlockResult result = made_up_result(small_block());
+  result.block.control_points.clear();
+  result.control.clear();
+  const auto first_half = [&](std::size_t o) { return result.block.images[result.tracks.image[o]].frame.value < 30; };
+  for (std::size_t t = 0; t + 1 < result.tracks.begin.size(); ++t)
+    for (auto o = static_cast<std::size_t>(result.tracks.begin[t]);
+         o < static_cast<std::size_t>(result.tracks.begin[t + 1]); ++o)
+      if (first_half(o) != first_half(static_cast<std::size_t>(result.tracks.begin[t]))) result.kept[o] = 0;
+  return result;
+}
+
+std::size_t count_of(const std::string& text, const std::string& word) {
+  std::size_t n = 0;
+  for (std::size_t i = text.find(word); i != std::string::npos; i = text.find(word, i + 1)) ++n;
+  return n;
+}
+
+TEST(Report, PartsWithoutADatumHaveMapsOfTheirOwn) {
+  BlockResult result = two_parts();
+  const report::Figures figures = report::figures_of(result);
+  ASSERT_EQ(figures.parts.size(), 2u);
+  EXPECT_EQ(figures.parts[0].frames, 30);
+  EXPECT_EQ(figures.parts[1].frames, 29);  // one is not oriented
+  for (FrameIndex f(0); f.value < 60; ++f.value)
+    EXPECT_EQ(figures.part_of_frame[f], f.value == 3 ? -1 : f.value < 30 ? 1 : 0);
+  const std::string placed = report_html(result);
+  EXPECT_EQ(count_of(placed, "aria-label=\"Map of the block\""), 1u);
+  EXPECT_THAT(placed, HasSubstr("each is placed by its own positions or control alone"));
+
+  result.free_parts = {{FrameIndex(0), 7}, {FrameIndex(30), 7}};
+  const std::string free = report_html(result);
+  expect_sound(free);
+  EXPECT_EQ(count_of(free, "aria-label=\"Map of the block\""), 2u);
+  EXPECT_THAT(free, HasSubstr("<li class=bad>The block falls into 2 parts"));
+  EXPECT_THAT(free, HasSubstr("how it lies to the other parts is not known"));
+  EXPECT_THAT(free, Not(HasSubstr(" km</text>")));  // a free scale is not in metres
+}
+
+TEST(Report, JointsThatShareNothingAreNotGood) {
+  BlockResult result = made_up_result(small_block());
+  result.seams = {{4, 0, 0, 0, ""}};
+  EXPECT_THAT(report_html(result),
+              HasSubstr("<li class=look>The joint of the merge tree joins parts that share nothing"));
+  result.seams.push_back({5, 30, 40, 81, ""});
+  EXPECT_THAT(report_html(result),
+              HasSubstr("the tiles agree at the joint of the merge tree that was tested. 1 more joins "
+                        "parts that share nothing"));
+}
+
+TEST(Report, ImagesAreListedUpToALimit) {
+  BlockResult result = made_up_result(small_block());
+  const std::string page = report_html(result);
+  const std::size_t table = page.find("<section id=\"images\"");
+  ASSERT_NE(table, std::string::npos);
+  const std::string part = page.substr(table, page.find("</section>", table) - table);
+  EXPECT_EQ(count_of(part, "<tr>") - 1, 59u);
+  EXPECT_THAT(part, HasSubstr("8\u202f010"));  // features of an image
+  SimulationOptions large = small_block();
+  large.frames = 2000;
+  large.points_per_frame = 12;
+  const std::string long_page = report_html(made_up_result(large));
+  EXPECT_THAT(long_page, HasSubstr("The 1\u202f500 images with the largest residuals of 1\u202f999"));
+}
+
+TEST(Report, FailedImagesWithWhatIsKnownOfThem) {
+  BlockResult result = made_up_result(small_block());
+  const std::string name = result.block.images[ImageIndex(3)].name;
+  result.failures = {{"init", "gone.jpg", "is empty"}, {"orientation", name, "too few points"}};
+  const std::string page = report_html(result);
+  expect_sound(page);
+  const std::size_t row = page.find("<td class=t>" + name, page.find("id=\"failures\""));
+  ASSERT_NE(row, std::string::npos);
+  const std::string cells = page.substr(row, page.find("</tr>", row) - row);
+  std::int64_t measured = 0;
+  for (const ImageIndex image : result.tracks.image) measured += image.value == 3;
+  for (const std::string& cell : {std::string("too few points"), std::string("1920 × 1280"), std::string("8\u202f003"),
+                                  std::string("12"), std::string("3\u202f400"), report::count(measured)})
+    EXPECT_THAT(cells, HasSubstr(">" + cell + "<"));
+}
+
 TEST(Report, StreetBlockWithRigs) {
   SimulationOptions options;
   options.scene = SimulationOptions::Scene::kStreet;
@@ -225,6 +329,84 @@ TEST(ReportFigures, IntersectionAnglesAndTrackLengths) {
   const report::ResidualField& field = figures.fields[CameraIndex(0)];
   EXPECT_EQ(field.observations, 2);
   EXPECT_EQ(field.mean(field.rows / 2, field.columns - 1), Eigen::Vector2d(3, 4));
+}
+
+// The sigma of a difference, by drawing many: a check point takes no part, a control point is pulled towards its given
+// place, here by an observation of equal weight.
+TEST(ReportFigures, SigmasOfControlAndCheckPoints) {
+  BlockResult result = made_up_result(small_block());
+  const double given = 0.02, alone = 0.03, adjusted = 1 / std::sqrt(1 / (given * given) + 1 / (alone * alone));
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  double check_squares = 0, control_squares = 0;
+  const int draws = 200000;
+  for (int i = 0; i < draws; ++i) {
+    const double l = given * normal(random), x = alone * normal(random);
+    const double together = adjusted * adjusted * (l / (given * given) + x / (alone * alone));
+    check_squares += (x - l) * (x - l) / draws;
+    control_squares += (together - l) * (together - l) / draws;
+  }
+  for (std::size_t p = 0; p < result.block.control_points.size(); ++p) {
+    ControlPoint& point = result.block.control_points[p];
+    point.sigma.setConstant(given);
+    const double sigma = point.role == PointRole::kCheck ? alone : adjusted;
+    result.control[p].covariance = Eigen::Matrix3d::Identity() * sigma * sigma;
+    result.control[p].adjusted = point.position + Eigen::Vector3d(0, -0.06, 0.01);
+  }
+  for (const report::PointResidual& r : report::figures_of(result).points) {
+    const bool check = result.block.control_points[r.point].role == PointRole::kCheck;
+    const double expected = std::sqrt(check ? check_squares : control_squares);
+    EXPECT_NEAR(r.sigma.x(), expected, 0.01 * expected);
+    EXPECT_NEAR(r.ratio, 0.06 / expected, 0.02 * r.ratio);
+  }
+  const std::string page = report_html(result);
+  expect_sound(page);
+  EXPECT_THAT(page, HasSubstr("<li class=look>4 of 4 control points differ by more than 3 sigma"));
+}
+
+TEST(ReportFigures, AttitudeResidualsAboutTheAxesOfTheCamera) {
+  BlockResult result = made_up_result(small_block());
+  for (Frame& frame : result.block.frames) frame.attitude_prior.reset();
+  const Eigen::Vector3d turn(0.01, -0.02, 0.03);  // radians, about the camera's axes
+  AttitudePrior prior;
+  prior.rotation_cw = rotation_exp<double>(-turn) * result.state.frames[FrameIndex(7)].rotation;
+  result.block.frames[FrameIndex(7)].attitude_prior = prior;
+  const report::Figures figures = report::figures_of(result);
+  ASSERT_EQ(figures.attitudes.size(), 1u);
+  EXPECT_EQ(figures.attitudes[0].frame, FrameIndex(7));
+  EXPECT_LT((figures.attitudes[0].difference - turn).norm(), 1e-12);
+}
+
+TEST(ReportFigures, ResidualsOfImagesAndMeasurements) {
+  BlockResult result = made_up_result(small_block());
+  result.control[0].residual_px[0] = {1.0, -2.0};
+  result.block.control_points[0].measurements[0].sigma_px = 0.4;
+  const report::Figures figures = report::figures_of(result);
+  EXPECT_EQ(figures.measurements[0].point, 0u);
+  EXPECT_DOUBLE_EQ(figures.measurements[0].ratio, 5);
+  double squares = 0;
+  std::int64_t n = 0, all = 0;
+  for (std::size_t o = 0; o < result.tracks.image.size(); ++o) {
+    if (result.tracks.image[o] != ImageIndex(11)) continue;
+    ++all;
+    if (!result.kept[o]) continue;
+    ++n;
+    squares += std::pow(result.residual_x[o], 2) + std::pow(result.residual_y[o], 2);
+  }
+  EXPECT_EQ(figures.measured[ImageIndex(11)], all);
+  EXPECT_EQ(figures.observations[ImageIndex(11)], n);
+  EXPECT_NEAR(report::image_rms(figures, ImageIndex(11)), std::sqrt(squares / static_cast<double>(n)), 1e-9);
+}
+
+TEST(Report, CorrelationsAndInsignificantParameters) {
+  BlockResult result = made_up_result(small_block());
+  const CameraIndex camera(0);
+  result.state.cameras[camera][3] = 1e-6;  // k1, sigma 1e-5
+  result.state.cameras[camera][4] = 1e-3;
+  const std::string page = report_html(result);
+  EXPECT_THAT(page, HasSubstr("\u22120.90</span>"));
+  EXPECT_THAT(page, HasSubstr("<tr class=\"weak\"><td class=t>k1"));
+  EXPECT_THAT(page, Not(HasSubstr("<tr class=\"weak\"><td class=t>k2")));
 }
 
 TEST(ReportFigures, HistogramsAndSpreads) {

@@ -54,6 +54,12 @@ BlockResult example_result() {
   result.sigma_scaled = true;
   result.global_iterations = 4;
   result.newton_decrement = 1e-8;
+  result.decrement_limit = 0.01;
+  result.free_parts = {{FrameIndex(0), 7}, {FrameIndex(1), 4}};
+  for (std::size_t i = 0; i < result.block.images.size(); ++i)
+    result.image_records.push_back({640, 480 + static_cast<int>(i), 100, 3, 70});
+  result.provenance = {
+      "p.yaml", "megablock 0.1.0", "avx2", {{"merge.decrement", "0.1", "0.01"}, {"tiles.min_tiles", "4", "4"}}};
   result.gauge = "fixed by priors";
   result.seams = {{2, 10.5, 12, 40.25, ""}, {3, 99, 12, 40.25, "tile 1 is suspected"}};
   result.failures = {{"features", "3.jpg", "truncated JPEG"}};
@@ -106,6 +112,22 @@ TEST(ResultFile, EverythingComesBack) {
   EXPECT_TRUE(back.sigma_scaled);
   EXPECT_EQ(back.global_iterations, 4);
   EXPECT_EQ(back.newton_decrement, result.newton_decrement);
+  EXPECT_EQ(back.decrement_limit, result.decrement_limit);
+  ASSERT_EQ(back.free_parts.size(), 2u);
+  EXPECT_EQ(back.free_parts[1].frame, FrameIndex(1));
+  EXPECT_EQ(back.free_parts[1].defect, 4);
+  ASSERT_EQ(back.image_records.size(), result.image_records.size());
+  EXPECT_EQ(back.image_records[ImageIndex(1)].height, 481);
+  EXPECT_EQ(back.image_records[ImageIndex(1)].features, 100);
+  EXPECT_EQ(back.image_records[ImageIndex(1)].matched_images, 3);
+  EXPECT_EQ(back.image_records[ImageIndex(1)].matches, 70);
+  EXPECT_EQ(back.provenance.project, "p.yaml");
+  EXPECT_EQ(back.provenance.program, "megablock 0.1.0");
+  EXPECT_EQ(back.provenance.arithmetic, "avx2");
+  ASSERT_EQ(back.provenance.options.size(), 2u);
+  EXPECT_EQ(back.provenance.options[0].name, "merge.decrement");
+  EXPECT_EQ(back.provenance.options[0].value, "0.1");
+  EXPECT_EQ(back.provenance.options[0].default_value, "0.01");
   EXPECT_EQ(back.gauge, result.gauge);
   ASSERT_EQ(back.seams.size(), 2u);
   EXPECT_EQ(back.seams[1].statistic, 99);

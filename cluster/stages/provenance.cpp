@@ -1,0 +1,80 @@
+#include "cluster/stages/provenance.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "cluster/arithmetic.h"
+#include "cluster/stages/stages.h"
+#include "cluster/version.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+// Names of the units of a stage; empty when the job has no such stage.
+std::vector<std::string> units_of(const Job& job, const std::string& stage) {
+  std::vector<std::string> names;
+  for (const StageRecord& record : job.records)
+    if (record.stage == stage)
+      for (const auto& unit : record.units) names.push_back(unit.first);
+  return names;
+}
+
+}  // namespace
+
+Provenance provenance_of(const Job& job) {
+  Provenance provenance;
+  provenance.project = std::filesystem::path(job.options.project).filename().string();
+  provenance.program = kProgram;
+  provenance.arithmetic = kArithmeticLevel;
+  const std::vector<OptionValue> values = option_values(job.settings), defaults = option_values({});
+  for (std::size_t i = 0; i < values.size(); ++i)
+    provenance.options.push_back({values[i].section + "." + values[i].key, values[i].value, defaults[i].value});
+  return provenance;
+}
+
+IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job) {
+  IndexedVector<ImageIndex, ImageRecord> records;
+  const std::vector<std::string> shards = units_of(job, "features");
+  if (shards.empty()) return records;
+  records.assign(job.block.images.size(), {-1, -1, 0, 0, 0});
+  for (const std::string& shard : shards)
+    for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard))) {
+      if (!records.contains(image.image)) continue;
+      ImageRecord& record = records[image.image];
+      if (image.width > 0) record.width = image.width;
+      if (image.height > 0) record.height = image.height;
+      record.features = static_cast<std::int64_t>(image.keypoints.size());
+    }
+  for (const std::string& cell : units_of(job, "matching")) {
+    if (!job.store.seal(cell)) continue;  // failed
+    for (const VerifiedPair& pair : read_matches(job.store.verified_path(cell))) {
+      if (pair.model == PairModel::kNone) continue;
+      for (const ImageIndex image : {pair.a, pair.b}) {
+        ++records[image].matched_images;
+        records[image].matches += static_cast<std::int64_t>(pair.feature_a.size());
+      }
+    }
+  }
+  return records;
+}
+
+std::function<std::string(const UnknownId&)> names_of(const Block& block) {
+  return [&block](const UnknownId& id) -> std::string {
+    switch (id.kind) {
+      case UnknownKind::kFrame: {
+        const FrameIndex frame(id.index);
+        const bool single = block.rig_of(frame).mounts.size() == 1;
+        return (single ? "image '" : "frame '") + block.frames[frame].name + "'";
+      }
+      case UnknownKind::kCamera:
+        return "camera '" + block.cameras[CameraIndex(id.index)].name + "'";
+      case UnknownKind::kMount:
+        return "mount " + std::to_string(id.part) + " of rig '" + block.rigs[RigIndex(id.index)].name + "'";
+    }
+    return describe(id);
+  };
+}
+
+}  // namespace megablock

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace megablock {
+
+inline constexpr const char* kProgram = "megablock 0.1.0";
+
+}  // namespace megablock

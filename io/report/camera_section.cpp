@@ -1,0 +1,125 @@
+// Cameras and mounts.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "io/report/html.h"
+#include "io/report/sections.h"
+
+namespace megablock::report {
+
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kSignificant = 2;  // sigmas
+
+// The value that a parameter has in a camera that does not need it: no distortion, principal point in the centre.
+double neutral(const Camera& camera, int parameter) {
+  if (parameter == kPrincipalX) return 0.5 * camera.width;
+  if (parameter == kPrincipalY) return 0.5 * camera.height;
+  return 0;
+}
+
+// Lower triangle of the correlations of the estimated parameters.
+std::string correlation_table(const BlockResult& result, CameraIndex index) {
+  if (!result.camera_covariance.contains(index)) return "";
+  const BlockResult::Matrix8& c = result.camera_covariance[index];
+  std::vector<int> estimated;
+  for (int k = 0; k < kIntrinsicCount; ++k)
+    if (c(k, k) > 0 && std::isfinite(c(k, k))) estimated.push_back(k);
+  if (estimated.size() < 2) return "";
+  std::vector<std::string> headings = {"correlation"};
+  for (int k : estimated) headings.emplace_back(kIntrinsicNames[static_cast<std::size_t>(k)]);
+  Table table(std::move(headings));
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    std::vector<std::string> cells = {kIntrinsicNames[static_cast<std::size_t>(estimated[i])]};
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double r =
+          c(estimated[i], estimated[j]) / std::sqrt(c(estimated[i], estimated[i]) * c(estimated[j], estimated[j]));
+      cells.push_back(i == j ? "1"
+                             : fmt::format("<span class=r style=\"--r:{:.2f}\">{}</span>",
+                                           std::isfinite(r) ? std::min(1.0, std::abs(r)) : 0.0, with_sign(r, 2)));
+    }
+    cells.resize(estimated.size() + 1);
+    table.add(std::move(cells));
+  }
+  return table.html("correlation");
+}
+
+std::string camera_table(const BlockResult& result, CameraIndex index) {
+  const Camera& camera = result.block.cameras[index];
+  const bool adjusted = result.state.cameras.contains(index), sigmas = result.camera_covariance.contains(index);
+  Table table({"parameter", "start", "adjusted", "change", "sigma", "÷ sigma", "prior"});
+  for (int k = 0; k < kIntrinsicCount; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const bool pixels = k <= kPrincipalY;
+    const double start = camera.intrinsics[at], now = adjusted ? result.state.cameras[index][at] : kUnknown;
+    const double sigma = sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[index](k, k))) : kUnknown;
+    const double prior = camera.prior_sigma[at];
+    const int decimals = pixels ? 2 : 6;
+    const bool held = prior == 0 || sigma == 0;
+    const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
+    const bool tested = k != kFocal && std::isfinite(ratio);
+    table.add({std::string(kIntrinsicNames[at]) + (pixels ? " [px]" : ""), fixed(start, decimals), fixed(now, decimals),
+               with_sign(now - start, decimals),
+               held     ? "held"
+               : pixels ? fixed(sigma, 3)
+                        : significant(sigma, 2),
+               tested ? fixed(ratio, 1) : "",
+               prior == 0             ? "held"
+               : std::isfinite(prior) ? "σ " + significant(prior, 2)
+                                      : "free"},
+              tested && ratio < kSignificant ? "weak" : "");
+  }
+  return table.html();
+}
+
+std::string mounts_table(const BlockResult& result, RigIndex index) {
+  const Rig& rig = result.block.rigs[index];
+  if (rig.mounts.size() < 2 || !result.state.mounts.contains(index)) return "";
+  Table table({"mount of " + escape(rig.name), "x [m]", "y [m]", "z [m]", "turned by [°]", "moved by [mm]"});
+  for (std::size_t m = 0; m < rig.mounts.size() && m < result.state.mounts[index].size(); ++m) {
+    const Pose &start = rig.mounts[m].pose, &now = result.state.mounts[index][m];
+    const bool held = rig.mounts[m].held();
+    table.add({count(static_cast<std::int64_t>(m)) + " " + escape(result.block.cameras[rig.mounts[m].camera].name),
+               fixed(now.centre.x(), 4), fixed(now.centre.y(), 4), fixed(now.centre.z(), 4),
+               held ? "held" : fixed(start.rotation.angularDistance(now.rotation) * kDegrees, 4),
+               held ? "held" : fixed((now.centre - start.centre).norm() * 1000, 1)});
+  }
+  return table.html();
+}
+
+}  // namespace
+
+std::string cameras_section(const BlockResult& result, const Figures& f) {
+  if (result.block.cameras.empty()) return "";
+  std::string body;
+  const std::int64_t listed = 20;
+  for (CameraIndex camera(0); result.block.cameras.contains(camera) && camera.value < listed; ++camera.value) {
+    const Camera& c = result.block.cameras[camera];
+    const double focal =
+        result.state.cameras.contains(camera) ? result.state.cameras[camera][kFocal] : c.intrinsics[kFocal];
+    body += "<div class=aside><h3>" + escape(c.name) + "</h3>" +
+            paragraph(fmt::format("{} × {} px, {}° × {}°, {} oriented images{}", c.width, c.height,
+                                  fixed(2 * std::atan(c.width / (2 * focal)) * kDegrees, 0),
+                                  fixed(2 * std::atan(c.height / (2 * focal)) * kDegrees, 0),
+                                  count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
+                      "muted") +
+            camera_table(result, camera) + correlation_table(result, camera) + "</div>";
+  }
+  if (result.block.cameras.next_index().value > listed)
+    body += paragraph("… and " + count(result.block.cameras.next_index().value - listed) + " more cameras.", "muted");
+  std::string mounts;
+  for (RigIndex rig(0); result.block.rigs.contains(rig) && rig.value < listed; ++rig.value)
+    mounts += mounts_table(result, rig);
+  if (!mounts.empty()) mounts = "<h3>Mounts</h3>" + mounts;
+  const std::string note = paragraph(
+      "÷ sigma: distance from no distortion, of the principal point from the image's centre; parameters within " +
+          fixed(kSignificant, 0) + " sigma are not significant and shown faint.",
+      "muted");
+  return section("cameras", "Cameras", note + "<div class=row>" + body + "</div>" + mounts);
+}
+
+}  // namespace megablock::report
