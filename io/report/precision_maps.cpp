@@ -15,9 +15,10 @@ namespace megablock::report {
 
 namespace {
 
-constexpr int kCells = 56;                       // along the map's longer side
-constexpr std::size_t kCoveragePoints = 400000;  // looked at
-constexpr std::size_t kEllipses = 1500;          // drawn
+constexpr double kMostCells = 56, kLeastCells = 8;  // along the map's longer side
+constexpr double kPointsPerCell = 12;               // in the mean, so that an empty cell says something
+constexpr std::size_t kCoveragePoints = 400000;     // looked at
+constexpr std::size_t kEllipses = 1500;             // drawn
 
 // 1, 2, 3, 4, 5 to 6, 7 to 9, 10 and more images.
 constexpr std::array<int, 7> kSteps = {1, 2, 3, 4, 5, 7, 10};
@@ -30,10 +31,17 @@ std::size_t shade_of(std::int64_t images) {
   return shade;
 }
 
+double cell_size(const BlockResult& result, const Plane& plane) {
+  const double points = std::min(static_cast<double>(result.points.size()), static_cast<double>(kCoveragePoints));
+  const double cell = std::sqrt(kMapWidth * plane.height * kPointsPerCell / std::max(1.0, points));
+  const double longer = std::max(kMapWidth, plane.height);
+  return std::clamp(cell, longer / kMostCells, longer / kLeastCells);
+}
+
 class Coverage {
  public:
   Coverage(const BlockResult& result, const FrameSelection& selected, const Plane& plane)
-      : plane_(plane), cell_(std::max(kMapWidth, plane.height) / kCells) {
+      : plane_(plane), cell_(cell_size(result, plane)) {
     columns_ = static_cast<int>(std::ceil(kMapWidth / cell_));
     rows_ = static_cast<int>(std::ceil(plane.height / cell_));
     points_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
@@ -154,7 +162,10 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   for (const Ellipse& e : all) sizes.push_back(std::max(e.major, e.up));
   const double typical = spread(sizes).p95;
   if (!(typical > 0)) return {};
-  const double wanted = kMapWidth / 28 / (typical * plane->scale);  // the 95 % figure is drawn so long
+  // The 95 % figure is drawn as long as half the distance between frames, and never longer than the margin has room
+  // for.
+  const double spacing = std::sqrt(kMapWidth * plane->height / static_cast<double>(all.size()));
+  const double wanted = std::min(kMapWidth / 28, 0.3 * spacing) / (typical * plane->scale);
   const double exaggeration = round_step(wanted, 1);
   const LengthUnit unit = length_unit(typical);
   const std::size_t step = 1 + all.size() / kEllipses;
