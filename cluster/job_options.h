@@ -19,8 +19,8 @@ namespace megablock {
 
 // Options of the merge that a project file can set.
 struct MergeSettings {
-  int max_iterations = 200;  // global Levenberg-Marquardt steps per round
-  double decrement = 1e-2;   // Newton decrement at which the block is adjusted (merge.md, 5)
+  int max_iterations = 50;   // global Levenberg-Marquardt steps per round
+  double decrement = 1e-4;   // Newton decrement at which the block is adjusted (merge.md, 5)
   int screening_rounds = 2;  // re-tests of kept/rejected after convergence
   bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
   void check() const;        // throws InputError

@@ -6,6 +6,7 @@
 
 #include "adjust/linearise.h"
 #include "io/error.h"
+#include "merge/point_refinement.h"
 
 namespace megablock {
 
@@ -91,7 +92,6 @@ RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<i
       if (node.tile.valid() && tiles_[i].tile == node.tile.value) own_tile_of_node_[n] = static_cast<std::int64_t>(i);
   }
   make_plans(tree, rank_of_tile.size());
-  gauge_ = gather_gauge();
 }
 
 RankRunner::~RankRunner() = default;
@@ -166,56 +166,56 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
   return update;
 }
 
-UpdateMatrix RankRunner::condense_leaf(std::int64_t node, double lambda) {
+UpdateMatrix RankRunner::condense_leaf(std::int64_t node, const Pass& pass) {
   const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
   const RankTile& tile = tiles_[row];
-  TileCondensation condensed = condense_tile(tile.problem, tile_plans_[row], tile.state, lambda, datum_of(row));
+  TileCondensation condensed = condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
   factors_.put(node, {std::move(condensed.factor), {}}, FactorStore::Loss::kRecompute);
   return std::move(condensed.update);
 }
 
 UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right,
-                                         double lambda) {
+                                         const Pass& pass) {
   const auto n = static_cast<std::size_t>(node);
-  Front::Result result = eliminate_node(plan_.nodes[n], {&left, &right}, lambda);
+  Front::Result result = eliminate_node(plan_.nodes[n], {&left, &right}, pass.lambda);
   factors_.put(node, {{}, std::move(result.factor)},
                on_one_rank_[n] ? FactorStore::Loss::kRecompute : FactorStore::Loss::kNever);
   return std::move(result.update);
 }
 
-UpdateMatrix RankRunner::condense_again(std::int64_t node, double lambda) {
+UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
-  if (plan.leaf >= 0) return condense_leaf(node, lambda);
-  const UpdateMatrix left = condense_again(plan.left, lambda), right = condense_again(plan.right, lambda);
-  return eliminate_inner(node, left, right, lambda);
+  if (plan.leaf >= 0) return condense_leaf(node, pass);
+  const UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
+  return eliminate_inner(node, left, right, pass);
 }
 
-const NodeFactors& RankRunner::factors_of(std::int64_t node, double lambda) {
+const NodeFactors& RankRunner::factors_of(std::int64_t node, const Pass& pass) {
   if (const NodeFactors* kept = factors_.get(node)) return *kept;
   factors_.note_recomputed();
-  condense_again(node, lambda);
+  condense_again(node, pass);
   return *factors_.get(node);
 }
 
-UpReport RankRunner::up(double lambda) {
+UpReport RankRunner::up(const Pass& pass) {
   updates_.clear();
   factors_.clear();
   seams_.clear();
   condensed_.clear();
   // Of the state at hand, not of the first one: a resumed run gets the same bits.
-  if (gauge_.free()) gauge_ = gather_gauge();
+  gauge_ = gather_gauge();
   for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
     if (!mine(n)) continue;
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf >= 0) {
-      UpdateMatrix update = condense_leaf(n, lambda);
+      UpdateMatrix update = condense_leaf(n, pass);
       if (check_seams_) condensed_[node.leaf] = update;
       pass_up(n, std::move(update));
       continue;
     }
     const UpdateMatrix left = child_update(node.left), right = child_update(node.right);
     if (check_seams_) seams_.push_back(check_seam(n, left, right, seam_probability_));
-    pass_up(n, eliminate_inner(n, left, right, lambda));
+    pass_up(n, eliminate_inner(n, left, right, pass));
   }
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
@@ -251,34 +251,42 @@ Values RankRunner::from_parent(std::int64_t n) {
   return Values::from_bytes(bytes);
 }
 
-std::vector<TileStep> RankRunner::steps_down(double lambda) {
+std::vector<TileStep> RankRunner::steps_down(const Pass& pass) {
   std::vector<TileStep> steps(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
     const Step passed = from_parent<Step>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf < 0) {
-      pass_down(n, back_substitute_node(factors_of(n, lambda).front, passed));
+      pass_down(n, back_substitute_node(factors_of(n, pass).front, passed));
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
     const RankTile& tile = tiles_[row];
-    steps[row] = solve_tile_down(tile.problem, tile_plans_[row], tile.state, lambda, factors_of(n, lambda).tile, passed,
+    steps[row] = solve_tile_down(tile.problem, tile_plans_[row], tile.state, pass, factors_of(n, pass).tile, passed,
                                  datum_of(row));
   }
   ranks_.flush_sends();
   return steps;
 }
 
-DownReport RankRunner::down(double lambda) {
+DownReport RankRunner::down(const Pass& pass) {
   struct Sums {
     double damping_norm = 0, trial_cost = 0;
   };
-  const std::vector<TileStep> steps = steps_down(lambda);
+  const std::vector<TileStep> steps = steps_down(pass);
+  std::vector<MotionSums> own;
+  for (std::size_t row = 0; row < tiles_.size(); ++row)
+    own.push_back(motion_sums(gauge_, tiles_[row].tile, tiles_[row].problem, tile_plans_[row], tiles_[row].state,
+                              steps[row].unknowns));
+  const std::vector<BlockMotion> motions =
+      block_motions(gauge_, gather_bytes_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
   std::vector<Sums> sums(tiles_.size());
   trial_.assign(tiles_.size(), {});
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
-    trial_[row] = apply_step(tiles_[row].problem, tiles_[row].state, steps[row]);
+    trial_[row] = apply_step(gauge_, motions, tiles_[row].tile, tiles_[row].problem, tile_plans_[row],
+                             tiles_[row].state, steps[row]);
+    refine_points(tiles_[row].problem, tile_plans_[row], trial_[row]);
     sums[row] = {steps[row].damping_norm, evaluate_cost(tiles_[row].problem, trial_[row])};
   }
   DownReport report;
@@ -302,6 +310,7 @@ RankRunner::Posterior RankRunner::posterior() {
   const auto inner =
       std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
   seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
+  gauge_ = gather_gauge();
   with_columns_ = gauge_.free();
   posterior.sums = up(0).sums;
   posterior.gauge = gauge_;

@@ -13,8 +13,9 @@
 
 #include "cluster/communicator.h"
 #include "merge/condense.h"
-#include "merge/gauge.h"
+#include "merge/block_motion.h"
 #include "merge/global_adjustment.h"
+#include "merge/inner_constraints.h"
 #include "merge/memory.h"
 #include "merge/node.h"
 #include "merge/seam_check.h"
@@ -38,8 +39,8 @@ class RankRunner : public TreeRunner {
              const MemoryOptions& memory);
   ~RankRunner() override;
 
-  UpReport up(double lambda) override;
-  DownReport down(double lambda) override;
+  UpReport up(const Pass& pass) override;
+  DownReport down(const Pass& pass) override;
   void accept() override;
   void reject() override;
 
@@ -66,17 +67,17 @@ class RankRunner : public TreeRunner {
   void pass_down(std::int64_t node, const Values& front);
   template <typename Values>
   Values from_parent(std::int64_t node);
-  UpdateMatrix condense_leaf(std::int64_t node, double lambda);
-  UpdateMatrix eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double lambda);
+  UpdateMatrix condense_leaf(std::int64_t node, const Pass& pass);
+  UpdateMatrix eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, const Pass& pass);
   // The subtree of a node that lies on this rank alone, once more.
-  UpdateMatrix condense_again(std::int64_t node, double lambda);
-  const NodeFactors& factors_of(std::int64_t node, double lambda);
+  UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
+  const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   BlockGauge gather_gauge() const;
   TileDatum datum_of(std::size_t row) const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
   // Down with the current factors: steps of this rank's tiles.
-  std::vector<TileStep> steps_down(double lambda);
+  std::vector<TileStep> steps_down(const Pass& pass);
 
   Communicator& ranks_;
   std::vector<RankTile> tiles_;

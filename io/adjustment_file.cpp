@@ -22,6 +22,11 @@ void write_adjustment(const std::string& path, const TileAdjustment& adjustment)
   file.matrix("cameras/intrinsics", intrinsics, kIntrinsicCount,
               {"px, px, px, 1, 1, 1, 1, 1", "f, cx, cy, k1, k2, k3, p1, p2"});
   file.vector("cameras/observations", adjustment.camera_observations, {"", "number of kept observations"});
+  file.group("mounts", "mounts of the rigs that the tile's residuals touch");
+  file.vector("mounts/rig", plain(adjustment.mount_rigs), {"", "rig index in the block"});
+  file.vector("mounts/mount", adjustment.mount_numbers, {"", "number of the mount in its rig"});
+  write_poses(file, "mounts", adjustment.mounts, "camera", "rig");
+  file.vector("mounts/observations", adjustment.mount_observations, {"", "number of kept observations"});
   file.group("points", "rows of the tile's track file, then its control points in block order");
   file.matrix("points/position", vectors3(adjustment.points, [](const Eigen::Vector3d& p) { return p; }), 3,
               {"m", "ground frame; NaN: not triangulated"});
@@ -46,6 +51,11 @@ TileAdjustment read_adjustment(const std::string& path) {
   for (std::size_t c = 0; c < adjustment.intrinsics.size(); ++c)
     std::copy_n(&intrinsics[kIntrinsicCount * c], kIntrinsicCount, adjustment.intrinsics[c].begin());
   adjustment.camera_observations = file.vector<std::int64_t>("cameras/observations", cameras);
+  adjustment.mount_rigs = indices<RigIndex>(file.vector<std::int64_t>("mounts/rig"));
+  const auto mounts = static_cast<std::int64_t>(adjustment.mount_rigs.size());
+  adjustment.mount_numbers = file.vector<std::int32_t>("mounts/mount", mounts);
+  adjustment.mounts = read_poses(file, "mounts", mounts);
+  adjustment.mount_observations = file.vector<std::int64_t>("mounts/observations", mounts);
   const auto points = file.matrix<double>("points/position", 3);
   for (std::size_t p = 0; p < points.size() / 3; ++p) adjustment.points.push_back(vector3(points, p));
   adjustment.kept = file.vector<std::uint8_t>("observations/kept");

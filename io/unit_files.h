@@ -53,6 +53,10 @@ struct TileAdjustment {
   std::vector<CameraIndex> cameras;
   std::vector<Intrinsics> intrinsics;            // [cameras]
   std::vector<std::int64_t> camera_observations; // [cameras]
+  std::vector<RigIndex> mount_rigs;
+  std::vector<std::int32_t> mount_numbers;       // [mount_rigs] of the mount in its rig
+  std::vector<Pose> mounts;                      // [mount_rigs]
+  std::vector<std::int64_t> mount_observations;  // [mount_rigs]
   std::vector<Eigen::Vector3d> points;           // [tracks + control points]; NaN = not triangulated
   std::vector<std::uint8_t> kept;                // [observations of tracks, then of control points] 1 = kept
   double image_sigma_px = 0;                     // of tie point measurements, with which the tile was adjusted

@@ -66,7 +66,7 @@ class CellAssembler {
     add_residual(term.blocks.data(), term.block_count, term.residual);
     SubtreeSums& sums = front_.sums();
     sums.cost += 0.5 * term.rho;
-    sums.weighted_squares += term.residual.squaredNorm();
+    sums.weighted_squares += term.weighted_squares;
     sums.residuals += term.residual.size();
   }
 
@@ -109,15 +109,15 @@ class CellAssembler {
   std::vector<std::int64_t> rows_;
 };
 
-Front fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
+Front fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                 const PlanNode& node, PointEquations& equations, std::int64_t right_hand_sides) {
   Front front(node.eliminated, node.passed, right_hand_sides);
   CellAssembler assembler(plan, front);
   for (std::int64_t point : plan.points[at(node.leaf)]) {
-    equations.linearise(point, lambda);
+    equations.linearise(point, pass);
     assembler.add_point(equations);
   }
-  visit_terms(problem, plan, state, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
+  visit_terms(problem, plan, state, pass, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
   return front;
 }
 
@@ -187,8 +187,8 @@ TileFactor TileFactor::from_bytes(const Bytes& bytes) {
   return factor;
 }
 
-TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
-                               const TileDatum& datum) {
+TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
+                               const Pass& pass, const TileDatum& datum) {
   const std::int64_t right_hand_sides = 1 + datum.columns.columns;
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
   PointEquations equations(problem, plan, state);
@@ -197,7 +197,7 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
   result.factor.nodes.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const PlanNode& node = nodes[i];
-    Front front = node.leaf >= 0 ? fill_cell(problem, plan, state, lambda, node, equations, right_hand_sides)
+    Front front = node.leaf >= 0 ? fill_cell(problem, plan, state, pass, node, equations, right_hand_sides)
                                  : Front(node.eliminated, node.passed, right_hand_sides);
     for (std::int64_t child : {node.left, node.right}) {
       if (child < 0) continue;
@@ -206,7 +206,7 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
     }
     add_datum(datum, node.eliminated, front);
     if (i + 1 == nodes.size()) add_datum(datum, node.passed, front);
-    Front::Result eliminated = std::move(front).eliminate(lambda);
+    Front::Result eliminated = std::move(front).eliminate(pass.lambda);
     updates[i] = std::move(eliminated.update);
     result.factor.nodes[i] = std::move(eliminated.factor);
   }
@@ -214,11 +214,11 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
   return result;
 }
 
-TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
+TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum) {
   if (factor.empty()) {
-    const TileFactor again = condense_tile(problem, plan, state, lambda, datum).factor;
-    return solve_tile_down(problem, plan, state, lambda, again, boundary);
+    const TileFactor again = condense_tile(problem, plan, state, pass, datum).factor;
+    return solve_tile_down(problem, plan, state, pass, again, boundary);
   }
   TileStep result;
   result.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
@@ -250,7 +250,7 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
   DampingNorm damping(plan);
   for (const auto& cell : plan.points) {
     for (std::int64_t point : cell) {
-      equations.linearise(point, lambda);
+      equations.linearise(point, pass);
       Eigen::Vector3d y = equations.z();
       for (const auto& block : equations.blocks())
         y -= block.w.transpose() * Eigen::Map<const Eigen::VectorXd>(x + offsets[at(block.unknown)], block.dimension);
@@ -262,30 +262,11 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
     }
   }
   for (std::size_t cell = 0; cell < plan.points.size(); ++cell)
-    visit_terms(problem, plan, state, cell, [&](const TermResidual& term) {
+    visit_terms(problem, plan, state, pass, cell, [&](const TermResidual& term) {
       for (int b = 0; b < term.block_count; ++b) damping.add(term.blocks[at(b)]);
     });
   result.damping_norm += damping.norm(result.unknowns);
   return result;
-}
-
-TileState apply_step(const TileProblem& problem, const TileState& state, const TileStep& step) {
-  TileState next = state;
-  const auto increment = [&](const UnknownId& id) -> const double* { return step.unknowns.find(id); };
-  for (std::size_t row = 0; row < problem.frames.size(); ++row)
-    if (const double* x = increment({UnknownKind::kFrame, 0, problem.frames[row].value}))
-      next.frames[row] = pose_update(state.frames[row], Eigen::Map<const PoseIncrement>(x));
-  for (std::size_t row = 0; row < problem.cameras.size(); ++row) {
-    const double* x = increment({UnknownKind::kCamera, 0, problem.cameras[row].value});
-    for (int k = 0; x != nullptr && k < kIntrinsicCount; ++k)
-      if ((problem.camera_free[row] >> k) & 1) next.cameras[row][at(k)] += *x++;
-  }
-  for (std::size_t row = 0; row < problem.mounts.size(); ++row)
-    if (const double* x = increment({UnknownKind::kMount, problem.mounts[row].mount, problem.mounts[row].rig.value}))
-      next.mounts[row] = pose_update(state.mounts[row], Eigen::Map<const PoseIncrement>(x));
-  for (std::size_t p = 0; p < next.points.size(); ++p)
-    if (!step.points[p].isZero(0)) next.points[p] += step.points[p];
-  return next;
 }
 
 }  // namespace megablock

@@ -7,7 +7,8 @@
 //
 // The cells' fronts are then eliminated depth-first like the nodes of the merge tree. The boundary block is never
 // factorised: in a tile without a datum it is singular.
-// Robust weights as Ceres (sqrt(rho'), no second-order term); D = diagonal of J'J.
+// Robust weights as Ceres (sqrt(rho'), no second-order term) unless the pass asks for the losses' curvature
+// (tile_linearisation.h); D = diagonal of J'J.
 #pragma once
 
 #include "adjust/tile_problem.h"
@@ -28,10 +29,15 @@ struct TilePlan {
   std::vector<std::vector<std::int64_t>> points;  // [cells] active points, ascending
   // Rows of the problem's tables of observations without a point, [cells].
   std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, intrinsic_priors, mount_priors;
+  // Part of every frame row that hangs together by points and relative poses, by lowest frame; -1: untouched. [frames]
+  std::vector<std::int64_t> part_of_frame;
+  std::int64_t part_count = 0;
   // Position in `unknowns`, -1: held or untouched.
   std::vector<std::int64_t> unknown_of_frame, unknown_of_camera, unknown_of_mount;
 };
 // `node` is the tile's leaf in the plan of the merge tree.
+// Frame row of an active point's first kept observation.
+std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);
 TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 32);
 
 // Factors of a tile's cells, by node of TilePlan::cells. Empty: recompute.
@@ -58,10 +64,17 @@ struct TileDatum {
   Step columns{{}, 0, {}};  // further right-hand sides
 };
 
+// How a pass linearises and damps.
+struct Pass {
+  double lambda = 0;
+  bool curvature = false;  // with the second-order term of the robust losses
+  Pass(double damping, bool with_curvature = false) : lambda(damping), curvature(with_curvature) {}
+};
+
 // Linearises at `state`, eliminates the tile's points and interior unknowns.
 // Throws ComputeError when a kept observation is behind its camera.
-TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
-                               const TileDatum& datum = {});
+TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
+                               const Pass& pass, const TileDatum& datum = {});
 
 // Step of everything in the tile.
 struct TileStep {
@@ -71,11 +84,8 @@ struct TileStep {
                                         // block is 1/2 (decrement^2 + lambda * sum of these)
 };
 // From the boundary's step. `factor` empty: condensed again (same bits).
-TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, double lambda,
+TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum = {});
-
-// state (+) step; every tile that holds a frame computes the same bits.
-TileState apply_step(const TileProblem& problem, const TileState& state, const TileStep& step);
 
 // Posterior covariances of a tile, from factors of a pass with lambda = 0.
 struct TileCovariance {

@@ -6,19 +6,17 @@
 //
 //     frames   dw = -phi,  dC = phi x (C - c) + L t + s (C - c)       points   dX as dC        mounts   dC_m = s C_m
 //
-// and changes no image residual (the scale only where two held mounts of a rig do not fix it). The directions that
-// change no other residual either are the null space of the 7 x 7 matrix sum (J N)'(J N) over the priors: 7 for free
-// single cameras, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. It belongs to a
-// connected component of the block and is found before the first pass; pivots that vanish in spite of it (front.h) are
-// unknowns that too few observations determine, reported as such.
+// and changes no image residual (the scale only where two held mounts of a rig do not fix it). What the other residuals
+// say of it is the 7 x 7 matrix sum (J N)'(J N) over the priors. Its null space is free: 7 directions for single
+// cameras without priors, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. So are
+// rotations that the priors give to no better than a radian and scales that they give to no better than a factor
+// (positions within their own noise of a straight line): the system linearised at hand says nothing of them.
+// It belongs to a connected component of the block and is found before every pass; pivots that vanish in spite of it
+// (front.h) are unknowns that too few observations determine, reported as such.
 //
 // Minimal constraints: one frame is held along the free directions, a second one along what is left (the scale), each
 // by adding D^1/2 P D^1/2 to its own 6 x 6 block: no coupling, no dense rows, nothing added to the gradient, and the
-// decrement stays as it is. At the end the S-transformation (Baarda 1973)
-//
-//     C' = S C S',   S = I - N M^-1 N'W,   M = N'WN over the component's frames,  W = (1, 1, 1, 1/L^2, ...)
-//
-// moves the covariances to inner constraints; C N W is formed by as many further right-hand sides through the tree.
+// decrement stays as it is.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,6 +30,7 @@
 
 namespace megablock {
 
+using Matrix37 = Eigen::Matrix<double, 3, 7>;
 using Matrix67 = Eigen::Matrix<double, 6, 7>;
 using Matrix77 = Eigen::Matrix<double, 7, 7>;
 
@@ -56,17 +55,21 @@ struct TileGauge {
 };
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
-// A connected component of the block whose datum is not complete.
-struct FreeComponent {
+// Movement by a similarity about `centre`, columns (phi, t, s).
+Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& centre, double extent);
+Matrix37 similarity_of_point(const Eigen::Vector3d& position, const Eigen::Vector3d& centre, double extent);
+
+// A connected component of the block.
+struct BlockComponent {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double extent = 1;
   std::int64_t frames = 0;  // boundary frames counted once per tile
   std::int64_t lowest_frame = -1;
-  std::int64_t defect = 0;                 // 1 to 7
+  std::int64_t defect = 0;                 // 0 (complete) to 7
   Matrix77 directions = Matrix77::Zero();  // first `defect` columns: combinations of (phi, t, s) that are free
   std::int64_t first_column = 0;           // of its further right-hand sides
   Matrix67 move(const Eigen::Vector3d& centre_of_frame) const;  // N of a frame, restricted to the free directions
-  Eigen::Matrix<double, 3, 7> move_point(const Eigen::Vector3d& position) const;
+  Matrix37 move_point(const Eigen::Vector3d& position) const;
   Eigen::Matrix<double, 6, 1> weights() const;  // W
 };
 
@@ -78,34 +81,22 @@ struct GaugeConstraint {
 };
 
 struct BlockGauge {
-  std::vector<FreeComponent> components;  // by lowest frame
+  std::vector<BlockComponent> components;
   std::vector<GaugeConstraint> constraints;
-  std::vector<std::vector<std::int64_t>> part_component;  // [tiles][parts] row of components, -1: complete
+  std::vector<std::vector<std::int64_t>> part_component;  // [tiles][parts] row of components
   std::int64_t defect() const;                            // sum over components = columns of further right-hand sides
-  bool free() const { return !components.empty(); }
+  bool free() const { return defect() > 0; }
 };
 // From all tiles, in tile order.
 BlockGauge make_gauge(const std::vector<TileGauge>& tiles);
 
+// Component of every frame row of a tile; nullptr: untouched, or its datum is complete.
+std::vector<const BlockComponent*> free_component_of_frame(const BlockGauge& gauge, std::int64_t tile,
+                                                           const TilePlan& plan);
+
 // What one tile adds: its constraints, and (when asked for) the rows W N of the frames that it owns.
 TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
                      const TileState& state, bool with_columns);
-
-// Sums for the S-transformation over the frames that a tile owns; added in tile order.
-struct InnerSums {
-  Eigen::MatrixXd m, k;  // [defect x defect]: N'WN, N'W C W N; blocks of different components are not used
-  void add(const InnerSums& other);
-  Bytes to_bytes() const;
-  static InnerSums from_bytes(const Bytes& bytes);
-};
-InnerSums inner_sums(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
-                     const TileState& state, const Step& unknowns);
-
-// Moves a tile's covariances to inner constraints. `unknowns`: the tile's step with the further columns (TileStep),
-// which covariance_tile() had as `columns`.
-void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::int64_t tile, const TileProblem& problem,
-                          const TilePlan& plan, const TileState& state, const Step& unknowns,
-                          TileCovariance& covariance);
 
 // For the report.
 struct GaugeReport {

@@ -14,6 +14,7 @@ namespace {
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kUnresolvable = 1e3 * kEpsilon;  // of the cost
 constexpr double kMaxLambda = 1e12;
+constexpr double kTrustworthy = 0.75;  // gain ratio
 
 void stop(GlobalState& state, GlobalOutcome outcome) {
   state.outcome = outcome;
@@ -24,6 +25,8 @@ void accept(GlobalState& state, double gain_ratio) {
   const double x = 2 * gain_ratio - 1;
   state.lambda *= std::max(1.0 / 3, 1 - x * x * x);
   state.nu = 2;
+  state.confirm = 1;
+  state.curvature = gain_ratio >= kTrustworthy;
   state.next = GlobalAction::kAccept;
 }
 
@@ -31,12 +34,15 @@ void reject(GlobalState& state) {
   state.lambda *= std::max(10 * state.nu, 1e-6 / state.lambda);
   state.nu *= 2;
   state.floor_decrement = -1;
+  state.curvature = 0;
+  if (state.pass_lambda == 0) state.confirm = 0;
   state.next = GlobalAction::kReject;
 }
 
 // After a step was accepted or rejected: the next pass, unless the budget of steps is spent.
 void start_pass(GlobalState& state, const GlobalOptions& options) {
   state.pass_lambda = state.lambda;
+  state.pass_curvature = state.curvature;
   state.next = GlobalAction::kUp;
   if (state.lambda > kMaxLambda) stop(state, GlobalOutcome::kFailed);
   if (state.iterations >= options.max_iterations) stop(state, GlobalOutcome::kIterationLimit);
@@ -68,8 +74,9 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
   if (state.pass_lambda == 0) {
     if (small) return stop(state, GlobalOutcome::kConverged);
     if (at_floor) return stop(state, GlobalOutcome::kRoundingFloor);
-  } else if (small || at_floor) {
+  } else if ((small || at_floor) && state.confirm != 0) {
     state.pass_lambda = 0;  // this pass decides
+    state.pass_curvature = 0;
     return;
   }
   state.next = GlobalAction::kDown;
@@ -103,10 +110,10 @@ void adjust_globally(TreeRunner& runner, const GlobalOptions& options, GlobalSta
   while (state.next != GlobalAction::kStop) {
     switch (state.next) {
       case GlobalAction::kUp:
-        report_up(state, options, runner.up(state.pass_lambda));
+        report_up(state, options, runner.up(next_pass(state)));
         break;
       case GlobalAction::kDown:
-        report_down(state, options, runner.down(state.pass_lambda));
+        report_down(state, options, runner.down(next_pass(state)));
         break;
       case GlobalAction::kAccept:
         runner.accept();

@@ -5,22 +5,26 @@
 // Damping after Nielsen (1999): lambda *= max(1/3, 1 - (2 rho - 1)^3) on acceptance, no floor; on rejection
 // lambda *= max(10 nu, 1e-6 / lambda), nu *= 2. Tiles come adjusted and aligned, so lambda starts at 1e-10.
 //
+// A pass takes the curvature of the robust losses (tile_linearisation.h) while steps do what their model promises:
+// after a step of gain ratio >= 0.75, until one falls short of it or is rejected.
+//
 // Stop on the Newton decrement d^2 = b'H^-1 b = sum |L^-1 b|^2 (every unknown is within d of its own posterior sigma of
-// the optimum), measured with lambda = 0: when the damped decrement falls below the limit, the same state is condensed
-// once more with lambda = 0, and that pass decides. When the predicted decrease is below 1e3 eps F the cost cannot
-// resolve it: the step is accepted, and the iteration goes on as long as d falls.
+// the optimum), measured with lambda = 0 and the weights of the covariances: when the decrement of a pass falls below
+// the limit, the same state is condensed once more with lambda = 0, and that pass decides. When it does not confirm and
+// its step is no good, the next step is damped and taken, however small. When the predicted decrease is below
+// 1e3 eps F the cost cannot resolve it: the step is accepted, and the iteration goes on as long as d falls.
 #pragma once
 
 #include <functional>
 #include <string>
 
-#include "merge/front.h"
+#include "merge/condense.h"
 
 namespace megablock {
 
 struct GlobalOptions {
   double initial_lambda = 1e-10;
-  double max_decrement = 1e-2;  // posterior sigmas; exactness tests use 1e-7
+  double max_decrement = 1e-4;  // posterior sigmas; exactness tests use 1e-7
   int max_iterations = 50;      // accepted and rejected steps
   void check() const;           // throws InputError
 };
@@ -37,7 +41,7 @@ struct DownReport {
 };
 
 enum class GlobalAction : std::int32_t {
-  kUp = 0,      // linearise at the current state, condense and eliminate with `GlobalState::pass_lambda`
+  kUp = 0,      // linearise at the current state, condense and eliminate with `next_pass`
   kDown = 1,    // back-substitute, form the trial state, evaluate its cost
   kAccept = 2,  // the trial state becomes the current state (then call report_accepted); checkpoint here
   kReject = 3,  // forget the trial state (then call report_rejected)
@@ -63,10 +67,14 @@ struct GlobalState {
   double predicted = 0, trial_cost = 0;
   std::int32_t iterations = 0;  // steps tried
   std::int32_t accepted = 0;
+  std::int32_t curvature = 0;       // the last step did what its model promised: the next one takes the losses' own
+  std::int32_t pass_curvature = 0;  // of the current pass; 0 for a confirming pass
+  std::int32_t confirm = 1;         // 0: a confirming pass failed at the current state and its step was rejected
 };
 
 GlobalState start_global(const GlobalOptions& options);
 inline GlobalAction next_action(const GlobalState& state) { return state.next; }
+inline Pass next_pass(const GlobalState& state) { return {state.pass_lambda, state.pass_curvature != 0}; }
 void report_up(GlobalState& state, const GlobalOptions& options, const UpReport& report);
 void report_down(GlobalState& state, const GlobalOptions& options, const DownReport& report);
 void report_accepted(GlobalState& state, const GlobalOptions& options);
@@ -76,8 +84,8 @@ void report_rejected(GlobalState& state, const GlobalOptions& options);
 class TreeRunner {
  public:
   virtual ~TreeRunner() = default;
-  virtual UpReport up(double lambda) = 0;      // at the current state
-  virtual DownReport down(double lambda) = 0;  // after up(lambda)
+  virtual UpReport up(const Pass& pass) = 0;      // at the current state
+  virtual DownReport down(const Pass& pass) = 0;  // after up(pass)
   virtual void accept() = 0;
   virtual void reject() = 0;
 };

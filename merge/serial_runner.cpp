@@ -2,6 +2,7 @@
 
 #include "adjust/linearise.h"
 #include "io/error.h"
+#include "merge/point_refinement.h"
 
 namespace megablock {
 
@@ -20,7 +21,6 @@ SerialRunner::SerialRunner(const MergeTree& tree, std::vector<TileProblem> probl
   for (std::size_t t = 0; t < problems_.size(); ++t)
     tile_plans_.push_back(make_tile_plan(problems_[t], plan_.nodes[at(plan_.node_of_leaf[t])]));
   steps_.resize(problems_.size());
-  block_gauge_ = find_gauge();
 }
 
 SerialRunner::~SerialRunner() = default;
@@ -31,21 +31,21 @@ std::int64_t SerialRunner::seam_count() const {
   return count;
 }
 
-UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, double lambda, bool check_seams) {
+UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, const Pass& pass, bool check_seams) {
   const PlanNode& node = plan_.nodes[at(number)];
   NodeFactors factors;
   UpdateMatrix update;
   if (node.leaf >= 0) {
     const std::size_t t = at(node.leaf);
-    TileCondensation condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], lambda, datum_of(t));
+    TileCondensation condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], pass, datum_of(t));
     update = std::move(condensed.update);
     factors.tile = std::move(condensed.factor);
   } else {
-    const UpdateMatrix left = condense_subtree(node.left, lambda, check_seams);
-    const UpdateMatrix right = condense_subtree(node.right, lambda, check_seams);
+    const UpdateMatrix left = condense_subtree(node.left, pass, check_seams);
+    const UpdateMatrix right = condense_subtree(node.right, pass, check_seams);
     if (check_seams)
       seams_.push_back(check_seam(number, left, right, kSeamAlarmProbability / static_cast<double>(seam_count())));
-    Front::Result result = eliminate_node(node, {&left, &right}, lambda);
+    Front::Result result = eliminate_node(node, {&left, &right}, pass.lambda);
     update = std::move(result.update);
     factors.front = std::move(result.factor);
   }
@@ -65,49 +65,56 @@ TileDatum SerialRunner::datum_of(std::size_t t) const {
                     with_columns_);
 }
 
-UpReport SerialRunner::pass(double lambda, bool final_pass) {
+UpReport SerialRunner::run_up(const Pass& pass, bool final_pass) {
   factors_.clear();
   // Of the state at hand, not of the first one: a resumed run gets the same bits.
-  if (block_gauge_.free()) block_gauge_ = find_gauge();
+  block_gauge_ = find_gauge();
   with_columns_ = final_pass && block_gauge_.free();
   if (final_pass) seams_.clear();
-  return {condense_subtree(plan_.root(), lambda, final_pass).sums};
+  return {condense_subtree(plan_.root(), pass, final_pass).sums};
 }
 
-UpReport SerialRunner::up(double lambda) { return pass(lambda, false); }
+UpReport SerialRunner::up(const Pass& pass) { return run_up(pass, false); }
 
 UpReport SerialRunner::final_up() {
-  const UpReport report = pass(0, true);
+  const UpReport report = run_up(0, true);
   gauge_ = judge_gauge(report.sums, block_gauge_);
   return report;
 }
 
-const NodeFactors& SerialRunner::inner_factor(std::int64_t node, double lambda) {
+const NodeFactors& SerialRunner::inner_factor(std::int64_t node, const Pass& pass) {
   if (const NodeFactors* kept = factors_.get(node)) return *kept;
   factors_.note_recomputed();
-  condense_subtree(node, lambda, false);
+  condense_subtree(node, pass, false);
   return *factors_.get(node);
 }
 
-void SerialRunner::down_from(std::int64_t number, double lambda, const Step& parent) {
+void SerialRunner::down_from(std::int64_t number, const Pass& pass, const Step& parent) {
   const PlanNode& node = plan_.nodes[at(number)];
   if (node.leaf >= 0) {
     const std::size_t t = at(node.leaf);
     steps_[t] =
-        solve_tile_down(problems_[t], tile_plans_[t], states_[t], lambda, inner_factor(number, lambda).tile, parent);
+        solve_tile_down(problems_[t], tile_plans_[t], states_[t], pass, inner_factor(number, pass).tile, parent);
     return;
   }
-  const Step step = back_substitute_node(inner_factor(number, lambda).front, parent);
-  down_from(node.right, lambda, step);
-  down_from(node.left, lambda, step);
+  const Step step = back_substitute_node(inner_factor(number, pass).front, parent);
+  down_from(node.right, pass, step);
+  down_from(node.left, pass, step);
 }
 
-DownReport SerialRunner::down(double lambda) {
-  down_from(plan_.root(), lambda, Step());
+DownReport SerialRunner::down(const Pass& pass) {
+  down_from(plan_.root(), pass, Step());
+  std::vector<MotionSums> sums;
+  for (std::size_t t = 0; t < problems_.size(); ++t)
+    sums.push_back(motion_sums(block_gauge_, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t], states_[t],
+                               steps_[t].unknowns));
+  const std::vector<BlockMotion> motions = block_motions(block_gauge_, sums);
   trial_.clear();
   DownReport report;
   for (std::size_t t = 0; t < problems_.size(); ++t) {
-    trial_.push_back(apply_step(problems_[t], states_[t], steps_[t]));
+    trial_.push_back(apply_step(block_gauge_, motions, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t],
+                                states_[t], steps_[t]));
+    refine_points(problems_[t], tile_plans_[t], trial_.back());
     report.damping_norm += steps_[t].damping_norm;
     report.trial_cost += evaluate_cost(problems_[t], trial_[t]);
   }

@@ -4,9 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "merge/block_motion.h"
 #include "merge/condense.h"
-#include "merge/gauge.h"
 #include "merge/global_adjustment.h"
+#include "merge/inner_constraints.h"
 #include "merge/memory.h"
 #include "merge/node.h"
 #include "merge/seam_check.h"
@@ -20,8 +21,8 @@ class SerialRunner : public TreeRunner {
                MemoryOptions memory = {});
   ~SerialRunner() override;
 
-  UpReport up(double lambda) override;
-  DownReport down(double lambda) override;
+  UpReport up(const Pass& pass) override;
+  DownReport down(const Pass& pass) override;
   void accept() override;
   void reject() override;
 
@@ -46,14 +47,14 @@ class SerialRunner : public TreeRunner {
 
  private:
   // Update matrix of a node's subtree; its factors go to the store.
-  UpdateMatrix condense_subtree(std::int64_t node, double lambda, bool check_seams);
+  UpdateMatrix condense_subtree(std::int64_t node, const Pass& pass, bool check_seams);
   // Factor of an inner node or a tile; recomputes the subtree where it was dropped.
-  const NodeFactors& inner_factor(std::int64_t node, double lambda);
-  void down_from(std::int64_t node, double lambda, const Step& parent);
+  const NodeFactors& inner_factor(std::int64_t node, const Pass& pass);
+  void down_from(std::int64_t node, const Pass& pass, const Step& parent);
   void covariances_from(std::int64_t node, const CovarianceMatrix& parent, std::vector<TileCovariance>& result);
   BlockGauge find_gauge() const;
   TileDatum datum_of(std::size_t tile) const;
-  UpReport pass(double lambda, bool final_pass);
+  UpReport run_up(const Pass& pass, bool final_pass);
   void inner_constraints(std::vector<TileCovariance>& covariances);
   std::int64_t seam_count() const;
 

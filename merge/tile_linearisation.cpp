@@ -21,7 +21,7 @@ PointEquations::Block& PointEquations::block_of(std::int64_t unknown, int dimens
   return blocks_[static_cast<std::size_t>(slot)];
 }
 
-void PointEquations::linearise(std::int64_t point, double lambda) {
+void PointEquations::linearise(std::int64_t point, const Pass& pass) {
   for (const Block& block : blocks_) slot_[static_cast<std::size_t>(block.unknown)] = -1;
   blocks_.clear();
   observations_.clear();
@@ -30,7 +30,7 @@ void PointEquations::linearise(std::int64_t point, double lambda) {
   rho_ = weighted_squares_ = 0;
   residual_count_ = 0;
   for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row)
-    if (problem_.kept[row]) add_observation(point, row);
+    if (problem_.kept[row]) add_observation(point, row, pass.curvature);
   if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0) {
     const auto& term = problem_.point_priors[static_cast<std::size_t>(i)];
     const Eigen::Vector3d weight = term.sigma.cwiseInverse();  // 0 on a free axis
@@ -41,10 +41,10 @@ void PointEquations::linearise(std::int64_t point, double lambda) {
     weighted_squares_ += r.squaredNorm();
     residual_count_ += (weight.array() > 0).count();
   }
-  factorise(lambda);
+  factorise(pass.lambda);
 }
 
-void PointEquations::add_observation(std::int64_t point, std::int64_t row) {
+void PointEquations::add_observation(std::int64_t point, std::int64_t row, bool curvature) {
   const TileImage& image = problem_.images[problem_.image[row].value];
   const auto frame = image.frame.value, camera = image.camera.value, mount = image.mount;
   const ImageResidual r =
@@ -53,15 +53,15 @@ void PointEquations::add_observation(std::int64_t point, std::int64_t row) {
   if (!r.in_front)
     throw ComputeError("a kept observation of point " + std::to_string(problem_.points[point].index) +
                        " lies behind image " + std::to_string(image.image.value));
-  const auto rho = problem_.image_loss.evaluate(r.residual.squaredNorm());
-  const double root = std::sqrt(rho[1]);
-  rho_ += rho[0];
+  const double squares = r.residual.squaredNorm();
+  const LossWeight weight(problem_.image_loss, squares, curvature);
+  rho_ += weight.rho;
+  weighted_squares_ += weight.first * squares;
   residual_count_ += 2;
 
   Observation& observation = observations_.emplace_back();
-  observation.residual = root * r.residual;
-  weighted_squares_ += observation.residual.squaredNorm();
-  const Eigen::Matrix<double, 2, 3> by_point = root * r.by_point;
+  observation.residual = weight.residual_scale * r.residual;
+  const Eigen::Matrix<double, 2, 3> by_point = weight.weighted(r.by_point, r.residual);
   v_.noalias() += by_point.transpose() * by_point;
   b_.noalias() -= by_point.transpose() * observation.residual;
 
@@ -71,16 +71,17 @@ void PointEquations::add_observation(std::int64_t point, std::int64_t row) {
     block.jacobian = jacobian;
     block_of(unknown, dimension).w.noalias() += block.jacobian.transpose() * by_point;
   };
-  add(plan_.unknown_of_frame[frame], Eigen::Matrix<double, 2, 6>(root * r.by_frame), 6);
+  add(plan_.unknown_of_frame[frame], weight.weighted(r.by_frame, r.residual), 6);
   if (const std::int64_t unknown = plan_.unknown_of_camera[camera]; unknown >= 0) {
     const int free_count = __builtin_popcount(problem_.camera_free[camera]);
+    const auto weighted = weight.weighted(r.by_intrinsics, r.residual);
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 8> jacobian(2, free_count);
     for (int k = 0, column = 0; k < kIntrinsicCount; ++k)
-      if ((problem_.camera_free[camera] >> k) & 1) jacobian.col(column++) = root * r.by_intrinsics.col(k);
+      if ((problem_.camera_free[camera] >> k) & 1) jacobian.col(column++) = weighted.col(k);
     add(unknown, jacobian, free_count);
   }
   if (const std::int64_t unknown = plan_.unknown_of_mount[mount]; unknown >= 0)
-    add(unknown, Eigen::Matrix<double, 2, 6>(root * r.by_mount), 6);
+    add(unknown, weight.weighted(r.by_mount, r.residual), 6);
 }
 
 void PointEquations::factorise(double lambda) {

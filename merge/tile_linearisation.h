@@ -1,5 +1,13 @@
 // Linearised residuals of one cell, point by point and term by term: shared by condensation, back-substitution and
 // covariances, which all recompute them (cheaper than keeping them).
+//
+// Losses. The second derivative of 1/2 rho(|r|^2) by r is rho' (I + 2 rho''/rho' r r'): rho' across the residual, and
+// rho' (1 + 2 s rho''/rho') along it, s = |r|^2: nothing for Huber beyond its corner, less than nothing for Cauchy
+// beyond its scale. Normal equations with rho' I alone (iteratively reweighted least squares; they define decrement and
+// covariances) overestimate the curvature along such residuals and approach the optimum by a constant factor per step.
+// A pass with curvature takes the smaller value, but no less than kLeastCurvature rho', so that the normal equations
+// stay positive definite: J and r are scaled by sqrt(rho') and, along r, further by (1 - k) and 1 / (1 - k),
+// (1 - k)^2 = the value (Triggs et al. 2000, "Bundle adjustment", 4.3). The gradient stays what it is.
 #pragma once
 
 #include <array>
@@ -11,37 +19,68 @@
 
 namespace megablock {
 
+inline constexpr double kLeastCurvature = 0.1;
+
+// Weighting of a residual under a loss.
+struct LossWeight {
+  double rho = 0, first = 1;  // of the squared norm
+  double root = 1;            // sqrt(rho')
+  double along = 0;           // k / s: J is scaled by root (I - along r r')
+  double residual_scale = 1;  // of r
+  LossWeight(const RobustLoss& loss, double squared_norm, bool curvature) {
+    const auto values = loss.evaluate(squared_norm);
+    rho = values[0];
+    first = values[1];
+    root = residual_scale = std::sqrt(first);
+    if (!curvature || values[2] >= 0) return;
+    const double left = std::sqrt(std::max(kLeastCurvature, 1 + 2 * squared_norm * values[2] / first));
+    along = (1 - left) / squared_norm;
+    residual_scale = root / left;
+  }
+  template <typename Jacobian, typename Residual>
+  auto weighted(const Jacobian& jacobian, const Residual& residual) const {
+    typename Jacobian::PlainObject result = root * jacobian;
+    if (along != 0) result -= residual * ((root * along) * (residual.transpose() * jacobian));
+    return result;
+  }
+};
+
 // Jacobian of a residual of up to 6 rows by one unknown (position in TilePlan::unknowns), weighted.
 struct JacobianBlock {
   std::int64_t unknown = -1;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 8> jacobian;
 };
 
-// A residual without a point, divided by sigma and weighted by sqrt(rho').
+// A residual without a point, divided by sigma and weighted by its loss.
 struct TermResidual {
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
   std::array<JacobianBlock, 2> blocks;
   int block_count = 0;
-  double rho = 0;  // of the squared norm
+  double rho = 0;               // of the squared norm
+  double weighted_squares = 0;  // rho' |r|^2
 
   void add_block(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& jacobian) {
     if (unknown < 0) return;
     blocks[static_cast<std::size_t>(block_count)].unknown = unknown;
     blocks[static_cast<std::size_t>(block_count++)].jacobian = jacobian;
   }
-  void weight(const RobustLoss& loss) {
-    const auto rho_values = loss.evaluate(residual.squaredNorm());
-    rho = rho_values[0];
-    const double root = std::sqrt(rho_values[1]);
-    residual *= root;
-    for (int b = 0; b < block_count; ++b) blocks[static_cast<std::size_t>(b)].jacobian *= root;
+  void weight(const RobustLoss& loss, const Pass& pass) {
+    const double squares = residual.squaredNorm();
+    const LossWeight w(loss, squares, pass.curvature);
+    rho = w.rho;
+    weighted_squares = w.first * squares;
+    for (int b = 0; b < block_count; ++b) {
+      auto& jacobian = blocks[static_cast<std::size_t>(b)].jacobian;
+      jacobian = w.weighted(jacobian, residual);
+    }
+    residual *= w.residual_scale;
   }
 };
 
 // Calls visit(TermResidual) for every observation without a point of a cell.
 template <typename Visitor>
-void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, std::size_t cell,
-                 Visitor&& visit) {
+void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                 std::size_t cell, Visitor&& visit) {
   const RobustLoss none;
   for (std::int64_t i : plan.positions[cell]) {
     const auto& term = problem.positions[static_cast<std::size_t>(i)];
@@ -49,7 +88,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     TermResidual out;
     out.residual = r.residual;
     out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(problem.position_loss);
+    out.weight(problem.position_loss, pass);
     visit(out);
   }
   for (std::int64_t i : plan.attitudes[cell]) {
@@ -58,7 +97,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     TermResidual out;
     out.residual = r.residual;
     out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(none);
+    out.weight(none, pass);
     visit(out);
   }
   for (std::int64_t i : plan.relatives[cell]) {
@@ -68,7 +107,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     out.residual = r.residual;
     out.add_block(plan.unknown_of_frame[term.from.value], r.by_from);
     out.add_block(plan.unknown_of_frame[term.to.value], r.by_to);
-    out.weight(problem.relative_loss);
+    out.weight(problem.relative_loss, pass);
     visit(out);
   }
   for (std::int64_t i : plan.intrinsic_priors[cell]) {
@@ -87,7 +126,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
           row(0, column) = weight;
           out.add_block(plan.unknown_of_camera[camera], row);
         }
-        out.weight(none);
+        out.weight(none, pass);
         visit(out);
       }
       column += free;
@@ -99,7 +138,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     TermResidual out;
     out.residual = r.residual;
     out.add_block(plan.unknown_of_mount[static_cast<std::size_t>(term.mount)], r.by_mount);
-    out.weight(none);
+    out.weight(none, pass);
     visit(out);
   }
 }
@@ -128,7 +167,7 @@ class PointEquations {
   }
 
   // Linearises all kept observations of the point and factorises its own block. Throws ComputeError behind a camera.
-  void linearise(std::int64_t point, double lambda);
+  void linearise(std::int64_t point, const Pass& pass);
 
   const std::vector<Observation>& observations() const { return observations_; }
   const std::vector<Block>& blocks() const { return blocks_; }        // holding Y after linearise()
@@ -143,7 +182,7 @@ class PointEquations {
 
  private:
   Block& block_of(std::int64_t unknown, int dimension);
-  void add_observation(std::int64_t point, std::int64_t row);
+  void add_observation(std::int64_t point, std::int64_t row, bool curvature);
   void factorise(double lambda);
 
   const TileProblem& problem_;

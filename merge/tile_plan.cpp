@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <map>
 
+#include "adjust/disjoint_sets.h"
 #include "merge/condense.h"
 #include "partition/tiles.h"
 
@@ -90,6 +91,19 @@ FrameGraph graph_of(const TileProblem& problem) {
     ++graph.edges.back().weight;
   }
   return graph;
+}
+
+void number_parts(const FrameGraph& graph, TilePlan& plan) {
+  DisjointSets sets(static_cast<std::int32_t>(graph.frame_count));
+  for (const auto& edge : graph.edges)
+    sets.join(static_cast<std::int32_t>(edge.a.value), static_cast<std::int32_t>(edge.b.value));
+  plan.part_of_frame.assign(static_cast<std::size_t>(graph.frame_count), -1);
+  for (std::int32_t f = 0; f < graph.frame_count; ++f) {
+    if (plan.unknown_of_frame[static_cast<std::size_t>(f)] < 0) continue;
+    const std::int32_t lowest = sets.find(f);
+    plan.part_of_frame[static_cast<std::size_t>(f)] =
+        lowest == f ? plan.part_count++ : plan.part_of_frame[static_cast<std::size_t>(lowest)];
+  }
 }
 
 // The cell with most of a point's observations, ties to the lower cell.
@@ -206,6 +220,12 @@ UnknownList tile_unknowns(const TileProblem& problem) {
   return unknowns;
 }
 
+std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point) {
+  for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
+    if (problem.kept[row]) return problem.images[problem.image[row].value].frame.value;
+  return -1;
+}
+
 TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames) {
   TilePlan plan;
   plan.unknowns = tile_unknowns(problem);
@@ -219,7 +239,9 @@ TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::i
   for (std::size_t row = 0; row < problem.mounts.size(); ++row)
     plan.unknown_of_mount.push_back(position(mount_unknown(problem, row)));
 
-  BisectionTree cells = bisect(graph_of(problem), cell_max_frames);
+  const FrameGraph graph = graph_of(problem);
+  number_parts(graph, plan);
+  BisectionTree cells = bisect(graph, cell_max_frames);
   if (cells.tree.nodes.empty()) {  // a tile without frames: one empty cell
     cells.tree.nodes.emplace_back();
     cells.tree.nodes.back().tile = TileIndex(0);

@@ -41,11 +41,18 @@ TileAdjustment adjust_one(TileStart start, const AdjustOptions& options) {
   result.intrinsics = state.cameras;
   result.observations.assign(problem.frames.size(), 0);
   result.camera_observations.assign(problem.cameras.size(), 0);
+  for (const MountId& id : problem.mounts) {
+    result.mount_rigs.push_back(id.rig);
+    result.mount_numbers.push_back(id.mount);
+  }
+  result.mounts = state.mounts;
+  result.mount_observations.assign(problem.mounts.size(), 0);
   for (std::int64_t o = 0; o < problem.observation_count(); ++o) {
     if (!problem.kept[o]) continue;
     const TileImage& image = problem.images[static_cast<std::size_t>(problem.image[o].value)];
     ++result.observations[static_cast<std::size_t>(image.frame.value)];
     ++result.camera_observations[static_cast<std::size_t>(image.camera.value)];
+    ++result.mount_observations[static_cast<std::size_t>(image.mount)];
   }
   result.points = std::move(state.points);
   result.kept = std::move(problem.kept);

@@ -303,8 +303,9 @@ MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
   const BlockGauge& gauge = adjusted.posterior.gauge;
   outcome.gauge = judge_gauge(sums, gauge, names_of(block)).text;
-  for (const FreeComponent& part : gauge.components)
-    outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
+  for (const BlockComponent& part : gauge.components)
+    if (part.defect > 0)
+      outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
   outcome.seams = seam_checks(adjusted.posterior);
   return outcome;
 }

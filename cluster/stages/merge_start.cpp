@@ -4,7 +4,9 @@
 #include <limits>
 
 #include "adjust/tile_adjustment.h"
+#include "geometry/rotation.h"
 #include "geometry/similarity.h"
+#include "merge/tile_alignment.h"
 
 namespace megablock {
 
@@ -36,42 +38,100 @@ void align(TileAdjustment& tile, const BlockState& oriented) {
   for (Pose& pose : tile.poses) pose = (*similarity)(pose);
 }
 
-}  // namespace
+// Means of what tiles share, weighted by observations.
+class SharedMeans {
+ public:
+  explicit SharedMeans(const Block& block) : block_(block), cameras_(block.cameras.size()) {
+    for (const Rig& rig : block.rigs) mounts_.emplace_back(rig.mounts.size());
+  }
+
+  void add(const TileAdjustment& tile) {
+    for (std::size_t i = 0; i < tile.cameras.size(); ++i) {
+      CameraMean& mean = cameras_[tile.cameras[i]];
+      const auto weight = static_cast<double>(tile.camera_observations[i]);
+      for (int p = 0; p < kIntrinsicCount; ++p) mean.sum[p] += weight * tile.intrinsics[i][p];
+      mean.weight += weight;
+    }
+    for (std::size_t i = 0; i < tile.mounts.size(); ++i) {
+      const auto number = static_cast<std::size_t>(tile.mount_numbers[i]);
+      if (block_.rigs[tile.mount_rigs[i]].mounts[number].held()) continue;
+      MountMean& mean = mounts_[static_cast<std::size_t>(tile.mount_rigs[i].value)][number];
+      const auto weight = static_cast<double>(tile.mount_observations[i]);
+      if (mean.weight == 0) mean.first = tile.mounts[i];
+      PoseIncrement difference;
+      difference << rotation_log<double>(mean.first.rotation.conjugate() * tile.mounts[i].rotation),
+          tile.mounts[i].centre - mean.first.centre;
+      mean.sum += weight * difference;
+      mean.weight += weight;
+    }
+  }
+
+  void store(BlockState& state) const {
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      const CameraMean& mean = cameras_[CameraIndex(static_cast<std::int64_t>(c))];
+      for (int p = 0; mean.weight > 0 && p < kIntrinsicCount; ++p)
+        state.cameras[CameraIndex(static_cast<std::int64_t>(c))][p] = mean.sum[p] / mean.weight;
+    }
+    for (std::size_t r = 0; r < mounts_.size(); ++r)
+      for (std::size_t m = 0; m < mounts_[r].size(); ++m) {
+        const MountMean& mean = mounts_[r][m];
+        if (mean.weight > 0)
+          state.mounts[RigIndex(static_cast<std::int64_t>(r))][m] = pose_update(mean.first, mean.sum / mean.weight);
+      }
+  }
+
+ private:
+  struct CameraMean {
+    std::array<double, kIntrinsicCount> sum{};
+    double weight = 0;
+  };
+  struct MountMean {
+    Pose first;
+    PoseIncrement sum = PoseIncrement::Zero();  // from the first tile's
+    double weight = 0;
+  };
+  const Block& block_;
+  IndexedVector<CameraIndex, CameraMean> cameras_;
+  std::vector<std::vector<MountMean>> mounts_;  // [rigs][mounts]
+};
 
 // Three points fix the pose of a camera; a frame with fewer than twice as many would hang on single observations.
 constexpr std::int64_t kFewestObservations = 6;
 
+// Poses from the tile that holds most of a frame's observations.
+void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Similarity>& similarities,
+                  BlockState& state) {
+  IndexedVector<FrameIndex, std::int64_t> richest(state.frames.size(), 0), total(state.frames.size(), 0);
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    for (std::size_t i = 0; i < tiles[t].frames.size(); ++i) {
+      const FrameIndex frame = tiles[t].frames[i];
+      total[frame] += tiles[t].observations[i];
+      if (tiles[t].observations[i] <= richest[frame]) continue;
+      richest[frame] = tiles[t].observations[i];
+      state.frames[frame] = similarities[t](tiles[t].poses[i]);
+    }
+  }
+  for (std::size_t f = 0; f < total.size(); ++f)
+    if (total[FrameIndex(static_cast<std::int64_t>(f))] < kFewestObservations)
+      state.oriented[FrameIndex(static_cast<std::int64_t>(f))] = 0;
+}
+
+}  // namespace
+
 BlockState merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted) {
   const bool datum = has_datum(job);
   BlockState start = oriented;
-  IndexedVector<FrameIndex, std::int64_t> richest(job.block.frames.size(), 0), total(job.block.frames.size(), 0);
-  std::vector<std::array<double, kIntrinsicCount>> sums(job.block.cameras.size());
-  std::vector<double> weights(job.block.cameras.size(), 0);
+  std::vector<AlignmentTile> tiles;
+  SharedMeans means(job.block);
   for (const std::string& name : adjusted) {
     if (name.empty()) continue;
     TileAdjustment tile = read_adjustment(job.store.verified_path(name));
     if (!datum) align(tile, oriented);
-    for (std::size_t i = 0; i < tile.frames.size(); ++i) {
-      total[tile.frames[i]] += tile.observations[i];
-      if (tile.observations[i] <= richest[tile.frames[i]]) continue;
-      richest[tile.frames[i]] = tile.observations[i];
-      start.frames[tile.frames[i]] = tile.poses[i];
-    }
-    for (std::size_t i = 0; i < tile.cameras.size(); ++i) {
-      const auto camera = static_cast<std::size_t>(tile.cameras[i].value);
-      const auto weight = static_cast<double>(tile.camera_observations[i]);
-      for (int p = 0; p < kIntrinsicCount; ++p) sums[camera][p] += weight * tile.intrinsics[i][p];
-      weights[camera] += weight;
-    }
+    means.add(tile);
+    tiles.push_back({std::move(tile.frames), std::move(tile.poses), std::move(tile.observations)});
   }
-  for (std::size_t c = 0; c < sums.size(); ++c)
-    if (weights[c] > 0)
-      for (int p = 0; p < kIntrinsicCount; ++p)
-        start.cameras[CameraIndex(static_cast<std::int64_t>(c))][p] = sums[c][p] / weights[c];
-  for (std::size_t f = 0; f < richest.size(); ++f) {
-    const FrameIndex frame(static_cast<std::int64_t>(f));
-    if (total[frame] < kFewestObservations) start.oriented[frame] = 0;
-  }
+  take_richest(tiles, align_tiles(tiles), start);
+  means.store(start);
   return start;
 }
 

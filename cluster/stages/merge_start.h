@@ -20,9 +20,10 @@ struct MergeTile {
   TileState state;
 };
 
-// Poses from the tile that holds most of a frame's observations (ties: lower tile), intrinsics as means over the tiles
-// weighted by observations; frames that no adjusted tile holds lose their orientation. Without a datum (no position
-// priors) the tiles are first brought onto the initial orientation by similarities.
+// The tiles' adjustments put together: without a datum (no position priors) each tile is first brought onto the initial
+// orientation; then all are aligned jointly (merge/tile_alignment.h), a frame takes its pose from the tile that holds
+// most of its observations (ties: lower tile), intrinsics and free mounts are means over the tiles weighted by
+// observations. Frames that no adjusted tile holds lose their orientation.
 BlockState merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
 
 // A tile's problem with the kept flags of its adjustment, its points re-triangulated in `state`.

@@ -184,6 +184,10 @@ TEST_F(GraphFiles, AdjustmentComesBack) {
   adjustment.cameras = {CameraIndex(1)};
   adjustment.intrinsics = {{1, 2, 3, 4, 5, 6, 7, 8}};
   adjustment.camera_observations = {30};
+  adjustment.mount_rigs = {RigIndex(2)};
+  adjustment.mount_numbers = {5};
+  adjustment.mounts = {{Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {0.1, 0.2, 0.3}}};
+  adjustment.mount_observations = {31};
   const double nan = std::numeric_limits<double>::quiet_NaN();
   adjustment.points = {{0.1, 0.2, 0.3}, {nan, nan, nan}};
   adjustment.kept = {1, 0, 1};
@@ -199,6 +203,11 @@ TEST_F(GraphFiles, AdjustmentComesBack) {
   EXPECT_EQ(back.cameras, adjustment.cameras);
   EXPECT_EQ(back.intrinsics, adjustment.intrinsics);
   EXPECT_EQ(back.camera_observations, adjustment.camera_observations);
+  EXPECT_EQ(back.mount_rigs, adjustment.mount_rigs);
+  EXPECT_EQ(back.mount_numbers, adjustment.mount_numbers);
+  ASSERT_EQ(back.mounts.size(), 1u);
+  EXPECT_TRUE(same_bits(back.mounts[0], adjustment.mounts[0]));
+  EXPECT_EQ(back.mount_observations, adjustment.mount_observations);
   ASSERT_EQ(back.points.size(), 2u);
   EXPECT_TRUE(same_bits(back.points[0], adjustment.points[0]));
   EXPECT_TRUE(same_bits(back.points[1], adjustment.points[1]));

@@ -134,6 +134,29 @@ TEST(Gauge, PositionsOnOneLineLeaveOneRotation) {
   EXPECT_TRUE(up.sums.held.empty());
 }
 
+// Positions within their own noise of a straight line do not say how the block is turned about it.
+TEST(Gauge, PositionsNearOneLineLeaveOneRotation) {
+  for (const double sigma : {10.0, 0.05}) {
+    SimulationOptions options = small(SimulationOptions::Scene::kAerial, 40, 40);
+    options.gps_sigma_m = sigma;
+    SimulatedBlock simulated = simulate_block(options);
+    Eigen::Vector3d first = Eigen::Vector3d::Zero(), along = Eigen::Vector3d::Zero();
+    int kept = 0;
+    for (std::size_t f = 0; f < simulated.block.frames.size(); ++f) {
+      const FrameIndex frame(static_cast<std::int64_t>(f));
+      const Eigen::Vector3d centre = simulated.truth.frames[frame].centre;
+      if (kept == 0) first = centre;
+      if (kept == 1) along = (centre - first).normalized();
+      const double off = kept < 2 ? 0 : along.cross(centre - first).norm();
+      if (kept++ >= 2 && off > 3) simulated.block.frames[frame].position_prior.reset();
+    }
+    const TiledBlock block(std::move(simulated), 12, {}, 0);
+    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    runner.final_up();
+    EXPECT_EQ(runner.gauge().defect, sigma > 1 ? 1 : 0) << "sigma " << sigma;
+  }
+}
+
 TEST(Gauge, AttitudesLeaveShiftAndScale) {
   SimulationOptions options = small(SimulationOptions::Scene::kAerial, 40, 40);
   options.gps_sigma_m = 0;

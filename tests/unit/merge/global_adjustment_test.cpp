@@ -173,7 +173,7 @@ GlobalState after(const GlobalOptions& options, const std::vector<std::pair<doub
 TEST(GlobalController, StopsOnTheDecrementOnly) {
   // The cost stands still to 13 digits, the block is two sigmas off: it must go on.
   EXPECT_EQ(after({}, {{1e9, 3.0}, {1e9 - 1e-4, 2.0}, {1e9 - 2e-4, 1.5}}).outcome, GlobalOutcome::kRunning);
-  EXPECT_EQ(after({}, {{1e9, 3.0}, {1e9 - 4.5, 5e-3}}).outcome, GlobalOutcome::kConverged);
+  EXPECT_EQ(after({}, {{1e9, 3.0}, {1e9 - 4.5, 5e-5}}).outcome, GlobalOutcome::kConverged);
 }
 
 TEST(GlobalController, StopsWhereTheDecrementNoLongerFalls) {
@@ -200,6 +200,50 @@ TEST(GlobalController, RaisesLambdaOnRejectionAndGivesUp) {
     }
   }
   EXPECT_EQ(state.outcome, GlobalOutcome::kFailed);
+}
+
+// A pass with lambda = 0 that does not confirm, and whose step is no good, must not be asked for again at the same
+// state.
+TEST(GlobalController, GoesOnDampedWhereTheUndampedStepFails) {
+  GlobalState state = start_global({});
+  UpReport damped, undamped;
+  damped.sums.cost = undamped.sums.cost = 100;
+  damped.sums.decrement_squared = 1e-10;
+  undamped.sums.decrement_squared = 1e-2;
+  report_up(state, {}, damped);
+  ASSERT_EQ(state.next, GlobalAction::kUp);
+  EXPECT_EQ(next_pass(state).lambda, 0);
+  EXPECT_FALSE(next_pass(state).curvature);
+  report_up(state, {}, undamped);
+  ASSERT_EQ(state.next, GlobalAction::kDown);
+  report_down(state, {}, {0.0, 200.0});
+  ASSERT_EQ(state.next, GlobalAction::kReject);
+  report_rejected(state, {});
+  report_up(state, {}, damped);
+  ASSERT_EQ(state.next, GlobalAction::kDown);  // the damped step, small as it is
+  EXPECT_GT(next_pass(state).lambda, 0);
+  report_down(state, {}, {0.0, 100 - 1e-11});
+  ASSERT_EQ(state.next, GlobalAction::kAccept);
+  report_accepted(state, {});
+  report_up(state, {}, damped);
+  EXPECT_EQ(next_pass(state).lambda, 0);
+}
+
+TEST(GlobalController, TakesTheCurvatureOfTheLossesWhileItsModelHolds) {
+  GlobalState state = start_global({});
+  UpReport up;
+  up.sums.cost = 100;
+  up.sums.decrement_squared = 2;
+  report_up(state, {}, up);
+  EXPECT_FALSE(next_pass(state).curvature);
+  report_down(state, {}, {0.0, 99.0});
+  report_accepted(state, {});
+  EXPECT_TRUE(next_pass(state).curvature);
+  up.sums.cost = 99;
+  report_up(state, {}, up);
+  report_down(state, {}, {0.0, 98.9});  // a tenth of what was promised
+  report_accepted(state, {});
+  EXPECT_FALSE(next_pass(state).curvature);
 }
 
 TEST(GlobalController, RefusesBadOptions) {

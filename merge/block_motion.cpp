@@ -1,0 +1,148 @@
+#include "merge/block_motion.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "geometry/rotation.h"
+
+namespace megablock {
+
+namespace {
+
+std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
+
+MotionSums::Row row_of(const Eigen::Vector3d& c, const PoseIncrement& x) {
+  const Eigen::Vector3d w = x.head<3>(), d = x.tail<3>();
+  const Eigen::Matrix3d square = c * c.transpose();
+  MotionSums::Row row;
+  row << 1, c, Eigen::Map<const Eigen::Matrix<double, 9, 1>>(square.data()), d, w, c.cross(d), c.dot(d);
+  return row;
+}
+
+// The nearest similarity; the moments are brought to the centroid, where the shift separates.
+BlockMotion motion_of(const MotionSums::Row& sums) {
+  BlockMotion motion;
+  const double frames = sums[0];
+  if (frames == 0) return motion;
+  motion.centre = sums.segment<3>(1) / frames;
+  motion.shift = sums.segment<3>(13) / frames;
+  const Eigen::Matrix3d scatter =
+      Eigen::Map<const Eigen::Matrix3d>(sums.data() + 4) - frames * motion.centre * motion.centre.transpose();
+  const Eigen::Vector3d moment = sums.segment<3>(19) - frames * motion.centre.cross(motion.shift);
+  const double growth = sums[22] - frames * motion.centre.dot(motion.shift);
+  const double spread = scatter.trace();
+  const double squared_extent = spread > 0 ? spread / frames : 1;
+  const Eigen::Matrix3d normal =
+      (frames + spread / squared_extent) * Eigen::Matrix3d::Identity() - scatter / squared_extent;
+  motion.rotation = normal.ldlt().solve(moment / squared_extent - sums.segment<3>(16));
+  if (spread > 0) motion.scale = growth / spread;
+  return motion;
+}
+
+// A component's motion, ready to move things.
+class Mover {
+ public:
+  explicit Mover(const BlockMotion& motion) : motion_(motion), turn_(rotation_exp<double>(motion.rotation)) {}
+
+  Eigen::Vector3d position(const Eigen::Vector3d& before, const Eigen::Vector3d& increment) const {
+    return moved(before + (increment - motion_.tangent(before)));
+  }
+  Pose pose(const Pose& before, PoseIncrement increment) const {
+    increment.head<3>() += motion_.rotation;
+    increment.tail<3>() -= motion_.tangent(before.centre);
+    Pose after = pose_update(before, increment);
+    after.rotation = (after.rotation * turn_.conjugate()).normalized();
+    after.centre = moved(after.centre);
+    return after;
+  }
+
+ private:
+  Eigen::Vector3d moved(const Eigen::Vector3d& position) const {
+    return motion_.centre + motion_.shift + (1 + motion_.scale) * (turn_ * (position - motion_.centre));
+  }
+  BlockMotion motion_;
+  Eigen::Quaterniond turn_;
+};
+
+void move_shared_parameters(const TileProblem& problem, const TileStep& step, TileState& next) {
+  for (std::size_t row = 0; row < problem.cameras.size(); ++row) {
+    const double* x = step.unknowns.find({UnknownKind::kCamera, 0, problem.cameras[row].value});
+    for (int k = 0; x != nullptr && k < kIntrinsicCount; ++k)
+      if ((problem.camera_free[row] >> k) & 1) next.cameras[row][static_cast<std::size_t>(k)] += *x++;
+  }
+  for (std::size_t row = 0; row < problem.mounts.size(); ++row) {
+    const MountId& id = problem.mounts[row];
+    if (const double* x = step.unknowns.find({UnknownKind::kMount, id.mount, id.rig.value}))
+      next.mounts[row] = pose_update(next.mounts[row], Eigen::Map<const PoseIncrement>(x));
+  }
+}
+
+}  // namespace
+
+Bytes MotionSums::to_bytes() const {
+  ByteWriter out;
+  out.values(components);
+  for (const Row& row : rows)
+    for (double value : row) out.value(value);
+  return out.take();
+}
+
+MotionSums MotionSums::from_bytes(const Bytes& bytes) {
+  ByteReader in(bytes);
+  MotionSums sums;
+  sums.components = in.values<std::int64_t>();
+  sums.rows.resize(sums.components.size());
+  for (Row& row : sums.rows)
+    for (double& value : row) value = in.value<double>();
+  if (!in.at_end()) throw StoreError("merge: sums of a step have the wrong size");
+  return sums;
+}
+
+MotionSums motion_sums(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
+                       const TileState& state, const Step& step) {
+  MotionSums sums;
+  sums.components = gauge.part_component[at(tile)];
+  std::sort(sums.components.begin(), sums.components.end());
+  sums.components.erase(std::unique(sums.components.begin(), sums.components.end()), sums.components.end());
+  sums.rows.assign(sums.components.size(), MotionSums::Row::Zero());
+  for (std::size_t f = 0; f < problem.frames.size(); ++f) {
+    const UnknownId id{UnknownKind::kFrame, 0, problem.frames[f].value};
+    if (plan.part_of_frame[f] < 0 || find_unknown(plan.owned, id) < 0) continue;
+    const std::int64_t component = gauge.part_component[at(tile)][at(plan.part_of_frame[f])];
+    const auto row = std::lower_bound(sums.components.begin(), sums.components.end(), component);
+    sums.rows[at(row - sums.components.begin())] +=
+        row_of(state.frames[f].centre, Eigen::Map<const PoseIncrement>(step.find(id)));
+  }
+  return sums;
+}
+
+std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vector<MotionSums>& tiles) {
+  std::vector<MotionSums::Row> rows(gauge.components.size(), MotionSums::Row::Zero());
+  for (const MotionSums& tile : tiles)
+    for (std::size_t i = 0; i < tile.rows.size(); ++i) rows[at(tile.components[i])] += tile.rows[i];
+  std::vector<BlockMotion> motions;
+  for (const MotionSums::Row& row : rows) motions.push_back(motion_of(row));
+  return motions;
+}
+
+TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
+                     const TileProblem& problem, const TilePlan& plan, const TileState& state, const TileStep& step) {
+  TileState next = state;
+  std::vector<Mover> movers;  // of the tile's parts
+  for (std::int64_t component : gauge.part_component[at(tile)])
+    movers.emplace_back(motions.empty() ? BlockMotion() : motions[at(component)]);
+  for (std::size_t f = 0; f < problem.frames.size(); ++f)
+    if (plan.part_of_frame[f] >= 0)
+      next.frames[f] = movers[at(plan.part_of_frame[f])].pose(
+          state.frames[f],
+          Eigen::Map<const PoseIncrement>(step.unknowns.find({UnknownKind::kFrame, 0, problem.frames[f].value})));
+  for (const auto& cell : plan.points)
+    for (std::int64_t p : cell) {
+      const Mover& mover = movers[at(plan.part_of_frame[at(frame_of_point(problem, p))])];
+      next.points[at(p)] = mover.position(state.points[at(p)], step.points[at(p)]);
+    }
+  move_shared_parameters(problem, step, next);
+  return next;
+}
+
+}  // namespace megablock

@@ -1,0 +1,106 @@
+#include "merge/point_refinement.h"
+
+#include <Eigen/Cholesky>
+#include <limits>
+
+#include "merge/tile_linearisation.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr int kMaxSteps = 100;
+constexpr double kSettled = 1e-12;  // squared decrement
+constexpr double kMaxDamping = 1e6;
+
+class PointRefiner {
+ public:
+  PointRefiner(const TileProblem& problem, TileState& state)
+      : problem_(problem), state_(state), prior_(prior_rows(problem)) {}
+
+  void refine(std::int64_t point) {
+    Eigen::Vector3d& position = state_.points[static_cast<std::size_t>(point)];
+    Equations now = equations(point, position);
+    if (!std::isfinite(now.cost) || now.tail == 0) return;
+    double damping = 1e-4;
+    bool raised = false;
+    for (int step = 0; step < kMaxSteps && now.decrement_squared() > kSettled; ++step) {
+      const Eigen::Vector3d trial = position + now.step(damping);
+      Equations next = equations(point, trial);
+      if (next.cost < now.cost) {
+        position = trial;
+        now = next;
+        if (!raised) damping /= 10;  // else it is just right
+        raised = false;
+      } else {
+        damping *= 10;
+        raised = true;
+        if (damping > kMaxDamping) return;
+      }
+    }
+  }
+
+ private:
+  struct Equations {
+    double cost = 0;
+    int tail = 0;                                          // observations beyond the corner
+    Eigen::Matrix3d reweighted = Eigen::Matrix3d::Zero();  // rho' alone
+    Eigen::Matrix3d curved = Eigen::Matrix3d::Zero();      // with the loss's curvature
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+
+    double decrement_squared() const { return b.dot(reweighted.ldlt().solve(b)); }
+    Eigen::Vector3d step(double damping) const {
+      return (curved + damping * Eigen::Matrix3d(reweighted.diagonal().asDiagonal())).ldlt().solve(b);
+    }
+  };
+
+  Equations equations(std::int64_t point, const Eigen::Vector3d& position) const {
+    Equations e;
+    for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
+      if (!problem_.kept[row]) continue;
+      const TileImage& image = problem_.images[problem_.image[row].value];
+      const ImageResidual r = linearise_image(state_.frames[image.frame.value], state_.mounts[image.mount],
+                                              state_.cameras[image.camera.value], position,
+                                              {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row]);
+      if (!r.in_front) {
+        e.cost = std::numeric_limits<double>::infinity();
+        return e;
+      }
+      const double squares = r.residual.squaredNorm();
+      const auto rho = problem_.image_loss.evaluate(squares);
+      const Eigen::Vector3d along = r.by_point.transpose() * r.residual;
+      const Eigen::Matrix3d whole = rho[1] * (r.by_point.transpose() * r.by_point);
+      e.cost += 0.5 * rho[0];
+      e.b -= rho[1] * along;
+      e.reweighted += whole;
+      e.curved += whole;
+      if (rho[2] < 0) {
+        ++e.tail;
+        e.curved += std::max(2 * rho[2], -rho[1] / squares) * (along * along.transpose());
+      }
+    }
+    if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0) {
+      const auto& term = problem_.point_priors[static_cast<std::size_t>(i)];
+      const Eigen::Vector3d weight = term.sigma.cwiseInverse(), r = point_prior_residual(position, term);
+      e.cost += 0.5 * r.squaredNorm();
+      e.b -= weight.cwiseProduct(r);
+      for (Eigen::Matrix3d* normal : {&e.reweighted, &e.curved}) normal->diagonal() += weight.cwiseAbs2();
+    }
+    return e;
+  }
+
+  const TileProblem& problem_;
+  TileState& state_;
+  std::vector<std::int64_t> prior_;
+};
+
+}  // namespace
+
+void refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state) {
+  if (problem.image_loss.kind == RobustLoss::Kind::kNone) return;
+  PointRefiner refiner(problem, state);
+  for (const auto& cell : plan.points)
+    for (std::int64_t point : cell) refiner.refine(point);
+}
+
+}  // namespace megablock

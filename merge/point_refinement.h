@@ -1,0 +1,18 @@
+// Points whose observations lie beyond the corner of the loss, brought to their own optimum at held poses.
+//
+// A point with few observations, most of them in the tail, has hardly any curvature along some direction: neither the
+// reweighted nor the true normal equations of the block bring it there in few steps, and a handful of such points holds
+// up all others. For a single point the problem is small: a damped Newton iteration in three unknowns, with the loss's
+// own curvature (tile_linearisation.h, no lower bound but zero). Done for the trial state of every step, so that it
+// only lowers the cost that the step is judged by (inner iterations; the optimum is the same).
+#pragma once
+
+#include "merge/condense.h"
+
+namespace megablock {
+
+// Moves active points that have an observation in the tail and are off their optimum by more than 1e-6 sigmas; all
+// others keep their bits. Points behind a camera are left alone.
+void refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state);
+
+}  // namespace megablock
