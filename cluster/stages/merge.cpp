@@ -54,12 +54,39 @@ std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
 BlockState gather_state(Job& job, const BlockState& start, const std::vector<RankTile>& tiles) {
   ByteWriter writer;
   for (const RankTile& tile : tiles) {
+    // What no kept residual of the tile touches has not moved with the block.
+    const UnknownList touched = tile_unknowns(tile.problem);
+    const auto write = [&](const auto& table, const auto& values, auto&& id_of, auto&& write_values) {
+      std::decay_t<decltype(table)> rows;
+      std::decay_t<decltype(values)> their;
+      for (std::size_t row = 0; row < table.size(); ++row) {
+        if (find_unknown(touched, id_of(table[row])) < 0) continue;
+        rows.push_back(table[row]);
+        their.push_back(values[row]);
+      }
+      writer.values(rows);
+      write_values(their);
+    };
+    const auto as_poses = [&](const std::vector<Pose>& poses) { write_poses(writer, poses); };
     writer.values(tile.problem.frames);
-    write_poses(writer, tile.state.frames);
-    writer.values(tile.problem.cameras);
-    writer.values(tile.state.cameras);
-    writer.values(tile.problem.mounts);
-    write_poses(writer, tile.state.mounts);
+    write(
+        tile.problem.frames, tile.state.frames,
+        [](FrameIndex f) {
+          return UnknownId{UnknownKind::kFrame, 0, f.value};
+        },
+        as_poses);
+    write(
+        tile.problem.cameras, tile.state.cameras,
+        [](CameraIndex c) {
+          return UnknownId{UnknownKind::kCamera, 0, c.value};
+        },
+        [&](const std::vector<Intrinsics>& values) { writer.values(values); });
+    write(
+        tile.problem.mounts, tile.state.mounts,
+        [](const MountId& m) {
+          return UnknownId{UnknownKind::kMount, m.mount, m.rig.value};
+        },
+        as_poses);
   }
   const Bytes mine = writer.take();
   BlockState state = start;
@@ -68,12 +95,10 @@ BlockState gather_state(Job& job, const BlockState& start, const std::vector<Ran
     const Bytes bytes(text.begin(), text.end());
     ByteReader reader(bytes);
     while (!reader.at_end()) {
+      for (const FrameIndex frame : reader.values<FrameIndex>()) state.oriented[frame] = start.oriented[frame];
       const auto frames = reader.values<FrameIndex>();
       const auto poses = read_poses(reader);
-      for (std::size_t f = 0; f < frames.size(); ++f) {
-        state.frames[frames[f]] = poses[f];
-        state.oriented[frames[f]] = start.oriented[frames[f]];
-      }
+      for (std::size_t f = 0; f < frames.size(); ++f) state.frames[frames[f]] = poses[f];
       const auto cameras = reader.values<CameraIndex>();
       const auto intrinsics = reader.values<Intrinsics>();
       for (std::size_t c = 0; c < cameras.size(); ++c) state.cameras[cameras[c]] = intrinsics[c];
@@ -84,6 +109,11 @@ BlockState gather_state(Job& job, const BlockState& start, const std::vector<Ran
     }
   }
   return state;
+}
+
+// Every tile takes over what others have moved: before observations are tested against it.
+void follow(const BlockState& state, std::vector<RankTile>& tiles) {
+  for (RankTile& tile : tiles) tile.state = make_tile_state(tile.problem, state, std::move(tile.state.points));
 }
 
 std::vector<RankTile> load_own_tiles(const Job& job, const MergeInputs& inputs, const BlockState& start,
@@ -175,8 +205,8 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
   options.max_iterations = job.settings.merge.max_iterations;
 
   std::optional<MergePosition> found = checkpoint.find();
-  const BlockState start = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
-  std::vector<RankTile> tiles = load_own_tiles(job, inputs, start, rank_of_tile);
+  BlockState block = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
+  std::vector<RankTile> tiles = load_own_tiles(job, inputs, block, rank_of_tile);
   if (found) {
     for (RankTile& tile : tiles) checkpoint.load_tile(tile);
   } else {
@@ -195,15 +225,17 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
       if (state.accepted != saved) {
         saved = state.accepted;
         position.global = state;
-        checkpoint.write(position, runner.tiles(), gather_state(job, start, runner.tiles()));
+        checkpoint.write(position, runner.tiles(), gather_state(job, block, runner.tiles()));
       }
       if (job.ranks.any(stop_requested()))
         throw AgreedError<Interrupted>("stopped in stage 'merge' as asked; run the same command to resume");
     });
     adjusted.converged = position.global.outcome == GlobalOutcome::kConverged ||
                          position.global.outcome == GlobalOutcome::kRoundingFloor;
+    block = gather_state(job, block, runner.tiles());
+    follow(block, runner.tiles());
     const bool last = position.round >= job.settings.merge.screening_rounds;
-    const bool reweighted = !last && adopt_image_sigma(job, runner.tiles(), rank_of_tile.size(), start);
+    const bool reweighted = !last && adopt_image_sigma(job, runner.tiles(), rank_of_tile.size(), block);
     if (last || (screen(job, runner) == 0 && !reweighted)) {
       adjusted.posterior = runner.posterior();
       say_memory(job, runner.memory());
@@ -215,9 +247,9 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
     const std::int32_t accepted = position.global.accepted;
     position.global = start_global(options);
     position.global.accepted = accepted;
-    checkpoint.write(position, tiles, gather_state(job, start, tiles));
+    checkpoint.write(position, tiles, block);
   }
-  adjusted.state = gather_state(job, start, adjusted.tiles);
+  adjusted.state = std::move(block);
   adjusted.image_sigma_px = common_image_sigma(job, adjusted.tiles);
   return adjusted;
 }
