@@ -5,6 +5,11 @@
 #include <cmath>
 #include <cstdio>
 
+extern "C" {
+void dpstrf_(const char* uplo, const int* n, double* a, const int* lda, int* pivots, int* rank, const double* tolerance,
+             double* work, int* info);
+}
+
 namespace megablock {
 
 namespace {
@@ -37,19 +42,26 @@ struct Minimum {
   std::int64_t rank = 0;
 };
 
-// By symmetric eigenvalues of the scaled matrix (the scale leaves rank and minimum as they are, b being in the range).
+// By Cholesky factorisation with diagonal pivoting of the scaled matrix, P'SP = LL' to its rank. The scale leaves rank
+// and minimum as they are; b lies in the range, so that the leading rows alone give b'S^+ b = |L_11^-1 b_1|^2.
 Minimum minimum(const Eigen::MatrixXd& s, const Eigen::VectorXd& b, const Eigen::VectorXd& scale) {
   Minimum m;
-  if (b.size() == 0) return m;
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * s * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  const Eigen::VectorXd along = solver.eigenvectors().transpose() * scale.cwiseProduct(b);
-  const double limit = kRankTolerance * std::max(1.0, solver.eigenvalues().maxCoeff());
-  for (Eigen::Index i = 0; i < along.size(); ++i) {
-    if (solver.eigenvalues()[i] <= limit) continue;
-    m.value += along[i] * along[i] / solver.eigenvalues()[i];
-    ++m.rank;
+  const int n = static_cast<int>(b.size());
+  if (n == 0 || s.diagonal().maxCoeff() <= 0) return m;
+  Eigen::MatrixXd factor = scale.asDiagonal() * s * scale.asDiagonal();
+  const double tolerance = kRankTolerance * factor.diagonal().maxCoeff();
+  std::vector<int> pivots(static_cast<std::size_t>(n));
+  std::vector<double> work(2 * static_cast<std::size_t>(n));
+  int rank = 0, info = 0;
+  dpstrf_("L", &n, factor.data(), &n, pivots.data(), &rank, &tolerance, work.data(), &info);
+  Eigen::VectorXd z(rank);
+  for (int i = 0; i < rank; ++i) {
+    const int row = pivots[static_cast<std::size_t>(i)] - 1;
+    z[i] = scale[row] * b[row];
   }
+  factor.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(z);
+  m.value = z.squaredNorm();
+  m.rank = rank;
   return m;
 }
 
