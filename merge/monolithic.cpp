@@ -4,6 +4,7 @@
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -25,8 +26,76 @@ Eigen::SparseMatrix<double> to_eigen(ceres::CRSMatrix& m) {
                                     m.cols.data(), m.values.data());
 }
 
-Eigen::SparseMatrix<double> normal_matrix(const MonolithicSystem& system) {
-  return Eigen::SparseMatrix<double>(system.jacobian.transpose() * system.jacobian);
+Eigen::SparseMatrix<double> normal_matrix(const MonolithicSystem& system, const DatumRows& datum) {
+  Eigen::SparseMatrix<double> normal = system.jacobian.transpose() * system.jacobian;
+  if (datum.rows() > 0) normal += Eigen::SparseMatrix<double>(datum.transpose() * datum);
+  return normal;
+}
+
+// Rows that hold the frames of the constraints along their directions, as heavy as what observes them.
+DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem, const BlockGauge& gauge) {
+  const Eigen::VectorXd root = system.diagonal().cwiseSqrt();
+  std::vector<Eigen::Triplet<double>> entries;
+  int rows = 0;
+  for (const GaugeConstraint& c : gauge.constraints) {
+    const auto row = std::lower_bound(problem.frames.begin(), problem.frames.end(), FrameIndex(c.frame));
+    const std::int64_t column = system.frame_column[static_cast<std::size_t>(row - problem.frames.begin())];
+    const Eigen::MatrixXd scaled = root.segment<6>(column).asDiagonal() * c.directions.leftCols(c.count);
+    const Eigen::MatrixXd basis = scaled.householderQr().householderQ() * Eigen::MatrixXd::Identity(6, c.count);
+    for (int k = 0; k < c.count; ++k, ++rows)
+      for (int i = 0; i < 6; ++i) entries.emplace_back(rows, column + i, basis(i, k) * root[column + i]);
+  }
+  DatumRows datum(rows, system.jacobian.cols());
+  datum.setFromTriplets(entries.begin(), entries.end());
+  return datum;
+}
+
+// S = I - N T of inner constraints over the frames, T = (N'WN)^-1 N'W.
+struct InnerTransformation {
+  Eigen::MatrixXd n, t;  // [reduced x defect], [defect x reduced]
+
+  Eigen::VectorXd step(const Eigen::VectorXd& x) const { return x - n * (t * x); }
+  Eigen::MatrixXd covariance(const Eigen::MatrixXd& c) const {
+    const Eigen::MatrixXd left = c - n * (t * c);
+    return left - (left * t.transpose()) * n.transpose();
+  }
+};
+
+InnerTransformation inner_transformation(const MonolithicSystem& system, const TileProblem& problem,
+                                         const TileState& state, const BlockGauge& gauge, const TilePlan& plan) {
+  InnerTransformation s;
+  s.n.setZero(system.reduced_dimension, gauge.defect());
+  Eigen::MatrixXd weighted = s.n;
+  const std::vector<const BlockComponent*> components = free_component_of_frame(gauge, 0, plan);
+  const auto place = [&](std::int64_t column, const BlockComponent& c, const Matrix67& move) {
+    s.n.block(column, c.first_column, 6, c.defect) = move.leftCols(c.defect);
+  };
+  for (std::size_t f = 0; f < components.size(); ++f) {
+    if (components[f] == nullptr) continue;
+    const BlockComponent& c = *components[f];
+    const std::int64_t column = system.frame_column[f];
+    place(column, c, c.move(state.frames[f].centre));
+    weighted.middleRows<6>(column) = c.weights().asDiagonal() * s.n.middleRows<6>(column);
+  }
+  for (const TileImage& image : problem.images) {  // free mounts follow the scale
+    const std::int64_t column = system.mount_column[static_cast<std::size_t>(image.mount)];
+    const BlockComponent* c = components[static_cast<std::size_t>(image.frame.value)];
+    if (column < 0 || c == nullptr) continue;
+    Matrix67 move = Matrix67::Zero();
+    move.bottomRightCorner<3, 1>() = state.mounts[static_cast<std::size_t>(image.mount)].centre;
+    place(column, *c, move * c->directions);
+  }
+  s.t = (weighted.transpose() * s.n).ldlt().solve(weighted.transpose());
+  return s;
+}
+
+double largest_over_sigma(const MonolithicSystem& system, const Eigen::VectorXd& step,
+                          const Eigen::MatrixXd& covariance) {
+  double largest = 0;
+  for (std::int64_t first : system.frame_column)
+    for (std::int64_t k = first; first >= 0 && k < first + 6; ++k)
+      largest = std::max(largest, std::abs(step[k]) / std::sqrt(covariance(k, k)));
+  return largest;
 }
 
 }  // namespace
@@ -76,8 +145,8 @@ MonolithicSystem monolithic_system(const TileProblem& problem, const TileState& 
   return system;
 }
 
-Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda) {
-  Eigen::SparseMatrix<double> normal = normal_matrix(system);
+Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda, const DatumRows& datum) {
+  Eigen::SparseMatrix<double> normal = normal_matrix(system, datum);
   normal.diagonal() += lambda * system.diagonal();
   const Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> solver(normal);
   if (solver.info() != Eigen::Success) throw ComputeError("monolithic reference: the normal equations are singular");
@@ -87,9 +156,9 @@ Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda) {
   return x;
 }
 
-Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system) {
+Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const DatumRows& datum) {
   const Eigen::Index n = system.reduced_dimension, points = system.jacobian.cols() - n;
-  const Eigen::SparseMatrix<double> normal = normal_matrix(system);
+  const Eigen::SparseMatrix<double> normal = normal_matrix(system, datum);
   Eigen::MatrixXd reduced = Eigen::MatrixXd(normal.topLeftCorner(n, n));
   const Eigen::SparseMatrix<double> coupling = normal.bottomLeftCorner(points, n);  // [points x n]
   const Eigen::SparseMatrix<double> own = normal.bottomRightCorner(points, points);
@@ -116,13 +185,17 @@ Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system) {
 
 double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state) {
   const MonolithicSystem system = monolithic_system(problem, state);
-  const Eigen::VectorXd step = monolithic_step(system, 0);
-  const Eigen::MatrixXd covariance = monolithic_covariance(system);
-  double largest = 0;
-  for (std::int64_t first : system.frame_column)
-    for (std::int64_t k = first; first >= 0 && k < first + 6; ++k)
-      largest = std::max(largest, std::abs(step[k]) / std::sqrt(covariance(k, k)));
-  return largest;
+  return largest_over_sigma(system, monolithic_step(system, 0), monolithic_covariance(system));
+}
+
+double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state, const BlockGauge& gauge,
+                                  const TilePlan& plan) {
+  if (!gauge.free()) return max_pose_difference_sigmas(problem, state);
+  const MonolithicSystem system = monolithic_system(problem, state);
+  const DatumRows datum = datum_rows(system, problem, gauge);
+  const InnerTransformation inner = inner_transformation(system, problem, state, gauge, plan);
+  const Eigen::VectorXd step = monolithic_step(system, 0, datum).head(system.reduced_dimension);
+  return largest_over_sigma(system, inner.step(step), inner.covariance(monolithic_covariance(system, datum)));
 }
 
 }  // namespace megablock

@@ -8,6 +8,7 @@
 #include <Eigen/SparseCore>
 
 #include "adjust/tile_problem.h"
+#include "merge/gauge.h"
 
 namespace megablock {
 
@@ -27,14 +28,21 @@ struct MonolithicSystem {
 // `problem`: one tile that holds everything.
 MonolithicSystem monolithic_system(const TileProblem& problem, const TileState& state);
 
+// The datum of a free block: rows [k x columns] that hold it, squared and added to J'J; empty where priors fix it.
+using DatumRows = Eigen::SparseMatrix<double>;
+
 // x of (J'J + lambda diag(J'J)) x = -J'r by CHOLMOD. Throws ComputeError when it is not positive definite.
-Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda);
+Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda, const DatumRows& datum = {});
 
 // Inverse of the reduced (points eliminated) undamped normal equations: covariances of everything but points, dense.
 // Throws ComputeError when the datum is free.
-Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system);
+Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const DatumRows& datum = {});
 
 // Largest component of the undamped Newton step at `state` over its posterior sigma, over all frames.
 double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state);
+// The same for a block whose datum may be free: held by the constraints of `gauge`, step and covariance then moved to
+// inner constraints. `plan`: of the problem as the only tile.
+double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state, const BlockGauge& gauge,
+                                  const TilePlan& plan);
 
 }  // namespace megablock
