@@ -105,6 +105,8 @@ struct GaugeReport {
   std::string text = "fixed by priors";
 };
 using UnknownName = std::function<std::string(const UnknownId&)>;
-GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge = {}, const UnknownName& name = describe);
+GaugeReport judge_gauge(
+    const SubtreeSums& root, const BlockGauge& gauge = {},
+    const UnknownName& name = [](const UnknownId& id) { return describe(id); });
 
 }  // namespace megablock
