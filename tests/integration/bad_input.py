@@ -182,7 +182,7 @@ class BadInput(unittest.TestCase):
             shutil.copy(picture, self.images / f"other_{picture.name}")
         self.run_job()
         self.assertEqual(status(self.job)["oriented"], 18)
-        self.assert_reported("falls into 2 sets of images")
+        self.assert_reported("falls into 2 parts without a tie point between them")
         self.assertLess(self.errors()["position_max_m"], 0.5)
 
     def test_images_matching_nothing(self):
