@@ -17,6 +17,7 @@ inline std::string real_data(const std::string& set) {
 
 }  // namespace megablock::testing
 
+// Skips where the photographs are not: they are no part of the repository.
 #define MEGABLOCK_NEEDS_DATA(set)                                           \
   if (!std::filesystem::is_directory(::megablock::testing::real_data(set))) \
   GTEST_SKIP() << ::megablock::testing::real_data(set)                      \

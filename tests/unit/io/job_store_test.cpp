@@ -302,7 +302,8 @@ TEST_F(Store, FileSizeLimitIsSaidAndTheProcessGoesOn) {
 }
 
 TEST_F(Store, FullDiskAndReadOnlyDiskAreSaid) {
-  // A small file system of its own, where the test may mount one (root).
+  // A small file system of its own, where the test may mount one (root); elsewhere it is skipped, as nothing else fills
+  // a disk or makes it read-only.
   const std::string mount_point = scratch_.path("disk");
   fs::create_directories(mount_point);
   if (::mount("tmpfs", mount_point.c_str(), "tmpfs", 0, "size=64k") != 0)

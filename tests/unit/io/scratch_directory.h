@@ -10,6 +10,7 @@ namespace megablock {
 class ScratchDirectory {
  public:
   ScratchDirectory() {
+    // mkdtemp wants six X at the end and puts letters of its own in their place.
     std::string name = (std::filesystem::temp_directory_path() / "megablock-test-XXXXXX").string();
     path_ = ::mkdtemp(name.data());
   }
