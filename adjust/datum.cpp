@@ -72,16 +72,6 @@ struct Component {
   }
 };
 
-// Two held mounts of a rig at different places give the scale.
-bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount) {
-  if (problem.mount_free[mount]) return false;
-  for (std::size_t other = 0; other < mount; ++other)
-    if (problem.mounts[other].rig == problem.mounts[mount].rig && !problem.mount_free[other] &&
-        (state.mounts[other].centre - state.mounts[mount].centre).norm() > 1e-9)
-      return true;
-  return false;
-}
-
 void add_mounts(const TileProblem& problem, const TileState& state, Components& components,
                 std::vector<Component>& all) {
   // Which components see which mounts.

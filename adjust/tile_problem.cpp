@@ -316,6 +316,15 @@ TileProblem make_tile_problem(const Block& block, const BlockState& state, const
   return TileBuilder(block, state, tiles, tile, owned, options).build();
 }
 
+bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount) {
+  if (problem.mount_free[mount]) return false;
+  for (std::size_t other = 0; other < mount; ++other)
+    if (problem.mounts[other].rig == problem.mounts[mount].rig && !problem.mount_free[other] &&
+        (state.mounts[other].centre - state.mounts[mount].centre).norm() > 1e-9)
+      return true;
+  return false;
+}
+
 TileState make_tile_state(const TileProblem& problem, const BlockState& state, std::vector<Eigen::Vector3d> points) {
   if (points.size() != problem.points.size())
     throw InputError("the tile has " + std::to_string(problem.points.size()) + " points, values were given for " +

@@ -129,6 +129,9 @@ TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* b
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options);
 
+// Whether a held mount and one of a lower row of its rig stand at different places: they give the scale of the ground.
+bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount);
+
 // Values for the problem's tables from the block's; points as given (one per row of problem.points).
 TileState make_tile_state(const TileProblem& problem, const BlockState& state, std::vector<Eigen::Vector3d> points);
 // Writes frames, cameras and mounts of the tile back into the block's state.

@@ -21,6 +21,8 @@ constexpr Setting kSettings[] = {
     {"OPENBLAS_CORETYPE", "Haswell"},
     {"OPENBLAS_NUM_THREADS", "1"},
     {"OPENCV_IPP", "disabled"},
+    // Ceres' own remarks on standard error; a unit that fails is reported with its reason by us.
+    {"GLOG_minloglevel", "3"},
     // Large images: keep malloc from returning and re-faulting pages between features of one image and the next.
     {"GLIBC_TUNABLES", "glibc.malloc.mmap_threshold=1073741824:glibc.malloc.trim_threshold=2147483648"},
 };

@@ -13,6 +13,7 @@
 #include "cluster/collective.h"
 #include "cluster/communicator.h"
 #include "cluster/exit_codes.h"
+#include "cluster/monolithic_comparison.h"
 #include "cluster/pipeline.h"
 #include "cluster/status.h"
 #include "cluster/version.h"
@@ -89,10 +90,16 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--strict", options->strict, "End at the first failed unit");
   command->add_flag("-q,--quiet", options->quiet, "No progress");
+  auto monolithic = std::make_shared<bool>(false);
+  if (stage == "merge")
+    command->add_flag("--monolithic", *monolithic,
+                      "Then compare with one monolithic adjustment of the same observations (JSON)");
   command->callback([=, &action, &ranks] {
-    action = [options, &ranks] {
+    action = [options, monolithic, &ranks] {
       const int code = run_job(*options, ranks);
-      if (ranks.rank() == 0) print_result(*options);
+      if (ranks.rank() != 0) return code;
+      print_result(*options);
+      if (*monolithic) std::printf("%s\n", compare_with_monolithic(JobStore(options->directory)).c_str());
       return code;
     };
   });
@@ -207,8 +214,8 @@ void add_report(CLI::App& app, Action& action) {
       const BlockResult result = finished_result(options->job);
       const auto written =
           std::filesystem::file_time_type::clock::to_sys(std::filesystem::last_write_time(store.path(kResult)));
-      const std::string page = report_html(
-          result, {options->job, std::chrono::duration<double>(written.time_since_epoch()).count()});
+      const std::string page =
+          report_html(result, {options->job, std::chrono::duration<double>(written.time_since_epoch()).count()});
       if (options->output.empty()) {
         store.write_text("result/report.html", page);
       } else {

@@ -93,11 +93,16 @@ void describe(Visitor& visit, MergeSettings& o) {
   visit.flag("scale_sigma", o.scale_sigma);
 }
 
-template <typename Options>
-void read_section(const StageSettings& settings, const std::string& section, Options& options) {
-  SettingsReader reader(settings, section);
-  describe(reader, options);
-  reader.finish();
+// The sections of the project file and the options that each sets, in the order of the docs.
+template <typename JobOptionsOrConst, typename Function>
+void for_each_section(JobOptionsOrConst& o, Function&& function) {
+  function("features", o.features);
+  function("candidates", o.candidates);
+  function("matching", o.matching, o.tracks);
+  function("tiles", o.tiles);
+  function("orientation", o.orientation);
+  function("adjustment", o.adjustment);
+  function("merge", o.merge);
 }
 
 // Visitor that feeds every described value to a hash.
@@ -136,12 +141,6 @@ class TextVisitor {
   std::vector<OptionValue>& values_;
 };
 
-template <typename Options>
-void write_down(std::vector<OptionValue>& values, const std::string& section, Options options) {
-  TextVisitor visitor(section, values);
-  describe(visitor, options);
-}
-
 // A value that is wrong for itself, with the place where the project file sets it.
 template <typename Options>
 void check_section(const StageSettings& settings, const std::string& section, const Options& options) {
@@ -171,38 +170,26 @@ void MergeSettings::check() const {
 }
 
 JobOptions read_options(const StageSettings& settings) {
-  JobOptions o;
-  read_section(settings, "features", o.features);
-  read_section(settings, "candidates", o.candidates);
-  SettingsReader matching(settings, "matching");
-  describe(matching, o.matching);
-  describe(matching, o.tracks);
-  matching.finish();
-  read_section(settings, "tiles", o.tiles);
-  read_section(settings, "orientation", o.orientation);
-  read_section(settings, "adjustment", o.adjustment);
-  read_section(settings, "merge", o.merge);
-  o.orientation.observations = o.adjustment.observations;  // one description of the observations for all stages
-  check_section(settings, "features", o.features);
-  check_section(settings, "candidates", o.candidates);
-  check_section(settings, "matching", o.matching);
-  check_section(settings, "tiles", o.tiles);
-  check_section(settings, "orientation", o.orientation);
-  check_section(settings, "adjustment", o.adjustment);
-  check_section(settings, "merge", o.merge);
-  return o;
+  JobOptions options;
+  for_each_section(options, [&](const std::string& section, auto&... parts) {
+    SettingsReader reader(settings, section);
+    (describe(reader, parts), ...);
+    reader.finish();
+  });
+  options.orientation.observations = options.adjustment.observations;  // one description for all stages
+  for_each_section(options, [&](const std::string& section, const auto&... parts) {
+    (check_section(settings, section, parts), ...);
+  });
+  return options;
 }
 
 std::vector<OptionValue> option_values(const JobOptions& options) {
   std::vector<OptionValue> values;
-  write_down(values, "features", options.features);
-  write_down(values, "candidates", options.candidates);
-  write_down(values, "matching", options.matching);
-  write_down(values, "matching", options.tracks);
-  write_down(values, "tiles", options.tiles);
-  write_down(values, "orientation", options.orientation);
-  write_down(values, "adjustment", options.adjustment);
-  write_down(values, "merge", options.merge);
+  JobOptions described = options;  // a visitor may also write
+  for_each_section(described, [&](const std::string& section, auto&... parts) {
+    TextVisitor visitor(section, values);
+    (describe(visitor, parts), ...);
+  });
   return values;
 }
 

@@ -2,8 +2,9 @@
 
 #include <sched.h>
 
-#include <cstdio>
+#include <algorithm>
 #include <fstream>
+#include <limits>
 #include <string>
 
 namespace megablock {
@@ -25,7 +26,30 @@ double peak_rss_mib() { return read_kib("/proc/self/status", "VmHWM:") / 1024; }
 
 void reset_peak_rss() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
-double host_memory_mib() { return read_kib("/proc/meminfo", "MemTotal:") / 1024; }
+double host_memory_mib() {
+  return std::min(read_kib("/proc/meminfo", "MemTotal:") / 1024,
+                  control_group_memory_mib("/proc/self/cgroup", "/sys/fs/cgroup"));
+}
+
+double control_group_memory_mib(const std::string& list, const std::string& root) {
+  double least = std::numeric_limits<double>::infinity();
+  std::ifstream in(list);
+  std::string line;
+  while (std::getline(in, line)) {  // number:controllers:path; version 2 names no controllers
+    const std::size_t first = line.find(':'), second = line.find(':', first + 1);
+    if (second == std::string::npos) continue;
+    const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
+    const bool unified = controllers == ",,";
+    if (!unified && controllers.find(",memory,") == std::string::npos) continue;
+    const std::string folder = unified ? root : root + "/memory";
+    const char* file = unified ? "/memory.max" : "/memory.limit_in_bytes";
+    for (std::string path = line.substr(second + 1); !path.empty(); path.resize(path.rfind('/'))) {
+      double bytes = 0;
+      if (std::ifstream(folder + (path == "/" ? "" : path) + file) >> bytes) least = std::min(least, bytes);
+    }
+  }
+  return least / (1 << 20);
+}
 
 int host_cores() {
   cpu_set_t set;

@@ -15,6 +15,29 @@ namespace {
 std::string text_of(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
 Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
+template <typename Value>
+concept MakesBytes = requires(const Value& value) {
+  value.to_bytes();
+};
+
+template <typename Value>
+void write(ByteWriter& writer, const Value& value) {
+  if constexpr (MakesBytes<Value>)
+    writer.values(value.to_bytes());
+  else
+    writer.value(value);
+}
+void write(ByteWriter& writer, const UnknownList& unknowns) { writer.values(unknowns); }
+
+template <typename Value>
+void read(ByteReader& reader, Value& value) {
+  if constexpr (MakesBytes<Value>)
+    value = Value::from_bytes(reader.values<char>());
+  else
+    value = reader.value<Value>();
+}
+void read(ByteReader& reader, UnknownList& unknowns) { unknowns = reader.values<Unknown>(); }
+
 // One value per tile from the ranks that hold them, in tile order, on every rank.
 template <typename Value>
 std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<RankTile>& own,
@@ -22,7 +45,7 @@ std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const 
   ByteWriter writer;
   for (std::size_t i = 0; i < own.size(); ++i) {
     writer.value(own[i].tile);
-    writer.value(values[i]);
+    write(writer, values[i]);
   }
   std::vector<Value> all(tiles);
   for (const std::string& text : ranks.gather_all(text_of(writer.take()))) {
@@ -30,36 +53,10 @@ std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const 
     ByteReader reader(bytes);
     while (!reader.at_end()) {
       const auto tile = reader.value<std::int64_t>();
-      all[static_cast<std::size_t>(tile)] = reader.value<Value>();
+      read(reader, all[static_cast<std::size_t>(tile)]);
     }
   }
   return all;
-}
-
-// The same for values that make bytes of themselves.
-template <typename Value>
-std::vector<Value> gather_bytes_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<RankTile>& own,
-                                        const std::vector<Value>& values) {
-  ByteWriter writer;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    writer.value(own[i].tile);
-    writer.values(values[i].to_bytes());
-  }
-  std::vector<Value> all(tiles);
-  for (const std::string& text : ranks.gather_all(text_of(writer.take()))) {
-    const Bytes bytes = bytes_of(text);
-    ByteReader reader(bytes);
-    while (!reader.at_end()) {
-      const auto tile = reader.value<std::int64_t>();
-      all[static_cast<std::size_t>(tile)] = Value::from_bytes(reader.values<char>());
-    }
-  }
-  return all;
-}
-
-void write_unknowns(ByteWriter& writer, std::int64_t tile, const UnknownList& unknowns) {
-  writer.value(tile);
-  writer.values(unknowns);
 }
 
 }  // namespace
@@ -97,18 +94,9 @@ RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<i
 RankRunner::~RankRunner() = default;
 
 void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
-  ByteWriter writer;
-  for (const RankTile& tile : tiles_) write_unknowns(writer, tile.tile, tile_unknowns(tile.problem));
-  std::vector<UnknownList> unknowns(tile_count);
-  for (const std::string& text : ranks_.gather_all(text_of(writer.take()))) {
-    const Bytes bytes = bytes_of(text);
-    ByteReader reader(bytes);
-    while (!reader.at_end()) {
-      const auto tile = reader.value<std::int64_t>();
-      unknowns[static_cast<std::size_t>(tile)] = reader.values<Unknown>();
-    }
-  }
-  plan_ = make_plan(tree, unknowns);
+  std::vector<UnknownList> own;
+  for (const RankTile& tile : tiles_) own.push_back(tile_unknowns(tile.problem));
+  plan_ = make_plan(tree, gather_by_tile(ranks_, tile_count, tiles_, own));
   on_one_rank_.assign(plan_.nodes.size(), false);
   for (std::size_t n = 0; n < plan_.nodes.size(); ++n) {
     const PlanNode& node = plan_.nodes[n];
@@ -125,7 +113,7 @@ BlockGauge RankRunner::gather_gauge() const {
   std::vector<TileGauge> own;
   for (std::size_t row = 0; row < tiles_.size(); ++row)
     own.push_back(tile_gauge(tiles_[row].problem, tile_plans_[row], tiles_[row].state));
-  return make_gauge(gather_bytes_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
+  return make_gauge(gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
 }
 
 TileDatum RankRunner::datum_of(std::size_t row) const {
@@ -138,7 +126,7 @@ InnerSums RankRunner::gather_inner_sums(const std::vector<TileStep>& steps) cons
   for (std::size_t row = 0; row < tiles_.size(); ++row)
     own.push_back(inner_sums(gauge_, tiles_[row].tile, tiles_[row].problem, tile_plans_[row], tiles_[row].state,
                              steps[row].unknowns));
-  const std::vector<InnerSums> all = gather_bytes_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own);
+  const std::vector<InnerSums> all = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own);
   InnerSums sums = all.front();
   for (std::size_t t = 1; t < all.size(); ++t) sums.add(all[t]);
   return sums;
@@ -198,12 +186,16 @@ const NodeFactors& RankRunner::factors_of(std::int64_t node, const Pass& pass) {
 }
 
 UpReport RankRunner::up(const Pass& pass) {
+  // Of the state at hand, not of the first one: a resumed run gets the same bits.
+  gauge_ = gather_gauge();
+  return condense_all(pass);
+}
+
+UpReport RankRunner::condense_all(const Pass& pass) {
   updates_.clear();
   factors_.clear();
   seams_.clear();
   condensed_.clear();
-  // Of the state at hand, not of the first one: a resumed run gets the same bits.
-  gauge_ = gather_gauge();
   for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
     if (!mine(n)) continue;
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
@@ -280,7 +272,7 @@ DownReport RankRunner::down(const Pass& pass) {
     own.push_back(motion_sums(gauge_, tiles_[row].tile, tiles_[row].problem, tile_plans_[row], tiles_[row].state,
                               steps[row].unknowns));
   const std::vector<BlockMotion> motions =
-      block_motions(gauge_, gather_bytes_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
+      block_motions(gauge_, gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
   std::vector<Sums> sums(tiles_.size());
   trial_.assign(tiles_.size(), {});
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
@@ -312,7 +304,7 @@ RankRunner::Posterior RankRunner::posterior() {
   seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
   gauge_ = gather_gauge();
   with_columns_ = gauge_.free();
-  posterior.sums = up(0).sums;
+  posterior.sums = condense_all(0).sums;
   posterior.gauge = gauge_;
   check_seams_ = false;
   std::vector<TileStep> steps(tiles_.size());

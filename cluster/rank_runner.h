@@ -72,6 +72,8 @@ class RankRunner : public TreeRunner {
   // The subtree of a node that lies on this rank alone, once more.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
+  // One upward pass with the datum in gauge_.
+  UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   BlockGauge gather_gauge() const;
   TileDatum datum_of(std::size_t row) const;

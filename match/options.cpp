@@ -3,6 +3,7 @@
 #include "io/error.h"
 #include "match/features.h"
 #include "match/pair_matching.h"
+#include "match/tracks.h"
 
 namespace megablock {
 
@@ -19,6 +20,10 @@ void MatchOptions::check() const {
   if (!(ratio > 0 && ratio <= 1)) throw InputError("ratio must be in (0, 1]");
   if (!(max_residual_px > 0 && max_residual_px <= 100)) throw InputError("max_residual_px must be in (0, 100]");
   if (min_inliers < 8) throw InputError("min_inliers must be at least 8, not " + std::to_string(min_inliers));
+}
+
+void TrackOptions::check() const {
+  if (min_length < 2) throw InputError("min_track_length must be at least 2, not " + std::to_string(min_length));
 }
 
 }  // namespace megablock

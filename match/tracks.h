@@ -11,6 +11,7 @@ namespace megablock {
 
 struct TrackOptions {
   int min_length = 2;  // images
+  void check() const;  // throws InputError
 };
 
 class FeatureSets;

@@ -12,16 +12,6 @@ std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 constexpr double kScaleGiven = 1e6;  // weight of the scale where held mounts give it
 
-// Two held mounts of a rig at different places give the scale.
-bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount) {
-  if (problem.mount_free[mount]) return false;
-  for (std::size_t other = 0; other < mount; ++other)
-    if (problem.mounts[other].rig == problem.mounts[mount].rig && !problem.mount_free[other] &&
-        (state.mounts[other].centre - state.mounts[mount].centre).norm() > 1e-9)
-      return true;
-  return false;
-}
-
 // Fills the parts of a tile.
 class PartBuilder {
  public:

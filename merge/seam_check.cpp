@@ -159,9 +159,12 @@ std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, co
   for (const SeamReport& seam : seams) {
     if (!seam.alarm()) continue;
     char line[240];
-    std::snprintf(line, sizeof line, "seam at node %lld: T = %.0f with %lld degrees of freedom (limit %.0f)",
-                  static_cast<long long>(seam.node), seam.statistic, static_cast<long long>(seam.degrees),
-                  seam.threshold);
+    std::snprintf(
+        line, sizeof line,
+        "seam at node %lld: T = %.0f with %lld degrees of freedom (limit %.0f), its sides differ %.1f times what "
+        "their sigmas explain",
+        static_cast<long long>(seam.node), seam.statistic, static_cast<long long>(seam.degrees), seam.threshold,
+        std::sqrt(seam.statistic / static_cast<double>(seam.degrees)));
     lines.emplace_back(line);
     if (worst != nullptr)
       lines.back() += "; tile " + std::to_string(worst->tile) + " disagrees most with the rest of the block";

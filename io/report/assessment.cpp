@@ -60,9 +60,12 @@ std::string parts_item(const Figures& f) {
 std::string seams_item(const BlockResult& result) {
   if (result.seams.empty()) return "";
   std::int64_t tested = 0, alarmed = 0;
+  double largest = 0;  // disagreement at an alarm, in sigmas
   for (const SeamCheck& seam : result.seams) {
     tested += seam.degrees > 0;
-    alarmed += alarms(seam);
+    if (!alarms(seam)) continue;
+    ++alarmed;
+    largest = std::max(largest, std::sqrt(seam.statistic / static_cast<double>(seam.degrees)));
   }
   const auto untested = static_cast<std::int64_t>(result.seams.size()) - tested;
   const std::string rest = untested == 0 ? ""
@@ -73,10 +76,16 @@ std::string seams_item(const BlockResult& result) {
                 fmt::format("The {} of the merge tree {} parts that share nothing: there is no seam to test.",
                             untested == 1 ? "joint" : count(untested) + " joints", untested == 1 ? "joins" : "join"));
   if (alarmed > 0)
-    return item("bad",
-                fmt::format("{} of {} joints of the merge tree raise an alarm: see <a href=\"#tiles\">tiles</a>.",
-                            count(alarmed), count(tested)) +
-                    rest);
+    return item(
+        largest > kGrossRatio ? "bad" : "look",
+        fmt::format("{} of {} joints of the merge tree raise an alarm: their sides, each for itself, would differ "
+                    "up to {} times what their sigmas explain. {} See <a href=\"#tiles\">tiles</a>.",
+                    count(alarmed), count(tested), fixed(largest, 1),
+                    largest > kGrossRatio
+                        ? "A tile holds observations that do not fit its neighbours."
+                        : "That little is what an imperfect camera model or optimistic sigmas leave; the "
+                          "result itself is one adjustment without a step at the joints.") +
+            rest);
   return item("good",
               (tested == 1 ? "No seam: the tiles agree at the joint of the merge tree that was tested."
                            : fmt::format("No seam: the tiles agree at the {} joints of the merge tree that were "

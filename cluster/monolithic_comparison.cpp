@@ -1,22 +1,8 @@
-// A finished job against the single-tile result over the same observations: what the tiles and the merge have left.
-//
-//     compare_single_tile JOB
-//
-// Reads poses, kept observations and priors of the job's result as one tile, and prints one line of JSON:
-//
-// * max_pose_difference_sigmas: largest component of the undamped Newton step of one monolithic problem at the job's
-//   solution (Jacobian and gradient by Ceres' automatic derivatives) over its posterior sigma;
-// * relative_cost_difference: how far Ceres lowers the cost from there with all tolerances 1e-16;
-// * single_tile_pose_difference_sigmas: the single tile adjusted by our own merge from a start that is off by a tenth
-// of
-//   the sigmas, to a decrement of 1e-6; largest difference of a pose to the job's over its sigma.
-//
-// Measured control points are taken as kept where the result has a finite residual of at most 4 sigmas. The covariance
-// is dense: about 2 GiB for 2 500 frames.
+#include "cluster/monolithic_comparison.h"
+
 #include <ceres/solver.h>
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -25,14 +11,13 @@
 #include "adjust/image_sigma.h"
 #include "adjust/linearise.h"
 #include "cluster/job_options.h"
-#include "io/job_store.h"
+#include "io/error.h"
 #include "io/result.h"
 #include "merge/monolithic.h"
 #include "merge/serial_runner.h"
 
-extern "C" void openblas_set_num_threads(int threads);
-
 namespace megablock {
+
 namespace {
 
 using Json = nlohmann::json;
@@ -138,9 +123,12 @@ OwnRun adjust_single_tile(const BlockResult& result, const SingleTile& tile) {
   return run;
 }
 
-Json compare(const std::string& job) {
-  const JobStore store(job);
-  const BlockResult result = read_result(store.verified_path("result/block.h5"));
+}  // namespace
+
+std::string compare_with_monolithic(const JobStore& store) {
+  constexpr const char* kResult = "result/block.h5";
+  if (!store.seal(kResult)) throw InputError(store.path(kResult) + ": the job has no result yet; run it to the end");
+  const BlockResult result = read_result(store.verified_path(kResult));
   const SingleTile tile = single_tile(result, observation_options(store));
   SerialRunner runner(one_leaf(), {tile.problem}, {tile.state});
   const SubtreeSums sums = runner.up(0).sums;
@@ -153,28 +141,12 @@ Json compare(const std::string& job) {
   json["max_pose_difference_sigmas"] =
       max_pose_difference_sigmas(tile.problem, tile.state, runner.block_gauge(), runner.tile_plans().front());
   json["relative_cost_difference"] = (sums.cost - cost_after_ceres(tile)) / sums.cost;
-  if (runner.block_gauge().free()) return json;  // the datum of a run is a matter of its start
+  if (runner.block_gauge().free()) return json.dump();
   const OwnRun own = adjust_single_tile(result, tile);
   json["single_tile_pose_difference_sigmas"] = own.pose_difference_sigmas;
   json["single_tile_steps"] = own.end.iterations;
   json["single_tile_converged"] = own.end.outcome == GlobalOutcome::kConverged;
-  return json;
+  return json.dump();
 }
 
-}  // namespace
 }  // namespace megablock
-
-int main(int argc, char** argv) {
-  openblas_set_num_threads(1);
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: compare_single_tile JOB (a finished job directory)\n");
-    return 2;
-  }
-  try {
-    std::printf("%s\n", megablock::compare(argv[1]).dump().c_str());
-    return 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "compare_single_tile: %s\n", error.what());
-    return 1;
-  }
-}
