@@ -2,12 +2,12 @@
 
 #include <ceres/autodiff_cost_function.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "adjust/linearise.h"
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -134,10 +134,10 @@ std::vector<Component> find_components(const TileProblem& problem, const TileSta
 // The two frames' increments along the free directions, in units of 1e-3 of the extent or 1e-3 rad.
 DatumDefect defect_of(const Component& c, const TileState& state) {
   DatumDefect defect;
-  const Eigen::SelfAdjointEigenSolver<Normal7> eigen(c.normal);
+  const SymmetricEigen eigen = symmetric_eigen(c.normal);
   constexpr double kNull = 1e-11;  // of the largest eigenvalue; the matrix itself carries errors of 1e-15
-  const double threshold = kNull * eigen.eigenvalues()(6);
-  while (defect.dimension < 7 && eigen.eigenvalues()(defect.dimension) <= threshold) ++defect.dimension;
+  const double threshold = kNull * eigen.values(6);
+  while (defect.dimension < 7 && eigen.values(defect.dimension) <= threshold) ++defect.dimension;
   if (defect.dimension == 0) return defect;
 
   defect.first = LocalFrame(c.frames.front());
@@ -158,7 +158,7 @@ DatumDefect defect_of(const Component& c, const TileState& state) {
   unit.segment<3>(3) /= c.extent;
   unit.segment<3>(9) /= c.extent;
   defect.constraints.topRows(defect.dimension) =
-      eigen.eigenvectors().leftCols(defect.dimension).transpose() * moves.transpose() * unit.asDiagonal();
+      eigen.vectors.leftCols(defect.dimension).transpose() * moves.transpose() * unit.asDiagonal();
   return defect;
 }
 

@@ -5,6 +5,7 @@
 
 add_library(megablock_options INTERFACE)
 target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_link_libraries(megablock_options INTERFACE OpenMP::OpenMP_CXX)  # everywhere: precompiled headers are shared
 # Contraction off: a*b+c gives the same bits wherever the compiler could have fused it or not.
 target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow -ffp-contract=off)
 # GCC 12's false alarms on inlined copies of std::string and std::vector.
@@ -18,6 +19,17 @@ if(MEGABLOCK_SANITIZE)
                          -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)
 endif()
+
+# Headers that nearly every file reads, precompiled once for all rooms and once for all tests: half of the build's time.
+if(NOT EXISTS ${CMAKE_BINARY_DIR}/headers.cpp)
+  file(WRITE ${CMAKE_BINARY_DIR}/headers.cpp "")
+endif()
+function(megablock_headers target)
+  cmake_parse_arguments(HEADERS "" "" "LINK;HEADERS" ${ARGN})
+  add_library(${target} OBJECT ${CMAKE_BINARY_DIR}/headers.cpp)
+  target_link_libraries(${target} PRIVATE megablock_options ${HEADERS_LINK})
+  target_precompile_headers(${target} PRIVATE ${HEADERS_HEADERS})
+endfunction()
 
 function(megablock_room name)
   cmake_parse_arguments(ROOM "" "" "DEPENDS" ${ARGN})
@@ -34,7 +46,7 @@ function(megablock_room name)
         set_source_files_properties(${source} PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma" SKIP_PRECOMPILE_HEADERS ON)
       endif()
     endforeach()
-    target_precompile_headers(megablock_${name} PRIVATE <Eigen/Dense>)  # nearly every file needs it: saves a quarter
+    target_precompile_headers(megablock_${name} REUSE_FROM megablock_room_headers)
   endif()
   target_link_libraries(megablock_${name} ${type} megablock_options ${ROOM_DEPENDS})
   add_library(megablock::${name} ALIAS megablock_${name})
@@ -52,7 +64,7 @@ function(megablock_tests target folder)
   endif()
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE ${TESTS_LINK} GTest::gmock GTest::gtest_main)
-  target_precompile_headers(${target} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense>)
+  target_precompile_headers(${target} REUSE_FROM megablock_test_headers)
   gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS ${TESTS_LABEL} TIMEOUT ${TESTS_TIMEOUT}
                                   ENVIRONMENT OPENBLAS_NUM_THREADS=1)  # as the program itself; more threads spin

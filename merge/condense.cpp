@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "geometry/decompositions.h"
 #include "merge/tile_linearisation.h"
 
 namespace megablock {
@@ -135,7 +136,7 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
       const Eigen::Matrix<double, 6, 1> root =
           Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).cwiseSqrt();
       const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
-      const Eigen::MatrixXd basis = scaled.householderQr().householderQ() * Eigen::MatrixXd::Identity(6, scaled.cols());
+      const Eigen::MatrixXd basis = orthonormal_basis(scaled);
       const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();
       add_product(front.matrix(), front.dimension(), row, row, weight, 1);
     }

@@ -1,10 +1,9 @@
 #include "merge/gauge.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 
 #include "adjust/disjoint_sets.h"
+#include "geometry/decompositions.h"
 #include "geometry/rotation.h"
 
 namespace megablock {
@@ -42,31 +41,31 @@ Eigen::MatrixXd free_directions(const Matrix77& normal) {
   Matrix77 ordered;
   for (int i = 0; i < 7; ++i)
     for (int j = 0; j < 7; ++j) ordered(i, j) = normal(kOrder[i], kOrder[j]);
-  const double limit = kNullDirection * Eigen::SelfAdjointEigenSolver<Matrix77>(normal).eigenvalues()(6);
+  const double limit = kNullDirection * symmetric_eigen(normal).values(6);
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shift(ordered.bottomRightCorner<3, 3>());
+  const SymmetricEigen shift = symmetric_eigen(ordered.bottomRightCorner<3, 3>());
   std::int64_t free_shifts = 0;
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
-    if (shift.eigenvalues()(i) <= limit)
+    if (shift.values(i) <= limit)
       ++free_shifts;
     else
-      inverse += shift.eigenvectors().col(i) * shift.eigenvectors().col(i).transpose() / shift.eigenvalues()(i);
+      inverse += shift.vectors.col(i) * shift.vectors.col(i).transpose() / shift.values(i);
   }
   const Eigen::Matrix<double, 3, 4> following = -inverse * ordered.bottomLeftCorner<3, 4>();
   const Eigen::Matrix4d turning = ordered.topLeftCorner<4, 4>() + ordered.topRightCorner<4, 3>() * following;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> turn(0.5 * (turning + turning.transpose()));
+  const SymmetricEigen turn = symmetric_eigen(0.5 * (turning + turning.transpose()));
   std::int64_t free_turns = 0;
-  while (free_turns < 4 && turn.eigenvalues()(free_turns) <= std::max(limit, kDetermined)) ++free_turns;
+  while (free_turns < 4 && turn.values(free_turns) <= std::max(limit, kDetermined)) ++free_turns;
 
   Eigen::MatrixXd found = Eigen::MatrixXd::Zero(7, free_shifts + free_turns);
-  found.block(4, 0, 3, free_shifts) = shift.eigenvectors().leftCols(free_shifts);
-  found.block(0, free_shifts, 4, free_turns) = turn.eigenvectors().leftCols(free_turns);
-  found.block(4, free_shifts, 3, free_turns) = following * turn.eigenvectors().leftCols(free_turns);
+  found.block(4, 0, 3, free_shifts) = shift.vectors.leftCols(free_shifts);
+  found.block(0, free_shifts, 4, free_turns) = turn.vectors.leftCols(free_turns);
+  found.block(4, free_shifts, 3, free_turns) = following * turn.vectors.leftCols(free_turns);
   Eigen::MatrixXd directions(7, found.cols());
   for (int i = 0; i < 7; ++i) directions.row(kOrder[i]) = found.row(i);
   if (directions.cols() == 0) return directions;
-  return directions.householderQr().householderQ() * Eigen::MatrixXd::Identity(7, directions.cols());
+  return orthonormal_basis(directions);
 }
 
 BlockComponent component_of(const PartGroup& group) {
@@ -97,18 +96,18 @@ void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<Ga
   const Vector6 unit = c.weights().cwiseSqrt();
   const auto hold = [&](std::int64_t frame, const Eigen::Vector3d& centre, const Eigen::MatrixXd& free) {
     const Eigen::MatrixXd moves = c.move(centre).leftCols(c.defect) * free;
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(unit.asDiagonal() * moves, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const double largest = svd.singularValues().size() > 0 ? svd.singularValues()(0) : 0;
+    const SingularValues svd = singular_values(unit.asDiagonal() * moves);
+    const double largest = svd.values.size() > 0 ? svd.values(0) : 0;
     std::int64_t rank = 0;
-    while (rank < svd.singularValues().size() && svd.singularValues()(rank) > kHeldDirection * largest) ++rank;
+    while (rank < svd.values.size() && svd.values(rank) > kHeldDirection * largest) ++rank;
     if (rank > 0 && largest > 0) {
       GaugeConstraint constraint;
       constraint.frame = frame;
       constraint.count = rank;
-      constraint.directions.leftCols(rank) = moves * svd.matrixV().leftCols(rank);
+      constraint.directions.leftCols(rank) = moves * svd.v.leftCols(rank);
       constraints.push_back(constraint);
     }
-    return Eigen::MatrixXd(free * svd.matrixV().rightCols(free.cols() - rank));
+    return Eigen::MatrixXd(free * svd.v.rightCols(free.cols() - rank));
   };
   const GaugePart* lowest = nullptr;
   std::int64_t second = -1;

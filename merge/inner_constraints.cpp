@@ -1,7 +1,8 @@
 #include "merge/inner_constraints.h"
 
-#include <Eigen/LU>
 #include <cmath>
+
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -76,9 +77,9 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
                           const TilePlan& plan, const TileState& state, const Step& unknowns,
                           TileCovariance& covariance) {
   if (!gauge.free()) return;
-  std::vector<Eigen::MatrixXd> inverse, k;
+  std::vector<Eigen::MatrixXd> inverses, k;
   for (const BlockComponent& c : gauge.components) {
-    inverse.push_back(sums.m.block(c.first_column, c.first_column, c.defect, c.defect).inverse());
+    inverses.push_back(inverse(sums.m.block(c.first_column, c.first_column, c.defect, c.defect)));
     k.push_back(sums.k.block(c.first_column, c.first_column, c.defect, c.defect));
   }
   const auto components = free_component_of_frame(gauge, tile, plan);
@@ -88,7 +89,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
     if (c == nullptr) continue;
     const UnknownId id{UnknownKind::kFrame, 0, problem.frames[f].value};
     transform(covariance.frames[f], columns_of(unknowns, id, *c),
-              Eigen::MatrixXd(c->move(state.frames[f].centre).leftCols(c->defect)), inverse[row_of(c)], k[row_of(c)]);
+              Eigen::MatrixXd(c->move(state.frames[f].centre).leftCols(c->defect)), inverses[row_of(c)], k[row_of(c)]);
   }
   for (const auto& cell : plan.points)
     for (std::int64_t p : cell) {
@@ -96,7 +97,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
       if (c == nullptr) continue;
       transform(covariance.points[at(p)],
                 Eigen::MatrixXd(covariance.point_columns[at(p)].middleCols(c->first_column, c->defect)),
-                Eigen::MatrixXd(c->move_point(state.points[at(p)]).leftCols(c->defect)), inverse[row_of(c)],
+                Eigen::MatrixXd(c->move_point(state.points[at(p)]).leftCols(c->defect)), inverses[row_of(c)],
                 k[row_of(c)]);
     }
   // Free mounts change with the scale of the component that sees them.
@@ -109,7 +110,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
     move.bottomRightCorner<3, 1>() = state.mounts[m].centre;
     const UnknownId id{UnknownKind::kMount, problem.mounts[m].mount, problem.mounts[m].rig.value};
     transform(covariance.mounts[m], columns_of(unknowns, id, *c),
-              Eigen::MatrixXd((move * c->directions).leftCols(c->defect)), inverse[row_of(c)], k[row_of(c)]);
+              Eigen::MatrixXd((move * c->directions).leftCols(c->defect)), inverses[row_of(c)], k[row_of(c)]);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "adjust/ceres_problem.h"
+#include "geometry/decompositions.h"
 #include "io/error.h"
 
 extern "C" {
@@ -41,7 +42,7 @@ DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem,
     const auto row = std::lower_bound(problem.frames.begin(), problem.frames.end(), FrameIndex(c.frame));
     const std::int64_t column = system.frame_column[static_cast<std::size_t>(row - problem.frames.begin())];
     const Eigen::MatrixXd scaled = root.segment<6>(column).asDiagonal() * c.directions.leftCols(c.count);
-    const Eigen::MatrixXd basis = scaled.householderQr().householderQ() * Eigen::MatrixXd::Identity(6, c.count);
+    const Eigen::MatrixXd basis = orthonormal_basis(scaled);
     for (int k = 0; k < c.count; ++k, ++rows)
       for (int i = 0; i < 6; ++i) entries.emplace_back(rows, column + i, basis(i, k) * root[column + i]);
   }
@@ -85,7 +86,7 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
     move.bottomRightCorner<3, 1>() = state.mounts[static_cast<std::size_t>(image.mount)].centre;
     place(column, *c, move * c->directions);
   }
-  s.t = (weighted.transpose() * s.n).ldlt().solve(weighted.transpose());
+  s.t = solve_symmetric(weighted.transpose() * s.n, weighted.transpose());
   return s;
 }
 
@@ -164,7 +165,7 @@ Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const Datu
   const Eigen::SparseMatrix<double> own = normal.bottomRightCorner(points, points);
   std::vector<Eigen::Triplet<double>> entries;
   for (Eigen::Index p = 0; p < points; p += 3) {
-    const Eigen::Matrix3d inverse = Eigen::MatrixXd(own.block(p, p, 3, 3)).inverse();
+    const Eigen::Matrix3d inverse = Eigen::Matrix3d(Eigen::MatrixXd(own.block(p, p, 3, 3))).inverse();
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) entries.emplace_back(p + i, p + j, inverse(i, j));
   }

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 
+#include "geometry/decompositions.h"
 #include "merge/monolithic.h"
 #include "tests/unit/merge/tiled_block.h"
 
@@ -33,11 +34,11 @@ struct DenseNormal {
 // Compares every tile's covariances with diagonal blocks of `expected`, relative to the block's sigmas.
 void expect_covariances(const TiledBlock& block, const std::vector<TileCovariance>& tiles,
                         const MonolithicSystem& system, const Eigen::MatrixXd& expected, double tolerance) {
-  const auto compare = [&](const auto& ours, std::int64_t column, const char* what) {
+  const auto compare = [&](const Eigen::MatrixXd& ours, std::int64_t column, const char* what) {
     const auto n = ours.rows();
     const Eigen::MatrixXd block_expected = expected.block(column, column, n, n);
     const Eigen::VectorXd sigma = block_expected.diagonal().cwiseSqrt();
-    const Eigen::MatrixXd error = sigma.cwiseInverse().asDiagonal() * (Eigen::MatrixXd(ours) - block_expected) *
+    const Eigen::MatrixXd error = sigma.cwiseInverse().asDiagonal() * (ours - block_expected) *
                                   sigma.cwiseInverse().asDiagonal();
     EXPECT_LE(error.cwiseAbs().maxCoeff(), tolerance) << what << " at column " << column;
   };
@@ -72,7 +73,7 @@ TEST_P(Covariances, EqualTheInverse) {
   const MonolithicSystem system = monolithic_system(block.whole, block.whole_state);
   const DenseNormal normal(system);
   const Eigen::MatrixXd inverse =
-      normal.scaled.llt().solve(Eigen::MatrixXd::Identity(normal.scaled.rows(), normal.scaled.cols()));
+      solve_symmetric(normal.scaled, Eigen::MatrixXd::Identity(normal.scaled.rows(), normal.scaled.cols()));
   expect_covariances(block, runner.covariances(), system,
                      normal.scale.asDiagonal() * inverse * normal.scale.asDiagonal(), 1e-8);
 }
@@ -94,23 +95,23 @@ TEST_P(Covariances, OfAFreeBlockEqualThePseudoInverse) {
 
   const MonolithicSystem system = monolithic_system(block.whole, block.whole_state);
   const DenseNormal normal(system);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal.scaled);
+  const SymmetricEigen eigen = symmetric_eigen(normal.scaled);
   const Eigen::Index n = normal.scaled.rows();
-  EXPECT_LT(eigen.eigenvalues()(defect - 1), 1e-11);
-  EXPECT_GT(eigen.eigenvalues()(defect), 1e-9);
-  Eigen::VectorXd inverse_values = eigen.eigenvalues().cwiseInverse();
+  EXPECT_LT(eigen.values(defect - 1), 1e-11);
+  EXPECT_GT(eigen.values(defect), 1e-9);
+  Eigen::VectorXd inverse_values = eigen.values.cwiseInverse();
   inverse_values.head(defect).setZero();
-  const Eigen::MatrixXd any = normal.scale.asDiagonal() * eigen.eigenvectors() * inverse_values.asDiagonal() *
-                              eigen.eigenvectors().transpose() * normal.scale.asDiagonal();
+  const Eigen::MatrixXd any = normal.scale.asDiagonal() * eigen.vectors * inverse_values.asDiagonal() *
+                              eigen.vectors.transpose() * normal.scale.asDiagonal();
   // Null space from the eigenvectors (not from the similarity's formulas); W over the frames, in the unit of the
   // extent.
-  const Eigen::MatrixXd null = normal.scale.asDiagonal() * eigen.eigenvectors().leftCols(defect);
+  const Eigen::MatrixXd null = normal.scale.asDiagonal() * eigen.vectors.leftCols(defect);
   Eigen::VectorXd w = Eigen::VectorXd::Zero(n);
   for (std::int64_t column : system.frame_column)
     if (column >= 0) w.segment<6>(column) = runner.block_gauge().components.front().weights();
   const Eigen::MatrixXd weighted = w.asDiagonal() * null;
   const Eigen::MatrixXd s =
-      Eigen::MatrixXd::Identity(n, n) - null * (null.transpose() * weighted).ldlt().solve(weighted.transpose());
+      Eigen::MatrixXd::Identity(n, n) - null * solve_symmetric(null.transpose() * weighted, weighted.transpose());
   expect_covariances(block, covariances, system, s * any * s.transpose(), 1e-5);
 }
 
