@@ -1,8 +1,9 @@
 #include "adjust/ceres_problem.h"
 
 #include <ceres/autodiff_cost_function.h>
+#include <ceres/cost_function.h>
+#include <ceres/dynamic_autodiff_cost_function.h>
 #include <ceres/loss_function.h>
-#include <ceres/sized_cost_function.h>
 
 #include <algorithm>
 #include <functional>
@@ -63,14 +64,17 @@ bool PoseManifold::MinusJacobian(const double* x, double* jacobian) const {
 namespace {
 
 // linearise_image for Ceres. Ceres multiplies a pose's Jacobian by dq/dw; dw/dq is its left inverse.
-class AnalyticImage : public ceres::SizedCostFunction<2, kPoseBlock, kPoseBlock, kIntrinsicCount, 3> {
+class AnalyticImage : public ceres::CostFunction {
  public:
-  AnalyticImage(const Eigen::Vector2d& measured, double inverse_sigma)
-      : measured_(measured), inverse_sigma_(inverse_sigma) {}
+  AnalyticImage(const CameraModel& model, const Eigen::Vector2d& measured, double inverse_sigma)
+      : model_(model), measured_(measured), inverse_sigma_(inverse_sigma) {
+    set_num_residuals(2);
+    *mutable_parameter_block_sizes() = {kPoseBlock, kPoseBlock, parameter_count(model), 3};
+  }
 
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
-    Intrinsics intrinsics;
-    std::copy_n(blocks[2], kIntrinsicCount, intrinsics.begin());
+    Intrinsics intrinsics(model_);
+    std::copy_n(blocks[2], intrinsics.size(), intrinsics.begin());
     const Pose frame = from_block(blocks[0]), mount = from_block(blocks[1]);
     const Eigen::Vector3d point = Eigen::Map<const Eigen::Vector3d>(blocks[3]);
     Eigen::Map<Eigen::Vector2d> result(residual);
@@ -85,7 +89,9 @@ class AnalyticImage : public ceres::SizedCostFunction<2, kPoseBlock, kPoseBlock,
     result = image.residual;
     if (jacobians[0]) write_pose(image.by_frame, blocks[0], jacobians[0]);
     if (jacobians[1]) write_pose(image.by_mount, blocks[1], jacobians[1]);
-    if (jacobians[2]) as_matrix<kIntrinsicCount>(jacobians[2]) = image.by_intrinsics;
+    if (jacobians[2])
+      Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>(jacobians[2], 2, intrinsics.size()) =
+          image.by_intrinsics;
     if (jacobians[3]) as_matrix<3>(jacobians[3]) = image.by_point;
     return true;
   }
@@ -101,6 +107,7 @@ class AnalyticImage : public ceres::SizedCostFunction<2, kPoseBlock, kPoseBlock,
     map.rightCols<3>() = by_tangent.rightCols<3>();
   }
 
+  CameraModel model_;
   Eigen::Vector2d measured_;
   double inverse_sigma_;
 };
@@ -130,6 +137,27 @@ ceres::CostFunction* automatic(Functor functor) {
   return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlocks...>(new Functor(std::move(functor)));
 }
 
+ceres::CostFunction* automatic_image(const residual::ImageMeasured& image) {
+  return automatic<2, kPoseBlock, kPoseBlock, parameter_count(CameraModel()), 3>(image);
+}
+
+// A prior has as many residuals as its camera has parameters.
+struct DynamicIntrinsicsKnown {
+  residual::IntrinsicsKnown known;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return known(blocks[0], result);
+  }
+};
+
+ceres::CostFunction* automatic_prior(const TileProblem::IntrinsicTerm& term) {
+  auto* cost = new ceres::DynamicAutoDiffCostFunction<DynamicIntrinsicsKnown, 8>(
+      new DynamicIntrinsicsKnown{residual::IntrinsicsKnown{term}});
+  cost->AddParameterBlock(term.value.size());
+  cost->SetNumResiduals(term.value.size());
+  return cost;
+}
+
 }  // namespace
 
 CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options)
@@ -138,9 +166,6 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
       camera_count_(std::ssize(state.cameras)),
       point_count_(std::ssize(state.points)),
       mounts_begin_(frame_count_ * kPoseBlock),
-      cameras_begin_(mounts_begin_ + mount_count_ * kPoseBlock),
-      points_begin_(cameras_begin_ + camera_count_ * kIntrinsicCount),
-      values_(static_cast<std::size_t>(points_begin_ + point_count_ * 3)),
       point_used_(problem.points.size(), 0),
       image_loss_(ceres_loss(problem.image_loss)),
       position_loss_(ceres_loss(problem.position_loss)),
@@ -151,18 +176,25 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
       state.mounts.size() != problem.mounts.size() || state.points.size() != problem.points.size() ||
       camera_free.size() != problem.cameras.size())
     throw InputError("the tile's state does not fit its problem");
+  points_begin_ = mounts_begin_ + mount_count_ * kPoseBlock;
+  for (const Intrinsics& intrinsics : state.cameras) {
+    camera_begin_.push_back(points_begin_);
+    points_begin_ += intrinsics.size();
+  }
+  values_.resize(static_cast<std::size_t>(points_begin_ + point_count_ * 3));
   for (std::int64_t f = 0; f < frame_count_; ++f) to_block(state.frames[f], frame(f));
   for (std::int64_t m = 0; m < mount_count_; ++m) to_block(state.mounts[m], mount(m));
-  for (std::int64_t c = 0; c < camera_count_; ++c) std::copy_n(state.cameras[c].begin(), kIntrinsicCount, camera(c));
+  for (std::int64_t c = 0; c < camera_count_; ++c)
+    std::copy(state.cameras[c].begin(), state.cameras[c].end(), camera(c));
   for (std::int64_t p = 0; p < point_count_; ++p) Eigen::Map<Eigen::Vector3d>(point(p)) = state.points[p];
-  add_images(problem, options.derivatives);
+  add_images(problem, state, options.derivatives);
   add_priors(problem);
-  hold_parameters(problem, camera_free);
+  hold_parameters(problem, state, camera_free);
 }
 
 CeresTile::~CeresTile() = default;
 
-void CeresTile::add_images(const TileProblem& problem, CeresOptions::Derivatives derivatives) {
+void CeresTile::add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives) {
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
     if (!problem.active(p)) continue;
     point_used_[p] = 1;
@@ -171,10 +203,10 @@ void CeresTile::add_images(const TileProblem& problem, CeresOptions::Derivatives
       const TileImage& image = problem.images[problem.image[row].value];
       const Eigen::Vector2d measured(problem.x[row], problem.y[row]);
       const double weight = problem.inverse_sigma[row];
-      ceres::CostFunction* cost =
-          derivatives == CeresOptions::Derivatives::kAnalytic
-              ? static_cast<ceres::CostFunction*>(new AnalyticImage(measured, weight))
-              : automatic<2, kPoseBlock, kPoseBlock, kIntrinsicCount, 3>(residual::ImageMeasured{measured, weight});
+      const CameraModel& model = state.cameras[image.camera.value].model();
+      ceres::CostFunction* cost = derivatives == CeresOptions::Derivatives::kAnalytic
+                                      ? static_cast<ceres::CostFunction*>(new AnalyticImage(model, measured, weight))
+                                      : automatic_image({measured, weight});
       ceres_->AddResidualBlock(cost, image_loss_.get(), frame(image.frame.value), mount(image.mount),
                                camera(image.camera.value), point(p));
     }
@@ -195,13 +227,13 @@ void CeresTile::add_priors(const TileProblem& problem) {
     if (point_used_[term.point.value])
       ceres_->AddResidualBlock(automatic<3, 3>(residual::PointKnown{term}), nullptr, point(term.point.value));
   for (const auto& term : problem.intrinsic_priors)
-    ceres_->AddResidualBlock(automatic<kIntrinsicCount, kIntrinsicCount>(residual::IntrinsicsKnown{term}), nullptr,
-                             camera(term.camera.value));
+    ceres_->AddResidualBlock(automatic_prior(term), nullptr, camera(term.camera.value));
   for (const auto& term : problem.mount_priors)
     ceres_->AddResidualBlock(automatic<6, kPoseBlock>(residual::MountKnown{term}), nullptr, mount(term.mount));
 }
 
-void CeresTile::hold_parameters(const TileProblem& problem, const std::vector<std::uint8_t>& camera_free) {
+void CeresTile::hold_parameters(const TileProblem& problem, const TileState& state,
+                                const std::vector<ParameterMask>& camera_free) {
   for (std::int64_t f = 0; f < frame_count_; ++f)
     if (ceres_->HasParameterBlock(frame(f))) ceres_->SetManifold(frame(f), &pose_manifold_);
   for (std::int64_t m = 0; m < mount_count_; ++m) {
@@ -213,12 +245,13 @@ void CeresTile::hold_parameters(const TileProblem& problem, const std::vector<st
     double* block = camera(c);
     if (!ceres_->HasParameterBlock(block)) continue;
     std::vector<int> held;
-    for (int k = 0; k < kIntrinsicCount; ++k)
-      if (!(camera_free[c] >> k & 1)) held.push_back(k);
-    if (held.size() == kIntrinsicCount) {
+    const int count = state.cameras[c].size();
+    for (int k = 0; k < count; ++k)
+      if (!contains(camera_free[c], k)) held.push_back(k);
+    if (std::ssize(held) == count) {
       ceres_->SetParameterBlockConstant(block);
     } else if (!held.empty()) {
-      camera_manifolds_.push_back(std::make_unique<ceres::SubsetManifold>(kIntrinsicCount, held));
+      camera_manifolds_.push_back(std::make_unique<ceres::SubsetManifold>(count, held));
       ceres_->SetManifold(block, camera_manifolds_.back().get());
     }
   }
@@ -255,7 +288,8 @@ void CeresTile::store(TileState& state) {
   // As Plus left them: already unit, and held blocks keep their bits.
   for (std::int64_t f = 0; f < frame_count_; ++f) state.frames[f] = from_block(frame(f));
   for (std::int64_t m = 0; m < mount_count_; ++m) state.mounts[m] = from_block(mount(m));
-  for (std::int64_t c = 0; c < camera_count_; ++c) std::copy_n(camera(c), kIntrinsicCount, state.cameras[c].begin());
+  for (std::int64_t c = 0; c < camera_count_; ++c)
+    std::copy_n(camera(c), state.cameras[c].size(), state.cameras[c].begin());
   for (std::int64_t p = 0; p < point_count_; ++p)
     if (point_used_[p]) state.points[p] = Eigen::Map<const Eigen::Vector3d>(point(p));
 }

@@ -14,8 +14,8 @@ namespace megablock {
 
 struct CeresOptions {
   enum class Derivatives { kAutomatic, kAnalytic } derivatives = Derivatives::kAutomatic;
-  // Bit masks of the estimated intrinsics, one per camera of the problem; empty = problem.camera_free.
-  std::vector<std::uint8_t> camera_free;
+  // Estimated intrinsics, one mask per camera of the problem; empty = problem.camera_free.
+  std::vector<ParameterMask> camera_free;
 };
 
 // Builds and owns the ceres::Problem and the parameter blocks. Holds the active points and their kept observations
@@ -31,7 +31,7 @@ class CeresTile {
   ceres::Problem& problem() { return *ceres_; }
   double* frame(std::int64_t row) { return &values_[row * kPoseBlock]; }
   double* mount(std::int64_t row) { return &values_[mounts_begin_ + row * kPoseBlock]; }
-  double* camera(std::int64_t row) { return &values_[cameras_begin_ + row * kIntrinsicCount]; }
+  double* camera(std::int64_t row) { return &values_[camera_begin_[row]]; }
   double* point(std::int64_t row) { return &values_[points_begin_ + row * 3]; }
 
   bool is_point(const double* block) const;
@@ -46,15 +46,18 @@ class CeresTile {
   void store(TileState& state);
 
  private:
-  void add_images(const TileProblem& problem, CeresOptions::Derivatives derivatives);
+  void add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives);
   void add_priors(const TileProblem& problem);
-  void hold_parameters(const TileProblem& problem, const std::vector<std::uint8_t>& camera_free);
+  void hold_parameters(const TileProblem& problem, const TileState& state,
+                       const std::vector<ParameterMask>& camera_free);
   bool unknown(const double* block) const;
 
   // Ceres orders blocks by their addresses: one allocation, so that the order, and with it the bits of the result, are
   // the same every time. Frames, mounts, cameras, points.
   std::int64_t frame_count_, mount_count_, camera_count_, point_count_;
-  std::int64_t mounts_begin_, cameras_begin_, points_begin_;
+  std::int64_t mounts_begin_;
+  std::vector<std::int64_t> camera_begin_;  // [cameras]
+  std::int64_t points_begin_;
   std::vector<double> values_;
   std::vector<std::uint8_t> point_used_;
   PoseManifold pose_manifold_;

@@ -1,7 +1,8 @@
 // The residuals of a tile for Ceres' automatic differentiation: written from the definitions in tile_problem.h alone,
 // independent of linearise.cpp, so that either can be held against the other.
 //
-// Parameter blocks: frame and mount 7 (quaternion w, x, y, z, then centre), camera 8 (Intrinsics), point 3.
+// Parameter blocks: frame and mount 7 (quaternion w, x, y, z, then centre), camera as many as its model
+// has (Intrinsics), point 3.
 // PoseManifold gives a pose the project's tangent increment (PoseIncrement, right perturbation): Jacobians, gradients
 // and steps that Ceres reports in tangent space have the six columns of a frame in our order and sign.
 #pragma once
@@ -112,7 +113,8 @@ struct IntrinsicsKnown {
   TileProblem::IntrinsicTerm term;
   template <typename Scalar>
   bool operator()(const Scalar* camera, Scalar* result) const {
-    for (std::size_t k = 0; k < kIntrinsicCount; ++k) {
+    for (int p = 0; p < term.value.size(); ++p) {
+      const auto k = static_cast<std::size_t>(p);
       const double sigma = term.sigma[k];
       result[k] = (camera[k] - term.value[k]) * (sigma > 0 ? 1 / sigma : 0.0);
     }

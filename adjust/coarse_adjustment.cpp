@@ -43,9 +43,10 @@ void add_cameras(const Block& block, const OrientationGraph& graph, const Orient
     const Camera& camera = block.cameras[graph.cameras[c]];
     TileProblem::IntrinsicTerm term{LocalCamera(static_cast<std::int32_t>(c)), camera.intrinsics, {}};
     bool any = false;
-    for (std::size_t k = 0; k < kIntrinsicCount; ++k) {
+    for (int p = 0; p < camera.intrinsics.size(); ++p) {
+      const auto k = static_cast<std::size_t>(p);
       const double sigma = camera.prior_sigma[k];
-      const bool stated = sigma > 0 && std::isfinite(sigma) && (options.camera_free[c] >> k & 1);
+      const bool stated = sigma > 0 && std::isfinite(sigma) && contains(options.camera_free[c], p);
       term.sigma[k] = stated ? sigma : std::numeric_limits<double>::infinity();
       any |= stated;
     }

@@ -7,9 +7,9 @@
 namespace megablock {
 
 struct CoarseOptions {
-  ObservationOptions observations;        // sigma and priors; the loss below replaces theirs
-  double loss_scale_px = 4;               // Cauchy scale of image residuals
-  std::vector<std::uint8_t> camera_free;  // [graph.cameras] bit mask of the refined intrinsics
+  ObservationOptions observations;         // sigma and priors; the loss below replaces theirs
+  double loss_scale_px = 4;                // Cauchy scale of image residuals
+  std::vector<ParameterMask> camera_free;  // [graph.cameras] refined intrinsics
   int max_iterations = 20;
   double function_tolerance = 1e-4;
 };

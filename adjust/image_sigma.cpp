@@ -14,7 +14,7 @@ constexpr std::int64_t kFewestRedundancy = 100;  // the estimate is then good to
 
 std::int64_t unknowns_of(const TileProblem& problem) {
   std::int64_t count = 6 * std::ssize(problem.frames);
-  for (const std::uint8_t mask : problem.camera_free) count += __builtin_popcount(mask);
+  for (const ParameterMask mask : problem.camera_free) count += count_of(mask);
   for (const std::uint8_t free : problem.mount_free) count += free ? 6 : 0;
   return count;
 }

@@ -143,7 +143,7 @@ double prior_cost(const TileProblem& problem, const TileState& state) {
     if (problem.active(term.point.value))
       sum += point_prior_residual(state.points[term.point.value], term).squaredNorm();
   for (const auto& term : problem.intrinsic_priors) {
-    for (int k = 0; k < kIntrinsicCount; ++k) {
+    for (int k = 0; k < term.value.size(); ++k) {
       const double r = intrinsic_prior_residual(state.cameras[term.camera.value], term, k);
       sum += r * r;
     }

@@ -10,7 +10,7 @@ struct ImageResidual {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6> by_frame;
   Eigen::Matrix<double, 2, 6> by_mount;
-  Eigen::Matrix<double, 2, kIntrinsicCount> by_intrinsics;
+  IntrinsicJacobian by_intrinsics;
   Eigen::Matrix<double, 2, 3> by_point;
   bool in_front = false;  // Z > 0; otherwise the rest is undefined and the observation must not take part
 };

@@ -180,9 +180,9 @@ class Orientation {
   void adjust() {
     struct Round {
       double limit_px;
-      std::uint8_t free;  // intrinsics refined
+      ParameterMask free;  // intrinsics refined
     };
-    constexpr std::uint8_t kF = 1 << kFocal, kK1 = 1 << kRadial1, kK2 = 1 << kRadial2;
+    constexpr ParameterMask kF = mask_of(kFocal), kK1 = mask_of(kRadial1), kK2 = mask_of(kRadial2);
     for (const Round& round : {Round{25, kF}, Round{10, kF | kK1}, Round{4, kF | kK1 | kK2}}) {
       rays_ = viewing_rays(graph_, values_.cameras);
       const double limit = intersect_within(round.limit_px);
@@ -265,15 +265,15 @@ class Orientation {
     }
   }
 
-  std::vector<std::uint8_t> free_intrinsics(std::uint8_t wanted, bool unknown_focal_only) const {
+  std::vector<ParameterMask> free_intrinsics(ParameterMask wanted, bool unknown_focal_only) const {
     constexpr std::size_t kFewestFrames = 4;
-    std::vector<std::uint8_t> result(graph_.cameras.size(), 0);
+    std::vector<ParameterMask> result(graph_.cameras.size(), 0);
     if (oriented() < kFewestFrames || any_given_) return result;  // given poses go with the given cameras
     for (std::size_t c = 0; c < result.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];
       if (unknown_focal_only && camera.focal_known) continue;
-      for (std::size_t k = 0; k < kIntrinsicCount; ++k)
-        if (camera.prior_sigma[k] > 0 && (wanted >> k & 1)) result[c] = static_cast<std::uint8_t>(result[c] | 1 << k);
+      for (int k = 0; k < camera.intrinsics.size(); ++k)
+        if (camera.prior_sigma[static_cast<std::size_t>(k)] > 0) result[c] |= wanted & mask_of(k);
     }
     return result;
   }

@@ -51,7 +51,7 @@ void add_priors(const TileProblem& problem, const TileState& state, ResidualSum&
       add(point_prior_residual(state.points[term.point.value], term).squaredNorm(),
           term.sigma.array().isFinite().count());
   for (const auto& term : problem.intrinsic_priors)
-    for (int k = 0; k < kIntrinsicCount; ++k) {
+    for (int k = 0; k < term.value.size(); ++k) {
       const double r = intrinsic_prior_residual(state.cameras[term.camera.value], term, k);
       add(r * r, intrinsic_prior_weight(term, k) > 0);
     }

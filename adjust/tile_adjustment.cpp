@@ -193,17 +193,16 @@ class TileAdjuster {
   }
 
   // Parameters estimated here: those of the stage that have a prior or enough images.
-  std::vector<std::uint8_t> camera_free(Stage stage) const {
-    std::vector<std::uint8_t> result = problem_.camera_free;
+  std::vector<ParameterMask> camera_free(Stage stage) const {
+    std::vector<ParameterMask> result = problem_.camera_free;
     for (std::size_t c = 0; c < result.size(); ++c) {
-      for (int k = 0; k < kIntrinsicCount; ++k) {
+      for (int k = 0; k < state_.cameras[c].size(); ++k) {
         const bool first = k == kFocal || k == kRadial1;
         const int needed = first           ? options_.min_images_focal
                            : k == kRadial3 ? options_.min_images_radial3
                                            : options_.min_images_principal;
         const bool wanted = stage == Stage::kAll || first;
-        if (!wanted || (images_[c] < needed && !has_prior(c, k)))
-          result[c] = static_cast<std::uint8_t>(result[c] & ~(1u << k));
+        if (!wanted || (images_[c] < needed && !has_prior(c, k))) result[c] &= ~mask_of(k);
       }
     }
     return result;

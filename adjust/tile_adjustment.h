@@ -12,10 +12,10 @@ namespace megablock {
 struct AdjustOptions {
   ObservationOptions observations;
   double min_intersection_deg = 1.5;  // points below are held out of the adjustment and kept in the store
-  bool estimate_image_sigma = true;   // of tie points, from their residuals (image_sigma.h); image_sigma_px is the start
-  double max_residual_sigmas = 4.0;   // screening threshold at the end; starts at 8 x and falls
-  int screening_rounds = 3;           // re-tests every observation against the current solution, both ways
-  int max_iterations = 50;            // of Ceres per round
+  bool estimate_image_sigma = true;  // of tie points, from their residuals (image_sigma.h); image_sigma_px is the start
+  double max_residual_sigmas = 4.0;  // screening threshold at the end; starts at 8 x and falls
+  int screening_rounds = 3;          // re-tests every observation against the current solution, both ways
+  int max_iterations = 50;           // of Ceres per round
   // Images a camera needs in the tile before the tile's own adjustment estimates parameters without a prior sigma:
   // focal length and k1; principal point, k2 and decentring; k3. Below, they stay at their values here and are left to
   // the adjustment of the whole block (TileProblem::camera_free is never changed).
@@ -36,8 +36,8 @@ std::int64_t screen_observations(TileProblem& problem, TileState& state, double 
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
                                  const AdjustOptions& options, const std::vector<std::uint8_t>& which);
 
-// The final screening threshold of a tile, in sigmas: max_residual_sigmas, raised where the kept residuals show (by their
-// median) that the a-priori sigma is too small for these images. What adjust_tile ends with.
+// The final screening threshold of a tile, in sigmas: max_residual_sigmas, raised where the kept residuals show (by
+// their median) that the a-priori sigma is too small for these images. What adjust_tile ends with.
 double screening_threshold(const TileProblem& problem, const TileState& state, const AdjustOptions& options);
 
 struct AdjustSummary {
@@ -55,7 +55,7 @@ struct AdjustSummary {
 struct SolveOptions {
   int max_iterations = 50;
   double function_tolerance = 1e-6;
-  std::vector<std::uint8_t> camera_free;  // estimated intrinsics per camera; empty = problem.camera_free
+  std::vector<ParameterMask> camera_free;  // estimated intrinsics per camera; empty = problem.camera_free
 };
 
 // One Ceres solve of the problem as it stands (one thread, deterministic). A datum that the observations leave free is

@@ -209,11 +209,11 @@ class TileBuilder {
     problem_.begin.push_back(0);
   }
 
-  static std::uint8_t free_mask(const Camera& camera) {
-    unsigned mask = 0;
-    for (int k = 0; k < kIntrinsicCount; ++k)
-      if (camera.prior_sigma[static_cast<std::size_t>(k)] != 0) mask |= 1u << k;
-    return static_cast<std::uint8_t>(mask);
+  static ParameterMask free_mask(const Camera& camera) {
+    ParameterMask mask = 0;
+    for (int k = 0; k < camera.intrinsics.size(); ++k)
+      if (camera.prior_sigma[static_cast<std::size_t>(k)] != 0) mask |= mask_of(k);
+    return mask;
   }
 
   void add_observation(ImageIndex image, double x, double y, double sigma) {

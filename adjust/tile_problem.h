@@ -7,11 +7,11 @@
 //   attitude         Log(R R_prior')                       (rotation about the rig's axes)               [3]
 //   relative pose    Log(R_to R_from' R_measured'), R_from (C_to - C_from) - T_measured                  [3 + 3]
 //   point prior      X - X_0                               (control points)                              [3]
-//   intrinsics prior k - k_0                               (per parameter with finite sigma)             [<= 8]
+//   intrinsics prior k - k_0                               (per parameter with finite sigma)             [1 each]
 //   mount prior      Log(R R_0'), C - C_0                                                                [6]
 // Robust losses act on image residuals (all), position priors and relative poses (their own option).
 //
-// Unknowns: frames (6, pose_update), free intrinsics (camera_free bit mask), free mounts (6), points (3).
+// Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3).
 // Every table is ascending by global index; a local index is a row of its table.
 #pragma once
 
@@ -57,27 +57,48 @@ struct TilePoint {
 struct TileProblem {
   std::vector<FrameIndex> frames;
   std::vector<CameraIndex> cameras;
-  std::vector<std::uint8_t> camera_free;  // [cameras] bit p set: intrinsic parameter p is an unknown
+  std::vector<ParameterMask> camera_free;  // [cameras] intrinsic parameters that are unknowns
   std::vector<MountId> mounts;
-  std::vector<std::uint8_t> mount_free;   // [mounts] 1: six unknowns
+  std::vector<std::uint8_t> mount_free;  // [mounts] 1: six unknowns
   std::vector<TileImage> images;
 
   // Points (tracks ascending, then control points ascending) and their observations.
   std::vector<TilePoint> points;
-  std::vector<std::int64_t> begin;        // [points + 1]
-  std::vector<LocalImage> image;          // [observations]; -1 where the frame has no pose (never kept)
-  std::vector<double> x, y;               // px
-  std::vector<double> inverse_sigma;      // 1/px
-  double image_sigma_px = 0.5;            // of the measurements of tie points, per axis (set_image_sigma)
+  std::vector<std::int64_t> begin;    // [points + 1]
+  std::vector<LocalImage> image;      // [observations]; -1 where the frame has no pose (never kept)
+  std::vector<double> x, y;           // px
+  std::vector<double> inverse_sigma;  // 1/px
+  double image_sigma_px = 0.5;        // of the measurements of tie points, per axis (set_image_sigma)
   // 1 = takes part. Points with fewer than two kept observations and no prior take no part at all.
   std::vector<std::uint8_t> kept;
 
-  struct PositionTerm { LocalFrame frame; PositionPrior prior; };
-  struct AttitudeTerm { LocalFrame frame; AttitudePrior prior; };
-  struct RelativeTerm { LocalFrame from, to; Pose pose; double rotation_sigma_rad, position_sigma_m; };
-  struct PointTerm { LocalPoint point; Eigen::Vector3d position, sigma; };  // sigma infinite: axis free
-  struct IntrinsicTerm { LocalCamera camera; Intrinsics value; std::array<double, kIntrinsicCount> sigma; };
-  struct MountTerm { std::int32_t mount; Pose value; double rotation_sigma_rad, position_sigma_m; };
+  struct PositionTerm {
+    LocalFrame frame;
+    PositionPrior prior;
+  };
+  struct AttitudeTerm {
+    LocalFrame frame;
+    AttitudePrior prior;
+  };
+  struct RelativeTerm {
+    LocalFrame from, to;
+    Pose pose;
+    double rotation_sigma_rad, position_sigma_m;
+  };
+  struct PointTerm {
+    LocalPoint point;
+    Eigen::Vector3d position, sigma;
+  };  // sigma infinite: axis free
+  struct IntrinsicTerm {
+    LocalCamera camera;
+    Intrinsics value;
+    IntrinsicSigmas sigma;
+  };
+  struct MountTerm {
+    std::int32_t mount;
+    Pose value;
+    double rotation_sigma_rad, position_sigma_m;
+  };
   std::vector<PositionTerm> positions;
   std::vector<AttitudeTerm> attitudes;
   std::vector<RelativeTerm> relatives;
@@ -108,13 +129,13 @@ struct TileState {
 };
 
 struct ObservationOptions {
-  double image_sigma_px = 0.5;    // a-priori sigma of a tie point measurement per axis, px
+  double image_sigma_px = 0.5;  // a-priori sigma of a tie point measurement per axis, px
   RobustLoss image_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
   bool use_position_priors = true;
   bool use_attitude_priors = true;
-  void check() const;             // throws InputError
+  void check() const;  // throws InputError
 };
 
 // Which tile owns what (merge.md, "Unknowns and ownership").

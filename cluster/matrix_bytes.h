@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 #include "geometry/pose.h"
@@ -24,6 +25,16 @@ std::vector<Matrix> read_matrices(ByteReader& reader) {
   std::vector<Matrix> matrices(flat.size() / kSize);
   for (std::size_t i = 0; i < matrices.size(); ++i) matrices[i] = Eigen::Map<const Matrix>(flat.data() + i * kSize);
   return matrices;
+}
+
+// A square matrix of any size.
+inline void write_matrix(ByteWriter& writer, const Eigen::MatrixXd& matrix) {
+  writer.values(std::vector<double>(matrix.data(), matrix.data() + matrix.size()));
+}
+inline Eigen::MatrixXd read_matrix(ByteReader& reader) {
+  const std::vector<double> flat = reader.values<double>();
+  const auto size = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(flat.size()))));
+  return Eigen::Map<const Eigen::MatrixXd>(flat.data(), size, size);
 }
 
 // (x, y, z, w of the quaternion, centre)

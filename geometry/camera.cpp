@@ -41,6 +41,7 @@ ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vecto
   result.by_point.noalias() = f * d.jacobian * normalised;
 
   const double r2 = x * x + y * y, r4 = r2 * r2, r6 = r4 * r2;
+  result.by_intrinsics.resize(2, k.size());
   result.by_intrinsics << d.point.x(), 1, 0, f * x * r2, f * x * r4, f * x * r6, f * 2 * x * y, f * (r2 + 2 * x * x),
       d.point.y(), 0, 1, f * y * r2, f * y * r4, f * y * r6, f * (r2 + 2 * y * y), f * 2 * x * y;
   return result;

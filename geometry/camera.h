@@ -9,27 +9,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 
+#include "geometry/intrinsics.h"
+
 namespace megablock {
-
-// Positions of the parameters in `Intrinsics`.
-enum IntrinsicParameter : int {
-  kFocal = 0,
-  kPrincipalX,
-  kPrincipalY,
-  kRadial1,
-  kRadial2,
-  kRadial3,
-  kDecentring1,
-  kDecentring2
-};
-inline constexpr int kIntrinsicCount = 8;
-using Intrinsics = std::array<double, kIntrinsicCount>;  // f, cx, cy [px], k1, k2, k3, p1, p2
-
-inline constexpr std::array<const char*, kIntrinsicCount> kIntrinsicNames = {"f",  "cx", "cy", "k1",
-                                                                             "k2", "k3", "p1", "p2"};
 
 // Projects camera coordinates; Z > 0 is the caller's to check. Templated for automatic differentiation.
 template <typename Scalar>
@@ -47,11 +31,14 @@ inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point
   return project<double>(k.data(), point);
 }
 
-// Projection with derivatives: J_point (2x3) by camera coordinates, J_intrinsics (2x8) by the parameters.
+// Columns: the model's parameters. In place, without heap.
+using IntrinsicJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxIntrinsics>;
+
+// Projection with derivatives by camera coordinates and by the parameters.
 struct ProjectionJacobian {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> by_point;
-  Eigen::Matrix<double, 2, kIntrinsicCount> by_intrinsics;
+  IntrinsicJacobian by_intrinsics;
 };
 ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point);
 

@@ -1,15 +1,10 @@
 // What a tile's adjustment leaves: docs/job-format.md, "Adjustment".
-#include <algorithm>
-
-#include "io/hdf5_tables.h"
+#include "io/hdf5_cameras.h"
 #include "io/unit_files.h"
 
 namespace megablock {
 
 void write_adjustment(const std::string& path, const TileAdjustment& adjustment) {
-  std::vector<double> intrinsics;
-  for (const Intrinsics& values : adjustment.intrinsics)
-    intrinsics.insert(intrinsics.end(), values.begin(), values.end());
   Hdf5Writer file(path, "adjustment");
   file.attribute("/", "summary", adjustment.summary);
   file.attribute("/", "image_sigma_px", adjustment.image_sigma_px);
@@ -19,8 +14,8 @@ void write_adjustment(const std::string& path, const TileAdjustment& adjustment)
   file.vector("frames/observations", adjustment.observations, {"", "number of kept observations"});
   file.group("cameras", "cameras the tile's residuals touch");
   file.vector("cameras/index", plain(adjustment.cameras), {"", "camera index in the block"});
-  file.matrix("cameras/intrinsics", intrinsics, kIntrinsicCount,
-              {"px, px, px, 1, 1, 1, 1, 1", "f, cx, cy, k1, k2, k3, p1, p2"});
+  put_models(file, models_of(adjustment.intrinsics));
+  put_intrinsics(file, adjustment.intrinsics, "adjusted values of the parameters");
   file.vector("cameras/observations", adjustment.camera_observations, {"", "number of kept observations"});
   file.group("mounts", "mounts of the rigs that the tile's residuals touch");
   file.vector("mounts/rig", plain(adjustment.mount_rigs), {"", "rig index in the block"});
@@ -46,10 +41,7 @@ TileAdjustment read_adjustment(const std::string& path) {
   adjustment.observations = file.vector<std::int64_t>("frames/observations", frames);
   adjustment.cameras = indices<CameraIndex>(file.vector<std::int64_t>("cameras/index"));
   const auto cameras = static_cast<std::int64_t>(adjustment.cameras.size());
-  const auto intrinsics = file.matrix<double>("cameras/intrinsics", kIntrinsicCount, cameras);
-  adjustment.intrinsics.resize(adjustment.cameras.size());
-  for (std::size_t c = 0; c < adjustment.intrinsics.size(); ++c)
-    std::copy_n(&intrinsics[kIntrinsicCount * c], kIntrinsicCount, adjustment.intrinsics[c].begin());
+  adjustment.intrinsics = get_intrinsics(file, cameras);
   adjustment.camera_observations = file.vector<std::int64_t>("cameras/observations", cameras);
   adjustment.mount_rigs = indices<RigIndex>(file.vector<std::int64_t>("mounts/rig"));
   const auto mounts = static_cast<std::int64_t>(adjustment.mount_rigs.size());

@@ -21,8 +21,8 @@ struct GroundFrame {
   bool georeferenced = false;  // false: arbitrary frame (free block or metric local coordinates)
   double latitude_deg = 0;     // of the origin, WGS84
   double longitude_deg = 0;
-  double height_m = 0;         // ellipsoidal
-  std::string crs = "local";   // of the inputs: "EPSG:4326", "EPSG:25832", "local"
+  double height_m = 0;        // ellipsoidal
+  std::string crs = "local";  // of the inputs: "EPSG:4326", "EPSG:25832", "local"
 };
 
 struct Camera {
@@ -30,7 +30,7 @@ struct Camera {
   int width = 0, height = 0;  // pixels
   Intrinsics intrinsics{};    // start values
   // Prior sigma of each parameter in its own unit: 0 = held, infinity = free without prior.
-  std::array<double, kIntrinsicCount> prior_sigma{};
+  IntrinsicSigmas prior_sigma{};
   bool focal_known = false;  // from EXIF, sensor table or project file; else a guess (1.2 x larger side)
   std::string mask_path;     // PNG, black = ignore; empty = none
 };
@@ -52,9 +52,9 @@ struct Rig {
 
 // GNSS position of the antenna in the ground frame.
 struct PositionPrior {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();        // metres
-  Eigen::Vector3d sigma = Eigen::Vector3d(3, 3, 6);          // metres, east north up
-  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();       // antenna in the rig, metres: antenna = C + R' lever_arm
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();   // metres
+  Eigen::Vector3d sigma = Eigen::Vector3d(3, 3, 6);     // metres, east north up
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  // antenna in the rig, metres: antenna = C + R' lever_arm
 };
 
 // Attitude observed in the ground frame (already turned from the frame's own vertical to the block's).
@@ -66,7 +66,7 @@ struct AttitudePrior {
 struct Frame {
   std::string name;
   RigIndex rig;
-  std::int64_t pass = -1;   // acquisition line it belongs to, -1 unknown
+  std::int64_t pass = -1;                                    // acquisition line it belongs to, -1 unknown
   double time_s = std::numeric_limits<double>::quiet_NaN();  // of acquisition (EXIF), seconds since 1970
   std::optional<PositionPrior> position_prior;
   std::optional<AttitudePrior> attitude_prior;
@@ -77,7 +77,7 @@ struct Image {
   std::string name;  // unique; relative path in the image folder
   std::string path;  // file, absolute; empty for simulated tie points
   FrameIndex frame;
-  int mount = 0;  // in the frame's rig
+  int mount = 0;                // in the frame's rig
   std::uint64_t file_hash = 0;  // XXH3 of the file (0: none)
 };
 
@@ -98,7 +98,7 @@ enum class PointRole { kTie, kControl, kCheck };
 
 struct ControlPoint {
   std::string name;
-  PointRole role = PointRole::kControl;  // kControl or kCheck; a check point is adjusted as a tie point
+  PointRole role = PointRole::kControl;                // kControl or kCheck; a check point is adjusted as a tie point
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // ground frame, metres; z NaN = unknown height
   Eigen::Vector3d sigma = Eigen::Vector3d::Constant(0.01);  // metres
   std::vector<ImageMeasurement> measurements;

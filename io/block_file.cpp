@@ -1,5 +1,6 @@
 // The block as read from project file and image headers: docs/job-format.md, "Block".
 #include "io/hdf5_block.h"
+#include "io/hdf5_cameras.h"
 #include "io/hdf5_tables.h"
 #include "io/unit_files.h"
 
@@ -28,19 +29,17 @@ GroundFrame get_ground(const Hdf5Reader& file) {
 
 void put_cameras(Hdf5Writer& file, const IndexedVector<CameraIndex, Camera>& cameras) {
   std::vector<std::int32_t> size;
-  std::vector<double> intrinsics, sigma;
-  for (const Camera& camera : cameras) {
-    size.insert(size.end(), {camera.width, camera.height});
-    intrinsics.insert(intrinsics.end(), camera.intrinsics.begin(), camera.intrinsics.end());
-    sigma.insert(sigma.end(), camera.prior_sigma.begin(), camera.prior_sigma.end());
-  }
+  for (const Camera& camera : cameras) size.insert(size.end(), {camera.width, camera.height});
+  const auto models = column(cameras, [](const Camera& c) { return c.intrinsics.model(); });
   file.group("cameras", "one row per physical camera");
   file.texts("cameras/name", column(cameras, [](const Camera& c) { return c.name; }));
   file.matrix("cameras/size", size, 2, {"px", "width, height"});
-  file.matrix("cameras/start_intrinsics", intrinsics, kIntrinsicCount,
-              {"px, px, px, 1, 1, 1, 1, 1", "start values of f, cx, cy, k1, k2, k3, p1, p2"});
-  file.matrix("cameras/prior_sigma", sigma, kIntrinsicCount,
-              {"px, px, px, 1, 1, 1, 1, 1", "prior sigmas; 0: held, infinity: free without prior"});
+  put_models(file, models);
+  put_parameters(file, "cameras/start_intrinsics", models,
+                 column(cameras, [](const Camera& c) { return c.intrinsics.data(); }), "start values");
+  put_parameters(file, "cameras/prior_sigma", models,
+                 column(cameras, [](const Camera& c) { return c.prior_sigma.data(); }),
+                 "prior sigmas; 0: held, infinity: free without prior");
   file.vector("cameras/focal_known", column(cameras, [](const Camera& c) -> std::uint8_t { return c.focal_known; }),
               {"", "1: from EXIF, sensor table or project file; 0: a guess"});
   file.texts("cameras/mask_path", column(cameras, [](const Camera& c) { return c.mask_path; }));
@@ -50,21 +49,24 @@ IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
   const std::vector<std::string> names = file.texts("cameras/name");
   const auto count = static_cast<std::int64_t>(names.size());
   const auto size = file.matrix<std::int32_t>("cameras/size", 2, count);
-  const auto intrinsics = file.matrix<double>("cameras/start_intrinsics", kIntrinsicCount, count);
-  const auto sigma = file.matrix<double>("cameras/prior_sigma", kIntrinsicCount, count);
+  const std::vector<CameraModel> models = get_models(file, count);
   const auto known = file.vector<std::uint8_t>("cameras/focal_known", count);
   const std::vector<std::string> masks = file.texts("cameras/mask_path", count);
   IndexedVector<CameraIndex, Camera> cameras(names.size());
+  std::vector<double*> intrinsics, sigma;
   for (std::size_t i = 0; i < names.size(); ++i) {
     Camera& camera = cameras[CameraIndex(static_cast<std::int64_t>(i))];
     camera.name = names[i];
     camera.width = size[2 * i];
     camera.height = size[2 * i + 1];
-    std::copy_n(&intrinsics[kIntrinsicCount * i], kIntrinsicCount, camera.intrinsics.begin());
-    std::copy_n(&sigma[kIntrinsicCount * i], kIntrinsicCount, camera.prior_sigma.begin());
+    camera.intrinsics = Intrinsics(models[i]);
     camera.focal_known = known[i] != 0;
     camera.mask_path = masks[i];
+    intrinsics.push_back(camera.intrinsics.data());
+    sigma.push_back(camera.prior_sigma.data());
   }
+  get_parameters(file, "cameras/start_intrinsics", models, intrinsics);
+  get_parameters(file, "cameras/prior_sigma", models, sigma);
   return cameras;
 }
 

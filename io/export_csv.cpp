@@ -83,21 +83,41 @@ void write_wgs84(const ExportView& view, const std::string& path) {
   writer.close();
 }
 
+// Names of the parameters of all models, in the order of their first appearance.
+std::vector<std::string> all_parameters(const IndexedVector<CameraIndex, Camera>& cameras) {
+  std::vector<std::string> names;
+  for (const Camera& camera : cameras)
+    for (int p = 0; p < camera.intrinsics.size(); ++p) {
+      const std::string name = parameter_name(camera.intrinsics.model(), p);
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  return names;
+}
+
+// Cells of parameters that a camera does not have stay empty.
 void write_cameras(const BlockResult& result, const std::string& path) {
+  const std::vector<std::string> names = all_parameters(result.block.cameras);
   TextWriter writer(path);
-  writer.print("name,width,height");
-  for (const char* name : kIntrinsicNames) writer.print(",{}", name);
+  writer.print("name,width,height,model");
+  for (const std::string& name : names) writer.print(",{}", name);
   if (!result.camera_covariance.empty())
-    for (const char* name : kIntrinsicNames) writer.print(",sigma_{}", name);
+    for (const std::string& name : names) writer.print(",sigma_{}", name);
   writer.print("\n");
   for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
     const CameraIndex index(static_cast<std::int64_t>(c));
     const Camera& camera = result.block.cameras[index];
-    writer.print("{},{},{}", camera.name, camera.width, camera.height);
-    for (const double value : result.state.cameras[index]) writer.print(",{}", value);
-    if (!result.camera_covariance.empty())
-      for (int p = 0; p < kIntrinsicCount; ++p)
-        writer.print(",{:.6g}", std::sqrt(result.camera_covariance[index](p, p)));
+    const Intrinsics& k = result.state.cameras[index];
+    writer.print("{},{},{},{}", camera.name, camera.width, camera.height, model_name(k.model()));
+    for (const std::string& name : names)
+      if (const auto p = find_parameter(k.model(), name))
+        writer.print(",{}", k[*p]);
+      else
+        writer.print(",");
+    for (std::size_t i = 0; i < names.size() && !result.camera_covariance.empty(); ++i)
+      if (const auto p = find_parameter(k.model(), names[i]))
+        writer.print(",{:.6g}", std::sqrt(result.camera_covariance[index](*p, *p)));
+      else
+        writer.print(",");
     writer.print("\n");
   }
   writer.close();

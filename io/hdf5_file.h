@@ -17,7 +17,7 @@
 namespace megablock {
 
 // Of every file the project writes and of the trailer of units; raised when the meaning or layout of any file changes.
-inline constexpr std::uint32_t kFormatVersion = 1;
+inline constexpr std::uint32_t kFormatVersion = 2;
 
 // An HDF5 identifier with its closing function.
 class Hdf5Handle {

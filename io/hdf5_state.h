@@ -8,7 +8,8 @@
 namespace megablock {
 
 void put_state(Hdf5Writer& file, const BlockState& state);
-// Mounts per rig are read from rigs/mounts, which put_block and write_state both write.
+// Mounts per rig are read from rigs/mounts, camera models from cameras/model: put_block and write_state both write
+// them.
 BlockState get_state(const Hdf5Reader& file);
 
 }  // namespace megablock

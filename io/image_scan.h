@@ -29,7 +29,7 @@ void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping groupin
 
 // Prior sigmas that keep self-calibration of small blocks stable: focal 5 % (30 % when guessed), principal point 2 % of
 // the width, k1 k2 k3 0.2, p1 p2 0.01.
-std::array<double, kIntrinsicCount> default_intrinsic_sigmas(const Camera& camera);
+IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera);
 
 // Verdict on the GNSS positions of the images: dropped when at 0,0, out of range, or more than 10 times the median
 // distance and 1 km from the median of all (a warning names each image). Heights far off only are set to NaN.

@@ -53,8 +53,7 @@ void ColmapBuilder::add_camera(std::int64_t id, const ColmapModel& model, std::i
     if ((name == "k4" || name == "k5" || name == "k6") && value != 0)
       fail(which + " uses " + name + ", which is not supported");
     const std::string ours = name == "fx" || name == "fy" ? "f" : name;
-    for (std::size_t p = 0; p < kIntrinsicCount; ++p)
-      if (ours == kIntrinsicNames[p]) camera.intrinsics[p] = value;
+    if (const auto p = find_parameter(camera.intrinsics.model(), ours)) camera.intrinsics[*p] = value;
   }
   if (!(camera.intrinsics[kFocal] > 0)) fail("the focal length of " + which + " is not positive");
   const double principal = 0.02 * camera.width;

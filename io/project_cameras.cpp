@@ -12,19 +12,19 @@ namespace fs = std::filesystem;
 namespace {
 
 // Names of `calibrate: [...]`: the parameters and two words for groups of them.
-std::vector<int> parameters_named(const std::string& name, const std::string& where) {
+std::vector<int> parameters_named(const CameraModel& model, const std::string& name, const std::string& where) {
   if (name == "focal") return {kFocal};
   if (name == "principal_point") return {kPrincipalX, kPrincipalY};
-  for (int p = 0; p < kIntrinsicCount; ++p)
-    if (name == kIntrinsicNames[static_cast<std::size_t>(p)]) return {p};
-  throw InputError(where + ": calibrate: '" + name +
-                   "' is no camera parameter; they are focal, principal_point, f, cx, cy, k1, k2, k3, p1, p2");
+  if (const auto parameter = find_parameter(model, name)) return {*parameter};
+  std::string list = "focal, principal_point";
+  for (int p = 0; p < parameter_count(model); ++p) list += ", " + parameter_name(model, p);
+  throw InputError(where + ": calibrate: '" + name + "' is no camera parameter; they are " + list);
 }
 
 void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
-  std::array<double, kIntrinsicCount> sigma{};
+  IntrinsicSigmas sigma{};
   for (const auto& item : list)
-    for (const int p : parameters_named(item.IsScalar() ? item.Scalar() : "", where))
+    for (const int p : parameters_named(camera.intrinsics.model(), item.IsScalar() ? item.Scalar() : "", where))
       sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(p)];
   camera.prior_sigma = sigma;
 }
@@ -44,8 +44,8 @@ void read_focal(YamlReader& reader, Camera& camera) {
 void read_distortion(YamlReader& reader, Camera& camera) {
   auto distortion = reader.mapping("distortion");
   if (!distortion) return;
-  for (int p = kRadial1; p < kIntrinsicCount; ++p)
-    if (const auto value = distortion->number(kIntrinsicNames[static_cast<std::size_t>(p)]))
+  for (int p = kRadial1; p < camera.intrinsics.size(); ++p)
+    if (const auto value = distortion->number(parameter_name(camera.intrinsics.model(), p)))
       camera.intrinsics[static_cast<std::size_t>(p)] = *value;
   distortion->finish();
 }

@@ -18,17 +18,17 @@ struct FailedUnit {
 
 struct StageStatistics {
   std::string name;
-  double seconds = 0;          // wall clock of the stage
-  double peak_rss_mib = 0;     // largest of the ranks
+  double seconds = 0;       // wall clock of the stage
+  double peak_rss_mib = 0;  // largest of the ranks
   std::int64_t units = 0, failed = 0;
 };
 
 struct SeamCheck {
-  std::int64_t node = -1;     // of the merge tree
-  double statistic = 0;       // T, chi-square distributed
+  std::int64_t node = -1;  // of the merge tree
+  double statistic = 0;    // T, chi-square distributed
   std::int64_t degrees = 0;
   double threshold = 0;
-  std::string note;           // names the suspected tile on alarm
+  std::string note;  // names the suspected tile on alarm
 };
 
 // One option of the job, as a project file would say it.
@@ -67,42 +67,42 @@ struct BlockResult {
 
   // Posterior covariances, a-priori variance factor 1 unless scaled. Empty when not computed.
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  using Matrix8 = Eigen::Matrix<double, 8, 8>;
-  IndexedVector<FrameIndex, Matrix6> frame_covariance;    // (rotation increment rad, centre m)
-  IndexedVector<CameraIndex, Matrix8> camera_covariance;  // held parameters: zero
+  IndexedVector<FrameIndex, Matrix6> frame_covariance;  // (rotation increment rad, centre m)
+  // Of the model's parameters; held ones: zero.
+  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
 
   // Tracks of all tiles in global track order. point NaN = not triangulated.
   TrackSet tracks;
-  std::vector<Eigen::Vector3d> points;             // [tracks]
-  std::vector<Eigen::Matrix3d> point_covariance;   // [tracks] or empty
-  std::vector<std::uint8_t> kept;                  // [observations]
-  std::vector<float> residual_x, residual_y;       // [observations] adjusted minus measured, px
+  std::vector<Eigen::Vector3d> points;            // [tracks]
+  std::vector<Eigen::Matrix3d> point_covariance;  // [tracks] or empty
+  std::vector<std::uint8_t> kept;                 // [observations]
+  std::vector<float> residual_x, residual_y;      // [observations] adjusted minus measured, px
 
   struct ControlResult {
-    Eigen::Vector3d adjusted;                      // ground frame; NaN = not seen by two oriented images
+    Eigen::Vector3d adjusted;  // ground frame; NaN = not seen by two oriented images
     Eigen::Matrix3d covariance;
-    std::vector<Eigen::Vector2d> residual_px;      // per measurement; NaN = image not oriented
+    std::vector<Eigen::Vector2d> residual_px;  // per measurement; NaN = image not oriented
   };
-  std::vector<ControlResult> control;              // in block order
+  std::vector<ControlResult> control;  // in block order
 
   // Figures (status --json).
-  double variance_factor = 1;       // a-posteriori, = chi2_per_dof
+  double variance_factor = 1;  // a-posteriori, = chi2_per_dof
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
-  double image_sigma_px = 0;        // of tie point measurements per axis, as adjusted with (stated or estimated)
-  bool sigma_scaled = false;        // covariances are multiplied by variance_factor
+  double image_sigma_px = 0;  // of tie point measurements per axis, as adjusted with (stated or estimated)
+  bool sigma_scaled = false;  // covariances are multiplied by variance_factor
   int global_iterations = 0;
   double newton_decrement = 0;
-  double decrement_limit = 0;       // at which the block counts as adjusted; 0: not known
+  double decrement_limit = 0;  // at which the block counts as adjusted; 0: not known
   std::vector<FreePart> free_parts;
   IndexedVector<ImageIndex, ImageRecord> image_records;  // empty when the job did not start from images
   Provenance provenance;
-  std::string gauge;                // "fixed by priors" or "free, inner constraints over N frames" ...
+  std::string gauge;  // "fixed by priors" or "free, inner constraints over N frames" ...
   std::vector<SeamCheck> seams;
-  std::vector<FailedUnit> failures; // images and units, with reasons
+  std::vector<FailedUnit> failures;  // images and units, with reasons
   std::vector<StageStatistics> stages;
-  std::vector<std::string> notes;   // warnings for the report, one line each
-  std::string digest;               // see result_digest()
+  std::vector<std::string> notes;  // warnings for the report, one line each
+  std::string digest;              // see result_digest()
 };
 
 void write_result(const std::string& path, const BlockResult& result);

@@ -3,6 +3,7 @@
 
 #include "io/error.h"
 #include "io/hdf5_block.h"
+#include "io/hdf5_cameras.h"
 #include "io/hdf5_state.h"
 #include "io/hdf5_tables.h"
 #include "io/hdf5_tiles.h"
@@ -60,10 +61,7 @@ void put_precision(Hdf5Writer& file, const BlockResult& result) {
   if (!result.frame_covariance.empty())
     file.array("frames/covariance", flattened<double>(result.frame_covariance), {rows(result.frame_covariance), 6, 6},
                {"rad, m", "posterior, of (rotation increment about the ground axes, centre)"});
-  if (!result.camera_covariance.empty())
-    file.array("cameras/covariance", flattened<double>(result.camera_covariance),
-               {rows(result.camera_covariance), kIntrinsicCount, kIntrinsicCount},
-               {"px, px, px, 1, 1, 1, 1, 1", "posterior, of f, cx, cy, k1, k2, k3, p1, p2; held: 0"});
+  if (!result.camera_covariance.empty()) put_covariances(file, result.camera_covariance);
 }
 
 void get_precision(const Hdf5Reader& file, BlockResult& result) {
@@ -71,8 +69,8 @@ void get_precision(const Hdf5Reader& file, BlockResult& result) {
     result.frame_covariance = IndexedVector<FrameIndex, BlockResult::Matrix6>(square_matrices<BlockResult::Matrix6>(
         file.array<double>("frames/covariance", {rows(result.block.frames), 6, 6})));
   if (file.has("cameras/covariance"))
-    result.camera_covariance = IndexedVector<CameraIndex, BlockResult::Matrix8>(square_matrices<BlockResult::Matrix8>(
-        file.array<double>("cameras/covariance", {rows(result.block.cameras), 8, 8})));
+    result.camera_covariance = IndexedVector<CameraIndex, Eigen::MatrixXd>(
+        get_covariances(file, column(result.block.cameras, [](const Camera& c) { return c.intrinsics.model(); })));
 }
 
 void put_points(Hdf5Writer& file, const BlockResult& result) {

@@ -67,8 +67,8 @@ class Mover {
 void move_shared_parameters(const TileProblem& problem, const TileStep& step, TileState& next) {
   for (std::size_t row = 0; row < problem.cameras.size(); ++row) {
     const double* x = step.unknowns.find({UnknownKind::kCamera, 0, problem.cameras[row].value});
-    for (int k = 0; x != nullptr && k < kIntrinsicCount; ++k)
-      if ((problem.camera_free[row] >> k) & 1) next.cameras[row][static_cast<std::size_t>(k)] += *x++;
+    for (int k = 0; x != nullptr && k < next.cameras[row].size(); ++k)
+      if (contains(problem.camera_free[row], k)) next.cameras[row][static_cast<std::size_t>(k)] += *x++;
   }
   for (std::size_t row = 0; row < problem.mounts.size(); ++row) {
     const MountId& id = problem.mounts[row];

@@ -72,8 +72,11 @@ class CellAssembler {
   }
 
  private:
-  template <typename Residual>
-  void add_residual(const JacobianBlock* blocks, int count, const Residual& residual) {
+  using Product =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxIntrinsics, kMaxIntrinsics>;
+
+  template <typename Jacobian, typename Residual>
+  void add_residual(const JacobianBlock<Jacobian>* blocks, int count, const Residual& residual) {
     const std::int64_t n = front_.dimension();
     for (int a = 0; a < count; ++a) {
       const auto& jacobian = blocks[a].jacobian;
@@ -86,8 +89,7 @@ class CellAssembler {
         diagonal[row + k] += jacobian.col(k).squaredNorm();
       }
       for (int b = 0; b <= a; ++b) {
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8> product =
-            jacobian.transpose().lazyProduct(blocks[b].jacobian);
+        const Product product = jacobian.transpose().lazyProduct(blocks[b].jacobian);
         add_product(front_.matrix(), n, row, rows_[at(blocks[b].unknown)], product, 1);
       }
     }
@@ -100,8 +102,7 @@ class CellAssembler {
       const Eigen::Matrix<double, 6, 6> product = left * right.transpose();
       add_product(matrix, n, row, column, product, -1);
     } else {
-      const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8> product =
-          a.w.lazyProduct(b.w.transpose());
+      const Product product = a.w.lazyProduct(b.w.transpose());
       add_product(matrix, n, row, column, product, -1);
     }
   }
@@ -149,7 +150,8 @@ class DampingNorm {
   explicit DampingNorm(const TilePlan& plan) : offsets_(row_offsets(plan.unknowns)) {
     diagonal_.assign(at(offsets_.back()), 0);
   }
-  void add(const JacobianBlock& block) {
+  template <typename Jacobian>
+  void add(const JacobianBlock<Jacobian>& block) {
     double* target = diagonal_.data() + offsets_[at(block.unknown)];
     for (Eigen::Index k = 0; k < block.jacobian.cols(); ++k) target[k] += block.jacobian.col(k).squaredNorm();
   }

@@ -89,11 +89,11 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
 
 // Posterior covariances of a tile, from factors of a pass with lambda = 0.
 struct TileCovariance {
-  CovarianceMatrix boundary;                         // as given
-  std::vector<Eigen::Matrix<double, 6, 6>> frames;   // [frames]; zero where untouched
-  std::vector<Eigen::Matrix<double, 8, 8>> cameras;  // [cameras]; held parameters zero
-  std::vector<Eigen::Matrix<double, 6, 6>> mounts;   // [mounts]
-  std::vector<Eigen::Matrix3d> points;               // [points]; zero for points that take no part
+  CovarianceMatrix boundary;                        // as given
+  std::vector<Eigen::Matrix<double, 6, 6>> frames;  // [frames]; zero where untouched
+  std::vector<Eigen::MatrixXd> cameras;             // [cameras] of the model's parameters; held ones zero
+  std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
+  std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part
   // [points] of the further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

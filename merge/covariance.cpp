@@ -17,7 +17,8 @@ class TileCovarianceBuilder {
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
     result_.frames.assign(problem.frames.size(), Eigen::Matrix<double, 6, 6>::Zero());
-    result_.cameras.assign(problem.cameras.size(), Eigen::Matrix<double, 8, 8>::Zero());
+    for (const Intrinsics& camera : state.cameras)
+      result_.cameras.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
     result_.mounts.assign(problem.mounts.size(), Eigen::Matrix<double, 6, 6>::Zero());
     result_.points.assign(problem.points.size(), Eigen::Matrix3d::Zero());
     row_of_unknown_.assign(plan.unknowns.size(), -1);
@@ -72,8 +73,8 @@ class TileCovarianceBuilder {
 
   void take_camera(std::size_t camera, std::int64_t dimension, const std::vector<double>& block) {
     std::vector<int> parameters;
-    for (int k = 0; k < kIntrinsicCount; ++k)
-      if ((problem_.camera_free[camera] >> k) & 1) parameters.push_back(k);
+    for (int k = 0; k < result_.cameras[camera].cols(); ++k)
+      if (contains(problem_.camera_free[camera], k)) parameters.push_back(k);
     for (std::size_t i = 0; i < parameters.size(); ++i)
       for (std::size_t j = 0; j < parameters.size(); ++j)
         result_.cameras[camera](parameters[i], parameters[j]) = block[i + j * at(dimension)];

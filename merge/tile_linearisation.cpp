@@ -66,19 +66,19 @@ void PointEquations::add_observation(std::int64_t point, std::int64_t row, bool 
   b_.noalias() -= by_point.transpose() * observation.residual;
 
   const auto add = [&](std::int64_t unknown, const auto& jacobian, int dimension) {
-    JacobianBlock& block = observation.blocks[static_cast<std::size_t>(observation.block_count++)];
+    auto& block = observation.blocks[static_cast<std::size_t>(observation.block_count++)];
     block.unknown = unknown;
     block.jacobian = jacobian;
     block_of(unknown, dimension).w.noalias() += block.jacobian.transpose() * by_point;
   };
   add(plan_.unknown_of_frame[frame], weight.weighted(r.by_frame, r.residual), 6);
   if (const std::int64_t unknown = plan_.unknown_of_camera[camera]; unknown >= 0) {
-    const int free_count = __builtin_popcount(problem_.camera_free[camera]);
+    const ParameterMask free = problem_.camera_free[camera];
     const auto weighted = weight.weighted(r.by_intrinsics, r.residual);
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 8> jacobian(2, free_count);
-    for (int k = 0, column = 0; k < kIntrinsicCount; ++k)
-      if ((problem_.camera_free[camera] >> k) & 1) jacobian.col(column++) = weighted.col(k);
-    add(unknown, jacobian, free_count);
+    IntrinsicJacobian jacobian(2, count_of(free));
+    for (int k = 0, column = 0; k < weighted.cols(); ++k)
+      if (contains(free, k)) jacobian.col(column++) = weighted.col(k);
+    add(unknown, jacobian, count_of(free));
   }
   if (const std::int64_t unknown = plan_.unknown_of_mount[mount]; unknown >= 0)
     add(unknown, weight.weighted(r.by_mount, r.residual), 6);

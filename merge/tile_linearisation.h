@@ -45,16 +45,18 @@ struct LossWeight {
   }
 };
 
-// Jacobian of a residual of up to 6 rows by one unknown (position in TilePlan::unknowns), weighted.
+// Jacobian of a residual by one unknown (position in TilePlan::unknowns), weighted.
+template <typename Jacobian>
 struct JacobianBlock {
   std::int64_t unknown = -1;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 8> jacobian;
+  Jacobian jacobian;
 };
 
 // A residual without a point, divided by sigma and weighted by its loss.
 struct TermResidual {
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxIntrinsics>;
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
-  std::array<JacobianBlock, 2> blocks;
+  std::array<JacobianBlock<Jacobian>, 2> blocks;
   int block_count = 0;
   double rho = 0;               // of the squared norm
   double weighted_squares = 0;  // rho' |r|^2
@@ -113,10 +115,10 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
   for (std::int64_t i : plan.intrinsic_priors[cell]) {
     const auto& term = problem.intrinsic_priors[static_cast<std::size_t>(i)];
     const auto camera = static_cast<std::size_t>(term.camera.value);
-    const int free_count = __builtin_popcount(problem.camera_free[camera]);
+    const int free_count = count_of(problem.camera_free[camera]);
     int column = 0;
-    for (int k = 0; k < kIntrinsicCount; ++k) {
-      const bool free = (problem.camera_free[camera] >> k) & 1;
+    for (int k = 0; k < term.value.size(); ++k) {
+      const bool free = contains(problem.camera_free[camera], k);
       const double weight = intrinsic_prior_weight(term, k);
       if (weight != 0) {
         TermResidual out;
@@ -153,12 +155,14 @@ class PointEquations {
   struct Block {
     std::int64_t unknown = -1;
     int dimension = 0;
-    Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, 8, 3> w;
+    Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMaxIntrinsics, 3> w;
+    Block() {}  // not defaulted: the vectors below must not fill its storage with zeros
   };
   struct Observation {
     Eigen::Vector2d residual;
-    std::array<JacobianBlock, 3> blocks;  // 2 x dimension, weighted
+    std::array<JacobianBlock<IntrinsicJacobian>, 3> blocks;  // 2 x dimension, weighted
     int block_count = 0;
+    Observation() {}  // as Block
   };
 
   PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)

@@ -43,7 +43,7 @@ Unknown frame_unknown(const TileProblem& problem, std::size_t row) {
   return {{UnknownKind::kFrame, 0, problem.frames[row].value}, 6};
 }
 Unknown camera_unknown(const TileProblem& problem, std::size_t row) {
-  return {{UnknownKind::kCamera, 0, problem.cameras[row].value}, __builtin_popcount(problem.camera_free[row])};
+  return {{UnknownKind::kCamera, 0, problem.cameras[row].value}, count_of(problem.camera_free[row])};
 }
 Unknown mount_unknown(const TileProblem& problem, std::size_t row) {
   return {{UnknownKind::kMount, problem.mounts[row].mount, problem.mounts[row].rig.value}, 6};

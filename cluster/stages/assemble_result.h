@@ -12,7 +12,7 @@ namespace megablock {
 struct MergeOutcome {
   BlockState state;
   IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;
-  IndexedVector<CameraIndex, BlockResult::Matrix8> camera_covariance;
+  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
   double image_sigma_px = 0;  // of tie point measurements, as adjusted with
@@ -25,14 +25,14 @@ struct MergeOutcome {
 
 // What one tile contributes to the result.
 struct TileResult {
-  TrackSet tracks;                              // ids: stable keys
-  std::vector<TilePoint> points;                // rows as in the problem: tracks, then control points
-  std::vector<Eigen::Vector3d> positions;       // [points]
-  std::vector<Eigen::Matrix3d> covariances;     // [points] or empty
-  std::vector<std::uint8_t> kept;               // [observations]
-  std::vector<float> residual_x, residual_y;    // [observations] adjusted minus measured, px; NaN without pose
-  std::vector<std::int64_t> begin;              // [points + 1]
-  std::vector<FrameIndex> frames;               // touched
+  TrackSet tracks;                            // ids: stable keys
+  std::vector<TilePoint> points;              // rows as in the problem: tracks, then control points
+  std::vector<Eigen::Vector3d> positions;     // [points]
+  std::vector<Eigen::Matrix3d> covariances;   // [points] or empty
+  std::vector<std::uint8_t> kept;             // [observations]
+  std::vector<float> residual_x, residual_y;  // [observations] adjusted minus measured, px; NaN without pose
+  std::vector<std::int64_t> begin;            // [points + 1]
+  std::vector<FrameIndex> frames;             // touched
 };
 std::string to_bytes(const TileResult& part);
 TileResult tile_result_from_bytes(const std::string& bytes);

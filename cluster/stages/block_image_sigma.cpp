@@ -14,8 +14,8 @@ namespace {
 std::int64_t orientation_unknowns(const Block& block, const BlockState& state) {
   std::int64_t count = 6 * std::count(state.oriented.begin(), state.oriented.end(), std::uint8_t{1});
   for (const Camera& camera : block.cameras)
-    count +=
-        std::count_if(camera.prior_sigma.begin(), camera.prior_sigma.end(), [](double sigma) { return sigma != 0; });
+    count += std::count_if(camera.prior_sigma.begin(), camera.prior_sigma.begin() + camera.intrinsics.size(),
+                           [](double sigma) { return sigma != 0; });
   for (const Rig& rig : block.rigs)
     count += 6 * std::count_if(rig.mounts.begin(), rig.mounts.end(), [](const Mount& mount) { return !mount.held(); });
   return count;

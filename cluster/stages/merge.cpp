@@ -257,7 +257,8 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
 // The block's covariances of frames and cameras, from the tiles that hold them (all hold the same bits).
 void add_covariances(const Adjusted& adjusted, MergeOutcome& outcome, const Block& block) {
   outcome.frame_covariance.assign(block.frames.size(), BlockResult::Matrix6::Zero());
-  outcome.camera_covariance.assign(block.cameras.size(), BlockResult::Matrix8::Zero());
+  for (const Camera& camera : block.cameras)
+    outcome.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.intrinsics.size(), camera.intrinsics.size()));
   for (std::size_t t = 0; t < adjusted.tiles.size(); ++t) {
     const TileProblem& problem = adjusted.tiles[t].problem;
     const TileCovariance& covariance = adjusted.posterior.covariances[t];
@@ -297,7 +298,7 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
       job.ranks.send(0, kTag + static_cast<int>(adjusted.tiles[row].tile), to_bytes(part_of(row)));
     ByteWriter writer;
     write_matrices<BlockResult::Matrix6>(writer, outcome.frame_covariance);
-    write_matrices<BlockResult::Matrix8>(writer, outcome.camera_covariance);
+    for (const Eigen::MatrixXd& covariance : outcome.camera_covariance) write_matrix(writer, covariance);
     const Bytes bytes = writer.take();
     job.ranks.send(0, kTag - 1, std::string(bytes.begin(), bytes.end()));
     job.ranks.flush_sends();
@@ -314,11 +315,10 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
     const Bytes bytes(text.begin(), text.end());
     ByteReader reader(bytes);
     const auto frames = read_matrices<BlockResult::Matrix6>(reader);
-    const auto cameras = read_matrices<BlockResult::Matrix8>(reader);
     for (std::size_t f = 0; f < frames.size(); ++f)
       if (!frames[f].isZero(0)) outcome.frame_covariance[FrameIndex(static_cast<std::int64_t>(f))] = frames[f];
-    for (std::size_t c = 0; c < cameras.size(); ++c)
-      if (!cameras[c].isZero(0)) outcome.camera_covariance[CameraIndex(static_cast<std::int64_t>(c))] = cameras[c];
+    for (Eigen::MatrixXd& covariance : outcome.camera_covariance)
+      if (Eigen::MatrixXd camera = read_matrix(reader); !camera.isZero(0)) covariance = std::move(camera);
   }
   return parts;
 }

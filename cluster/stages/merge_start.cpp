@@ -49,7 +49,7 @@ class SharedMeans {
     for (std::size_t i = 0; i < tile.cameras.size(); ++i) {
       CameraMean& mean = cameras_[tile.cameras[i]];
       const auto weight = static_cast<double>(tile.camera_observations[i]);
-      for (int p = 0; p < kIntrinsicCount; ++p) mean.sum[p] += weight * tile.intrinsics[i][p];
+      for (int p = 0; p < tile.intrinsics[i].size(); ++p) mean.sum[p] += weight * tile.intrinsics[i][p];
       mean.weight += weight;
     }
     for (std::size_t i = 0; i < tile.mounts.size(); ++i) {
@@ -69,8 +69,8 @@ class SharedMeans {
   void store(BlockState& state) const {
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       const CameraMean& mean = cameras_[CameraIndex(static_cast<std::int64_t>(c))];
-      for (int p = 0; mean.weight > 0 && p < kIntrinsicCount; ++p)
-        state.cameras[CameraIndex(static_cast<std::int64_t>(c))][p] = mean.sum[p] / mean.weight;
+      Intrinsics& camera = state.cameras[CameraIndex(static_cast<std::int64_t>(c))];
+      for (int p = 0; mean.weight > 0 && p < camera.size(); ++p) camera[p] = mean.sum[p] / mean.weight;
     }
     for (std::size_t r = 0; r < mounts_.size(); ++r)
       for (std::size_t m = 0; m < mounts_[r].size(); ++m) {
@@ -82,7 +82,7 @@ class SharedMeans {
 
  private:
   struct CameraMean {
-    std::array<double, kIntrinsicCount> sum{};
+    std::array<double, kMaxIntrinsics> sum{};
     double weight = 0;
   };
   struct MountMean {

@@ -25,16 +25,17 @@ double neutral(const Camera& camera, int parameter) {
 // Lower triangle of the correlations of the estimated parameters.
 std::string correlation_table(const BlockResult& result, CameraIndex index) {
   if (!result.camera_covariance.contains(index)) return "";
-  const BlockResult::Matrix8& c = result.camera_covariance[index];
+  const Eigen::MatrixXd& c = result.camera_covariance[index];
+  const CameraModel& model = result.block.cameras[index].intrinsics.model();
   std::vector<int> estimated;
-  for (int k = 0; k < kIntrinsicCount; ++k)
+  for (int k = 0; k < parameter_count(model); ++k)
     if (c(k, k) > 0 && std::isfinite(c(k, k))) estimated.push_back(k);
   if (estimated.size() < 2) return "";
   std::vector<std::string> headings = {"correlation"};
-  for (int k : estimated) headings.emplace_back(kIntrinsicNames[static_cast<std::size_t>(k)]);
+  for (int k : estimated) headings.push_back(parameter_name(model, k));
   Table table(std::move(headings));
   for (std::size_t i = 0; i < estimated.size(); ++i) {
-    std::vector<std::string> cells = {kIntrinsicNames[static_cast<std::size_t>(estimated[i])]};
+    std::vector<std::string> cells = {parameter_name(model, estimated[i])};
     for (std::size_t j = 0; j <= i; ++j) {
       const double r =
           c(estimated[i], estimated[j]) / std::sqrt(c(estimated[i], estimated[i]) * c(estimated[j], estimated[j]));
@@ -52,7 +53,8 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
   const Camera& camera = result.block.cameras[index];
   const bool adjusted = result.state.cameras.contains(index), sigmas = result.camera_covariance.contains(index);
   Table table({"parameter", "start", "adjusted", "change", "sigma", "÷ sigma", "prior"});
-  for (int k = 0; k < kIntrinsicCount; ++k) {
+  const CameraModel& model = camera.intrinsics.model();
+  for (int k = 0; k < parameter_count(model); ++k) {
     const auto at = static_cast<std::size_t>(k);
     const bool pixels = k <= kPrincipalY;
     const double start = camera.intrinsics[at], now = adjusted ? result.state.cameras[index][at] : kUnknown;
@@ -62,7 +64,7 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
     const bool held = prior == 0 || sigma == 0;
     const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
     const bool tested = k != kFocal && std::isfinite(ratio);
-    table.add({std::string(kIntrinsicNames[at]) + (pixels ? " [px]" : ""), fixed(start, decimals), fixed(now, decimals),
+    table.add({parameter_name(model, k) + (pixels ? " [px]" : ""), fixed(start, decimals), fixed(now, decimals),
                with_sign(now - start, decimals),
                held     ? "held"
                : pixels ? fixed(sigma, 3)

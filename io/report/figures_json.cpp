@@ -56,14 +56,15 @@ Json cameras(const BlockResult& result) {
   Json list = Json::array();
   for (CameraIndex c(0); result.block.cameras.contains(c); ++c.value) {
     Json parameters;
-    for (int k = 0; k < kIntrinsicCount; ++k) {
+    const CameraModel& model = result.block.cameras[c].intrinsics.model();
+    for (int k = 0; k < parameter_count(model); ++k) {
       const auto at = static_cast<std::size_t>(k);
       const bool sigmas = result.camera_covariance.contains(c);
-      parameters[kIntrinsicNames[at]] = {
+      parameters[parameter_name(model, k)] = {
           {"value", number(result.state.cameras.contains(c) ? result.state.cameras[c][at] : kUnknown)},
           {"sigma", number(sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[c](k, k))) : kUnknown)}};
     }
-    list.push_back({{"name", result.block.cameras[c].name}, {"parameters", parameters}});
+    list.push_back({{"name", result.block.cameras[c].name}, {"model", model_name(model)}, {"parameters", parameters}});
   }
   return list;
 }

@@ -70,7 +70,7 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
     truth[kDecentring2] = random.uniform(-4e-4, 4e-4);
   }
   if (options.calibrate) {
-    camera.prior_sigma.fill(std::numeric_limits<double>::infinity());
+    std::fill_n(camera.prior_sigma.begin(), camera.intrinsics.size(), std::numeric_limits<double>::infinity());
     camera.prior_sigma[kRadial3] = 0;
   } else {
     camera.intrinsics = truth;

@@ -72,7 +72,7 @@ TEST_F(CeresTileTest, AnalyticAndAutomaticGradientsAgree) {
   }
   const TileProblem& problem = tile_->problem;
   std::size_t unknowns = 6 * problem.frames.size() + 3 * problem.points.size();
-  for (std::uint8_t mask : problem.camera_free) unknowns += static_cast<std::size_t>(std::popcount(mask));
+  for (ParameterMask mask : problem.camera_free) unknowns += static_cast<std::size_t>(std::popcount(mask));
   for (std::uint8_t free : problem.mount_free) unknowns += 6u * free;
   ASSERT_EQ(gradients[0].size(), unknowns);
   double largest = 0;

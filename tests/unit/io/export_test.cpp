@@ -387,7 +387,8 @@ TEST(Export, CsvGivesPosesInBothFrames) {
   EXPECT_EQ(frames.poses[2].centre, result.state.frames[FrameIndex(3)].centre);
   const auto cameras = words_of(folder / "tables/cameras.csv", ',');
   ASSERT_EQ(cameras.size(), 3u);
-  EXPECT_EQ(std::stod(cameras[2][8]), 0.013);
+  EXPECT_EQ(cameras[2][3], "brown");
+  EXPECT_EQ(std::stod(cameras[2][9]), 0.013);
 }
 
 TEST(Export, CsvOfALocalBlockHasNoGeodeticTable) {

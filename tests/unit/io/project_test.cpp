@@ -231,7 +231,7 @@ TEST(Project, CameraSettingsOverrideTheHeaders) {
   EXPECT_EQ(camera.intrinsics[kPrincipalX], 31.5);
   EXPECT_EQ(camera.intrinsics[kRadial1], -0.1);
   EXPECT_EQ(camera.intrinsics[kDecentring2], 1e-3);
-  EXPECT_EQ(camera.prior_sigma, (std::array<double, 8>{1.6, 1.28, 1.28, 0.2, 0, 0, 0, 0}));
+  EXPECT_EQ(camera.prior_sigma, (IntrinsicSigmas{1.6, 1.28, 1.28, 0.2, 0, 0, 0, 0}));
   EXPECT_EQ(camera.mask_path, folder / "mask.png");
   EXPECT_THAT(block.cameras[CameraIndex(1)].prior_sigma, Each(0.0));
 }

@@ -265,7 +265,7 @@ TEST_P(RenderTest, HeldCamerasAreInTheProject) {
   ASSERT_EQ(project.block.cameras.size(), truth.cameras.size());
   for (std::size_t c = 0; c < truth.cameras.size(); ++c) {
     const Camera& held = project.block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
-    for (std::size_t p = 0; p < held.intrinsics.size(); ++p) {
+    for (int p = 0; p < held.intrinsics.size(); ++p) {
       EXPECT_NEAR(held.intrinsics[p], truth.cameras[CameraIndex(static_cast<std::int64_t>(c))][p], 1e-8);
       EXPECT_EQ(held.prior_sigma[p], 0);
     }

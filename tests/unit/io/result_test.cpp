@@ -36,7 +36,7 @@ BlockResult example_result() {
   result.tiles.component.assign(4, 0);
   result.tiles.tree.nodes = {{-1, -1, -1, TileIndex(0), 0}};
   for (int f = 0; f < 4; ++f) result.frame_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 1));
-  for (int c = 0; c < 2; ++c) result.camera_covariance.push_back(symmetric<BlockResult::Matrix8>(c + 0.5));
+  for (int c = 0; c < 2; ++c) result.camera_covariance.push_back(symmetric<Eigen::Matrix<double, 8, 8>>(c + 0.5));
   result.tracks = example_tracks();
   result.points = {{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}};
   result.point_covariance = {symmetric<Eigen::Matrix3d>(1), symmetric<Eigen::Matrix3d>(nan),

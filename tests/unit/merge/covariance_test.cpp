@@ -52,8 +52,8 @@ void expect_covariances(const TiledBlock& block, const std::vector<TileCovarianc
     }
     for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
       std::vector<int> free;
-      for (int k = 0; k < kIntrinsicCount; ++k)
-        if ((problem.camera_free[c] >> k) & 1) free.push_back(k);
+      for (int k = 0; k < tiles[t].cameras[c].rows(); ++k)
+        if (contains(problem.camera_free[c], k)) free.push_back(k);
       if (free.empty()) continue;
       compare(Eigen::MatrixXd(tiles[t].cameras[c](free, free)),
               system.camera_column[TiledBlock::row(block.whole.cameras, problem.cameras[c])], "camera");
