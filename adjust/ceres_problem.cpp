@@ -79,10 +79,8 @@ class AnalyticImage : public ceres::CostFunction {
     const Eigen::Vector3d point = Eigen::Map<const Eigen::Vector3d>(blocks[3]);
     Eigen::Map<Eigen::Vector2d> result(residual);
     if (jacobians == nullptr) {
-      const Eigen::Vector3d in_camera = to_camera(frame, mount, point);
-      if (!(in_camera.z() > 0)) return false;
-      result = inverse_sigma_ * (project(intrinsics, in_camera) - measured_);
-      return true;
+      result = inverse_sigma_ * reprojection(intrinsics, to_camera(frame, mount, point), measured_);
+      return result.allFinite();
     }
     const ImageResidual image = linearise_image(frame, mount, intrinsics, point, measured_, inverse_sigma_);
     if (!image.in_front) return false;
@@ -137,8 +135,21 @@ ceres::CostFunction* automatic(Functor functor) {
   return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlocks...>(new Functor(std::move(functor)));
 }
 
+struct DynamicImage {
+  residual::ImageMeasured image;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return image(blocks[0], blocks[1], blocks[2], blocks[3], result);
+  }
+};
+
 ceres::CostFunction* automatic_image(const residual::ImageMeasured& image) {
-  return automatic<2, kPoseBlock, kPoseBlock, parameter_count(CameraModel()), 3>(image);
+  if (image.model == CameraModel())
+    return automatic<2, kPoseBlock, kPoseBlock, parameter_count(CameraModel()), 3>(image);
+  auto* cost = new ceres::DynamicAutoDiffCostFunction<DynamicImage, 8>(new DynamicImage{image});
+  for (const int size : {kPoseBlock, kPoseBlock, parameter_count(image.model), 3}) cost->AddParameterBlock(size);
+  cost->SetNumResiduals(2);
+  return cost;
 }
 
 // A prior has as many residuals as its camera has parameters.
@@ -206,7 +217,7 @@ void CeresTile::add_images(const TileProblem& problem, const TileState& state, C
       const CameraModel& model = state.cameras[image.camera.value].model();
       ceres::CostFunction* cost = derivatives == CeresOptions::Derivatives::kAnalytic
                                       ? static_cast<ceres::CostFunction*>(new AnalyticImage(model, measured, weight))
-                                      : automatic_image({measured, weight});
+                                      : automatic_image({model, measured, weight});
       ceres_->AddResidualBlock(cost, image_loss_.get(), frame(image.frame.value), mount(image.mount),
                                camera(image.camera.value), point(p));
     }

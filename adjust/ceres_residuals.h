@@ -7,7 +7,10 @@
 // and steps that Ceres reports in tangent space have the six columns of a frame in our order and sign.
 #pragma once
 
+#include <ceres/jet.h>
 #include <ceres/manifold.h>
+
+#include <Eigen/LU>
 
 #include "adjust/tile_problem.h"
 
@@ -46,7 +49,35 @@ Vector3<Scalar> centre_of(const Scalar* pose) {
   return Vector3<Scalar>(pose[4], pose[5], pose[6]);
 }
 
+inline double value_of(double x) { return x; }
+template <typename T, int kSize>
+double value_of(const ceres::Jet<T, kSize>& x) {
+  return x.a;
+}
+
+// The pixel m with m + d(m) = `straight`: from its value, Newton steps with the derivative of d by automatic
+// differentiation; the first gives m its derivatives, the second shows that the value was one.
+template <typename Scalar>
+Eigen::Matrix<Scalar, 2, 1> corrected_pixel(const CameraModel& model, const Scalar* camera,
+                                            const Eigen::Vector2d& value, const Eigen::Matrix<Scalar, 2, 1>& straight) {
+  using Jet = ceres::Jet<double, 2>;
+  Intrinsics plain(model);
+  for (int p = 0; p < plain.size(); ++p) plain[p] = value_of(camera[p]);
+  Eigen::Matrix<Scalar, 2, 1> pixel(Scalar(value.x()), Scalar(value.y()));
+  for (int step = 0; step < 2; ++step) {
+    const Eigen::Matrix<Jet, 2, 1> at(Jet(value_of(pixel.x()), 0), Jet(value_of(pixel.y()), 1));
+    const Eigen::Matrix<Jet, 2, 1> d = correction<Jet, double>(model, plain.data(), at);
+    Eigen::Matrix2d jacobian;
+    jacobian << 1 + d.x().v[0], d.x().v[1], d.y().v[0], 1 + d.y().v[1];
+    const Eigen::Matrix2d inverse = jacobian.inverse();
+    const Eigen::Matrix<Scalar, 2, 1> open = straight - pixel - correction<Scalar, Scalar>(model, camera, pixel);
+    for (int i = 0; i < 2; ++i) pixel[i] += inverse(i, 0) * open[0] + inverse(i, 1) * open[1];
+  }
+  return pixel;
+}
+
 struct ImageMeasured {
+  CameraModel model;
   Eigen::Vector2d measured;
   double inverse_sigma;
   template <typename Scalar>
@@ -55,10 +86,30 @@ struct ImageMeasured {
     const Vector3<Scalar> ground(point[0], point[1], point[2]);
     const Vector3<Scalar> in_rig = to_inside<Scalar>(rotation_of(frame), centre_of(frame), ground);
     const Vector3<Scalar> in_camera = to_inside<Scalar>(rotation_of(mount), centre_of(mount), in_rig);
-    if (!(in_camera.z() > Scalar(0))) return false;
-    const Eigen::Matrix<Scalar, 2, 1> pixel = project<Scalar>(camera, in_camera);
-    result[0] = (pixel.x() - measured.x()) * inverse_sigma;
-    result[1] = (pixel.y() - measured.y()) * inverse_sigma;
+    Eigen::Matrix<Scalar, 2, 1> pixel;
+    if (!project_point(camera, in_camera, pixel)) return false;
+    const Eigen::Matrix<Scalar, 2, 1> difference = pixel_difference(model, camera, pixel, measured);
+    result[0] = difference.x() * inverse_sigma;
+    result[1] = difference.y() * inverse_sigma;
+    return true;
+  }
+
+  // False where the model has no pixel for the point.
+  template <typename Scalar>
+  bool project_point(const Scalar* camera, const Vector3<Scalar>& point, Eigen::Matrix<Scalar, 2, 1>& pixel) const {
+    if (model == CameraModel()) {
+      if (!(point.z() > Scalar(0))) return false;
+      pixel = project_directly(model.kind, camera, point);
+      return true;
+    }
+    Intrinsics plain(model);
+    for (int p = 0; p < plain.size(); ++p) plain[p] = value_of(camera[p]);
+    const Eigen::Vector2d value =
+        project(plain, Eigen::Vector3d(value_of(point.x()), value_of(point.y()), value_of(point.z())));
+    if (!value.allFinite()) return false;
+    pixel = corrects_pixels(model) ? corrected_pixel<Scalar>(model, camera, value,
+                                                             project_directly(CameraModelKind::kPinhole, camera, point))
+                                   : project_directly(model.kind, camera, point);
     return true;
   }
 };

@@ -74,7 +74,10 @@ void add_points(const OrientationGraph& graph, const OrientationValues& values, 
       if (!values.kept[o]) continue;
       const std::int32_t image = graph.observations[o].image;
       const auto camera = values.camera(graph, image);
-      if (!camera || !(to_inside(*camera, *values.points[t]).z() > 0)) continue;
+      if (!camera) continue;
+      const Intrinsics& intrinsics =
+          values.cameras[static_cast<std::size_t>(graph.images[static_cast<std::size_t>(image)].camera)];
+      if (!project(intrinsics, to_inside(*camera, *values.points[t])).allFinite()) continue;
       problem.image.push_back(LocalImage(image));
       problem.x.push_back(graph.observations[o].pixel.x());
       problem.y.push_back(graph.observations[o].pixel.y());

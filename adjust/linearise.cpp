@@ -35,13 +35,13 @@ ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrin
   const Eigen::Vector3d from_frame = point - frame.centre;
   const Eigen::Vector3d from_mount = frame_rotation * from_frame - mount.centre;
   const Eigen::Vector3d in_camera = mount_rotation * from_mount;
-  result.in_front = in_camera.z() > 0;
+  const ProjectionJacobian projection = project_with_jacobian(intrinsics, in_camera);
+  result.in_front = projection.valid;
   if (!result.in_front) return result;
 
-  const ProjectionJacobian projection = project_with_jacobian(intrinsics, in_camera);
   const Eigen::Matrix<double, 2, 3> by_rig = inverse_sigma * projection.by_point * mount_rotation;
   const Eigen::Matrix<double, 2, 3> by_point = by_rig * frame_rotation;
-  result.residual = inverse_sigma * (projection.pixel - measured);
+  result.residual = inverse_sigma * pixel_difference(intrinsics, projection.pixel, measured);
   result.by_point = by_point;
   result.by_frame << -by_point * skew3(from_frame), -by_point;
   result.by_mount << -by_rig * skew3(from_mount), -by_rig;
@@ -101,10 +101,9 @@ MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& t
 Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState& state, std::int64_t point,
                                     std::int64_t row) {
   const TileImage& image = problem.images[problem.image[row].value];
-  const Eigen::Vector2d pixel =
-      project(state.cameras[image.camera.value],
-              to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[point]));
-  return pixel - Eigen::Vector2d(problem.x[row], problem.y[row]);
+  return reprojection(state.cameras[image.camera.value],
+                      to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[point]),
+                      {problem.x[row], problem.y[row]});
 }
 
 namespace {
@@ -115,12 +114,8 @@ double image_cost(const TileProblem& problem, const TileState& state) {
     if (!problem.active(p)) continue;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      const TileImage& image = problem.images[problem.image[row].value];
-      const Eigen::Vector3d in_camera =
-          to_camera(state.frames[image.frame.value], state.mounts[image.mount], state.points[p]);
-      if (!(in_camera.z() > 0)) return std::numeric_limits<double>::infinity();
-      const Eigen::Vector2d difference =
-          project(state.cameras[image.camera.value], in_camera) - Eigen::Vector2d(problem.x[row], problem.y[row]);
+      const Eigen::Vector2d difference = image_difference_px(problem, state, p, row);
+      if (!difference.allFinite()) return std::numeric_limits<double>::infinity();
       sum += problem.image_loss.evaluate((problem.inverse_sigma[row] * difference).squaredNorm())[0];
     }
   }

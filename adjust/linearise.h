@@ -12,12 +12,14 @@ struct ImageResidual {
   Eigen::Matrix<double, 2, 6> by_mount;
   IntrinsicJacobian by_intrinsics;
   Eigen::Matrix<double, 2, 3> by_point;
-  bool in_front = false;  // Z > 0; otherwise the rest is undefined and the observation must not take part
+  // The camera can project the point; otherwise the rest is undefined and the observation must not take part.
+  bool in_front = false;
 };
 ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrinsics& intrinsics,
                               const Eigen::Vector3d& point, const Eigen::Vector2d& measured, double inverse_sigma);
 
-// Adjusted minus measured position of one observation (a row of the problem) of a point, pixels.
+// Adjusted minus measured position of one observation (a row of the problem) of a point, pixels; NaN where the camera
+// cannot project the point.
 Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState& state, std::int64_t point,
                                     std::int64_t row);
 
@@ -53,7 +55,7 @@ inline double intrinsic_prior_residual(const Intrinsics& value, const TileProble
 // Robust weighting as Ceres (corrector): residual and Jacobian are scaled by sqrt(rho'); the second-order term is
 // applied where rho'' > 0 and dropped where rho'' <= 0 (always, for the losses here).
 // Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a
-// camera.
+// camera (cannot be projected).
 double evaluate_cost(const TileProblem& problem, const TileState& state);
 
 }  // namespace megablock

@@ -79,9 +79,8 @@ class Resection {
   bool agrees(const Pose& frame, std::int64_t row) const {
     const TileImage& image = image_of(row);
     const Eigen::Vector3d inside = to_camera(frame, state_.mounts[image.mount], state_.points[point_of_row_[row]]);
-    if (!(inside.z() > 0)) return false;
     const Eigen::Vector2d measured(problem_.x[row], problem_.y[row]);
-    return (project(state_.cameras[image.camera.value], inside) - measured).norm() * problem_.inverse_sigma[row] <=
+    return reprojection(state_.cameras[image.camera.value], inside, measured).norm() * problem_.inverse_sigma[row] <=
            threshold_;
   }
 

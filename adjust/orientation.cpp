@@ -180,10 +180,9 @@ class Orientation {
   void adjust() {
     struct Round {
       double limit_px;
-      ParameterMask free;  // intrinsics refined
+      int radial_terms;  // refined, besides the focal length
     };
-    constexpr ParameterMask kF = mask_of(kFocal), kK1 = mask_of(kRadial1), kK2 = mask_of(kRadial2);
-    for (const Round& round : {Round{25, kF}, Round{10, kF | kK1}, Round{4, kF | kK1 | kK2}}) {
+    for (const Round& round : {Round{25, 0}, Round{10, 1}, Round{4, 2}}) {
       rays_ = viewing_rays(graph_, values_.cameras);
       const double limit = intersect_within(round.limit_px);
       drop_weak_frames();
@@ -193,7 +192,7 @@ class Orientation {
       coarse.observations = options_.observations;
       coarse.loss_scale_px = limit * smallest_focal() / 3;
       if (round.limit_px > 4) coarse.function_tolerance = 1e-3;
-      coarse.camera_free = free_intrinsics(round.free, round.limit_px >= 25);
+      coarse.camera_free = free_intrinsics(round.radial_terms, round.limit_px >= 25);
       adjust_coarsely(block_, graph_, coarse, values_);
       check_focals();
     }
@@ -265,13 +264,14 @@ class Orientation {
     }
   }
 
-  std::vector<ParameterMask> free_intrinsics(ParameterMask wanted, bool unknown_focal_only) const {
+  std::vector<ParameterMask> free_intrinsics(int terms, bool unknown_focal_only) const {
     constexpr std::size_t kFewestFrames = 4;
     std::vector<ParameterMask> result(graph_.cameras.size(), 0);
     if (oriented() < kFewestFrames || any_given_) return result;  // given poses go with the given cameras
     for (std::size_t c = 0; c < result.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];
       if (unknown_focal_only && camera.focal_known) continue;
+      const ParameterMask wanted = mask_of(kFocal) | radial_terms(camera.intrinsics.model(), terms);
       for (int k = 0; k < camera.intrinsics.size(); ++k)
         if (camera.prior_sigma[static_cast<std::size_t>(k)] > 0) result[c] |= wanted & mask_of(k);
     }
@@ -283,6 +283,8 @@ class Orientation {
     for (std::size_t c = 0; c < values_.cameras.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];
       const double ratio = values_.cameras[c][kFocal] / std::max(camera.width, camera.height);
+      const CameraModelKind kind = camera.intrinsics.model().kind;
+      if (kind == CameraModelKind::kFisheye || kind == CameraModelKind::kEquirectangular) continue;
       if (!(ratio > 0.2 && ratio < 10)) values_.cameras[c] = camera.intrinsics;
     }
   }

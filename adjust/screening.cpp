@@ -107,9 +107,8 @@ class PointSettler {
   // Length of the residual in sigmas; infinite behind the camera.
   double residual(std::size_t i, const Eigen::Vector3d& point) const {
     const PointView& view = views_[i];
-    const Eigen::Vector3d inside = to_inside(view.camera, point);
-    if (!(inside.z() > 0)) return std::numeric_limits<double>::infinity();
-    const double length = view.inverse_sigma * (project(*view.intrinsics, inside) - view.pixel).norm();
+    const double length =
+        view.inverse_sigma * reprojection(*view.intrinsics, to_inside(view.camera, point), view.pixel).norm();
     return std::isfinite(length) ? length : std::numeric_limits<double>::infinity();
   }
   bool passes_all_kept(const Eigen::Vector3d& point, double threshold) const {

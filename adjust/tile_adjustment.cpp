@@ -197,10 +197,11 @@ class TileAdjuster {
     std::vector<ParameterMask> result = problem_.camera_free;
     for (std::size_t c = 0; c < result.size(); ++c) {
       for (int k = 0; k < state_.cameras[c].size(); ++k) {
-        const bool first = k == kFocal || k == kRadial1;
-        const int needed = first           ? options_.min_images_focal
-                           : k == kRadial3 ? options_.min_images_radial3
-                                           : options_.min_images_principal;
+        const ParameterRank rank = parameter_rank(state_.cameras[c].model(), k);
+        const bool first = rank == ParameterRank::kLeading;
+        const int needed = first                          ? options_.min_images_focal
+                           : rank == ParameterRank::kHigh ? options_.min_images_radial3
+                                                          : options_.min_images_principal;
         const bool wanted = stage == Stage::kAll || first;
         if (!wanted || (images_[c] < needed && !has_prior(c, k))) result[c] &= ~mask_of(k);
       }

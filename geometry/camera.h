@@ -1,52 +1,68 @@
-// Camera: intrinsics and projection of the Brown model (later models join this file's family).
+// Projection of a camera, its inverse and its derivatives, for every model: formulas in projection.h and correction.h.
 //
-//     x = X/Z, y = Y/Z, r2 = x^2 + y^2                          (camera coordinates, looking along +z, y down)
-//     x_d = x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2)
-//     y_d = y (1 + k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 y^2) + 2 p2 x y
-//     u = cx + f x_d,  v = cy + f y_d                           (pixels, pixel centres at +0.5)
-//
-// Distort direction (ground -> image), after Brown (1971), parameter order and signs as in OpenCV.
+// What is in front of a camera is the model's own matter: pinhole, Brown and all corrections see Z > 0 (corrections as
+// far as they do not fold the image); the fisheye sees every direction up to where its polynomial stops growing, also
+// beyond 90 degrees; the panorama everything but its poles.
 #pragma once
 
-#include <Eigen/Core>
+#include <limits>
 #include <optional>
 
-#include "geometry/intrinsics.h"
+#include "geometry/correction.h"
+#include "geometry/projection.h"
 
 namespace megablock {
 
-// Projects camera coordinates; Z > 0 is the caller's to check. Templated for automatic differentiation.
-template <typename Scalar>
-Eigen::Matrix<Scalar, 2, 1> project(const Scalar* k, const Eigen::Matrix<Scalar, 3, 1>& point) {
-  const Scalar x = point.x() / point.z(), y = point.y() / point.z();
-  const Scalar r2 = x * x + y * y;
-  const Scalar radial = Scalar(1) + r2 * (k[kRadial1] + r2 * (k[kRadial2] + r2 * k[kRadial3]));
-  const Scalar two_xy = Scalar(2) * x * y;
-  const Scalar xd = x * radial + k[kDecentring1] * two_xy + k[kDecentring2] * (r2 + Scalar(2) * x * x);
-  const Scalar yd = y * radial + k[kDecentring1] * (r2 + Scalar(2) * y * y) + k[kDecentring2] * two_xy;
-  return {k[kPrincipalX] + k[kFocal] * xd, k[kPrincipalY] + k[kFocal] * yd};
+// NaN where the model has no pixel for the point.
+Eigen::Vector2d project_other(const Intrinsics& k, const Eigen::Vector3d& point);  // all models but Brown
+inline Eigen::Vector2d no_pixel() { return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()); }
+inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point) {
+  if (k.model().kind != CameraModelKind::kBrown) return project_other(k, point);
+  return point.z() > 0 ? projection::brown(k.data(), point) : no_pixel();
 }
 
-inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point) {
-  return project<double>(k.data(), point);
+// Adjusted minus measured pixel. The two edges of a panorama are the same place: its differences are less than half a
+// turn.
+template <typename Scalar>
+Eigen::Matrix<Scalar, 2, 1> pixel_difference(const CameraModel& model, const Scalar* k,
+                                             const Eigen::Matrix<Scalar, 2, 1>& adjusted,
+                                             const Eigen::Vector2d& measured) {
+  using std::floor;
+  Eigen::Matrix<Scalar, 2, 1> difference(adjusted.x() - measured.x(), adjusted.y() - measured.y());
+  if (model.kind == CameraModelKind::kEquirectangular) {
+    const Scalar turn = (2 * 3.14159265358979323846) * k[kFocal];
+    difference.x() -= turn * floor(difference.x() / turn + 0.5);
+  }
+  return difference;
+}
+inline Eigen::Vector2d pixel_difference(const Intrinsics& k, const Eigen::Vector2d& adjusted,
+                                        const Eigen::Vector2d& measured) {
+  return pixel_difference<double>(k.model(), k.data(), adjusted, measured);
+}
+
+// Projected minus measured; NaN where the model has no pixel for the point.
+inline Eigen::Vector2d reprojection(const Intrinsics& k, const Eigen::Vector3d& point,
+                                    const Eigen::Vector2d& measured) {
+  return pixel_difference(k, project(k, point), measured);
 }
 
 // Columns: the model's parameters. In place, without heap.
 using IntrinsicJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxIntrinsics>;
 
-// Projection with derivatives by camera coordinates and by the parameters.
+// Projection with derivatives by camera coordinates and by the parameters (fixed ones: zero).
 struct ProjectionJacobian {
+  bool valid = false;  // otherwise the rest is undefined: the model has no pixel for the point
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> by_point;
   IntrinsicJacobian by_intrinsics;
 };
 ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point);
 
-// Inverse: the normalised image point (x, y) = (X/Z, Y/Z) of a pixel, by Newton iterations on the distortion.
-// Empty where the model cannot be inverted (beyond the radius at which the radial polynomial turns back).
-std::optional<Eigen::Vector2d> unproject(const Intrinsics& k, const Eigen::Vector2d& pixel);
-
-// Unit viewing direction of a pixel in camera coordinates; empty as unproject.
+// Unit viewing direction of a pixel in camera coordinates. Empty where the model cannot be inverted: beyond the radius
+// at which the radial polynomial turns back, where a correction folds the image, above the poles of a panorama.
 std::optional<Eigen::Vector3d> viewing_ray(const Intrinsics& k, const Eigen::Vector2d& pixel);
+
+// The normalised image point (x, y) = (X/Z, Y/Z) of a pixel. Empty as viewing_ray, and where the ray has Z <= 0.
+std::optional<Eigen::Vector2d> unproject(const Intrinsics& k, const Eigen::Vector2d& pixel);
 
 }  // namespace megablock

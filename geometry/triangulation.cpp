@@ -55,10 +55,10 @@ struct PointEquations {
 bool linearise(const Eigen::Vector3d& point, std::span<const PointView> views, PointEquations& equations) {
   equations = {};
   for (const PointView& view : views) {
-    const Eigen::Vector3d inside = to_inside(view.camera, point);
-    if (!(inside.z() > 0)) return false;
-    const ProjectionJacobian projection = project_with_jacobian(*view.intrinsics, inside);
-    const Eigen::Vector2d residual = (projection.pixel - view.pixel) * view.inverse_sigma;
+    const ProjectionJacobian projection = project_with_jacobian(*view.intrinsics, to_inside(view.camera, point));
+    if (!projection.valid) return false;
+    const Eigen::Vector2d residual =
+        pixel_difference(*view.intrinsics, projection.pixel, view.pixel) * view.inverse_sigma;
     const Eigen::Matrix<double, 2, 3> jacobian =
         view.inverse_sigma * projection.by_point * view.camera.rotation.toRotationMatrix();
     equations.normal += jacobian.transpose() * jacobian;

@@ -17,6 +17,8 @@ struct BalObservations {
 };
 
 BalObservations bal_observations(const ExportView& view) {
+  for (std::int64_t i = 0; i < view.image_count(); ++i)
+    check_bal_model(view.result.block.cameras[view.camera_index(i)].name, view.intrinsics(i).model());
   const ObservationsByImage by_image = observations_by_image(view);
   BalObservations all;
   for (std::int64_t t = 0; t < view.track_count(); ++t) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "io/error.h"
 #include "io/export_view.h"
 #include "io/text_writer.h"
 
@@ -12,7 +13,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kOpenCv = 4, kFullOpenCv = 6;  // COLMAP's numbers of the models
+constexpr int kPinhole = 1, kOpenCv = 4, kOpenCvFisheye = 5, kFullOpenCv = 6;  // COLMAP's numbers of the models
 constexpr int kGrey = 128;
 
 struct ColmapCamera {
@@ -21,7 +22,18 @@ struct ColmapCamera {
   std::vector<double> parameters;
 };
 
-ColmapCamera colmap_camera(const Intrinsics& k) {
+ColmapCamera colmap_camera(const Camera& given, const Intrinsics& k) {
+  const CameraModelKind kind = k.model().kind;
+  if (kind == CameraModelKind::kPinhole)
+    return {kPinhole, "PINHOLE", {k[kFocal], k[kFocal], k[kPrincipalX], k[kPrincipalY]}};
+  if (kind == CameraModelKind::kFisheye) {
+    ColmapCamera fisheye{kOpenCvFisheye, "OPENCV_FISHEYE", {k[kFocal], k[kFocal], k[kPrincipalX], k[kPrincipalY]}};
+    fisheye.parameters.insert(fisheye.parameters.end(), k.begin() + kRadial1, k.end());
+    return fisheye;
+  }
+  if (kind != CameraModelKind::kBrown)
+    throw InputError("camera '" + given.name + "' has the model " + model_name(k.model()) +
+                     ", which COLMAP does not have; pinhole, brown and opencv-fisheye can be exported");
   ColmapCamera camera{kOpenCv,
                       "OPENCV",
                       {k[kFocal], k[kFocal], k[kPrincipalX], k[kPrincipalY], k[kRadial1], k[kRadial2], k[kDecentring1],
@@ -39,7 +51,7 @@ double point_error(const ExportView& view, std::int64_t t) {
   const std::int64_t begin = view.begin[static_cast<std::size_t>(t)], end = view.begin[static_cast<std::size_t>(t) + 1];
   for (std::int64_t k = begin; k < end; ++k) {
     const std::int64_t o = view.observations[static_cast<std::size_t>(k)], i = view.image_of(o);
-    sum += (project(view.intrinsics(i), to_inside(view.pose(i), view.point(t))) - view.pixel(o)).norm();
+    sum += reprojection(view.intrinsics(i), to_inside(view.pose(i), view.point(t)), view.pixel(o)).norm();
   }
   return sum / static_cast<double>(end - begin);
 }
@@ -62,7 +74,8 @@ void write_model(const BlockResult& result, Writer& writer) {
   writer.begin_cameras(result.block.cameras.size());
   for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
     const CameraIndex index(static_cast<std::int64_t>(c));
-    writer.camera(index.value + 1, result.block.cameras[index], colmap_camera(result.state.cameras[index]));
+    writer.camera(index.value + 1, result.block.cameras[index],
+                  colmap_camera(result.block.cameras[index], result.state.cameras[index]));
   }
   writer.begin_images(view.image_count(), view.observations.size());
   for (std::int64_t i = 0; i < view.image_count(); ++i) {

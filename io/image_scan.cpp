@@ -119,9 +119,7 @@ Camera make_camera(const std::string& name, const ImageHeader& header) {
 }  // namespace
 
 IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera) {
-  const double focal = camera.intrinsics[kFocal] * (camera.focal_known ? 0.05 : 0.3);
-  const double principal = 0.02 * camera.width;
-  return {focal, principal, principal, 0.2, 0.2, 0.2, 0.01, 0.01};
+  return weak_sigmas(camera.intrinsics, camera.intrinsics[kFocal] * (camera.focal_known ? 0.05 : 0.3), camera.width);
 }
 
 void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping grouping, Block& block) {

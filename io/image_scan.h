@@ -27,8 +27,8 @@ enum class CameraGrouping { kExif, kFolder, kOne };
 // different size never share a camera. Priors of position and attitude are not set here.
 void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping grouping, Block& block);
 
-// Prior sigmas that keep self-calibration of small blocks stable: focal 5 % (30 % when guessed), principal point 2 % of
-// the width, k1 k2 k3 0.2, p1 p2 0.01.
+// Prior sigmas that keep self-calibration of small blocks stable (weak_sigmas); the focal length is good for 5 %, 30 %
+// when guessed.
 IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera);
 
 // Verdict on the GNSS positions of the images: dropped when at 0,0, out of range, or more than 10 times the median

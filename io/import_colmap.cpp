@@ -8,12 +8,16 @@ namespace megablock {
 
 const std::vector<ColmapModel>& colmap_models() {
   static const std::vector<ColmapModel> all = {
-      {0, "SIMPLE_PINHOLE", {"f", "cx", "cy"}},
-      {1, "PINHOLE", {"fx", "fy", "cx", "cy"}},
-      {2, "SIMPLE_RADIAL", {"f", "cx", "cy", "k1"}},
-      {3, "RADIAL", {"f", "cx", "cy", "k1", "k2"}},
-      {4, "OPENCV", {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"}},
-      {6, "FULL_OPENCV", {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}}};
+      {0, "SIMPLE_PINHOLE", CameraModelKind::kPinhole, {"f", "cx", "cy"}},
+      {1, "PINHOLE", CameraModelKind::kPinhole, {"fx", "fy", "cx", "cy"}},
+      {2, "SIMPLE_RADIAL", CameraModelKind::kBrown, {"f", "cx", "cy", "k1"}},
+      {3, "RADIAL", CameraModelKind::kBrown, {"f", "cx", "cy", "k1", "k2"}},
+      {4, "OPENCV", CameraModelKind::kBrown, {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"}},
+      {5, "OPENCV_FISHEYE", CameraModelKind::kFisheye, {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"}},
+      {6,
+       "FULL_OPENCV",
+       CameraModelKind::kBrown,
+       {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}}};
   return all;
 }
 
@@ -42,6 +46,7 @@ void ColmapBuilder::add_camera(std::int64_t id, const ColmapModel& model, std::i
   camera.name = which;
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
+  camera.intrinsics = Intrinsics(CameraModel{model.kind});
   double fx = 0;
   for (std::size_t i = 0; i < model.parameters.size(); ++i) {
     const std::string& name = model.parameters[i];
@@ -50,14 +55,14 @@ void ColmapBuilder::add_camera(std::int64_t id, const ColmapModel& model, std::i
     if (name == "fy" && std::abs(value - fx) > 1e-9 * std::abs(fx))
       fail(which + " has fx " + std::to_string(fx) + " and fy " + std::to_string(value) +
            "; only square pixels (fx = fy) are supported");
-    if ((name == "k4" || name == "k5" || name == "k6") && value != 0)
+    const auto ours = find_parameter(camera.intrinsics.model(), name == "fx" || name == "fy" ? "f" : name);
+    if (ours)
+      camera.intrinsics[*ours] = value;
+    else if (value != 0)
       fail(which + " uses " + name + ", which is not supported");
-    const std::string ours = name == "fx" || name == "fy" ? "f" : name;
-    if (const auto p = find_parameter(camera.intrinsics.model(), ours)) camera.intrinsics[*p] = value;
   }
   if (!(camera.intrinsics[kFocal] > 0)) fail("the focal length of " + which + " is not positive");
-  const double principal = 0.02 * camera.width;
-  camera.prior_sigma = {0.05 * camera.intrinsics[kFocal], principal, principal, 0.2, 0.2, 0.2, 0.01, 0.01};
+  camera.prior_sigma = weak_sigmas(camera.intrinsics, 0.05 * camera.intrinsics[kFocal], camera.width);
   camera.focal_known = true;
   Block& block = imported_.block;
   if (!cameras_.emplace(id, block.cameras.next_index()).second) fail(which + " appears twice");

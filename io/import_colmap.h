@@ -10,11 +10,12 @@
 
 namespace megablock {
 
-// A camera model of COLMAP: its number in binary files, its name in text files, its parameters. "fx" and "fy" must
-// agree.
+// A camera model of COLMAP: its number in binary files, its name in text files, ours of the same projection, its
+// parameters. "fx" and "fy" must agree.
 struct ColmapModel {
   int number;
   std::string name;
+  CameraModelKind kind;
   std::vector<std::string> parameters;
 };
 const std::vector<ColmapModel>& colmap_models();

@@ -22,11 +22,32 @@ std::vector<int> parameters_named(const CameraModel& model, const std::string& n
 }
 
 void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
+  const CameraModel& model = camera.intrinsics.model();
   IntrinsicSigmas sigma{};
   for (const auto& item : list)
-    for (const int p : parameters_named(camera.intrinsics.model(), item.IsScalar() ? item.Scalar() : "", where))
-      sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(p)];
+    for (const int p : parameters_named(model, item.IsScalar() ? item.Scalar() : "", where)) {
+      if (is_fixed(model, p))
+        throw InputError(where + ": calibrate: '" + parameter_name(model, p) + "' of the model " + model_name(model) +
+                         " follows from the size of the image and cannot be estimated");
+      // A panorama's cx is held by default: its sigma is that of cy.
+      const int like = camera.prior_sigma[static_cast<std::size_t>(p)] > 0 ? p : static_cast<int>(kPrincipalY);
+      sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(like)];
+    }
   camera.prior_sigma = sigma;
+}
+
+// The camera's focal length and principal point stay.
+void read_model(YamlReader& reader, Camera& camera) {
+  const auto name = reader.text("model");
+  if (!name) return;
+  const auto model = find_model(*name);
+  if (!model)
+    throw InputError(reader.where("model") + ": model: '" + *name + "' is no camera model; they are " + model_list());
+  if (*model == camera.intrinsics.model()) return;
+  const Intrinsics before = camera.intrinsics;
+  camera.intrinsics = start_intrinsics(*model, before[kFocal], camera.width, camera.height);
+  camera.intrinsics[kPrincipalX] = before[kPrincipalX];
+  camera.intrinsics[kPrincipalY] = before[kPrincipalY];
 }
 
 void read_focal(YamlReader& reader, Camera& camera) {
@@ -37,6 +58,9 @@ void read_focal(YamlReader& reader, Camera& camera) {
   if (millimetres.has_value() != sensor.has_value())
     throw InputError(reader.where() + ": focal_mm and sensor_mm (width along the larger side) belong together");
   if (!pixels && !millimetres) return;
+  if (is_fixed(camera.intrinsics.model(), kFocal))
+    throw InputError(reader.where(pixels ? "focal_px" : "focal_mm") +
+                     ": the focal length of an equirectangular camera is its width / 2 pi and cannot be given");
   camera.intrinsics[kFocal] = pixels ? *pixels : *millimetres / *sensor * std::max(camera.width, camera.height);
   camera.focal_known = true;
 }
@@ -44,17 +68,25 @@ void read_focal(YamlReader& reader, Camera& camera) {
 void read_distortion(YamlReader& reader, Camera& camera) {
   auto distortion = reader.mapping("distortion");
   if (!distortion) return;
-  for (int p = kRadial1; p < camera.intrinsics.size(); ++p)
-    if (const auto value = distortion->number(parameter_name(camera.intrinsics.model(), p)))
+  const CameraModel& model = camera.intrinsics.model();
+  for (int p = kPrincipalY + 1; p < camera.intrinsics.size(); ++p)
+    if (is_fixed(model, p))
+      continue;
+    else if (const auto value = distortion->number(parameter_name(model, p)))
       camera.intrinsics[static_cast<std::size_t>(p)] = *value;
   distortion->finish();
 }
 
 void read_camera(YamlReader& reader, Camera& camera) {
+  read_model(reader, camera);
   read_focal(reader, camera);
   if (const auto point = reader.numbers("principal_point_px", 2)) {
     camera.intrinsics[kPrincipalX] = (*point)[0];
     camera.intrinsics[kPrincipalY] = (*point)[1];
+    if (is_radial(camera.intrinsics.model())) {
+      camera.intrinsics[kSymmetryX] = (*point)[0];
+      camera.intrinsics[kSymmetryY] = (*point)[1];
+    }
   }
   read_distortion(reader, camera);
   camera.prior_sigma = default_intrinsic_sigmas(camera);

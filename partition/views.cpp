@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <numeric>
 #include <string_view>
 #include <tuple>
@@ -188,6 +189,13 @@ void place_between(const std::vector<ImageIndex>& pass, Views& views) {
 }  // namespace
 
 double half_opening(const Camera& camera) {
+  const Intrinsics& k = camera.intrinsics;
+  if (k.model().kind == CameraModelKind::kEquirectangular) return std::numbers::pi;
+  if (k.model().kind == CameraModelKind::kFisheye) {
+    const double radius = 0.5 * std::max(camera.width, camera.height);
+    const auto ray = viewing_ray(k, {k[kPrincipalX] + radius, k[kPrincipalY]});
+    return ray ? std::acos(ray->z()) : std::numbers::pi;
+  }
   return std::atan(0.5 * std::max(camera.width, camera.height) / camera.intrinsics[kFocal]);
 }
 

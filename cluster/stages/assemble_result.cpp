@@ -24,9 +24,8 @@ Eigen::Vector2d residual(const MergeTile& tile, std::int64_t point, std::int64_t
   const TileImage& image = tile.problem.images[static_cast<std::size_t>(local.value)];
   const Eigen::Vector3d x = to_camera(tile.state.frames[static_cast<std::size_t>(image.frame.value)],
                                       tile.state.mounts[static_cast<std::size_t>(image.mount)], ground);
-  if (!(x.z() > 0)) return undefined;
-  return project(tile.state.cameras[static_cast<std::size_t>(image.camera.value)], x) -
-         Eigen::Vector2d(tile.problem.x[static_cast<std::size_t>(o)], tile.problem.y[static_cast<std::size_t>(o)]);
+  return reprojection(tile.state.cameras[static_cast<std::size_t>(image.camera.value)], x,
+                      {tile.problem.x[static_cast<std::size_t>(o)], tile.problem.y[static_cast<std::size_t>(o)]});
 }
 
 // Rows of all tiles' tracks in the order of their keys.

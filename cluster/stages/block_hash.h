@@ -28,6 +28,11 @@ inline void add_to_hash(Hasher& hasher, const AttitudePrior& prior) {
   add_to_hash(hasher, prior.sigma_rad);
 }
 
+inline void add_to_hash(Hasher& hasher, const Intrinsics& k) {
+  hasher.add(k.model().kind).add(k.model().order);
+  for (const double value : k) hasher.add(value);
+}
+
 // What an adjustment takes of a frame besides its pose.
 inline void add_priors_to_hash(Hasher& hasher, const Frame& frame) {
   if (frame.position_prior) add_to_hash(hasher.add('p'), *frame.position_prior);

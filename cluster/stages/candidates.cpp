@@ -25,7 +25,7 @@ std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& feature
   hasher.add(features.image_fingerprint).add(job.generations);
   for (const Image& image : job.block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
   for (const Camera& camera : job.block.cameras)
-    hasher.add(camera.width).add(camera.height).add(camera.intrinsics[kFocal]);
+    hasher.add(camera.width).add(camera.height).add(camera.intrinsics[kFocal]).add(camera.intrinsics.model().kind);
   for (const Rig& rig : job.block.rigs)
     for (const Mount& mount : rig.mounts) add_to_hash(hasher, mount.pose);
   for (const Frame& frame : job.block.frames) {

@@ -18,7 +18,7 @@ std::vector<ImagePair> cell_pairs(const CandidateGraph& graph, std::size_t cell)
 
 void add_camera(Hasher& hasher, const Camera& camera) {
   hasher.add(camera.width).add(camera.height).add(camera.focal_known);
-  for (const double value : camera.intrinsics) hasher.add(value);
+  add_to_hash(hasher, camera.intrinsics);
 }
 
 std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs) {

@@ -34,7 +34,7 @@ void add_block_values(Hasher& hasher, const Block& block) {
     for (const Mount& mount : rig.mounts) add_to_hash(hasher.add(mount.camera.value), mount.pose);
   for (const Camera& camera : block.cameras) {
     hasher.add(camera.width).add(camera.height).add(camera.focal_known);
-    for (const double value : camera.intrinsics) hasher.add(value);
+    add_to_hash(hasher, camera.intrinsics);
     for (const double value : camera.prior_sigma) hasher.add(value);
   }
 }

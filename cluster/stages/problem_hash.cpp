@@ -34,7 +34,7 @@ void add_other_terms(Hasher& hasher, const TileProblem& p) {
   }
   for (const auto& term : p.intrinsic_priors) {
     hasher.add(term.camera.value);
-    for (const double value : term.value) hasher.add(value);
+    add_to_hash(hasher, term.value);
     for (const double value : term.sigma) hasher.add(value);
   }
   for (const auto& term : p.mount_priors) {
@@ -51,8 +51,7 @@ void add_to_hash(Hasher& hasher, const TileProblem& problem, const TileState& st
   add_frame_terms(hasher, problem);
   add_other_terms(hasher, problem);
   for (const Pose& pose : start.frames) add_to_hash(hasher, pose);
-  for (const Intrinsics& camera : start.cameras)
-    for (const double value : camera) hasher.add(value);
+  for (const Intrinsics& camera : start.cameras) add_to_hash(hasher, camera);
   for (const Pose& pose : start.mounts) add_to_hash(hasher, pose);
 }
 

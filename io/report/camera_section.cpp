@@ -17,9 +17,31 @@ constexpr double kSignificant = 2;  // sigmas
 
 // The value that a parameter has in a camera that does not need it: no distortion, principal point in the centre.
 double neutral(const Camera& camera, int parameter) {
-  if (parameter == kPrincipalX) return 0.5 * camera.width;
-  if (parameter == kPrincipalY) return 0.5 * camera.height;
-  return 0;
+  const Intrinsics start = start_intrinsics(camera.intrinsics.model(), 1, camera.width, camera.height);
+  return parameter == kFocal ? 0 : start[static_cast<std::size_t>(parameter)];
+}
+
+bool in_pixels(const CameraModel& model, int parameter) {
+  return parameter <= kPrincipalY || is_additive(model) || (is_radial(model) && parameter < kRadialTerms);
+}
+
+// Radial coefficients in pixels are too small for decimals.
+std::string with_digits(const CameraModel& model, int parameter, double value) {
+  if (in_pixels(model, parameter)) return fixed(value, 2);
+  return model.kind == CameraModelKind::kIgnRadial ? significant(value, 4) : fixed(value, 6);
+}
+
+// Angle between the rays through the middles of opposite borders, degrees.
+double opening(const Camera& camera, const Intrinsics& k, const Eigen::Vector2d& half) {
+  const Eigen::Vector2d centre(0.5 * camera.width, 0.5 * camera.height);
+  if (k.model().kind == CameraModelKind::kEquirectangular) return 2 * half.norm() / k[kFocal] * kDegrees;
+  if (k.model().kind != CameraModelKind::kFisheye) return 2 * std::atan(half.norm() / k[kFocal]) * kDegrees;
+  double angle = 0;
+  for (const double side : {-1.0, 1.0}) {
+    const auto ray = viewing_ray(k, centre + side * half);
+    angle += ray ? std::acos(std::clamp(ray->z(), -1.0, 1.0)) * kDegrees : 180;
+  }
+  return angle;
 }
 
 // Lower triangle of the correlations of the estimated parameters.
@@ -56,24 +78,25 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
   const CameraModel& model = camera.intrinsics.model();
   for (int k = 0; k < parameter_count(model); ++k) {
     const auto at = static_cast<std::size_t>(k);
-    const bool pixels = k <= kPrincipalY;
+    const bool pixels = in_pixels(model, k);
     const double start = camera.intrinsics[at], now = adjusted ? result.state.cameras[index][at] : kUnknown;
     const double sigma = sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[index](k, k))) : kUnknown;
     const double prior = camera.prior_sigma[at];
-    const int decimals = pixels ? 2 : 6;
     const bool held = prior == 0 || sigma == 0;
     const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
     const bool tested = k != kFocal && std::isfinite(ratio);
-    table.add({parameter_name(model, k) + (pixels ? " [px]" : ""), fixed(start, decimals), fixed(now, decimals),
-               with_sign(now - start, decimals),
-               held     ? "held"
-               : pixels ? fixed(sigma, 3)
-                        : significant(sigma, 2),
-               tested ? fixed(ratio, 1) : "",
-               prior == 0             ? "held"
-               : std::isfinite(prior) ? "σ " + significant(prior, 2)
-                                      : "free"},
-              tested && ratio < kSignificant ? "weak" : "");
+    table.add(
+        {parameter_name(model, k) + (pixels ? " [px]" : ""), with_digits(model, k, start), with_digits(model, k, now),
+         pixels || model.kind != CameraModelKind::kIgnRadial ? with_sign(now - start, pixels ? 2 : 6)
+                                                             : significant(now - start, 4),
+         held     ? "held"
+         : pixels ? fixed(sigma, 3)
+                  : significant(sigma, 2),
+         tested ? fixed(ratio, 1) : "",
+         prior == 0             ? "held"
+         : std::isfinite(prior) ? "σ " + significant(prior, 2)
+                                : "free"},
+        tested && ratio < kSignificant ? "weak" : "");
   }
   return table.html();
 }
@@ -101,14 +124,13 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
   const std::int64_t listed = 20;
   for (CameraIndex camera(0); result.block.cameras.contains(camera) && camera.value < listed; ++camera.value) {
     const Camera& c = result.block.cameras[camera];
-    const double focal =
-        result.state.cameras.contains(camera) ? result.state.cameras[camera][kFocal] : c.intrinsics[kFocal];
+    const Intrinsics& k = result.state.cameras.contains(camera) ? result.state.cameras[camera] : c.intrinsics;
     body += "<div class=aside><h3>" + escape(c.name) + "</h3>" +
-            paragraph(fmt::format("{} × {} px, {}° × {}°, {} oriented images{}", c.width, c.height,
-                                  fixed(2 * std::atan(c.width / (2 * focal)) * kDegrees, 0),
-                                  fixed(2 * std::atan(c.height / (2 * focal)) * kDegrees, 0),
-                                  count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
-                      "muted") +
+            paragraph(
+                fmt::format("{}, {} × {} px, {}° × {}°, {} oriented images{}", model_name(k.model()), c.width, c.height,
+                            fixed(opening(c, k, {0.5 * c.width, 0}), 0), fixed(opening(c, k, {0, 0.5 * c.height}), 0),
+                            count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
+                "muted") +
             camera_table(result, camera) + correlation_table(result, camera) + "</div>";
   }
   if (result.block.cameras.next_index().value > listed)

@@ -97,7 +97,7 @@ TEST_P(Linearise, Image) {
   const double weight = uniform(0.5, 4);
 
   const ImageResidual ours = linearise_image(frame, mount, k, point, measured, weight);
-  const Evaluated reference = by_ceres<2, 7, 7, 8, 3>(residual::ImageMeasured{measured, weight},
+  const Evaluated reference = by_ceres<2, 7, 7, 8, 3>(residual::ImageMeasured{k.model(), measured, weight},
                                                       {block(frame), block(mount), block(k), block(point)});
   ASSERT_TRUE(ours.in_front);
   expect_residual(ours.residual, reference.residual);

@@ -20,7 +20,13 @@ inline Block example_block() {
                            {10, 5, 5, infinity, infinity, 0, 1e-3, 1e-3},
                            true,
                            "masks/vorn \xc3\xa4.png"});
-  block.cameras.push_back({"back", 1920, 1080, {1400, 960, 540, 0, 0, 0, 0, 0}, {}, false, ""});
+  block.cameras.push_back({"back",
+                           1920,
+                           1080,
+                           {*find_model("ign-radial"), {1400, 960, 540, 950, 530, -4.6e-8, 3.1e-14, 0}},
+                           {},
+                           false,
+                           ""});
   Rig pair{"pair", {Mount{CameraIndex(0), {}, 0, 0}, Mount{CameraIndex(1), {}, 0.01, 0.002}}};
   pair.mounts[1].pose = {Eigen::Quaterniond(0, 0, 1, 0), {0.1, -0.2, 0.30000000000000004}};
   block.rigs.push_back(pair);
