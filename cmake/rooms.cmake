@@ -15,7 +15,9 @@ if(MEGABLOCK_WERROR)
   target_compile_options(megablock_options INTERFACE -Werror)
 endif()
 if(MEGABLOCK_SANITIZE)
+  # Without the checks of pointers that the address sanitizer makes anyway: in Eigen they triple the build's time.
   target_compile_options(megablock_options INTERFACE -fsanitize=address,undefined
+                         -fno-sanitize=null,object-size,alignment,vptr
                          -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)
 endif()
