@@ -323,7 +323,7 @@ void add_simulate(CLI::App& app, Action& action) {
       if (options->rendered)
         write_rendered_block(options->simulation, options->output);
       else
-        write_simulated_block(simulate_block(options->simulation), options->output);
+        write_simulated_block(options->simulation, options->output);
       std::printf("%s/block.yaml\n", options->output.c_str());
       return kExitDone;
     };

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -67,12 +68,15 @@ struct DatasetNote {
   std::string units, description;
 };
 
-// The file is put together in memory (compressed) and written by close() in one go: HDF5 cannot recover from a disk
-// that fills up under it, and crashes when the process ends.
+// HDF5 cannot recover from a disk that fills up under it, and crashes when the process ends. So a file is put together
+// in memory (compressed) and written by close() in one go; one that is too large for that (kDisk) is written as its
+// rows are appended, on disk space that is reserved before HDF5 needs it.
+enum class Hdf5Storage { kMemory, kDisk };
+
 class Hdf5Writer {
  public:
-  Hdf5Writer(const std::string& path, const std::string& kind);
-  // Without close(), as after an exception, nothing is written.
+  Hdf5Writer(const std::string& path, const std::string& kind, Hdf5Storage storage = Hdf5Storage::kMemory);
+  // Without close(), as after an exception, no file is left.
   ~Hdf5Writer();
   // Writes the file, in place of one that is there; nothing may follow.
   void close();
@@ -104,6 +108,17 @@ class Hdf5Writer {
   void dataset(const std::string& name, ElementType type, const void* values, const std::vector<std::int64_t>& shape,
                const DatasetNote& note);
 
+  // A dataset that grows: no rows at first, `columns` values per row (1: one dimension), always in compressed chunks.
+  template <typename T>
+  void growing(const std::string& name, std::int64_t columns = 1, const DatasetNote& note = {}) {
+    growing_dataset(name, element_type<T>(), columns, note);
+  }
+  // Appends rows (row-major) to a growing dataset of this element type.
+  template <typename T>
+  void append(const std::string& name, const std::vector<T>& values) {
+    append_rows(name, element_type<T>(), values.data(), static_cast<std::int64_t>(values.size()));
+  }
+
   // A second name for a dataset (hard link).
   void link(const std::string& existing, const std::string& name);
 
@@ -118,13 +133,23 @@ class Hdf5Writer {
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, const void* value);
   void write_dataset(const std::string& name, std::int64_t file_type, std::int64_t memory_type, const void* values,
                      const std::vector<std::int64_t>& shape, const DatasetNote& note);
+  void growing_dataset(const std::string& name, ElementType type, std::int64_t columns, const DatasetNote& note);
+  void append_rows(const std::string& name, ElementType type, const void* values, std::int64_t count);
+  void reserve_disk(std::int64_t bytes);
   std::int64_t checked(std::int64_t result, const std::string& name) const;  // throws when result < 0
 
   struct Image;  // the file in memory
+  struct Growing {
+    Hdf5Handle set;  // kept open: the chunk that is being filled stays in its cache
+    ElementType type;
+    std::int64_t columns, rows;
+  };
 
   std::string path_;
-  std::unique_ptr<Image> image_;
+  Hdf5Storage storage_;
+  std::unique_ptr<Image> image_;  // kMemory
   Hdf5Handle file_;
+  std::map<std::string, Growing> growing_;
 };
 
 // What a file holds: its attribute `kind`. Errors as Hdf5Reader.

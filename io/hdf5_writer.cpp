@@ -1,4 +1,5 @@
 #include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -34,6 +35,12 @@ Hdf5Handle text_type(std::size_t length) {
   return type;
 }
 
+void set_chunks(hid_t properties, int rank, const std::vector<hsize_t>& chunk) {
+  H5Pset_chunk(properties, rank, chunk.data());
+  H5Pset_shuffle(properties);
+  H5Pset_deflate(properties, kDeflateLevel);
+}
+
 // Chunks are whole rows; the longest dimension is the first.
 void set_compression(hid_t properties, const std::vector<hsize_t>& extent, std::size_t element_bytes) {
   std::size_t row_bytes = element_bytes;
@@ -41,9 +48,7 @@ void set_compression(hid_t properties, const std::vector<hsize_t>& extent, std::
   if (row_bytes == 0 || row_bytes * extent[0] < kCompressFrom) return;
   std::vector<hsize_t> chunk = extent;
   chunk[0] = std::min(extent[0], std::max<hsize_t>(1, kChunkBytes / row_bytes));
-  H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data());
-  H5Pset_shuffle(properties);
-  H5Pset_deflate(properties, kDeflateLevel);
+  set_chunks(properties, static_cast<int>(chunk.size()), chunk);
 }
 
 template <typename T>
@@ -79,27 +84,54 @@ struct Hdf5Writer::Image {
   }
 };
 
-Hdf5Writer::Hdf5Writer(const std::string& path, const std::string& kind)
-    : path_(path), image_(std::make_unique<Image>()) {
+Hdf5Writer::Hdf5Writer(const std::string& path, const std::string& kind, Hdf5Storage storage)
+    : path_(path), storage_(storage) {
   silence_hdf5();
   const Hdf5Handle creation = without_times(H5P_FILE_CREATE);
   const Hdf5Handle access = file_access();
-  checked(H5Pset_fapl_core(access.id(), kMemoryStep, false), "");
-  H5FD_file_image_callbacks_t callbacks = {&Image::allocate, nullptr,         &Image::resize, &Image::keep,
-                                           &Image::share,    &Image::unshare, image_.get()};
-  checked(H5Pset_file_image_callbacks(access.id(), &callbacks), "");
+  if (storage == Hdf5Storage::kMemory) {
+    image_ = std::make_unique<Image>();
+    checked(H5Pset_fapl_core(access.id(), kMemoryStep, false), "");
+    H5FD_file_image_callbacks_t callbacks = {&Image::allocate, nullptr,         &Image::resize, &Image::keep,
+                                             &Image::share,    &Image::unshare, image_.get()};
+    checked(H5Pset_file_image_callbacks(access.id(), &callbacks), "");
+  } else {
+    const Descriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
+    if (file.id() < 0) throw_file_error(path, "created", errno);
+    reserve_disk(0);  // is there any room? HDF5 must not find out
+  }
   file_ = Hdf5Handle(checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()), ""), &H5Fclose);
+  reserve_disk(0);  // creating gave it back
   attribute("/", "kind", kind);
   attribute("/", "format_version", kFormatVersion);
 }
 
-Hdf5Writer::~Hdf5Writer() { file_.reset(); }
+Hdf5Writer::~Hdf5Writer() {
+  const bool abandoned = file_.id() >= 0;
+  growing_.clear();
+  file_.reset();
+  if (abandoned && storage_ == Hdf5Storage::kDisk) unlink(path_.c_str());
+}
 
 void Hdf5Writer::close() {
+  growing_.clear();
   checked(H5Fclose(file_.release()), "");
+  if (storage_ == Hdf5Storage::kDisk) return;
   const Descriptor file(path_, O_WRONLY | O_CREAT | O_TRUNC);
   if (file.id() < 0) throw_file_error(path_, "created", errno);
   write_fully(file.id(), path_, image_->data, image_->size());
+}
+
+// Room for `bytes` of new rows, for chunks that are not full yet, and for HDF5's own tables.
+void Hdf5Writer::reserve_disk(std::int64_t bytes) {
+  if (storage_ == Hdf5Storage::kMemory) return;
+  hsize_t written = 0;
+  if (file_.id() >= 0) H5Fget_filesize(file_.id(), &written);
+  const auto open_chunks = static_cast<std::int64_t>((2 * growing_.size() + 2) * kChunkBytes);
+  const std::int64_t needed = static_cast<std::int64_t>(written) + bytes + bytes / 8 + open_chunks;
+  const Descriptor file(path_, O_WRONLY);
+  if (file.id() < 0) throw_file_error(path_, "written", errno);
+  if (const int error = posix_fallocate(file.id(), 0, needed)) throw_file_error(path_, "written", error);
 }
 
 void Hdf5Writer::group(const std::string& name, const std::string& description) {
@@ -151,6 +183,45 @@ void Hdf5Writer::write_dataset(const std::string& name, std::int64_t file_type, 
     checked(H5Dwrite(set.id(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
   if (!note.units.empty()) attribute(name, "units", note.units);
   if (!note.description.empty()) attribute(name, "description", note.description);
+}
+
+void Hdf5Writer::growing_dataset(const std::string& name, ElementType type, std::int64_t columns,
+                                 const DatasetNote& note) {
+  const std::vector<hsize_t> none = {0, static_cast<hsize_t>(columns)},
+                             most = {H5S_UNLIMITED, static_cast<hsize_t>(columns)};
+  const int rank = columns == 1 ? 1 : 2;
+  const Hdf5Handle space(H5Screate_simple(rank, none.data(), most.data()), &H5Sclose);
+  const Hdf5Handle creation = without_times(H5P_DATASET_CREATE);
+  const std::size_t row_bytes = H5Tget_size(file_type(type)) * static_cast<std::size_t>(columns);
+  const std::vector<hsize_t> chunk = {std::max<hsize_t>(1, kChunkBytes / row_bytes), static_cast<hsize_t>(columns)};
+  set_chunks(creation.id(), rank, chunk);
+  Hdf5Handle set(checked(H5Dcreate2(file_.id(), name.c_str(), file_type(type), space.id(), H5P_DEFAULT, creation.id(),
+                                    H5P_DEFAULT),
+                         name),
+                 &H5Dclose);
+  growing_.insert_or_assign(name, Growing{std::move(set), type, columns, 0});
+  reserve_disk(0);
+  if (!note.units.empty()) attribute(name, "units", note.units);
+  if (!note.description.empty()) attribute(name, "description", note.description);
+}
+
+void Hdf5Writer::append_rows(const std::string& name, ElementType type, const void* values, std::int64_t count) {
+  const auto found = growing_.find(name);
+  if (found == growing_.end() || found->second.type != type || count % found->second.columns != 0)
+    throw StoreError(path_ + ": " + name + ": no growing dataset of this type and width");
+  Growing& growing = found->second;
+  const std::int64_t rows = count / growing.columns;
+  if (rows == 0) return;
+  reserve_disk(count * static_cast<std::int64_t>(H5Tget_size(file_type(type))));
+  const auto columns = static_cast<hsize_t>(growing.columns);
+  const hsize_t start[] = {static_cast<hsize_t>(growing.rows), 0}, extent[] = {static_cast<hsize_t>(rows), columns},
+                total[] = {start[0] + extent[0], columns};
+  checked(H5Dset_extent(growing.set.id(), total), name);
+  const Hdf5Handle memory(H5Screate_simple(growing.columns == 1 ? 1 : 2, extent, nullptr), &H5Sclose);
+  const Hdf5Handle space(checked(H5Dget_space(growing.set.id()), name), &H5Sclose);
+  checked(H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, start, nullptr, extent, nullptr), name);
+  checked(H5Dwrite(growing.set.id(), memory_type(type), memory.id(), space.id(), H5P_DEFAULT, values), name);
+  growing.rows += rows;
 }
 
 void Hdf5Writer::link(const std::string& existing, const std::string& name) {

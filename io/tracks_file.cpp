@@ -1,16 +1,25 @@
 // Tracks: docs/job-format.md, "Tracks".
 #include "io/hdf5_tables.h"
+#include "io/track_writer.h"
 #include "io/unit_files.h"
 
 namespace megablock {
 
 namespace {
 
+// Where the delta coding of a file stands after the rows written so far.
+struct Coded {
+  std::int64_t last_id = 0, last_first_image = 0;
+};
+
+struct Columns {
+  std::vector<std::int64_t> id_difference, observations, image_difference;
+};
+
 // Image of each observation minus that of the observation before it in the track; a track's first minus the first of
 // the track before. Neighbouring tracks begin in neighbouring images, so the numbers are small.
-std::vector<std::int64_t> image_differences(const TrackSet& tracks) {
+std::vector<std::int64_t> image_differences(const TrackSet& tracks, std::int64_t& previous_first) {
   std::vector<std::int64_t> values(tracks.image.size());
-  std::int64_t previous_first = 0;
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
     std::int64_t previous = previous_first;
     for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o) {
@@ -21,6 +30,39 @@ std::vector<std::int64_t> image_differences(const TrackSet& tracks) {
     }
   }
   return values;
+}
+
+Columns encode(const TrackSet& tracks, Coded& coded) {
+  Columns columns;
+  columns.id_difference = differences(plain(tracks.id));
+  if (!tracks.id.empty()) {
+    columns.id_difference.front() -= coded.last_id;
+    coded.last_id = tracks.id.back().value;
+  }
+  columns.observations = counts_of(tracks.begin);
+  columns.image_difference = image_differences(tracks, coded.last_first_image);
+  return columns;
+}
+
+const char *const kTracks = "tracks", *const kIds = "tracks/id_difference", *const kCounts = "tracks/observations";
+const char *const kObservations = "observations", *const kImages = "observations/image_difference";
+const char *const kX = "observations/x", *const kY = "observations/y", *const kFeature = "observations/feature";
+
+DatasetNote note_of(const std::string& name) {
+  if (name == kIds) return {"", "global index, minus that of the row before"};
+  if (name == kCounts) return {"", "number of observations of the track"};
+  if (name == kImages)
+    return {"",
+            "image index, minus that of the observation before it in its track (a track's first: minus the first of "
+            "the track before)"};
+  if (name == kX) return {"2^-10 px", "to the right, pixel centres at +0.5"};
+  if (name == kY) return {"2^-10 px", "down, pixel centres at +0.5"};
+  return {"", "row in the image's features, -1: none"};
+}
+
+void make_groups(Hdf5Writer& file) {
+  file.group(kTracks, "tie points' image measurements, one row per track");
+  file.group(kObservations, "one row per observation, in the order of the tracks");
 }
 
 std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, const std::vector<std::int64_t>& begin) {
@@ -40,12 +82,11 @@ std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, con
 
 void check_order(const Hdf5Reader& file, const TrackSet& tracks) {
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
-    if (tracks.id[t].value < 0 || (t > 0 && tracks.id[t] <= tracks.id[t - 1]))
-      file.fail("tracks/id_difference", "indices do not ascend");
+    if (tracks.id[t].value < 0 || (t > 0 && tracks.id[t] <= tracks.id[t - 1])) file.fail(kIds, "indices do not ascend");
     ImageIndex previous;  // -1
     for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o) {
       const ImageIndex image = tracks.image[static_cast<std::size_t>(o)];
-      if (image <= previous) file.fail("observations/image_difference", "the images of a track do not ascend");
+      if (image <= previous) file.fail(kImages, "the images of a track do not ascend");
       previous = image;
     }
   }
@@ -55,32 +96,54 @@ void check_order(const Hdf5Reader& file, const TrackSet& tracks) {
 
 void write_tracks(const std::string& path, const TrackSet& tracks) {
   Hdf5Writer file(path, "tracks");
-  file.group("tracks", "tie points' image measurements, one row per track");
-  file.integers("tracks/id_difference", differences(plain(tracks.id)),
-                {"", "global index, minus that of the row before"});
-  file.integers("tracks/observations", counts_of(tracks.begin), {"", "number of observations of the track"});
-  file.group("observations", "one row per observation, in the order of the tracks");
-  file.integers("observations/image_difference", image_differences(tracks),
-                {"",
-                 "image index, minus that of the observation before it in its track (a track's first: minus the "
-                 "first of the track before)"});
-  file.vector("observations/x", tracks.x, {"2^-10 px", "to the right, pixel centres at +0.5"});
-  file.vector("observations/y", tracks.y, {"2^-10 px", "down, pixel centres at +0.5"});
-  file.vector("observations/feature", tracks.feature, {"", "row in the image's features, -1: none"});
+  make_groups(file);
+  Coded coded;
+  const Columns columns = encode(tracks, coded);
+  file.integers(kIds, columns.id_difference, note_of(kIds));
+  file.integers(kCounts, columns.observations, note_of(kCounts));
+  file.integers(kImages, columns.image_difference, note_of(kImages));
+  file.vector(kX, tracks.x, note_of(kX));
+  file.vector(kY, tracks.y, note_of(kY));
+  file.vector(kFeature, tracks.feature, note_of(kFeature));
   file.close();
 }
+
+struct TrackWriter::File {
+  explicit File(const std::string& path) : hdf5(path, "tracks", Hdf5Storage::kDisk) {}
+  Hdf5Writer hdf5;
+  Coded coded;
+};
+
+TrackWriter::TrackWriter(const std::string& path) : file_(std::make_unique<File>(path)) {
+  make_groups(file_->hdf5);
+  for (const char* name : {kIds, kCounts, kImages}) file_->hdf5.growing<std::int64_t>(name, 1, note_of(name));
+  for (const char* name : {kX, kY, kFeature}) file_->hdf5.growing<std::int32_t>(name, 1, note_of(name));
+}
+
+TrackWriter::~TrackWriter() = default;
+
+void TrackWriter::append(const TrackSet& batch) {
+  const Columns columns = encode(batch, file_->coded);
+  file_->hdf5.append(kIds, columns.id_difference);
+  file_->hdf5.append(kCounts, columns.observations);
+  file_->hdf5.append(kImages, columns.image_difference);
+  file_->hdf5.append(kX, batch.x);
+  file_->hdf5.append(kY, batch.y);
+  file_->hdf5.append(kFeature, batch.feature);
+}
+
+void TrackWriter::close() { file_->hdf5.close(); }
 
 TrackSet read_tracks(const std::string& path) {
   const Hdf5Reader file(path, "tracks");
   TrackSet tracks;
-  tracks.id = indices<TrackIndex>(cumulate(file.vector<std::int64_t>("tracks/id_difference")));
-  tracks.x = file.vector<std::int32_t>("observations/x");
+  tracks.id = indices<TrackIndex>(cumulate(file.vector<std::int64_t>(kIds)));
+  tracks.x = file.vector<std::int32_t>(kX);
   const auto count = static_cast<std::int64_t>(tracks.x.size());
-  tracks.y = file.vector<std::int32_t>("observations/y", count);
-  tracks.feature = file.vector<std::int32_t>("observations/feature", count);
-  tracks.begin = begin_of(file, "tracks/observations",
-                          file.vector<std::int64_t>("tracks/observations", tracks.track_count()), count);
-  tracks.image = images_from(file.vector<std::int64_t>("observations/image_difference", count), tracks.begin);
+  tracks.y = file.vector<std::int32_t>(kY, count);
+  tracks.feature = file.vector<std::int32_t>(kFeature, count);
+  tracks.begin = begin_of(file, kCounts, file.vector<std::int64_t>(kCounts, tracks.track_count()), count);
+  tracks.image = images_from(file.vector<std::int64_t>(kImages, count), tracks.begin);
   check_order(file, tracks);
   return tracks;
 }

@@ -100,13 +100,15 @@ namespace {
 
 class TrackMaker {
  public:
-  TrackMaker(const SimulationOptions& options, const Layout& layout, SimulatedBlock& simulated)
+  TrackMaker(const SimulationOptions& options, const Layout& layout, const TrackSink& sink,
+             std::int64_t batch_observations)
       : options_(options),
         layout_(layout),
-        simulated_(simulated),
+        sink_(sink),
+        batch_observations_(batch_observations),
         observer_(layout, 2 + 5 * options.image_noise_px),
         count_(layout.block.frames.size(), 0) {
-    simulated_.tracks.begin.push_back(0);
+    batch_.tracks.begin = {0};
   }
 
   void run() {
@@ -126,6 +128,7 @@ class TrackMaker {
           made += seed_point(FrameIndex(f), random);
       }
     }
+    hand_over();
   }
 
  private:
@@ -188,8 +191,8 @@ class TrackMaker {
   }
 
   void store(const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random) {
-    TrackSet& tracks = simulated_.tracks;
-    tracks.id.emplace_back(tracks.track_count());
+    TrackSet& tracks = batch_.tracks;
+    tracks.id.emplace_back(next_track_++);
     for (const Sighting& s : seen) {
       const Camera& camera = layout_.block.cameras[layout_.block.camera_of(s.image)];
       const bool outlier = random.uniform() < options_.outlier_share;
@@ -203,16 +206,26 @@ class TrackMaker {
       tracks.x.push_back(to_fixed_pixel(pixel.x()));
       tracks.y.push_back(to_fixed_pixel(pixel.y()));
       tracks.feature.push_back(-1);
-      simulated_.outlier.push_back(outlier);
+      batch_.outlier.push_back(outlier);
       ++count_of(layout_.block.images[s.image].frame.value);
     }
     tracks.begin.push_back(tracks.observation_count());
-    simulated_.points.push_back(point.position);
+    batch_.points.push_back(point.position);
+    if (tracks.observation_count() >= batch_observations_) hand_over();
+  }
+
+  void hand_over() {
+    if (!batch_.tracks.id.empty()) sink_(batch_);
+    batch_ = {};
+    batch_.tracks.begin = {0};
   }
 
   const SimulationOptions& options_;
   const Layout& layout_;
-  SimulatedBlock& simulated_;
+  const TrackSink& sink_;
+  std::int64_t batch_observations_;
+  SimulatedTracks batch_;        // finished tracks that the sink has not got yet
+  std::int64_t next_track_ = 0;  // index of the next track
   Observer observer_;
   std::vector<std::int64_t> count_;  // observations of each frame so far
   int lacking_ = 0;                  // observations by which tracks fell short of their wanted length
@@ -220,8 +233,9 @@ class TrackMaker {
 
 }  // namespace
 
-void simulate_tracks(const SimulationOptions& options, const Layout& layout, SimulatedBlock& simulated) {
-  TrackMaker(options, layout, simulated).run();
+void simulate_tracks(const SimulationOptions& options, const Layout& layout, const TrackSink& sink,
+                     std::int64_t batch_observations) {
+  TrackMaker(options, layout, sink, batch_observations).run();
 }
 
 }  // namespace megablock

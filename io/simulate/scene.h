@@ -78,7 +78,8 @@ class Observer {
 };
 
 // Parts of simulate_block.
-void simulate_tracks(const SimulationOptions& options, const Layout& layout, SimulatedBlock& simulated);
+void simulate_tracks(const SimulationOptions& options, const Layout& layout, const TrackSink& sink,
+                     std::int64_t batch_observations);
 void simulate_control(const SimulationOptions& options, const Layout& layout, SimulatedBlock& simulated);
 void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated);
 

@@ -104,7 +104,8 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   layout.truth.oriented.push_back(1);
 }
 
-SimulatedBlock simulate_block(const SimulationOptions& options) {
+SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink& sink,
+                              std::int64_t batch_observations) {
   options.check();
   const bool aerial = options.scene == SimulationOptions::Scene::kAerial;
   Layout layout = aerial ? make_aerial_layout(options) : make_street_layout(options);
@@ -112,12 +113,33 @@ SimulatedBlock simulate_block(const SimulationOptions& options) {
   if (layout.block.ground.georeferenced) layout.block.ground = {true, 48.85, 2.35, 100, "EPSG:4326"};
 
   SimulatedBlock simulated;
+  simulated.tracks.begin = {0};
   simulated.block = layout.block;
   simulated.truth = layout.truth;
-  simulate_tracks(options, layout, simulated);
+  simulate_tracks(options, layout, sink, batch_observations);
   simulate_control(options, layout, simulated);
   simulate_priors(options, simulated);
   check(simulated.block);
+  return simulated;
+}
+
+SimulatedBlock simulate_block(const SimulationOptions& options) {
+  SimulatedTracks all;
+  all.tracks.begin = {0};
+  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  SimulatedBlock simulated = simulate_block(options, [&](const SimulatedTracks& batch) {
+    const std::int64_t before = all.tracks.observation_count();
+    for (std::size_t t = 1; t < batch.tracks.begin.size(); ++t)
+      all.tracks.begin.push_back(before + batch.tracks.begin[t]);
+    append(all.tracks.id, batch.tracks.id);
+    append(all.tracks.image, batch.tracks.image);
+    append(all.tracks.x, batch.tracks.x);
+    append(all.tracks.y, batch.tracks.y);
+    append(all.tracks.feature, batch.tracks.feature);
+    append(all.points, batch.points);
+    append(all.outlier, batch.outlier);
+  });
+  static_cast<SimulatedTracks&>(simulated) = std::move(all);
   return simulated;
 }
 

@@ -1,6 +1,7 @@
 // Simulated blocks with known truth: one options-driven generator behind all pipeline tests and `megablock simulate`.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -41,16 +42,27 @@ struct SimulationOptions {
   void check() const;      // throws InputError
 };
 
-struct SimulatedBlock {
+struct SimulatedTracks {
+  TrackSet tracks;                      // noisy observations
+  std::vector<Eigen::Vector3d> points;  // true positions [tracks]
+  std::vector<std::uint8_t> outlier;    // [observations] 1 = replaced by a wrong position
+};
+
+// Everything of a block; its tracks are all of them, or none where they went to a sink.
+struct SimulatedBlock : SimulatedTracks {
   Block block;  // what a job is given
   BlockState truth;
-  TrackSet tracks;                             // noisy observations, all tracks
-  std::vector<Eigen::Vector3d> points;         // true positions [tracks]
-  std::vector<std::uint8_t> outlier;           // [observations] 1 = replaced by a wrong position
   std::vector<Eigen::Vector3d> control_truth;  // true positions [block.control_points]
 };
 
 SimulatedBlock simulate_block(const SimulationOptions& options);
+
+// The same block, its tracks handed over in batches in the order of their indices. The memory is that of one batch and
+// of the frames and images.
+using TrackSink = std::function<void(const SimulatedTracks&)>;
+inline constexpr std::int64_t kTrackBatch = 1 << 20;  // observations
+SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink& sink,
+                              std::int64_t batch_observations = kTrackBatch);
 
 // Renders the images of a small block (textured terrain and boxes, ray cast, Brown distortion) as JPEG with EXIF GPS
 // into folder/images, and writes the project files around them:
@@ -60,7 +72,11 @@ SimulatedBlock simulate_block(const SimulationOptions& options);
 //   held)
 // Attitude priors and relative poses have no place in these files and are not written.
 void write_rendered_block(const SimulationOptions& options, const std::string& folder);
-// The tie-point level: folder/block.yaml (with `tie_points: tie_points.h5`, `block: given.h5`), truth.csv, truth.h5.
-void write_simulated_block(const SimulatedBlock& simulated, const std::string& folder);
+// The tie-point level, streamed to the files: folder/block.yaml (with `tie_points: tie_points.h5`, `block: given.h5`),
+// truth.csv, truth.h5 (poses, cameras), truth_tracks.h5 (points, wrong observations).
+void write_simulated_block(const SimulationOptions& options, const std::string& folder,
+                           std::int64_t batch_observations = kTrackBatch);
+// Of truth_tracks.h5: positions of the points and verdicts on the observations, no tracks.
+SimulatedTracks read_truth_tracks(const std::string& path);
 
 }  // namespace megablock

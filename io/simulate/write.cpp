@@ -3,30 +3,71 @@
 #include <fstream>
 
 #include "io/error.h"
+#include "io/hdf5_tables.h"
 #include "io/pose_csv.h"
 #include "io/simulate/simulate.h"
+#include "io/track_writer.h"
 #include "io/unit_files.h"
 
 namespace megablock {
 
 namespace fs = std::filesystem;
 
-void write_simulated_block(const SimulatedBlock& simulated, const std::string& folder) {
+namespace {
+
+constexpr const char *kTruth = "simulated_tracks", *kPosition = "points/position", *kOutlier = "observations/outlier";
+
+std::vector<double> positions(const std::vector<Eigen::Vector3d>& points) {
+  return vectors3(points, [](const Eigen::Vector3d& point) { return point; });
+}
+
+}  // namespace
+
+void write_simulated_block(const SimulationOptions& options, const std::string& folder,
+                           std::int64_t batch_observations) {
+  options.check();
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw InputError(folder + ": cannot be created: " + error.message());
   const fs::path root(folder);
+
+  TrackWriter tie_points((root / "tie_points.h5").string());
+  Hdf5Writer truth_tracks((root / "truth_tracks.h5").string(), kTruth, Hdf5Storage::kDisk);
+  truth_tracks.group("points", "one row per track of tie_points.h5");
+  truth_tracks.growing<double>(kPosition, 3, {"m", "true position in the ground frame"});
+  truth_tracks.group("observations", "one row per observation of tie_points.h5");
+  truth_tracks.growing<std::uint8_t>(kOutlier, 1, {"", "1: a wrong match, 0: the point with the stated noise"});
+  const SimulatedBlock simulated = simulate_block(
+      options,
+      [&](const SimulatedTracks& batch) {
+        tie_points.append(batch.tracks);
+        truth_tracks.append(kPosition, positions(batch.points));
+        truth_tracks.append(kOutlier, batch.outlier);
+      },
+      batch_observations);
+  tie_points.close();
+  truth_tracks.close();
+
   write_block((root / "given.h5").string(), simulated.block);
-  write_tracks((root / "tie_points.h5").string(), simulated.tracks);
   write_state((root / "truth.h5").string(), simulated.truth);
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
   std::ofstream yaml(root / "block.yaml");
   yaml << "# A simulated block: cameras, frames and priors in given.h5, tie points in tie_points.h5.\n"
-       << "# The truth is in truth.csv (poses) and truth.h5 (poses and cameras).\n"
+       << "# The truth is in truth.csv (poses), truth.h5 (poses and cameras) and truth_tracks.h5 (points, wrong "
+          "observations).\n"
        << "block: given.h5\n"
        << "tie_points: tie_points.h5\n";
   yaml.close();
   if (!yaml) throw InputError((root / "block.yaml").string() + ": cannot be written");
+}
+
+SimulatedTracks read_truth_tracks(const std::string& path) {
+  const Hdf5Reader file(path, kTruth);
+  SimulatedTracks truth;
+  const std::vector<double> rows = file.matrix<double>(kPosition, 3);
+  for (std::size_t p = 0; 3 * p < rows.size(); ++p) truth.points.push_back(vector3(rows, p));
+  truth.outlier = file.vector<std::uint8_t>(kOutlier);
+  return truth;
 }
 
 }  // namespace megablock

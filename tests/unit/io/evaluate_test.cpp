@@ -21,11 +21,14 @@ constexpr double kDegree = std::numbers::pi / 180;
 // A result whose errors are drawn from the covariances it states.
 class EvaluateTest : public testing::Test {
  protected:
-  EvaluateTest() {
+  static SimulationOptions options() {
     SimulationOptions options;
     options.frames = 2000;
     options.points_per_frame = 10;
-    simulated_ = simulate_block(options);
+    return options;
+  }
+  EvaluateTest() {
+    simulated_ = simulate_block(options());
     result_.block = simulated_.block;
     result_.state = simulated_.truth;
     result_.gauge = "fixed by priors";
@@ -212,7 +215,7 @@ TEST_F(EvaluateTest, JsonHasNullForWhatDoesNotExist) {
 TEST_F(EvaluateTest, TruthIsReadFromFiles) {
   const auto folder = std::filesystem::path(testing::TempDir()) / "evaluate_test";
   std::filesystem::remove_all(folder);
-  write_simulated_block(simulated_, folder.string());
+  write_simulated_block(options(), folder.string());
   const Evaluation direct = evaluate(result_, simulated_.truth);
   for (const std::string name : {"", "truth.csv", "truth.h5"}) {
     const Evaluation e = evaluate(result_, (folder / name).string());

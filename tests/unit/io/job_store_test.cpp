@@ -15,6 +15,7 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/hdf5_file.h"
+#include "io/track_writer.h"
 #include "io/unit_files.h"
 #include "tests/unit/io/example_block.h"
 #include "tests/unit/io/scratch_directory.h"
@@ -297,6 +298,38 @@ TEST_F(Store, FileSizeLimitIsSaidAndTheProcessGoesOn) {
     if (files_in_tracks() != 0) ::_exit(2);
     store_.write_text("job.json", "{}");  // small files can still be written
     std::exit(0);                         // HDF5 closes itself without a crash
+  });
+  EXPECT_EQ(status, 0);
+}
+
+// A file that HDF5 writes to the disk itself.
+TEST_F(Store, FileSizeLimitIsSaidWhileTracksAreAppended) {
+  const std::string path = scratch_.path("large.h5");
+  const int status = in_child([&] {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{20 << 20, 20 << 20};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    const std::string found = message_of<InputError>([&] {
+      TrackWriter writer(path);
+      TrackSet batch;
+      batch.begin = {0};
+      for (std::int64_t t = 0; t < 1000000; ++t) {
+        const auto noise = static_cast<std::int32_t>(t * 0x9e3779b9);
+        batch.id.push_back(TrackIndex(t));
+        batch.image.push_back(ImageIndex(noise & 0xffff));
+        batch.x.push_back(noise);
+        batch.y.push_back(-noise);
+        batch.feature.push_back(noise ^ 0x5555);
+        batch.begin.push_back(t + 1);
+      }
+      for (;;) {
+        writer.append(batch);
+        for (TrackIndex& id : batch.id) id.value += 1000000;
+      }
+    });
+    if (found.find(path + ": cannot be written: larger than the file size limit") == std::string::npos) ::_exit(1);
+    if (fs::exists(path)) ::_exit(2);
+    std::exit(0);  // HDF5 closes itself without a crash
   });
   EXPECT_EQ(status, 0);
 }

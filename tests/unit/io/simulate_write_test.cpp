@@ -7,6 +7,7 @@
 #include "io/error.h"
 #include "io/pose_csv.h"
 #include "io/simulate/simulate.h"
+#include "io/track_writer.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -45,7 +46,7 @@ TEST_F(SimulateWriteTest, FilesHoldTheBlock) {
   options.frames = 12;
   options.control_points = 4;
   const SimulatedBlock s = simulate_block(options);
-  write_simulated_block(s, folder_.string());
+  write_simulated_block(options, folder_.string());
 
   const Block block = read_block(file("given.h5"));
   ASSERT_EQ(block.frames.size(), s.block.frames.size());
@@ -73,6 +74,57 @@ TEST_F(SimulateWriteTest, FilesHoldTheBlock) {
     EXPECT_EQ(poses.poses[f].centre, s.truth.frames[frame].centre);  // 17 digits: the same bits
     EXPECT_LT(rotation_angle(poses.poses[f].rotation, s.truth.frames[frame].rotation), 1e-15);
   }
+}
+
+// Streamed in batches of a few tracks, the files hold what is made in memory.
+TEST_F(SimulateWriteTest, BatchesLeaveNoTrace) {
+  SimulationOptions options;
+  options.frames = 30;
+  options.points_per_frame = 40;
+  options.outlier_share = 0.1;
+  for (const auto scene : {SimulationOptions::Scene::kAerial, SimulationOptions::Scene::kStreet}) {
+    options.scene = scene;
+    const SimulatedBlock s = simulate_block(options);
+    for (const std::int64_t batch : {std::int64_t{1}, std::int64_t{37}, kTrackBatch}) {
+      write_simulated_block(options, folder_.string(), batch);
+      const TrackSet tracks = read_tracks(file("tie_points.h5"));
+      EXPECT_EQ(tracks.id, s.tracks.id);
+      EXPECT_EQ(tracks.begin, s.tracks.begin);
+      EXPECT_EQ(tracks.image, s.tracks.image);
+      EXPECT_EQ(tracks.x, s.tracks.x);
+      EXPECT_EQ(tracks.y, s.tracks.y);
+      EXPECT_EQ(tracks.feature, s.tracks.feature);
+      const SimulatedTracks truth = read_truth_tracks(file("truth_tracks.h5"));
+      EXPECT_EQ(truth.points, s.points);
+      EXPECT_EQ(truth.outlier, s.outlier);
+    }
+  }
+}
+
+TEST_F(SimulateWriteTest, BatchesAreNoLargerThanAsked) {
+  SimulationOptions options;
+  options.frames = 30;
+  options.points_per_frame = 40;
+  std::int64_t batches = 0, observations = 0;
+  simulate_block(
+      options,
+      [&](const SimulatedTracks& batch) {
+        ++batches;
+        observations += batch.tracks.observation_count();
+        EXPECT_LT(batch.tracks.observation_count(), 100 + 30);  // the last track of a batch is kept whole
+      },
+      100);
+  EXPECT_GE(batches, observations / 130);
+}
+
+TEST_F(SimulateWriteTest, AWriterThatIsAbandonedLeavesNoFile) {
+  {
+    TrackWriter writer(file("half.h5"));
+    TrackSet batch;
+    batch.begin = {0};
+    writer.append(batch);
+  }
+  EXPECT_FALSE(fs::exists(file("half.h5")));
 }
 
 TEST_F(SimulateWriteTest, ColumnsOfAPoseTableMayStandInAnyOrder) {
@@ -104,7 +156,7 @@ TEST_F(SimulateWriteTest, AFolderThatCannotBeMadeIsReported) {
   write_text("occupied", "");
   SimulationOptions options;
   options.frames = 4;
-  EXPECT_THROW(write_simulated_block(simulate_block(options), file("occupied")), InputError);
+  EXPECT_THROW(write_simulated_block(options, file("occupied")), InputError);
 }
 
 }  // namespace
