@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <thread>
 
 #include "cluster/arithmetic.h"
@@ -15,6 +14,7 @@
 #include "cluster/exit_codes.h"
 #include "cluster/monolithic_comparison.h"
 #include "cluster/pipeline.h"
+#include "cluster/simulate_command.h"
 #include "cluster/status.h"
 #include "cluster/version.h"
 #include "io/check.h"
@@ -24,15 +24,11 @@
 #include "io/import.h"
 #include "io/project.h"
 #include "io/report.h"
-#include "io/simulate/simulate.h"
 #include "io/unit_files.h"
 
 namespace megablock {
 
 namespace {
-
-// A command fills this in when it was chosen; it is run after parsing, so that all errors leave by one door.
-using Action = std::function<int()>;
 
 constexpr const char* kResult = "result/block.h5";
 
@@ -262,69 +258,6 @@ void add_evaluate(CLI::App& app, Action& action) {
     action = [options] {
       const Evaluation evaluation = evaluate(finished_result(options->job), options->truth, options->evaluation);
       std::printf("%s\n", (options->json ? to_json(evaluation) : to_text(evaluation)).c_str());
-      return kExitDone;
-    };
-  });
-}
-
-void add_simulate(CLI::App& app, Action& action) {
-  struct Options {
-    SimulationOptions simulation;
-    std::string scene = "aerial", output;
-    bool rendered = false;
-  };
-  auto options = std::make_shared<Options>();
-  SimulationOptions& s = options->simulation;
-  CLI::App* command = app.add_subcommand("simulate", "Make a block with known truth: tie points or rendered pictures");
-  command->footer(
-      "Example: megablock simulate --scene aerial --frames 500 -o simulated\n"
-      "         megablock simulate --rendered --frames 24 -o rendered");
-  command->add_option("--scene", options->scene, "aerial | street")
-      ->check(CLI::IsMember({"aerial", "street"}))
-      ->capture_default_str();
-  command->add_flag("--rendered", options->rendered, "Render pictures (small blocks) instead of tie points");
-  command->add_option("--frames", s.frames, "Frames")->capture_default_str();
-  command->add_option("--seed", s.seed, "Seed")->capture_default_str();
-  command->add_option("--forward-overlap", s.forward_overlap, "Aerial: along the row, 0..1")->capture_default_str();
-  command->add_option("--side-overlap", s.side_overlap, "Aerial: between rows, 0..1")->capture_default_str();
-  command->add_option("--height", s.height_m, "Aerial: above mean terrain, m")->capture_default_str();
-  command->add_option("--relief", s.terrain_relief_m, "Aerial: terrain relief, m")->capture_default_str();
-  command->add_option("--street-spacing", s.street_spacing_m, "Street: between streets, m")->capture_default_str();
-  command->add_option("--frame-distance", s.frame_distance_m, "Street: between frames, m")->capture_default_str();
-  command->add_option("--rig-cameras", s.rig_cameras, "Street: cameras of the rig")->capture_default_str();
-  command->add_option("--points-per-frame", s.points_per_frame, "Observations per frame")->capture_default_str();
-  command->add_option("--mean-track", s.mean_track, "Observations per point")->capture_default_str();
-  command->add_option("--noise", s.image_noise_px, "Image noise per axis, px")->capture_default_str();
-  command->add_option("--outliers", s.outlier_share, "Share of wrong observations, 0..1")->capture_default_str();
-  command->add_option("--gps-sigma", s.gps_sigma_m, "Position priors, m; 0 = none")->capture_default_str();
-  command->add_option("--gps-share", s.gps_share, "Share of frames with a position prior")->capture_default_str();
-  command->add_option("--attitude-sigma", s.attitude_sigma_deg, "Attitude priors, degrees; 0 = none")
-      ->capture_default_str();
-  command->add_option("--relative-position-sigma", s.relative_position_sigma_m, "Relative poses, m; 0 = none")
-      ->capture_default_str();
-  command->add_option("--relative-rotation-sigma", s.relative_rotation_sigma_deg, "Relative poses, degrees")
-      ->capture_default_str();
-  command->add_option("--control-points", s.control_points, "Control points")->capture_default_str();
-  command->add_option("--check-points", s.check_points, "Check points")->capture_default_str();
-  command->add_option("--control-sigma", s.control_sigma_m, "Sigma of control points, m")->capture_default_str();
-  command->add_option("--width", s.image_width, "Image width, px")->capture_default_str();
-  command->add_option("--image-height", s.image_height, "Image height, px")->capture_default_str();
-  command->add_option("--focal", s.focal_px, "Focal length, px")->capture_default_str();
-  command->add_flag_callback(
-      "--no-distortion", [options] { options->simulation.distortion = false; }, "A camera without lens distortion");
-  command->add_flag_callback(
-      "--no-calibration", [options] { options->simulation.calibrate = false; }, "Hold the camera at the truth");
-  command->add_option("-o,--output", options->output, "Folder to write")->required();
-  command->callback([=, &action] {
-    action = [options] {
-      options->simulation.scene =
-          options->scene == "street" ? SimulationOptions::Scene::kStreet : SimulationOptions::Scene::kAerial;
-      options->simulation.check();
-      if (options->rendered)
-        write_rendered_block(options->simulation, options->output);
-      else
-        write_simulated_block(options->simulation, options->output);
-      std::printf("%s/block.yaml\n", options->output.c_str());
       return kExitDone;
     };
   });

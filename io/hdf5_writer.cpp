@@ -21,6 +21,9 @@ constexpr hsize_t kChunkBytes = 1 << 19;      // of one chunk before compression
 constexpr std::size_t kMemoryStep = 1 << 20;  // bytes by which the file in memory grows
 constexpr unsigned kDeflateLevel = 1;         // higher levels gain a few per cent for several times the time
 
+// Where the superblock (version 2 or 3, 8-byte addresses) tells the end of the file.
+constexpr std::int64_t kEndOfFile = 28;
+
 Hdf5Handle without_times(hid_t property_class) {
   Hdf5Handle properties(H5Pcreate(property_class), &H5Pclose);
   H5Pset_obj_track_times(properties.id(), false);
@@ -56,6 +59,15 @@ bool fits(std::int64_t lowest, std::int64_t highest) {
   return lowest >= std::numeric_limits<T>::min() && highest <= std::numeric_limits<T>::max();
 }
 
+// Gives back what is reserved beyond the end of a closed file.
+void give_back_disk(const std::string& path) {
+  const Descriptor file(path, O_RDWR);
+  std::uint64_t end = 0;
+  if (file.id() < 0 || !read_fully(file.id(), &end, sizeof end, kEndOfFile) ||
+      ::ftruncate(file.id(), static_cast<off_t>(end)) != 0)
+    throw_file_error(path, "written", errno);
+}
+
 }  // namespace
 
 // HDF5's memory driver asks these callbacks for its buffer and hands it back when the file is closed.
@@ -76,10 +88,10 @@ struct Hdf5Writer::Image {
   static void* share(void* image) { return image; }
   static herr_t unshare(void*) { return 0; }
 
-  // End of the file, from its superblock (version 2 or 3, 8-byte addresses): the buffer itself is longer.
+  // The buffer itself is longer than the file.
   std::size_t size() const {
     std::uint64_t end = 0;
-    if (data) std::memcpy(&end, static_cast<const char*>(data) + 28, sizeof end);
+    if (data) std::memcpy(&end, static_cast<const char*>(data) + kEndOfFile, sizeof end);
     return end;
   }
 };
@@ -116,7 +128,10 @@ Hdf5Writer::~Hdf5Writer() {
 void Hdf5Writer::close() {
   growing_.clear();
   checked(H5Fclose(file_.release()), "");
-  if (storage_ == Hdf5Storage::kDisk) return;
+  if (storage_ == Hdf5Storage::kDisk) {
+    give_back_disk(path_);
+    return;
+  }
   const Descriptor file(path_, O_WRONLY | O_CREAT | O_TRUNC);
   if (file.id() < 0) throw_file_error(path_, "created", errno);
   write_fully(file.id(), path_, image_->data, image_->size());

@@ -1,4 +1,5 @@
 // Tracks: docs/job-format.md, "Tracks".
+#include "io/error.h"
 #include "io/hdf5_tables.h"
 #include "io/track_writer.h"
 #include "io/unit_files.h"
@@ -108,6 +109,21 @@ void write_tracks(const std::string& path, const TrackSet& tracks) {
   file.close();
 }
 
+namespace {
+
+// The types of growing datasets are settled before their values are known; half the width saves a quarter of the file.
+std::vector<std::int32_t> narrow(const std::vector<std::int64_t>& values) {
+  std::vector<std::int32_t> narrowed;
+  narrowed.reserve(values.size());
+  for (const std::int64_t value : values) {
+    if (value != static_cast<std::int32_t>(value)) throw StoreError("tracks: more than 2^31 images cannot be streamed");
+    narrowed.push_back(static_cast<std::int32_t>(value));
+  }
+  return narrowed;
+}
+
+}  // namespace
+
 struct TrackWriter::File {
   explicit File(const std::string& path) : hdf5(path, "tracks", Hdf5Storage::kDisk) {}
   Hdf5Writer hdf5;
@@ -116,8 +132,9 @@ struct TrackWriter::File {
 
 TrackWriter::TrackWriter(const std::string& path) : file_(std::make_unique<File>(path)) {
   make_groups(file_->hdf5);
-  for (const char* name : {kIds, kCounts, kImages}) file_->hdf5.growing<std::int64_t>(name, 1, note_of(name));
-  for (const char* name : {kX, kY, kFeature}) file_->hdf5.growing<std::int32_t>(name, 1, note_of(name));
+  file_->hdf5.growing<std::int64_t>(kIds, 1, note_of(kIds));
+  for (const char* name : {kCounts, kImages, kX, kY, kFeature})
+    file_->hdf5.growing<std::int32_t>(name, 1, note_of(name));
 }
 
 TrackWriter::~TrackWriter() = default;
@@ -125,8 +142,8 @@ TrackWriter::~TrackWriter() = default;
 void TrackWriter::append(const TrackSet& batch) {
   const Columns columns = encode(batch, file_->coded);
   file_->hdf5.append(kIds, columns.id_difference);
-  file_->hdf5.append(kCounts, columns.observations);
-  file_->hdf5.append(kImages, columns.image_difference);
+  file_->hdf5.append(kCounts, narrow(columns.observations));
+  file_->hdf5.append(kImages, narrow(columns.image_difference));
   file_->hdf5.append(kX, batch.x);
   file_->hdf5.append(kY, batch.y);
   file_->hdf5.append(kFeature, batch.feature);

@@ -69,7 +69,7 @@ double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3
 
 City::City(const SimulationOptions& options, const Layout& layout)
     : options_(options),
-      street_(options.scene == SimulationOptions::Scene::kStreet),
+      street_(options.scene != SimulationOptions::Scene::kAerial),
       range_m_(street_ ? 60 : layout.scene->range_m()),
       intrinsics_(layout.truth.cameras.front()),
       texture_(options.seed, 3 * (street_ ? 8 : options.height_m) / options.focal_px) {

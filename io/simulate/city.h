@@ -62,6 +62,9 @@ class City : public Scene {
 
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override;
   bool visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const override;
+  std::optional<SurfacePoint> road(const Eigen::Vector2d& place) const override {
+    return SurfacePoint{{place.x(), place.y(), ground_.height(place.x(), place.y())}, Eigen::Vector3d::UnitZ()};
+  }
   double range_m() const override { return range_m_; }
   bool along_passes() const override { return street_; }
 

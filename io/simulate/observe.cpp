@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "io/simulate/scene.h"
+#include "io/simulate/wrong_matches.h"
 
 namespace megablock {
 
@@ -66,19 +67,24 @@ void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<S
   if (!layout_.scene->visible(pose.centre, point)) return;
   const auto cameras = static_cast<std::int64_t>(layout_.block.rigs[RigIndex(0)].mounts.size());
   for (std::int64_t i = frame * cameras; i < (frame + 1) * cameras; ++i) {
-    const View& view = views_[static_cast<std::size_t>(i)];
-    const Eigen::Vector3d inside = view.rotation * (point.position - view.centre);
-    if (inside.z() < 0.5) continue;
-    const CameraIndex camera(view.camera);
-    const double radius_sq = inside.head<2>().squaredNorm() / (inside.z() * inside.z());
-    if (radius_sq > max_radius_sq_[static_cast<std::size_t>(view.camera)]) continue;
-    const Eigen::Vector2d pixel = project(layout_.truth.cameras[camera], inside);
-    const Camera& size = layout_.block.cameras[camera];
-    if (pixel.x() < margin_px_ || pixel.x() > size.width - margin_px_ || pixel.y() < margin_px_ ||
-        pixel.y() > size.height - margin_px_)
-      continue;
-    seen.push_back({ImageIndex(i), pixel});
+    const ImageIndex image(i);
+    if (const auto pixel = pixel_of(image, point.position)) seen.push_back({image, *pixel});
   }
+}
+
+std::optional<Eigen::Vector2d> Observer::pixel_of(ImageIndex image, const Eigen::Vector3d& place) const {
+  const View& view = views_[static_cast<std::size_t>(image.value)];
+  const Eigen::Vector3d inside = view.rotation * (place - view.centre);
+  if (inside.z() < 0.5) return std::nullopt;
+  const CameraIndex camera(view.camera);
+  const double radius_sq = inside.head<2>().squaredNorm() / (inside.z() * inside.z());
+  if (radius_sq > max_radius_sq_[static_cast<std::size_t>(view.camera)]) return std::nullopt;
+  const Eigen::Vector2d pixel = project(layout_.truth.cameras[camera], inside);
+  const Camera& size = layout_.block.cameras[camera];
+  if (pixel.x() < margin_px_ || pixel.x() > size.width - margin_px_ || pixel.y() < margin_px_ ||
+      pixel.y() > size.height - margin_px_)
+    return std::nullopt;
+  return pixel;
 }
 
 std::vector<Sighting> Observer::sightings(const SurfacePoint& point) const {
@@ -100,13 +106,13 @@ namespace {
 
 class TrackMaker {
  public:
-  TrackMaker(const SimulationOptions& options, const Layout& layout, const TrackSink& sink,
+  TrackMaker(const SimulationOptions& options, const Layout& layout, const Observer& observer, const TrackSink& sink,
              std::int64_t batch_observations)
       : options_(options),
         layout_(layout),
+        observer_(observer),
         sink_(sink),
         batch_observations_(batch_observations),
-        observer_(layout, 2 + 5 * options.image_noise_px),
         count_(layout.block.frames.size(), 0) {
     batch_.tracks.begin = {0};
   }
@@ -162,8 +168,9 @@ class TrackMaker {
       const FrameIndex other = layout_.block.images[s.image].frame;
       double rank = random.uniform();
       if (layout_.scene->along_passes()) {
-        // Frames of the other pass are ranked by distance: they meet the point anywhere in their drive.
-        const bool same = layout_.block.frames[other].pass == pass;
+        // Frames of another visit are ranked by distance: they meet the point anywhere in their drive.
+        const bool same = layout_.block.frames[other].pass == pass &&
+                          std::abs(other.value - frame.value) <= layout_.scene->visit_frames();
         rank += same ? static_cast<double>(std::abs(other.value - frame.value))
                      : (two_passes ? 0 : 1e6) +
                            (layout_.truth.frames[other].centre - layout_.truth.frames[frame].centre).norm() /
@@ -193,21 +200,27 @@ class TrackMaker {
   void store(const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random) {
     TrackSet& tracks = batch_.tracks;
     tracks.id.emplace_back(next_track_++);
-    for (const Sighting& s : seen) {
-      const Camera& camera = layout_.block.cameras[layout_.block.camera_of(s.image)];
-      const bool outlier = random.uniform() < options_.outlier_share;
+    const WrongGroup wrong = draw_wrong_group(options_, layout_, observer_, point, seen, random);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const ImageIndex image = seen[i].image;
+      const Camera& camera = layout_.block.cameras[layout_.block.camera_of(image)];
+      const bool agreed = i >= wrong.begin && i < wrong.begin + wrong.pixels.size();  // on a wrong place
+      const bool stray = agreed ? !wrong.pixels[i - wrong.begin] : random.uniform() < wrong.stray_share;
+      const Eigen::Vector2d place = agreed && !stray ? *wrong.pixels[i - wrong.begin] : seen[i].pixel;
       Eigen::Vector2d pixel;
       do {
-        const double a = outlier ? random.uniform() : random.normal(), b = outlier ? random.uniform() : random.normal();
-        pixel = outlier ? Eigen::Vector2d(a * camera.width, b * camera.height)
-                        : Eigen::Vector2d(s.pixel + options_.image_noise_px * Eigen::Vector2d(a, b));
+        const double a = stray ? random.uniform() : random.normal(), b = stray ? random.uniform() : random.normal();
+        pixel = stray ? Eigen::Vector2d(a * camera.width, b * camera.height)
+                      : Eigen::Vector2d(place + options_.image_noise_px * Eigen::Vector2d(a, b));
       } while (pixel.x() < 0 || pixel.x() > camera.width || pixel.y() < 0 || pixel.y() > camera.height);
-      tracks.image.push_back(s.image);
+      tracks.image.push_back(image);
       tracks.x.push_back(to_fixed_pixel(pixel.x()));
       tracks.y.push_back(to_fixed_pixel(pixel.y()));
       tracks.feature.push_back(-1);
-      batch_.outlier.push_back(outlier);
-      ++count_of(layout_.block.images[s.image].frame.value);
+      batch_.outlier.push_back(static_cast<std::uint8_t>(stray    ? Verdict::kStray
+                                                         : agreed ? wrong.verdict
+                                                                  : Verdict::kRight));
+      ++count_of(layout_.block.images[image].frame.value);
     }
     tracks.begin.push_back(tracks.observation_count());
     batch_.points.push_back(point.position);
@@ -222,20 +235,20 @@ class TrackMaker {
 
   const SimulationOptions& options_;
   const Layout& layout_;
+  const Observer& observer_;
   const TrackSink& sink_;
   std::int64_t batch_observations_;
-  SimulatedTracks batch_;        // finished tracks that the sink has not got yet
-  std::int64_t next_track_ = 0;  // index of the next track
-  Observer observer_;
+  SimulatedTracks batch_;            // finished tracks that the sink has not got yet
+  std::int64_t next_track_ = 0;      // index of the next track
   std::vector<std::int64_t> count_;  // observations of each frame so far
   int lacking_ = 0;                  // observations by which tracks fell short of their wanted length
 };
 
 }  // namespace
 
-void simulate_tracks(const SimulationOptions& options, const Layout& layout, const TrackSink& sink,
-                     std::int64_t batch_observations) {
-  TrackMaker(options, layout, sink, batch_observations).run();
+void simulate_tracks(const SimulationOptions& options, const Layout& layout, const Observer& observer,
+                     const TrackSink& sink, std::int64_t batch_observations) {
+  TrackMaker(options, layout, observer, sink, batch_observations).run();
 }
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// Priors, given poses, and control and check points of a simulated block. Every stated sigma is the true one.
+// Priors and given poses of a simulated block. Every stated sigma is the true one.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -42,6 +42,8 @@ class DriftingError {
   Eigen::Vector3d slow_ = Eigen::Vector3d::Zero();
 };
 
+}  // namespace
+
 RelativePose measure_relative(const SimulationOptions& options, const BlockState& truth, FrameIndex from, FrameIndex to,
                               Random& random) {
   const Pose &a = truth.frames[from], &b = truth.frames[to];
@@ -55,8 +57,6 @@ RelativePose measure_relative(const SimulationOptions& options, const BlockState
   relative.pose.centre = to_inside(a, b.centre) + relative.position_sigma_m * random.normal3();
   return relative;
 }
-
-}  // namespace
 
 void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated) {
   Block& block = simulated.block;
@@ -99,53 +99,6 @@ void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated
     if (options.relative_position_sigma_m > 0 && !new_pass)
       block.relative_poses.push_back(
           measure_relative(options, simulated.truth, FrameIndex(index.value - 1), index, random));
-  }
-}
-
-// Places follow an additive recurrence over the block's extent (Roberts' R2 sequence), each moved to the view of the
-// nearest frame; roles alternate in proportion.
-void simulate_control(const SimulationOptions& options, const Layout& layout, SimulatedBlock& simulated) {
-  const int total = options.control_points + options.check_points;
-  if (total == 0) return;
-  const Observer observer(layout, 2 + 5 * options.image_noise_px);
-  Eigen::Vector2d low = layout.truth.frames.front().centre.head<2>(), high = low;
-  for (const Pose& pose : layout.truth.frames) {
-    low = low.cwiseMin(pose.centre.head<2>());
-    high = high.cwiseMax(pose.centre.head<2>());
-  }
-  const double sigma_px = options.image_noise_px > 0 ? options.image_noise_px : 0.1;
-  int control = 0;
-  for (int i = 0; i < total; ++i) {
-    Random random(options.seed, Random::Purpose::kControl, static_cast<std::uint64_t>(i));
-    const Eigen::Vector2d share(std::fmod(0.5 + 0.7548776662466927 * (i + 1), 1.0),
-                                std::fmod(0.5 + 0.5698402909980532 * (i + 1), 1.0));
-    const Eigen::Vector2d target = low + share.cwiseProduct(high - low);
-    const auto distance = [&](const Pose& pose) { return (pose.centre.head<2>() - target).squaredNorm(); };
-    const auto nearest = std::min_element(layout.truth.frames.begin(), layout.truth.frames.end(),
-                                          [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
-    ControlPoint point;
-    Eigen::Vector3d truth = Eigen::Vector3d::Zero();
-    std::vector<Sighting> seen;
-    for (int tries = 0; tries < 1000 && seen.size() < 3; ++tries) {
-      const auto surface = layout.scene->sample(*nearest, random);
-      if (!surface) continue;
-      truth = surface->position;
-      seen = observer.sightings(*surface);
-    }
-    if (seen.size() < 2) continue;
-    const bool is_control =
-        static_cast<std::int64_t>(control) * total < static_cast<std::int64_t>(options.control_points) * (i + 1);
-    control += is_control;
-    point.role = is_control ? PointRole::kControl : PointRole::kCheck;
-    point.name.append(is_control ? "control" : "check").append(std::to_string(i));
-    point.position = truth + options.control_sigma_m * random.normal3();
-    point.sigma.setConstant(options.control_sigma_m);
-    for (const Sighting& s : seen) {
-      const double x = random.normal(), y = random.normal();
-      point.measurements.push_back({s.image, s.pixel + options.image_noise_px * Eigen::Vector2d(x, y), sigma_px});
-    }
-    simulated.block.control_points.push_back(std::move(point));
-    simulated.control_truth.push_back(truth);
   }
 }
 

@@ -21,7 +21,17 @@ inline std::uint64_t mix_bits(std::uint64_t z) {
 class Random {
  public:
   // What a stream is drawn for; streams of different purposes are independent.
-  enum class Purpose : std::uint64_t { kCamera = 1, kTerrain, kFrame, kTracks, kNoise, kPriors, kControl, kImage };
+  enum class Purpose : std::uint64_t {
+    kCamera = 1,
+    kTerrain,
+    kFrame,
+    kTracks,
+    kNoise,
+    kPriors,
+    kControl,
+    kImage,
+    kTrajectory
+  };
 
   Random(std::uint64_t seed, Purpose purpose, std::uint64_t item = 0)
       : state_(mix_bits(mix_bits(mix_bits(seed + kStep) + static_cast<std::uint64_t>(purpose) * kStep) + item)) {}

@@ -7,6 +7,7 @@
 
 #include "io/error.h"
 #include "io/simulate/scene.h"
+#include "io/simulate/trajectory.h"
 
 namespace megablock {
 
@@ -24,6 +25,34 @@ std::string frame_name(std::int64_t index) {
 
 }  // namespace
 
+SimulationOptions SimulationOptions::of(Scene scene, Path path) {
+  SimulationOptions options;
+  options.scene = scene;
+  options.path = path;
+  if (scene == Scene::kAerial || scene == Scene::kStreet) return options;
+  options.rig_cameras = 10;
+  options.image_height = 1080;
+  options.points_per_frame = 200;
+  if (scene == Scene::kStereopolis) {
+    options.frames = 800;
+    options.outlier_share = 0.03;
+    options.gps_sigma_m = 0.02;
+    options.attitude_sigma_deg = 0.03;
+    options.relative_position_sigma_m = 0.005;
+    options.control_sigma_m = 0.015;
+  } else {
+    const bool sparse = path == Path::kSparse;
+    options.frames = sparse ? 4 : 30;
+    options.points_per_frame = sparse ? 20 : 350;
+    options.gps_sigma_m = 0;
+    options.start_position_error_m = 0.2;
+    options.control_points = sparse ? 10 : 154;
+    options.check_points = sparse ? 5 : 77;
+    options.control_sigma_m = 0.002;
+  }
+  return options;
+}
+
 void SimulationOptions::check() const {
   require(frames >= 2, "frames must be at least 2");
   require(forward_overlap >= 0.3 && forward_overlap < 0.99, "forward_overlap must lie in [0.3, 0.99)");
@@ -33,6 +62,21 @@ void SimulationOptions::check() const {
   require(street_spacing_m >= 40, "street_spacing_m must be at least 40");
   require(frame_distance_m > 0 && frame_distance_m <= 15, "frame_distance_m must lie in (0, 15]");
   require(rig_cameras >= 1 && rig_cameras <= 16, "rig_cameras must lie in [1, 16]");
+  require(drives >= 1 && drives <= 100, "drives must lie in [1, 100]");
+  require(days >= 1 && days <= drives, "days must lie in [1, drives]");
+  require(scene != Scene::kStereopolis || frames >= 2 * drives, "frames must be at least 2 per drive");
+  require(gnss_masked_share >= 0 && gnss_masked_share < 1, "gnss_masked_share must lie in [0, 1)");
+  require(gnss_absent_share >= 0 && gnss_absent_share <= gnss_masked_share,
+          "gnss_absent_share must lie in [0, gnss_masked_share]");
+  require(gnss_masked_frames >= 1, "gnss_masked_frames must be at least 1");
+  require(drift_m >= 0, "drift_m must not be negative");
+  require(control_zones >= 0, "control_zones must not be negative");
+  require(held_out_zone == -1 || (held_out_zone >= 0 && held_out_zone < control_zones),
+          "held_out_zone must be -1 or one of the control zones, counted from 0");
+  require(scene != Scene::kStereopolis || outlier_share <= 0.4, "outlier_share of this scene must lie in [0, 0.4]");
+  require(control_zones == 0 || scene == Scene::kStereopolis, "control_zones are those of the stereopolis scene");
+  require(mount_position_error_m >= 0 && mount_rotation_error_deg >= 0 && mount_rotation_error_deg < 10,
+          "mount errors must not be negative, mount_rotation_error_deg below 10");
   require(points_per_frame >= 10, "points_per_frame must be at least 10");
   require(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");
   require(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");
@@ -92,7 +136,10 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   for (std::size_t m = 0; m < cameras; ++m) {
     Image image;
     image.name = frame.name;
-    if (cameras > 1) image.name.append("_c").append(std::to_string(m));
+    if (!layout.image_suffixes.empty())
+      image.name.append(layout.image_suffixes[m]);
+    else if (cameras > 1)
+      image.name.append("_c").append(std::to_string(m));
     image.name.append(".jpg");
     image.frame = index;
     image.mount = static_cast<int>(m);
@@ -104,21 +151,47 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   layout.truth.oriented.push_back(1);
 }
 
+Layout make_layout(const SimulationOptions& options) {
+  switch (options.scene) {
+    case SimulationOptions::Scene::kAerial:
+      return make_aerial_layout(options);
+    case SimulationOptions::Scene::kStreet:
+      return make_street_layout(options);
+    case SimulationOptions::Scene::kStereopolis:
+      return make_stereopolis_layout(options);
+    case SimulationOptions::Scene::kTargetField:
+      break;
+  }
+  return make_target_field_layout(options);
+}
+
+void simulate_given(const SimulationOptions& options, SimulatedBlock& simulated) {
+  if (options.scene == SimulationOptions::Scene::kStereopolis)
+    simulate_trajectory(options, simulated);
+  else
+    simulate_priors(options, simulated);
+}
+
 SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink& sink,
                               std::int64_t batch_observations) {
   options.check();
-  const bool aerial = options.scene == SimulationOptions::Scene::kAerial;
-  Layout layout = aerial ? make_aerial_layout(options) : make_street_layout(options);
-  layout.block.ground.georeferenced = options.gps_sigma_m > 0 || options.control_points > 0;
+  Layout layout = make_layout(options);
+  layout.block.ground.georeferenced =
+      options.gps_sigma_m > 0 || options.control_points > 0 || options.control_zones > 0;
   if (layout.block.ground.georeferenced) layout.block.ground = {true, 48.85, 2.35, 100, "EPSG:4326"};
 
   SimulatedBlock simulated;
   simulated.tracks.begin = {0};
-  simulated.block = layout.block;
-  simulated.truth = layout.truth;
-  simulate_tracks(options, layout, sink, batch_observations);
-  simulate_control(options, layout, simulated);
-  simulate_priors(options, simulated);
+  {
+    const Observer observer(layout, image_margin(options));
+    simulate_control_zones(options, observer, layout);
+    simulate_control(options, observer, layout);
+    simulate_tracks(options, layout, observer, sink, batch_observations);
+  }
+  simulated.block = std::move(layout.block);
+  simulated.truth = std::move(layout.truth);
+  simulated.control_truth = std::move(layout.control_truth);
+  simulate_given(options, simulated);
   check(simulated.block);
   return simulated;
 }

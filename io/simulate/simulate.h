@@ -11,23 +11,41 @@
 namespace megablock {
 
 struct SimulationOptions {
-  enum class Scene { kAerial, kStreet } scene = Scene::kAerial;
-  std::int64_t frames = 100;  // number of frames (aerial: single photos; street: rigs)
+  enum class Scene { kAerial, kStreet, kStereopolis, kTargetField } scene = Scene::kAerial;
+  // Target field: how the vehicle moves (docs/simulate.md).
+  enum class Path { kSingle, kLine, kLoop, kS, kAll, kSparse } path = Path::kS;
+  // The defaults of a scene (and of a path on the target field); those below are of the aerial and the street scene.
+  static SimulationOptions of(Scene scene, Path path = Path::kS);
+
+  std::int64_t frames = 100;  // number of frames (aerial: single photos; else: rigs)
   std::uint64_t seed = 1;
   // Aerial: rows with overlaps over terrain.
   double forward_overlap = 0.8, side_overlap = 0.6;
   double height_m = 100;  // above mean terrain
   double terrain_relief_m = 15;
-  // Street: grid of `street_spacing_m`, driven twice, a frame each `frame_distance_m`, `rig_cameras` cameras.
+  // Street, Stereopolis: grid of `street_spacing_m`, a frame each `frame_distance_m`, `rig_cameras` cameras.
   double street_spacing_m = 100, frame_distance_m = 4;
   int rig_cameras = 4;
+  // Stereopolis: every street is driven `drives` times, forth and back, on `days` days.
+  int drives = 2, days = 2;
+  bool bridge = true;  // one street passes over another one, where a drive is long enough for both
+  // Stereopolis: trajectory. Shares of the frames whose satellites are masked, and that have none (a part of those);
+  // mean length of a masked stretch (at most a quarter of a drive); mean of the largest horizontal drift in one, m.
+  double gnss_masked_share = 0.5, gnss_absent_share = 0.04;
+  int gnss_masked_frames = 400;
+  double drift_m = 3;
+  // Stereopolis: crossings with 8 to 40 control points each, a seventh of them check points; all of zone
+  // `held_out_zone` are (-1: of none).
+  int control_zones = 0, held_out_zone = -1;
+  // Stereopolis, target field: sigmas per axis of the given mounts, which are also stated; 0: held at the truth.
+  double mount_position_error_m = 0.005, mount_rotation_error_deg = 0.5;
   // Observations.
   int points_per_frame = 300;  // observations per frame
   double mean_track = 5;
   double image_noise_px = 0.5;  // sigma per axis
   double outlier_share = 0;     // wrong matches
   // Priors.
-  double gps_sigma_m = 0.05;      // <= 0: no position priors. Stated sigma = true sigma
+  double gps_sigma_m = 0.05;      // <= 0: no position priors. Stated sigma = true sigma, save for Stereopolis
   double gps_share = 1;           // share of frames with a position prior
   double attitude_sigma_deg = 0;  // <= 0: no attitude priors
   double relative_position_sigma_m = 0, relative_rotation_sigma_deg = 0.01;  // successive frames; <= 0: none
@@ -42,10 +60,21 @@ struct SimulationOptions {
   void check() const;      // throws InputError
 };
 
+// What a simulated observation shows.
+enum class Verdict : std::uint8_t {
+  kRight = 0,     // the point, with image_noise_px
+  kStray = 1,     // anything, anywhere in the image
+  kRepeated = 2,  // another place of a repeated facade, in which neighbouring observations of the track agree
+  kVehicle = 3    // a spot on a moving vehicle, the same one in neighbouring observations
+};
+
+// State of the satellites at a frame of a simulated trajectory.
+enum class Gnss : std::uint8_t { kNone = 0, kMasked = 1, kClear = 2 };
+
 struct SimulatedTracks {
   TrackSet tracks;                      // noisy observations
   std::vector<Eigen::Vector3d> points;  // true positions [tracks]
-  std::vector<std::uint8_t> outlier;    // [observations] 1 = replaced by a wrong position
+  std::vector<std::uint8_t> outlier;    // [observations] Verdict; 0 = right
 };
 
 // Everything of a block; its tracks are all of them, or none where they went to a sink.
@@ -53,6 +82,7 @@ struct SimulatedBlock : SimulatedTracks {
   Block block;  // what a job is given
   BlockState truth;
   std::vector<Eigen::Vector3d> control_truth;  // true positions [block.control_points]
+  std::vector<Gnss> gnss;                      // [frames] Stereopolis; else empty
 };
 
 SimulatedBlock simulate_block(const SimulationOptions& options);

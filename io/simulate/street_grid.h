@@ -31,7 +31,8 @@ inline double facade_distance(std::uint64_t seed, bool street_along_x, std::int6
 }
 
 inline Terrain street_terrain(const SimulationOptions& options) {
-  return Terrain(options.seed, 0.2 * options.terrain_relief_m, 400);
+  const double share = options.scene == SimulationOptions::Scene::kStreet ? 0.2 : 1;
+  return Terrain(options.seed, share * options.terrain_relief_m, 400);
 }
 
 }  // namespace megablock

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <iomanip>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <sstream>
 
 #include "io/control_file.h"
@@ -19,9 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using Scene = SimulationOptions::Scene;
+
 Layout make_city_layout(const SimulationOptions& options) {
-  const bool street = options.scene == SimulationOptions::Scene::kStreet;
-  Layout layout = street ? make_street_layout(options) : make_aerial_layout(options);
+  Layout layout = make_layout(options);
   layout.block.ground = {true, 48.85, 2.35, 100, "EPSG:4979"};
   layout.scene = std::make_unique<City>(options, layout);
   return layout;
@@ -114,7 +116,8 @@ void write_gcp_list(const Block& block, const fs::path& path) {
 }
 
 void write_cameras(const SimulationOptions& options, const Block& block, std::ostream& yaml) {
-  if (options.calibrate) return;  // the headers of the images say enough
+  // The headers of the images say enough, unless there is a calibration to start from or to hold.
+  if (options.calibrate && options.scene != Scene::kStereopolis) return;
   yaml << "cameras:\n  grouping: " << (block.cameras.size() > 1 ? "exif" : "one") << '\n';
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
     const Camera& camera = block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
@@ -128,7 +131,8 @@ void write_cameras(const SimulationOptions& options, const Block& block, std::os
       yaml << "  default:\n";
     yaml << "    focal_px: " << k[kFocal] << "\n    principal_point_px: [" << k[kPrincipalX] << ", " << k[kPrincipalY]
          << "]\n    distortion: {k1: " << k[kRadial1] << ", k2: " << k[kRadial2] << ", k3: " << k[kRadial3]
-         << ", p1: " << k[kDecentring1] << ", p2: " << k[kDecentring2] << "}\n    calibrate: false\n";
+         << ", p1: " << k[kDecentring1] << ", p2: " << k[kDecentring2]
+         << "}\n    calibrate: " << (options.calibrate ? "true" : "false") << '\n';
   }
 }
 
@@ -153,29 +157,43 @@ void write_project(const SimulationOptions& options, const Block& block, const W
       break;
     }
   }
-  if (has_rig(block))
+  if (has_rig(block)) {
+    const Mount& mount = block.rigs.front().mounts.back();
     yaml << "rigs:\n  cameras: rig_cameras.json\n  assignments: rig_assignments.json\n"
-         << "  sigma_position_m: 0  # held\n  sigma_rotation_deg: 0\n";
+         << "  sigma_position_m: " << mount.position_sigma_m << (mount.held() ? "  # held" : "")
+         << "\n  sigma_rotation_deg: " << mount.rotation_sigma_rad * 180 / std::numbers::pi << '\n';
+  }
   if (written.control) yaml << "control: control.csv\n";
-  if (written.poses) yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
+  if (written.poses && options.scene == Scene::kStereopolis)
+    yaml << "poses: poses.csv  # the trajectory\n";
+  else if (written.poses)
+    yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
   write_cameras(options, block, yaml);
   write_text(path, yaml.str());
 }
 
 }  // namespace
 
-void write_rendered_block(const SimulationOptions& options, const std::string& folder) {
-  options.check();
+void write_rendered_block(const SimulationOptions& asked, const std::string& folder) {
+  asked.check();
+  if (asked.scene == Scene::kTargetField)
+    throw InputError("simulation: the target field is made of tie points only; leave out --rendered");
+  SimulationOptions options = asked;
+  options.bridge = false;  // the renderer knows houses only
   const fs::path root(folder);
   std::error_code error;
   fs::create_directories(root / "images", error);
   if (error) throw InputError(folder + ": cannot be created: " + error.message());
-  const Layout layout = make_city_layout(options);
+  Layout layout = make_city_layout(options);
+  {
+    const Observer observer(layout, image_margin(options));
+    simulate_control_zones(options, observer, layout);
+    simulate_control(options, observer, layout);
+  }
   SimulatedBlock simulated;
   simulated.block = layout.block;
   simulated.truth = layout.truth;
-  simulate_control(options, layout, simulated);
-  simulate_priors(options, simulated);
+  simulate_given(options, simulated);
   write_images(options, layout, simulated.block, root / "images");
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
   write_state((root / "truth.h5").string(), simulated.truth);

@@ -117,6 +117,16 @@ TEST_F(SimulateWriteTest, BatchesAreNoLargerThanAsked) {
   EXPECT_GE(batches, observations / 130);
 }
 
+// Reserved disk space is given back: a file of few tracks is not larger for having been streamed.
+TEST_F(SimulateWriteTest, StreamedFilesAreSmall) {
+  SimulationOptions options;
+  options.frames = 30;
+  options.points_per_frame = 40;
+  write_simulated_block(options, folder_.string());
+  write_tracks(file("plain.h5"), read_tracks(file("tie_points.h5")));
+  EXPECT_LT(fs::file_size(file("tie_points.h5")), fs::file_size(file("plain.h5")) + 10000);
+}
+
 TEST_F(SimulateWriteTest, AWriterThatIsAbandonedLeavesNoFile) {
   {
     TrackWriter writer(file("half.h5"));

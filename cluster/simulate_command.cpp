@@ -1,0 +1,151 @@
+#include "cluster/simulate_command.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <map>
+
+#include "cluster/exit_codes.h"
+#include "io/simulate/simulate.h"
+
+namespace megablock {
+
+namespace {
+
+using Scene = SimulationOptions::Scene;
+using Path = SimulationOptions::Path;
+
+const std::map<std::string, Scene> kScenes = {{"aerial", Scene::kAerial},
+                                              {"street", Scene::kStreet},
+                                              {"stereopolis", Scene::kStereopolis},
+                                              {"target-field", Scene::kTargetField}};
+const std::map<std::string, Path> kPaths = {{"single", Path::kSingle}, {"line", Path::kLine},
+                                            {"loop", Path::kLoop},     {"s", Path::kS},
+                                            {"all", Path::kAll},       {"sparse", Path::kSparse}};
+
+template <typename Value>
+std::vector<std::string> names_in(const std::map<std::string, Value>& map) {
+  std::vector<std::string> names;
+  for (const auto& entry : map) names.push_back(entry.first);
+  return names;
+}
+
+// The options of the command line. What is not given has the default of the scene, which is known after parsing.
+class SimulateOptions {
+ public:
+  explicit SimulateOptions(CLI::App* command) : command_(command) {}
+
+  template <typename Value>
+  void add(const std::string& name, Value SimulationOptions::*member, const std::string& help) {
+    const CLI::Option* option = command_->add_option(name, given_.*member, help);
+    settle_.push_back([this, option, member](SimulationOptions& options) {
+      if (option->count() > 0) options.*member = given_.*member;
+    });
+  }
+  void add_switch(const std::string& name, bool SimulationOptions::*member, const std::string& help) {
+    command_->add_flag_callback(
+        name, [this, member] { off_.push_back(member); }, help);
+  }
+  SimulationOptions settled() const {
+    SimulationOptions options = SimulationOptions::of(kScenes.at(scene), kPaths.at(path));
+    for (const auto& settle : settle_) settle(options);
+    for (const auto member : off_) options.*member = false;
+    return options;
+  }
+
+  std::string scene = "aerial", path = "s", output;
+  bool rendered = false;
+
+ private:
+  CLI::App* command_;
+  SimulationOptions given_;
+  std::vector<std::function<void(SimulationOptions&)>> settle_;
+  std::vector<bool SimulationOptions::*> off_;
+};
+
+void add_scene_options(SimulateOptions& s) {
+  using O = SimulationOptions;
+  s.add("--frames", &O::frames, "Frames [100; stereopolis 800, target-field 30]");
+  s.add("--seed", &O::seed, "Seed [1]");
+  s.add("--forward-overlap", &O::forward_overlap, "Aerial: along the row, 0..1 [0.8]");
+  s.add("--side-overlap", &O::side_overlap, "Aerial: between rows, 0..1 [0.6]");
+  s.add("--height", &O::height_m, "Aerial: above mean terrain, m [100]");
+  s.add("--relief", &O::terrain_relief_m, "Terrain relief, m [15]");
+  s.add("--street-spacing", &O::street_spacing_m, "Street, stereopolis: between streets, m [100]");
+  s.add("--frame-distance", &O::frame_distance_m, "Street, stereopolis: between frames, m [4]");
+  s.add("--rig-cameras", &O::rig_cameras, "Cameras of the rig [street 4, stereopolis and target-field 10]");
+  s.add("--drives", &O::drives, "Stereopolis: drives over every street [2]");
+  s.add("--days", &O::days, "Stereopolis: days of the drives [2]");
+  s.add_switch("--no-bridge", &O::bridge, "Stereopolis: no street passes over another");
+  s.add("--mount-position-error", &O::mount_position_error_m,
+        "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]");
+  s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]");
+}
+
+void add_observation_options(SimulateOptions& s) {
+  using O = SimulationOptions;
+  s.add("--points-per-frame", &O::points_per_frame, "Observations per frame [300; stereopolis 200, target-field 350]");
+  s.add("--mean-track", &O::mean_track, "Observations per point [5]");
+  s.add("--noise", &O::image_noise_px, "Image noise per axis, px [0.5]");
+  s.add("--outliers", &O::outlier_share, "Share of wrong observations, 0..1 [0; stereopolis 0.03]");
+  s.add("--width", &O::image_width, "Image width, px [1920]");
+  s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
+  s.add("--focal", &O::focal_px, "Focal length, px [1400]");
+  s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
+  s.add_switch("--no-calibration", &O::calibrate, "Hold cameras and mounts at the truth");
+}
+
+void add_prior_options(SimulateOptions& s) {
+  using O = SimulationOptions;
+  s.add("--gps-sigma", &O::gps_sigma_m, "Position priors, m; 0 = none [0.05; stereopolis 0.02, target-field 0]");
+  s.add("--gps-share", &O::gps_share, "Share of frames with a position prior [1]");
+  s.add("--masked-share", &O::gnss_masked_share, "Stereopolis: share of frames with masked satellites [0.5]");
+  s.add("--absent-share", &O::gnss_absent_share, "Stereopolis: share of them without any [0.04]");
+  s.add("--masked-frames", &O::gnss_masked_frames, "Stereopolis: mean length of a masked stretch, frames [400]");
+  s.add("--drift", &O::drift_m, "Stereopolis: mean largest drift of a masked stretch, m [3]");
+  s.add("--attitude-sigma", &O::attitude_sigma_deg, "Attitude priors, degrees; 0 = none [0; stereopolis 0.03]");
+  s.add("--relative-position-sigma", &O::relative_position_sigma_m,
+        "Relative poses, m; 0 = none [0; stereopolis 0.005]");
+  s.add("--relative-rotation-sigma", &O::relative_rotation_sigma_deg, "Relative poses, degrees [0.01]");
+  s.add("--control-points", &O::control_points, "Control points [0; target-field 154]");
+  s.add("--check-points", &O::check_points, "Check points [0; target-field 77]");
+  s.add("--control-zones", &O::control_zones, "Stereopolis: crossings with 8 to 40 control and check points [0]");
+  s.add("--held-out-zone", &O::held_out_zone, "Stereopolis: zone whose points are all check points, from 0");
+  s.add("--control-sigma", &O::control_sigma_m,
+        "Sigma of control points, m [0.01; stereopolis 0.015, target-field 0.002]");
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("simulate", "Make a block with known truth: tie points or rendered pictures");
+  command->footer(
+      "Example: megablock simulate --scene aerial --frames 500 -o simulated\n"
+      "         megablock simulate --scene stereopolis --frames 2000 --control-zones 7 -o stereopolis\n"
+      "         megablock simulate --rendered --frames 24 -o rendered");
+  const auto options = std::make_shared<SimulateOptions>(command);
+  command->add_option("--scene", options->scene, "Scene")
+      ->check(CLI::IsMember(names_in(kScenes)))
+      ->capture_default_str();
+  command->add_option("--path", options->path, "Target field: way of the vehicle")
+      ->check(CLI::IsMember(names_in(kPaths)))
+      ->capture_default_str();
+  command->add_flag("--rendered", options->rendered, "Render pictures (small blocks) instead of tie points");
+  add_scene_options(*options);
+  add_observation_options(*options);
+  add_prior_options(*options);
+  command->add_option("-o,--output", options->output, "Folder to write")->required();
+  command->callback([=, &action] {
+    action = [options] {
+      const SimulationOptions simulation = options->settled();
+      simulation.check();
+      if (options->rendered)
+        write_rendered_block(simulation, options->output);
+      else
+        write_simulated_block(simulation, options->output);
+      std::printf("%s/block.yaml\n", options->output.c_str());
+      return kExitDone;
+    };
+  });
+}
+
+}  // namespace megablock
