@@ -1,0 +1,284 @@
+#include "adjust/rig_resection.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "geometry/gp3p.h"
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+// Whitened residual and its derivative by the pose.
+struct Whitened {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 6> by_pose;
+  double squared_px;
+};
+
+std::optional<Whitened> whitened(const RigSight& sight, const Pose& pose, bool with_jacobian) {
+  const auto r = ray_residual(sight.ray, to_inside(pose, sight.point));
+  if (!r) return std::nullopt;
+  const Eigen::Matrix<double, 2, 3> by_ground = r->by_point * pose.rotation.toRotationMatrix();
+  const Eigen::Matrix2d covariance = sight.sigma_px * sight.sigma_px * Eigen::Matrix2d::Identity() +
+                                     by_ground * sight.covariance * by_ground.transpose();
+  // Cholesky factor of a 2x2, by hand: this is the innermost loop.
+  const double a = std::sqrt(covariance(0, 0)), b = covariance(1, 0) / a,
+               c = std::sqrt(std::max(covariance(1, 1) - b * b, 1e-300));
+  const auto solve = [&](const auto& v) {
+    std::decay_t<decltype(v.eval())> x = v;
+    x.row(0) /= a;
+    x.row(1) = (x.row(1) - b * x.row(0)) / c;
+    return x;
+  };
+  Whitened w{solve(r->pixels), Eigen::Matrix<double, 2, 6>::Zero(), r->pixels.squaredNorm()};
+  if (with_jacobian) w.by_pose = solve((r->by_point * in_rig_by_pose(pose, sight.point)).eval());
+  return w;
+}
+
+// Truncated sum of squares.
+double cost(std::span<const RigSight> sights, const Pose& pose, double limit_squared, double give_up) {
+  double sum = 0;
+  for (const RigSight& sight : sights) {
+    const auto w = whitened(sight, pose, false);
+    sum += w ? std::min(limit_squared, w->residual.squaredNorm()) : limit_squared;
+    if (sum > give_up) break;
+  }
+  return sum;
+}
+
+Matrix6 normal_matrix(std::span<const RigSight> sights, const Pose& pose, double limit_squared, PoseIncrement& right) {
+  Matrix6 normal = Matrix6::Zero();
+  right.setZero();
+  for (const RigSight& sight : sights) {
+    const auto w = whitened(sight, pose, true);
+    if (!w || w->residual.squaredNorm() > limit_squared) continue;
+    normal += w->by_pose.transpose() * w->by_pose;
+    right -= w->by_pose.transpose() * w->residual;
+  }
+  return normal;
+}
+
+// Levenberg-Marquardt on the truncated squares.
+Pose refine(std::span<const RigSight> sights, Pose pose, double limit_squared) {
+  double damping = 1e-6, current = cost(sights, pose, limit_squared, 1e300);
+  for (int iteration = 0; iteration < 30 && damping < 1e6; ++iteration) {
+    PoseIncrement right;
+    Matrix6 normal = normal_matrix(sights, pose, limit_squared, right);
+    normal.diagonal() *= 1 + damping;
+    const PoseIncrement step = normal.ldlt().solve(right);
+    if (!step.allFinite()) break;
+    const Pose next = pose_update(pose, step);
+    const double value = cost(sights, next, limit_squared, 1e300);
+    if (!(value <= current)) {
+      damping = std::max(10 * damping, 1e-4);
+      continue;
+    }
+    const bool done = step.norm() < 1e-10;
+    pose = next, current = value, damping *= 0.1;
+    if (done) break;
+  }
+  return pose;
+}
+
+struct Candidate {
+  double cost;
+  Pose pose;
+};
+
+// Solutions of one sample, kept when they are among the best.
+void try_sample(std::span<const RigSight> sights, const std::array<std::size_t, 3>& rows, double limit_squared,
+                std::vector<Candidate>& best) {
+  constexpr std::size_t kCandidates = 16;
+  std::array<Eigen::Vector3d, 3> origins, directions, points;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const RigSight& sight = sights[rows[k]];
+    origins[k] = sight.ray.origin, directions[k] = sight.ray.direction, points[k] = sight.point;
+  }
+  for (const Pose& pose : solve_gp3p(origins, directions, points)) {
+    const double give_up = best.size() < kCandidates ? 1e300 : best.back().cost;
+    const double value = cost(sights, pose, limit_squared, give_up);
+    if (best.size() == kCandidates && value >= best.back().cost) continue;
+    const auto place = std::upper_bound(best.begin(), best.end(), value,
+                                        [](double v, const Candidate& candidate) { return v < candidate.cost; });
+    best.insert(place, {value, pose});
+    if (best.size() > kCandidates) best.pop_back();
+  }
+}
+
+// Samples of three distinct points: all of them where they are few, else random ones until it is unlikely (1e-4) that
+// none of right sights alone was among them.
+std::vector<Candidate> sample(std::span<const RigSight> sights, const RigResectionOptions& options,
+                              double limit_squared, std::uint64_t seed) {
+  const std::size_t n = sights.size();
+  const auto distinct = [&](const std::array<std::size_t, 3>& r) {
+    return sights[r[0]].id != sights[r[1]].id && sights[r[0]].id != sights[r[2]].id &&
+           sights[r[1]].id != sights[r[2]].id;
+  };
+  std::vector<Candidate> best;
+  if (n * (n - 1) * (n - 2) / 6 <= static_cast<std::size_t>(options.samples)) {
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = i + 1; j < n; ++j)
+        for (std::size_t k = j + 1; k < n; ++k)
+          if (const std::array<std::size_t, 3> rows{i, j, k}; distinct(rows))
+            try_sample(sights, rows, limit_squared, best);
+    return best;
+  }
+  std::mt19937_64 random(seed);
+  double needed = options.samples;
+  for (int done = 0; done < options.samples && done < needed; ++done) {
+    const std::array<std::size_t, 3> rows{random() % n, random() % n, random() % n};
+    if (!distinct(rows)) continue;
+    try_sample(sights, rows, limit_squared, best);
+    if (best.empty()) continue;
+    // Share of right sights, at least: each wrong one costs the limit.
+    const double right = std::max(0.0, 1 - best.front().cost / (limit_squared * static_cast<double>(n)));
+    const double all_right = std::pow(right, 3);
+    // A sample of right sights is good for a start two times in three.
+    if (all_right > 0.02) needed = std::min(needed, 10 + std::log(1e-4) / std::log1p(-0.6 * all_right));
+  }
+  return best;
+}
+
+std::size_t distinct_points(std::span<const RigSight> sights, const std::vector<std::uint8_t>* agrees = nullptr) {
+  std::set<std::int64_t> ids;
+  for (std::size_t i = 0; i < sights.size(); ++i)
+    if (!agrees || (*agrees)[i]) ids.insert(sights[i].id);
+  return ids.size();
+}
+
+// Standard deviation of the points across the line that fits them best, divided by that along it.
+double line_ratio(std::span<const RigSight> sights, const std::vector<std::uint8_t>& agrees) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (std::size_t i = 0; i < sights.size(); ++i)
+    if (agrees[i]) mean += sights[i].point, ++count;
+  mean /= count;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < sights.size(); ++i)
+    if (agrees[i]) spread += (sights[i].point - mean) * (sights[i].point - mean).transpose();
+  const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
+  return values[2] > 0 ? std::sqrt(std::max(values[1], 0.0) / values[2]) : 0;
+}
+
+double largest_angle_deg(std::span<const RigSight> sights, const std::vector<std::uint8_t>& agrees, const Pose& pose) {
+  std::vector<Eigen::Vector3d> units;
+  for (std::size_t i = 0; i < sights.size(); ++i)
+    if (agrees[i]) units.push_back((sights[i].point - pose.centre).normalized());
+  double smallest_cosine = 1;
+  for (std::size_t i = 0; i < units.size(); ++i)
+    for (std::size_t j = i + 1; j < units.size(); ++j)
+      smallest_cosine = std::min(smallest_cosine, units[i].dot(units[j]));
+  return std::acos(std::clamp(smallest_cosine, -1.0, 1.0)) / kDegree;
+}
+
+// The candidates that the sights cannot tell from the best one, refined, each once.
+std::vector<Candidate> equally_good(std::span<const RigSight> sights, const std::vector<Candidate>& found,
+                                    double limit_squared) {
+  constexpr double kClear = 9;  // a pose whose squares are this much larger is worse
+  std::vector<Candidate> refined;
+  for (const Candidate& candidate : found) {
+    const Pose pose = refine(sights, candidate.pose, limit_squared);
+    refined.push_back({cost(sights, pose, limit_squared, 1e300), pose});
+  }
+  std::stable_sort(refined.begin(), refined.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+  std::vector<Candidate> distinct;
+  for (const Candidate& candidate : refined) {
+    if (candidate.cost > refined.front().cost + kClear) break;
+    const auto same = [&](const Candidate& other) {
+      return (other.pose.centre - candidate.pose.centre).norm() < 0.1 &&
+             rotation_angle(other.pose.rotation, candidate.pose.rotation) < 0.005;
+    };
+    if (std::none_of(distinct.begin(), distinct.end(), same)) distinct.push_back(candidate);
+  }
+  return distinct;
+}
+
+Pose nearest_to(const Pose& approximate, const std::vector<Candidate>& candidates) {
+  const auto distance = [&](const Candidate& c) {  // one metre counts as much as half a degree
+    return (c.pose.centre - approximate.centre).norm() +
+           2 / kDegree * rotation_angle(c.pose.rotation, approximate.rotation);
+  };
+  return std::min_element(candidates.begin(), candidates.end(),
+                          [&](const Candidate& a, const Candidate& b) { return distance(a) < distance(b); })
+      ->pose;
+}
+
+void assess(std::span<const RigSight> sights, const RigResectionOptions& options, RigResection& result) {
+  const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
+  double squares = 0, count = 0;
+  result.agrees.assign(sights.size(), 0);
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    const auto w = whitened(sights[i], result.pose, false);
+    if (!w || w->residual.squaredNorm() > limit_squared) continue;
+    result.agrees[i] = 1;
+    squares += w->squared_px, count += 2;
+  }
+  result.points = static_cast<int>(distinct_points(sights, &result.agrees));
+  const auto all = static_cast<int>(distinct_points(sights));
+  const int needed = std::max(options.min_points, static_cast<int>(std::ceil(options.min_share * all)));
+  if (result.points < needed)
+    throw ComputeError(
+        fmt::format("only {} of {} points agree with one pose, {} are needed", result.points, all, needed));
+  if (line_ratio(sights, result.agrees) < options.min_line_ratio)
+    throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
+  PoseIncrement right;
+  const Matrix6 normal = normal_matrix(sights, result.pose, limit_squared, right);
+  result.covariance = normal.ldlt().solve(Matrix6::Identity());
+  const double sigma = std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace());
+  if (!(sigma <= options.max_position_sigma_m) || !(result.covariance.diagonal().array() >= 0).all())
+    throw ComputeError(
+        fmt::format("the points give the position to {:.2g} m only; measure points in other directions", sigma));
+  result.rms_px = std::sqrt(squares / count);
+  result.angle_deg = largest_angle_deg(sights, result.agrees, result.pose);
+  if (result.angle_deg < options.warn_angle_deg)
+    result.warnings.push_back(
+        fmt::format("all points are seen within {:.0f} degrees (less than {:.0f}): the pose is weak", result.angle_deg,
+                    options.warn_angle_deg));
+}
+
+}  // namespace
+
+void RigResectionOptions::check() const {
+  if (!(max_error_sigmas > 0)) throw InputError("max_error_sigmas must be positive");
+  if (samples < 1) throw InputError("samples must be at least 1");
+  if (!(min_share >= 0 && min_share <= 1)) throw InputError("min_share must be between 0 and 1");
+  if (min_points < 3) throw InputError("min_points must be at least 3");
+  if (!(min_line_ratio >= 0)) throw InputError("min_line_ratio must not be negative");
+  if (!(max_position_sigma_m > 0)) throw InputError("max_position_sigma_m must be positive");
+}
+
+RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed,
+                        const std::optional<Pose>& approximate) {
+  const std::size_t points = distinct_points(sights);
+  if (points < 3) throw ComputeError(fmt::format("{} known points are seen, at least 3 are needed", points));
+  const std::vector<std::uint8_t> all(sights.size(), 1);
+  if (line_ratio(sights, all) < options.min_line_ratio)
+    throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
+  const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
+  const std::vector<Candidate> found = sample(sights, options, limit_squared, seed);
+  if (found.empty()) throw ComputeError("no pose agrees with three of the points");
+  const std::vector<Candidate> candidates = equally_good(sights, found, limit_squared);
+  RigResection result;
+  result.pose = approximate ? nearest_to(*approximate, candidates) : candidates.front().pose;
+  assess(sights, options, result);
+  if (candidates.size() > 1 && !approximate)
+    throw ComputeError(
+        fmt::format("{} poses agree with the points equally well; give an approximate pose or measure "
+                    "another point",
+                    candidates.size()));
+  return result;
+}
+
+}  // namespace megablock

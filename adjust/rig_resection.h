@@ -1,0 +1,58 @@
+// Pose of a rig from known points seen by any of its cameras ("relevement", CN-21).
+//
+// Generalised P3P (geometry/gp3p.h) on samples of three points, each solution judged by all sights (truncated squares,
+// MSAC: Torr and Zisserman 2000), then Levenberg-Marquardt over the agreeing ones. Residuals are in pixels
+// (geometry/rig_ray.h), each whitened by
+//
+//     image_sigma^2 I + J R C_X R' J'        (C_X: covariance of the point, J R: derivative by the point)
+//
+// so that sigmas of the points enter the choice, the weights and the covariance of the pose.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/rig_ray.h"
+
+namespace megablock {
+
+struct RigSight {
+  RigRay ray;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();       // ground frame, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the point, m^2
+  double sigma_px = 0.5;                                 // of the measurement, per axis
+  std::int64_t id = 0;                                   // of the point: sights of one point share it
+};
+
+struct RigResectionOptions {
+  double max_error_sigmas = 4;        // length of the whitened residual of an agreeing sight
+  int samples = 500;                  // of three points; fewer where there are fewer triplets or the agreement is clear
+  int min_points = 3;                 // agreeing points
+  double min_share = 0.4;             // agreeing points / all
+  double min_line_ratio = 0.02;       // spread of the points across their line / along it; below: aligned, refused
+  double max_position_sigma_m = 0.1;  // of the result, length; above (points near a critical surface): refused
+  double warn_angle_deg = 20;         // largest angle between two agreeing points seen from the rig; below: warning
+  void check() const;                 // throws InputError
+};
+
+struct RigResection {
+  Pose pose;                                                                     // ground -> rig
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  // of PoseIncrement, a priori
+  std::vector<std::uint8_t> agrees;                                              // [sights]
+  int points = 0;                                                                // agreeing ones
+  double rms_px = 0;                                                             // of the agreeing sights, per axis
+  double angle_deg = 0;                                                          // largest between agreeing points
+  std::vector<std::string> warnings;
+};
+
+// Deterministic: samples depend on `seed` and the order of the sights alone. `approximate` decides between poses that
+// the sights cannot tell apart (three points leave up to eight).
+// Throws ComputeError saying what is missing: fewer than three points, points on one line, no agreement, several poses
+// possible, position not determined.
+RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed,
+                        const std::optional<Pose>& approximate = {});
+
+}  // namespace megablock
