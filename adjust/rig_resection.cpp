@@ -46,7 +46,18 @@ std::optional<Whitened> whitened(const RigSight& sight, const Pose& pose, bool w
   return w;
 }
 
-// Truncated sum of squares.
+using Approximate = std::optional<ApproximatePose>;
+
+// Whitened difference from the pose known beforehand, by its increment: w of R = R_0 Exp(w), C - C_0.
+PoseIncrement departure(const Approximate& known, const Pose& pose) {
+  PoseIncrement d = PoseIncrement::Zero();
+  if (!known) return d;
+  d << rotation_log<double>(known->pose.rotation.conjugate() * pose.rotation) / known->rotation_sigma_rad,
+      (pose.centre - known->pose.centre) / known->position_sigma_m;
+  return d;
+}
+
+// Truncated sum of squares of the sights.
 double cost(std::span<const RigSight> sights, const Pose& pose, double limit_squared, double give_up) {
   double sum = 0;
   for (const RigSight& sight : sights) {
@@ -57,9 +68,17 @@ double cost(std::span<const RigSight> sights, const Pose& pose, double limit_squ
   return sum;
 }
 
-Matrix6 normal_matrix(std::span<const RigSight> sights, const Pose& pose, double limit_squared, PoseIncrement& right) {
+Matrix6 normal_matrix(std::span<const RigSight> sights, const Approximate& known, const Pose& pose,
+                      double limit_squared, PoseIncrement& right) {
   Matrix6 normal = Matrix6::Zero();
   right.setZero();
+  if (known) {  // the departure of the rotation is small: its derivative is the identity
+    PoseIncrement inverse_sigma;
+    inverse_sigma << Eigen::Vector3d::Constant(1 / known->rotation_sigma_rad),
+        Eigen::Vector3d::Constant(1 / known->position_sigma_m);
+    normal = inverse_sigma.cwiseAbs2().asDiagonal();
+    right = -inverse_sigma.cwiseProduct(departure(known, pose));
+  }
   for (const RigSight& sight : sights) {
     const auto w = whitened(sight, pose, true);
     if (!w || w->residual.squaredNorm() > limit_squared) continue;
@@ -70,16 +89,19 @@ Matrix6 normal_matrix(std::span<const RigSight> sights, const Pose& pose, double
 }
 
 // Levenberg-Marquardt on the truncated squares.
-Pose refine(std::span<const RigSight> sights, Pose pose, double limit_squared) {
-  double damping = 1e-6, current = cost(sights, pose, limit_squared, 1e300);
+Pose refine(std::span<const RigSight> sights, const Approximate& known, Pose pose, double limit_squared) {
+  const auto value_at = [&](const Pose& p) {
+    return cost(sights, p, limit_squared, 1e300) + departure(known, p).squaredNorm();
+  };
+  double damping = 1e-6, current = value_at(pose);
   for (int iteration = 0; iteration < 30 && damping < 1e6; ++iteration) {
     PoseIncrement right;
-    Matrix6 normal = normal_matrix(sights, pose, limit_squared, right);
+    Matrix6 normal = normal_matrix(sights, known, pose, limit_squared, right);
     normal.diagonal() *= 1 + damping;
     const PoseIncrement step = normal.ldlt().solve(right);
     if (!step.allFinite()) break;
     const Pose next = pose_update(pose, step);
-    const double value = cost(sights, next, limit_squared, 1e300);
+    const double value = value_at(next);
     if (!(value <= current)) {
       damping = std::max(10 * damping, 1e-4);
       continue;
@@ -183,13 +205,13 @@ double largest_angle_deg(std::span<const RigSight> sights, const std::vector<std
 }
 
 // The candidates that the sights cannot tell from the best one, refined, each once.
-std::vector<Candidate> equally_good(std::span<const RigSight> sights, const std::vector<Candidate>& found,
-                                    double limit_squared) {
+std::vector<Candidate> equally_good(std::span<const RigSight> sights, const Approximate& known,
+                                    const std::vector<Candidate>& found, double limit_squared) {
   constexpr double kClear = 9;  // a pose whose squares are this much larger is worse
   std::vector<Candidate> refined;
   for (const Candidate& candidate : found) {
-    const Pose pose = refine(sights, candidate.pose, limit_squared);
-    refined.push_back({cost(sights, pose, limit_squared, 1e300), pose});
+    const Pose pose = refine(sights, known, candidate.pose, limit_squared);
+    refined.push_back({cost(sights, pose, limit_squared, 1e300) + departure(known, pose).squaredNorm(), pose});
   }
   std::stable_sort(refined.begin(), refined.end(),
                    [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
@@ -205,17 +227,8 @@ std::vector<Candidate> equally_good(std::span<const RigSight> sights, const std:
   return distinct;
 }
 
-Pose nearest_to(const Pose& approximate, const std::vector<Candidate>& candidates) {
-  const auto distance = [&](const Candidate& c) {  // one metre counts as much as half a degree
-    return (c.pose.centre - approximate.centre).norm() +
-           2 / kDegree * rotation_angle(c.pose.rotation, approximate.rotation);
-  };
-  return std::min_element(candidates.begin(), candidates.end(),
-                          [&](const Candidate& a, const Candidate& b) { return distance(a) < distance(b); })
-      ->pose;
-}
-
-void assess(std::span<const RigSight> sights, const RigResectionOptions& options, RigResection& result) {
+void assess(std::span<const RigSight> sights, const Approximate& known, const RigResectionOptions& options,
+            RigResection& result) {
   const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
   double squares = 0, count = 0;
   result.agrees.assign(sights.size(), 0);
@@ -234,7 +247,7 @@ void assess(std::span<const RigSight> sights, const RigResectionOptions& options
   if (line_ratio(sights, result.agrees) < options.min_line_ratio)
     throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
   PoseIncrement right;
-  const Matrix6 normal = normal_matrix(sights, result.pose, limit_squared, right);
+  const Matrix6 normal = normal_matrix(sights, known, result.pose, limit_squared, right);
   result.covariance = normal.ldlt().solve(Matrix6::Identity());
   const double sigma = std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace());
   if (!(sigma <= options.max_position_sigma_m) || !(result.covariance.diagonal().array() >= 0).all())
@@ -260,7 +273,7 @@ void RigResectionOptions::check() const {
 }
 
 RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed,
-                        const std::optional<Pose>& approximate) {
+                        const Approximate& known) {
   const std::size_t points = distinct_points(sights);
   if (points < 3) throw ComputeError(fmt::format("{} known points are seen, at least 3 are needed", points));
   const std::vector<std::uint8_t> all(sights.size(), 1);
@@ -269,11 +282,11 @@ RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOpti
   const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
   const std::vector<Candidate> found = sample(sights, options, limit_squared, seed);
   if (found.empty()) throw ComputeError("no pose agrees with three of the points");
-  const std::vector<Candidate> candidates = equally_good(sights, found, limit_squared);
+  const std::vector<Candidate> candidates = equally_good(sights, known, found, limit_squared);
   RigResection result;
-  result.pose = approximate ? nearest_to(*approximate, candidates) : candidates.front().pose;
-  assess(sights, options, result);
-  if (candidates.size() > 1 && !approximate)
+  result.pose = candidates.front().pose;
+  assess(sights, known, options, result);
+  if (candidates.size() > 1)
     throw ComputeError(
         fmt::format("{} poses agree with the points equally well; give an approximate pose or measure "
                     "another point",

@@ -6,7 +6,9 @@
 //
 //     image_sigma^2 I + J R C_X R' J'        (C_X: covariance of the point, J R: derivative by the point)
 //
-// so that sigmas of the points enter the choice, the weights and the covariance of the pose.
+// so that sigmas of the points enter the choice, the weights and the covariance of the pose. A pose known beforehand
+// (the trajectory's: metres in position, hundredths of a degree in attitude) takes part as an observation with its
+// sigmas: it decides between the solutions of three points and steadies configurations near a critical surface.
 #pragma once
 
 #include <cstdint>
@@ -38,6 +40,12 @@ struct RigResectionOptions {
   void check() const;                 // throws InputError
 };
 
+struct ApproximatePose {
+  Pose pose;
+  double position_sigma_m = 3;        // per axis
+  double rotation_sigma_rad = 0.002;  // about each axis
+};
+
 struct RigResection {
   Pose pose;                                                                     // ground -> rig
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  // of PoseIncrement, a priori
@@ -48,11 +56,10 @@ struct RigResection {
   std::vector<std::string> warnings;
 };
 
-// Deterministic: samples depend on `seed` and the order of the sights alone. `approximate` decides between poses that
-// the sights cannot tell apart (three points leave up to eight).
+// Deterministic: samples depend on `seed` and the order of the sights alone.
 // Throws ComputeError saying what is missing: fewer than three points, points on one line, no agreement, several poses
 // possible, position not determined.
 RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed,
-                        const std::optional<Pose>& approximate = {});
+                        const std::optional<ApproximatePose>& approximate = {});
 
 }  // namespace megablock

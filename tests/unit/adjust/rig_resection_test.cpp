@@ -29,17 +29,17 @@ std::vector<RigSight> sights_of(const std::vector<Eigen::Vector3d>& points, cons
   return sights;
 }
 
-// Around a crossing: facades on all sides, the road.
+// Details on all sides of a narrow crossing.
 std::vector<Eigen::Vector3d> surroundings(Noise& noise, int count) {
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < count; ++i) {
-    const double angle = noise.uniform(0, 2 * std::numbers::pi), distance = noise.uniform(5, 15);
-    points.emplace_back(500 + distance * std::cos(angle), 300 + distance * std::sin(angle), noise.uniform(30, 38));
+    const double angle = noise.uniform(0, 2 * std::numbers::pi), distance = noise.uniform(4, 12);
+    points.emplace_back(500 + distance * std::cos(angle), 300 + distance * std::sin(angle), noise.uniform(30.5, 36));
   }
   return points;
 }
 
-std::string refusal(const std::vector<RigSight>& sights, const std::optional<Pose>& approximate = {}) {
+std::string refusal(const std::vector<RigSight>& sights, const std::optional<ApproximatePose>& approximate = {}) {
   try {
     resect_rig(sights, {}, 1, approximate);
   } catch (const ComputeError& error) {
@@ -48,46 +48,47 @@ std::string refusal(const std::vector<RigSight>& sights, const std::optional<Pos
   return "";
 }
 
-// CN-21: 680 triplets out of 17 points; 10 % aligned, 93 % of the rest better than 5 cm are published.
+// CN-21: all 680 triplets of 17 points: nine on facades, eight along the edge of a pedestrian crossing. Of the
+// published ones 10 % do not converge (aligned) and 93 % of the rest are better than 5 cm, half better than 1 cm.
 TEST(RigResection, TripletsOfSeventeenPoints) {
-  Noise noise(21);
-  const Pose truth = level_rig({500, 300, 32.5}, 0.7, {0.01, -0.02, 0.005});
-  std::vector<Eigen::Vector3d> points = surroundings(noise, 9);
-  for (int i = 0; i < 8; ++i)
-    points.push_back(Eigen::Vector3d(491, 292.0 + 2.1 * i, 30.05));  // along a crossing's edge
-  const std::vector<RigSight> sights = sights_of(points, truth, noise);
-  ASSERT_EQ(sights.size(), 17u);
-  Pose approximate = truth;
-  approximate.centre += Eigen::Vector3d(0.6, -0.8, 0.3);
-  approximate.rotation = rotation_update(truth.rotation, Eigen::Vector3d(0.002, 0.003, -0.01));
-  int triplets = 0, aligned = 0, aligned_refused = 0, refused = 0, within_5cm = 0, within_1cm = 0;
-  for (std::size_t i = 0; i < 17; ++i)
-    for (std::size_t j = i + 1; j < 17; ++j)
-      for (std::size_t k = j + 1; k < 17; ++k) {
-        const std::vector<RigSight> three = {sights[i], sights[j], sights[k]};
-        const bool on_one_line = i >= 9;
-        ++triplets;
-        aligned += on_one_line;
-        try {
-          const RigResection result = resect_rig(three, {}, 1, approximate);
-          const double error = (result.pose.centre - truth.centre).norm();
-          within_5cm += error <= 0.05, within_1cm += error <= 0.01;
-        } catch (const ComputeError& error) {
-          aligned_refused += on_one_line && std::string(error.what()).find("one line") != std::string::npos;
-          refused += !on_one_line;
+  int sites = 0, triplets = 0, aligned = 0, aligned_refused = 0, weak = 0, within_5cm = 0, within_1cm = 0;
+  for (std::uint64_t seed = 0; sites < 5 && seed < 1000; ++seed) {
+    Noise noise(seed);
+    const Pose truth = level_rig({500, 300, 32.5}, 0.7, {0.01, -0.02, 0.005});
+    std::vector<Eigen::Vector3d> points = surroundings(noise, 9);
+    for (int i = 0; i < 8; ++i) points.emplace_back(509, 296.5 + i, 30.0);
+    const std::vector<RigSight> sights = sights_of(points, truth, noise);
+    if (sights.size() < 17) continue;  // above or below the images
+    ++sites;
+    ApproximatePose approximate{truth, 2, 0.001};  // a masked trajectory: metres, 0.06 degrees
+    approximate.pose.centre += Eigen::Vector3d(1.6, -1.8, 0.3);
+    approximate.pose.rotation = rotation_update(truth.rotation, 0.001 * noise.triple());
+    for (std::size_t i = 0; i < 17; ++i)
+      for (std::size_t j = i + 1; j < 17; ++j)
+        for (std::size_t k = j + 1; k < 17; ++k, ++triplets) {
+          const bool on_one_line = i >= 9;
+          aligned += on_one_line;
+          try {
+            const RigResection result = resect_rig(std::vector{sights[i], sights[j], sights[k]}, {}, 1, approximate);
+            const double error = (result.pose.centre - truth.centre).norm();
+            within_5cm += error <= 0.05, within_1cm += error <= 0.01;
+          } catch (const ComputeError& error) {
+            if (on_one_line)
+              aligned_refused += std::string(error.what()).find("one line") != std::string::npos;
+            else
+              ++weak;
+          }
         }
-      }
-  EXPECT_EQ(triplets, 680);
-  EXPECT_EQ(aligned, 56);
+  }
+  EXPECT_EQ(triplets, 5 * 680);
+  EXPECT_EQ(aligned, 5 * 56);
   EXPECT_EQ(aligned_refused, aligned);
-  const double rest = triplets - aligned - refused;  // some lie near a surface on which the pose is not determined
-  EXPECT_LE(refused, 0.1 * (triplets - aligned));
-  RecordProperty("share_within_5cm", std::to_string(within_5cm / rest));
-  RecordProperty("share_within_1cm", std::to_string(within_1cm / rest));
-  std::printf(
-      "triplets: %d aligned refused, of the others %d refused, of the rest %.1f %% within 5 cm, %.1f %% within 1 cm\n",
-      aligned_refused, refused, 100 * within_5cm / rest, 100 * within_1cm / rest);
+  const double rest = triplets - aligned - weak;  // weak ones lie near a surface on which the pose is not determined
+  std::printf("%d aligned refused, %d refused as weak, of the rest %.1f %% within 5 cm, %.1f %% within 1 cm\n",
+              aligned_refused, weak, 100 * within_5cm / rest, 100 * within_1cm / rest);
+  EXPECT_LE(weak, 0.1 * triplets);
   EXPECT_GE(within_5cm, 0.95 * rest);
+  EXPECT_GE(within_1cm, 0.5 * rest);
 }
 
 TEST(RigResection, WrongPointsAreFoundAndTheSigmaIsTrue) {
@@ -96,7 +97,7 @@ TEST(RigResection, WrongPointsAreFoundAndTheSigmaIsTrue) {
   constexpr int kTrials = 60;
   for (int trial = 0; trial < kTrials; ++trial) {
     const Pose truth = level_rig({500, 300, 32.5}, noise.uniform(-3, 3));
-    std::vector<Eigen::Vector3d> points = surroundings(noise, 20);
+    std::vector<Eigen::Vector3d> points = surroundings(noise, 32);
     std::vector<RigSight> sights = sights_of(points, truth, noise);
     for (RigSight& sight : sights) {  // stated positions with an error of their own
       sight.point += 0.02 * noise.triple();
@@ -104,7 +105,7 @@ TEST(RigResection, WrongPointsAreFoundAndTheSigmaIsTrue) {
     }
     for (std::size_t i = 0; i < 8; ++i) sights[i].point += 3 * noise.triple();
     const RigResection result = resect_rig(sights, {}, static_cast<std::uint64_t>(trial));
-    EXPECT_GE(result.points, static_cast<int>(sights.size()) - 9);
+    EXPECT_GE(result.points, static_cast<int>(sights.size()) - 10);
     const Eigen::Vector3d error = result.pose.centre - truth.centre;
     normalised += error.dot(result.covariance.bottomRightCorner<3, 3>().inverse() * error) / 3 / kTrials;
   }
@@ -132,7 +133,9 @@ TEST(RigResection, ThreePointsNeedAnApproximatePoseWhereSeveralFit) {
     const std::string text = refusal(sights);
     if (text.find("equally well") == std::string::npos) continue;
     ++ambiguous;
-    EXPECT_LT((resect_rig(sights, {}, 1, truth).pose.centre - truth.centre).norm(), 0.3);
+    RigResectionOptions options;
+    options.max_position_sigma_m = 1;
+    EXPECT_LT((resect_rig(sights, options, 1, ApproximatePose{truth}).pose.centre - truth.centre).norm(), 1);
   }
   EXPECT_GT(ambiguous, 5);
 }
