@@ -46,6 +46,11 @@ struct StreetRig {
   }
 };
 
+inline const StreetRig& street_rig() {
+  static const StreetRig rig;
+  return rig;
+}
+
 // Level rig at a place, driving along `heading` (radians from east, anticlockwise), tilted a little.
 inline Pose level_rig(const Eigen::Vector3d& centre, double heading, const Eigen::Vector3d& tilt = {0, 0, 0}) {
   Eigen::Matrix3d r;

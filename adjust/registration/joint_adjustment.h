@@ -1,0 +1,106 @@
+// Joint adjustment of a trajectory (CN-22, 23, 28, 29, 30): poses of all frames from
+//
+//   chain          successive frames of a pass: in the axes of the first, as a 2x2 registration, or, as published, in
+//                  ground axes: S_i - S_{i-1} = dS, R_i R_{i-1}' = dR
+//   registrations  relative poses of crossing passes with their covariances, weights switchable
+//   resections     absolute poses of frames with their covariances
+//   positions      of the trajectory, whose sigmas nobody trusts
+//   attitudes      of the trajectory
+//   control        image measurements of control points along the path; of check points, whose positions are not used
+//
+// as one sparse least squares problem (Ceres, SPARSE_NORMAL_CHOLESKY, one thread: the same bits every time).
+//
+// Weights. A registration is right or altogether wrong, a position is good to centimetres or off by metres with all of
+// its neighbours. Both get the weight of Geman and McClure, w = (1 + q / c^2)^-2, of their mean squared normalised
+// residual q, in rounds of reweighting in which the scale falls from what the start is good for to the noise (graduated
+// non-convexity: Yang, Antonante, Tzoumas and Carlone, RA-L 2020). q of a position is the mean over its neighbours in
+// the pass, and its weight is divided by their number: errors of a trajectory change over tens of frames, so that this
+// many positions count as one.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "geometry/rig_ray.h"
+#include "io/block.h"
+
+namespace megablock {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+struct ChainLink {
+  FrameIndex from, to;
+  Pose pose;  // RelativePose::pose; with in_ground its centre is S_to - S_from
+  double rotation_sigma_rad = 0, position_sigma_m = 0;
+  bool in_ground = false;
+};
+
+struct RegistrationLink {
+  FrameIndex from, to;
+  Pose pose;           // RelativePose::pose
+  Matrix6 covariance;  // of Log(R R_estimated') [rad] and of the centre of `to` in the axes of `from` [m]
+};
+
+struct ResectedFrame {
+  FrameIndex frame;
+  Pose pose;
+  Matrix6 covariance;  // of PoseIncrement
+};
+
+// Image measurements of one control point (known position) or of a tie point (none).
+struct PathPoint {
+  struct View {
+    FrameIndex frame;
+    RigRay ray;
+    double sigma_px = 0.5;
+  };
+  bool known = true;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // known: with sigma; else the start
+  Eigen::Vector3d sigma = Eigen::Vector3d::Constant(0.01);
+  std::vector<View> views;
+};
+
+struct JointOptions {
+  double registration_scale = 3;          // c of the last round, in sigmas
+  double first_registration_scale = 300;  // of the first round
+  bool robust_registrations = true;       // false: all weigh one
+  bool use_positions = true;
+  double first_position_sigma_m = 2;  // what the trajectory's positions are good for at first
+  double position_sigma_m = 0.05;     // and where they are good, per axis
+  double position_scale = 3;          // c
+  int position_neighbours = 50;       // frames over which a trajectory's errors stay the same
+  bool use_attitudes = true;
+  double attitude_sigma_deg = 0.05;                 // of the trajectory, about each axis; shared by position_neighbours
+  double first_image_scale = 100, image_scale = 3;  // c of control measurements, in sigmas
+  int rounds = 10;                                  // of reweighting
+  int iterations = 4;                               // at most, of each but the last
+  int last_iterations = 30;
+  std::vector<FrameIndex> covariance_of;  // frames whose covariance is asked for (small blocks)
+  void check() const;                     // throws InputError
+};
+
+struct JointInput {
+  std::vector<Pose> start;            // [frames] of the trajectory; observed positions and attitudes as well
+  std::vector<std::int64_t> pass;     // [frames]
+  std::vector<std::uint8_t> located;  // [frames] 1: its position is an observation
+  std::vector<ChainLink> chain;
+  std::vector<RegistrationLink> registrations;
+  std::vector<ResectedFrame> resections;
+  std::vector<PathPoint> points;
+};
+
+struct JointResult {
+  std::vector<Pose> frames;
+  std::vector<double> registration_weight;    // [registrations] 0..1
+  std::vector<double> registration_residual;  // [registrations] length of the normalised residual (6 numbers)
+  std::vector<double> position_weight;        // [frames] 0..1
+  std::vector<Eigen::Vector3d> points;        // [points]
+  std::vector<Matrix6> covariances;           // [covariance_of] of PoseIncrement
+  int iterations = 0;
+  double cost = 0;  // of the last round
+};
+
+// Throws ComputeError when the normal equations cannot be solved.
+JointResult adjust_jointly(const JointInput& input, const JointOptions& options);
+
+}  // namespace megablock

@@ -1,0 +1,79 @@
+// 2x2 registration (CN-25): relative pose of two passes from two successive frames of each, A and B of one, C and D of
+// the other, and the points that all four see.
+//
+// Everything is expressed in the axes of A. Unknowns are the poses of B, C and D and the points; A is held, the pairs
+// are tied by the trusted relative poses of the trajectory
+//
+//     Log(R_B R_AB') / s_r, (C_B - T_AB) / s_t        and likewise D from C,
+//
+// or held (s = 0), as published. Residuals are in pixels (geometry/rig_ray.h). Points are eliminated (Schur
+// complement); twenty iterations with a threshold that falls geometrically to its last value, within it Cauchy weights
+// of half of it.
+//
+// The published start is the trajectory's pose with a threshold of 200 px. Here A and B intersect the points first, the
+// rig of C and D is resected from them by RANSAC (adjust/rig_resection.h, covariances of the points in the weights),
+// and the threshold begins at `robust_threshold_px`; where that fails, the published start is taken.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "geometry/rig_ray.h"
+
+namespace megablock {
+
+// A point seen in the frames 0..3 = A, B, C, D; a frame may see it in two cameras.
+struct FourFrameTrack {
+  struct View {
+    std::int32_t frame = 0;
+    RigRay ray;
+  };
+  std::vector<View> views;
+};
+
+struct PairRegistrationOptions {
+  int iterations = 20;
+  double first_threshold_px = 200;  // with the trajectory as start
+  double last_threshold_px = 3;
+  bool robust_start = true;               // by resection; false: as published
+  double robust_threshold_px = 20;        // first threshold after it
+  int samples = 300;                      // of three points
+  double image_sigma_px = 0.5;            // per axis
+  double pair_position_sigma_m = 0.005;   // of successive frames' relative pose, per axis; 0: held
+  double pair_rotation_sigma_deg = 0.01;  // 0: held
+  int min_frames = 4;                     // of the four that see a point; 3: one may miss it
+  int min_tracks = 6;                     // seen in so many frames
+  int min_measurements = 21;              // that stay ("more than 20")
+  double min_kept_share = 0.3;            // of the measurements
+  double max_position_sigma_m = 0.02;     // of the relative pose, length; above: refused
+  double max_rotation_sigma_deg = 0.02;
+  double max_shift_m = 10;  // from the trajectory's relative pose; above: refused
+  double max_turn_deg = 5;
+  void check() const;  // throws InputError
+};
+
+struct PairRegistration {
+  bool accepted = false;
+  std::string reason;  // why not
+  Pose relative;       // A -> C (RelativePose::pose)
+  // Of Log(R R_estimated') [rad] and of the centre of C in the axes of A [m].
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  std::int32_t tracks = 0, measurements = 0, kept = 0;  // tracks: in enough frames; kept: measurements
+  double median_before_px = 0, median_after_px = 0;     // residual lengths with the trajectory's pose; of kept ones
+  double position_sigma_m = 0, rotation_sigma_deg = 0;  // lengths
+  double shift_m = 0;                                   // from the trajectory's relative pose
+};
+
+// `frames`: approximate poses (ground -> rig) of A, B, C, D; B relative to A and D relative to C are trusted. Tracks
+// that not all four frames see are left aside. Deterministic: random samples depend on `seed` alone.
+PairRegistration register_pair(const std::array<Pose, 4>& frames, const std::vector<FourFrameTrack>& tracks,
+                               const PairRegistrationOptions& options, std::uint64_t seed);
+
+// Baseline (CN-24): rigid transformation between the points as A and B intersect them and as C and D do. Relative pose
+// A -> C; empty with fewer than three points. Not usable where points are far against the base.
+std::optional<Pose> register_3d_3d(const std::array<Pose, 4>& frames, const std::vector<FourFrameTrack>& tracks,
+                                   std::uint64_t seed);
+
+}  // namespace megablock
