@@ -14,6 +14,7 @@
 #include "cluster/exit_codes.h"
 #include "cluster/monolithic_comparison.h"
 #include "cluster/pipeline.h"
+#include "cluster/register_command.h"
 #include "cluster/simulate_command.h"
 #include "cluster/status.h"
 #include "cluster/version.h"
@@ -306,6 +307,8 @@ int command_line(int argc, char** argv) {
     add_run(app, action, ranks, "orient", "orient", "Run as far as the initial orientation");
     add_run(app, action, ranks, "adjust", "adjust", "Run as far as the adjustment of the tiles");
     add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
+    add_resect(app, action);
+    add_register(app, action, ranks);
     add_status(app, action);
     add_report(app, action);
     add_export(app, action);

@@ -1,8 +1,10 @@
 #include "cluster/pipeline.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -93,9 +95,15 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   Json effective = Json::object();
   for (const OptionValue& option : option_values(read_options(project.settings)))
     effective[option.section][option.key] = option.value;
-  Json job{{"version", kJobVersion},      {"program", kProgram},     {"arithmetic", kArithmeticLevel},
-           {"project", project.file},     {"generations", generations},       {"settings", settings},
-           {"options", effective},        {"tie_points", project.tie_points}, {"unreadable", project.unreadable},
+  Json job{{"version", kJobVersion},
+           {"program", kProgram},
+           {"arithmetic", kArithmeticLevel},
+           {"project", project.file},
+           {"generations", generations},
+           {"settings", settings},
+           {"options", effective},
+           {"tie_points", project.tie_points},
+           {"unreadable", project.unreadable},
            {"warnings", project.warnings}};
   std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
   store.write_text("job.json", text);
@@ -152,9 +160,53 @@ void run_stages(Job& job, const std::string& tie_points) {
   remove_surplus(job, tracks);
 }
 
-}  // namespace
+// The tracks of all tiles, in the order of their indices.
+TrackSet read_all_tracks(const Job& job, const std::vector<std::string>& units) {
+  std::vector<TrackSet> parts;
+  std::vector<std::pair<TrackIndex, std::pair<std::size_t, std::size_t>>> order;  // id, part and row
+  for (const std::string& unit : units) {
+    parts.push_back(read_tracks(job.store.verified_path(unit)));
+    for (std::size_t t = 0; t < parts.back().id.size(); ++t)
+      order.push_back({parts.back().id[t], {parts.size() - 1, t}});
+  }
+  std::sort(order.begin(), order.end());
+  TrackSet all;
+  all.begin.push_back(0);
+  for (const auto& [id, place] : order) {
+    const TrackSet& part = parts[place.first];
+    all.id.push_back(id);
+    for (auto o = static_cast<std::size_t>(part.begin[place.second]);
+         o < static_cast<std::size_t>(part.begin[place.second + 1]); ++o) {
+      all.image.push_back(part.image[o]);
+      all.x.push_back(part.x[o]);
+      all.y.push_back(part.y[o]);
+      all.feature.push_back(part.feature[o]);
+    }
+    all.begin.push_back(all.observation_count());
+  }
+  return all;
+}
 
-int run_job(const RunOptions& run_options, Communicator& ranks) {
+TrackSource track_source(Job& job, const std::string& tie_points) {
+  if (!tie_points.empty()) {
+    TrackSource source{tie_points, 0, [tie_points] { return read_tracks(tie_points); }};
+    source.fingerprint = std::stoull(on_first_rank(job.ranks, [&] { return std::to_string(hash_file(tie_points)); }));
+    return source;
+  }
+  const FeatureStage features = run_features(job);
+  const CandidateGraph graph = run_candidates(job, features);
+  const std::vector<std::string> matches = run_matching(job, features, graph);
+  const Tiles tiles = run_tiles(job, matches);
+  const std::vector<std::string> tracks = run_tracks(job, matches, tiles);
+  Hasher hasher;
+  for (const std::string& unit : tracks) hasher.add(job.store.seal(unit)->content_hash);
+  return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }};
+}
+
+using Stages = std::function<void(Job& job, const std::string& tie_points)>;
+
+// Opens the job, runs the stages and returns the exit code.
+int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& stages) {
   JobStore store(run_options.directory);
   std::optional<JobLock> lock;
   const std::string text = on_first_rank(ranks, [&] {
@@ -179,9 +231,21 @@ int run_job(const RunOptions& run_options, Communicator& ranks) {
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
   for (const auto& [file, reason] : json.at("unreadable").get<std::vector<std::pair<std::string, std::string>>>())
     job.failures.push_back({"init", file, reason});
-  run_stages(job, json.at("tie_points"));
+  stages(job, json.at("tie_points"));
   ranks.barrier();  // the lock is held until everybody is done
   return job.failures.empty() ? kExitDone : kExitFailedUnits;
+}
+
+}  // namespace
+
+int run_job(const RunOptions& options, Communicator& ranks) { return with_job(options, ranks, run_stages); }
+
+int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks) {
+  settings.check();
+  return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+    const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
+    if (job.is_first_rank()) std::printf("%s", to_text(summary).c_str());
+  });
 }
 
 }  // namespace megablock

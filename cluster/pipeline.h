@@ -6,6 +6,7 @@
 
 #include "cluster/communicator.h"
 #include "cluster/job.h"
+#include "cluster/stages/registration.h"
 
 namespace megablock {
 
@@ -15,5 +16,8 @@ inline constexpr const char* kStages[] = {"partition", "match", "orient", "adjus
 // Collective. Brings the job up to date as far as options.last_stage and returns the exit code (kExitDone or
 // kExitFailedUnits). Throws the project's errors, the same on every rank.
 int run_job(const RunOptions& options, Communicator& ranks);
+
+// Collective. Opens the same job, brings its tracks up to date and registers its trajectory (stages/registration.h).
+int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks);
 
 }  // namespace megablock

@@ -41,3 +41,6 @@ megablock_library(metis metis metis.h)
 megablock_library(xxHash::xxHash xxhash xxhash.h)
 megablock_library(SuiteSparse::CHOLMOD cholmod cholmod.h suitesparse)
 megablock_library(openblas openblas cblas.h x86_64-linux-gnu/openblas-pthread openblas-pthread)
+# CGAL is headers; its exact arithmetic is GMP and MPFR.
+megablock_library(gmp gmp gmp.h)
+megablock_library(mpfr mpfr mpfr.h)

@@ -9,6 +9,7 @@
 #include "io/error.h"
 #include "io/events.h"
 #include "io/hdf5_file.h"
+#include "io/registration.h"
 #include "io/result.h"
 #include "io/unit_files.h"
 
@@ -55,7 +56,8 @@ class Check {
     for (const std::string& name : store_.list("")) {
       const bool top = name.find('/') == std::string::npos;
       const bool text = name.starts_with("events/") || name.starts_with("stages/") || name.starts_with("scratch/") ||
-                        (name.starts_with("result/") && name != kResult);
+                        (name.starts_with("result/") && name != kResult) ||
+                        (name.starts_with("register/") && !name.ends_with(".h5"));
       if (top ? name.ends_with(".h5") : !text) names.push_back(name);
     }
     return names;
@@ -69,11 +71,18 @@ class Check {
       check_result(path);
     } else {
       const std::map<std::string, std::function<void()>> readers = {
-          {"block", [&] { check(read_block(path)); }},    {"features", [&] { read_features(path); }},
-          {"candidates", [&] { read_candidates(path); }}, {"matches", [&] { read_matches(path); }},
-          {"tiles", [&] { read_tiles(path); }},           {"tracks", [&] { read_tracks(path); }},
-          {"state", [&] { read_state(path); }},           {"orientation", [&] { read_orientation(path); }},
-          {"adjustment", [&] { read_adjustment(path); }}};
+          {"block", [&] { check(read_block(path)); }},
+          {"features", [&] { read_features(path); }},
+          {"candidates", [&] { read_candidates(path); }},
+          {"matches", [&] { read_matches(path); }},
+          {"tiles", [&] { read_tiles(path); }},
+          {"tracks", [&] { read_tracks(path); }},
+          {"state", [&] { read_state(path); }},
+          {"orientation", [&] { read_orientation(path); }},
+          {"adjustment", [&] { read_adjustment(path); }},
+          {"places", [&] { read_places(path); }},
+          {"registrations", [&] { read_registrations(path); }},
+          {"trajectory", [&] { read_trajectory(path); }}};
       if (const auto reader = readers.find(kind); reader != readers.end()) reader->second();
     }
   }

@@ -17,10 +17,11 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "geometry/rig_ray.h"
+#include "io/registration.h"
 
 namespace megablock {
 
@@ -52,18 +53,6 @@ struct PairRegistrationOptions {
   double max_shift_m = 10;  // from the trajectory's relative pose; above: refused
   double max_turn_deg = 5;
   void check() const;  // throws InputError
-};
-
-struct PairRegistration {
-  bool accepted = false;
-  std::string reason;  // why not
-  Pose relative;       // A -> C (RelativePose::pose)
-  // Of Log(R R_estimated') [rad] and of the centre of C in the axes of A [m].
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  std::int32_t tracks = 0, measurements = 0, kept = 0;  // tracks: in enough frames; kept: measurements
-  double median_before_px = 0, median_after_px = 0;     // residual lengths with the trajectory's pose; of kept ones
-  double position_sigma_m = 0, rotation_sigma_deg = 0;  // lengths
-  double shift_m = 0;                                   // from the trajectory's relative pose
 };
 
 // `frames`: approximate poses (ground -> rig) of A, B, C, D; B relative to A and D relative to C are trusted. Tracks

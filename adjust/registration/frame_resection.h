@@ -1,0 +1,24 @@
+// Resection of every frame that sees enough control points (CN-21, CN-23).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "adjust/registration/trajectory.h"
+#include "adjust/rig_resection.h"
+
+namespace megablock {
+
+struct FrameResection {
+  FrameIndex frame;
+  std::string refused;  // why there is no pose; empty: there is one
+  int points = 0;       // known points that the frame sees
+  RigResection resection;
+};
+
+// Frames that see a known control point, ascending. `start`: approximate poses, one per frame, or empty: none. Control
+// points whose height is not known take no part. The seed of a frame's samples is its index.
+std::vector<FrameResection> resect_frames(const Block& block, const std::vector<Pose>& start,
+                                          const TrajectoryOptions& which, const RigResectionOptions& options);
+
+}  // namespace megablock

@@ -1,0 +1,182 @@
+#include "adjust/registration/trajectory.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "adjust/registration/four_frames.h"
+#include "geometry/triangulation.h"
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kFree = 1e6;  // sigma of a coordinate that is not known, metres
+
+using RelativeOf = std::map<std::pair<FrameIndex, FrameIndex>, const RelativePose*>;
+
+std::optional<Pose> stated_pose(const Frame& frame) {
+  if (frame.given_pose) return frame.given_pose;
+  if (!frame.position_prior || !frame.attitude_prior) return std::nullopt;
+  const Eigen::Quaterniond rotation = frame.attitude_prior->rotation_cw;
+  return Pose{rotation, frame.position_prior->position - rotation.conjugate() * frame.position_prior->lever_arm};
+}
+
+Pose carry_on(const Pose& from, const Pose& relative) {
+  return {(relative.rotation * from.rotation).normalized(), from.centre + from.rotation.conjugate() * relative.centre};
+}
+
+void check_times(const Block& block, const std::vector<FrameIndex>& pass) {
+  int ascending = 0, descending = 0;
+  for (int attempt = 0; attempt < 2; ++attempt)  // counted first, so that the message names a frame of the minority
+    for (std::size_t i = 1; i < pass.size(); ++i) {
+      const Frame &before = block.frames[pass[i - 1]], &now = block.frames[pass[i]];
+      if (!std::isfinite(before.time_s) || !std::isfinite(now.time_s)) continue;
+      if (attempt == 0) {
+        if (now.time_s == before.time_s)
+          throw InputError(fmt::format("frames '{}' and '{}' of pass {} have the same time; remove one", before.name,
+                                       now.name, now.pass));
+        ++(now.time_s > before.time_s ? ascending : descending);
+      } else if (ascending > 0 && descending > 0 && (now.time_s > before.time_s) == (ascending < descending)) {
+        throw InputError(
+            fmt::format("frame '{}': the clock of pass {} runs backwards from frame '{}' on; list the "
+                        "frames of a pass in the order of their times",
+                        now.name, now.pass, before.name));
+      }
+    }
+}
+
+// Frames of each pass in their order.
+std::map<std::int64_t, std::vector<FrameIndex>> passes_of(const Block& block) {
+  std::map<std::int64_t, std::vector<FrameIndex>> passes;
+  for (std::int64_t f = 0; f < std::ssize(block.frames); ++f)
+    passes[block.frames[FrameIndex(f)].pass].push_back(FrameIndex(f));
+  return passes;
+}
+
+Pose start_of(const Block& block, FrameIndex f, const std::vector<Pose>& starts, FrameIndex before,
+              const RelativeOf& relative) {
+  const Frame& frame = block.frames[f];
+  std::optional<Pose> pose = stated_pose(frame);
+  const auto link = relative.find({before, f});
+  if (!pose && link != relative.end())
+    pose = carry_on(starts[static_cast<std::size_t>(before.value)], link->second->pose);
+  if (!pose)
+    throw InputError(
+        fmt::format("frame '{}' has no pose in the trajectory; give an approximate pose, or position and "
+                    "attitude",
+                    frame.name));
+  if (!pose->centre.allFinite() || !pose->rotation.coeffs().allFinite())
+    throw InputError(fmt::format("frame '{}': its pose in the trajectory is not a number; remove the frame or its pose",
+                                 frame.name));
+  return *pose;
+}
+
+void add_link(const Block& block, FrameIndex from, FrameIndex to, const RelativeOf& relative,
+              const TrajectoryOptions& options, Trajectory& trajectory) {
+  const auto stated = relative.find({from, to});
+  if (stated != relative.end()) {
+    const RelativePose& r = *stated->second;
+    const bool uniform = options.chain_position_sigma_m > 0;
+    trajectory.input.chain.push_back({from, to, r.pose,
+                                      uniform ? options.chain_rotation_sigma_deg * kDegree : r.rotation_sigma_rad,
+                                      uniform ? options.chain_position_sigma_m : r.position_sigma_m, false});
+    return;
+  }
+  const Pose &a = trajectory.input.start[static_cast<std::size_t>(from.value)],
+             &b = trajectory.input.start[static_cast<std::size_t>(to.value)];
+  const double distance = (b.centre - a.centre).norm();
+  if (distance > options.max_gap_m) {
+    trajectory.notes.push_back(fmt::format("gap of {:.0f} m between frames '{}' and '{}': not linked", distance,
+                                           block.frames[from].name, block.frames[to].name));
+    return;
+  }
+  trajectory.input.chain.push_back({from,
+                                    to,
+                                    {(b.rotation * a.rotation.conjugate()).normalized(), b.centre - a.centre},
+                                    options.difference_rotation_sigma_deg * kDegree,
+                                    options.difference_position_sigma_m,
+                                    true});
+}
+
+std::vector<Ray> rays_of(const PathPoint& point, const std::vector<Pose>& start) {
+  std::vector<Ray> rays;
+  for (const PathPoint::View& view : point.views) {
+    const Pose& pose = start[static_cast<std::size_t>(view.frame.value)];
+    rays.push_back(
+        {pose.centre + pose.rotation.conjugate() * view.ray.origin, pose.rotation.conjugate() * view.ray.direction, 1});
+  }
+  return rays;
+}
+
+void add_points(const Block& block, const TrajectoryOptions& options, Trajectory& trajectory) {
+  for (std::size_t i = 0; i < block.control_points.size(); ++i) {
+    const ControlPoint& control = block.control_points[i];
+    const bool held_out = !options.check_prefix.empty() && control.name.starts_with(options.check_prefix);
+    PathPoint point;
+    point.known = control.role == PointRole::kControl && !held_out;
+    if (!point.known && options.check_points == TrajectoryOptions::CheckPoints::kIgnore) continue;
+    for (const ImageMeasurement& m : control.measurements) {
+      const auto ray =
+          rig_ray(block.mount_of(m.image).pose, block.cameras[block.camera_of(m.image)].intrinsics, m.pixel);
+      if (ray) point.views.push_back({block.images[m.image].frame, *ray, m.sigma_px});
+    }
+    const auto meeting = intersect_rays(rays_of(point, trajectory.input.start));
+    point.position = control.position;
+    point.sigma = control.sigma;
+    if (point.known && std::isnan(control.position.z())) {
+      if (!meeting) continue;
+      point.position.z() = meeting->z();
+      point.sigma.z() = kFree;
+    }
+    if (!point.known) {
+      if (point.views.size() < 2 || !meeting) continue;
+      point.position = *meeting;
+    }
+    if (point.views.empty()) continue;
+    trajectory.input.points.push_back(std::move(point));
+    trajectory.point_row.push_back(static_cast<std::int64_t>(i));
+  }
+}
+
+}  // namespace
+
+void TrajectoryOptions::check() const {
+  if (!(chain_position_sigma_m >= 0) || !(chain_rotation_sigma_deg >= 0))
+    throw InputError("chain_position_sigma_m and chain_rotation_sigma_deg must not be negative");
+  if ((chain_position_sigma_m == 0) != (chain_rotation_sigma_deg == 0))
+    throw InputError("chain_position_sigma_m and chain_rotation_sigma_deg are both zero or neither");
+  if (!(difference_position_sigma_m > 0) || !(difference_rotation_sigma_deg > 0))
+    throw InputError("difference_position_sigma_m and difference_rotation_sigma_deg must be positive");
+  if (!(max_gap_m > 0)) throw InputError("max_gap_m must be positive");
+}
+
+Trajectory trajectory_of(const Block& block, const TrajectoryOptions& options) {
+  RelativeOf relative;
+  for (const RelativePose& r : block.relative_poses) relative[{r.from, r.to}] = &r;
+  Trajectory trajectory;
+  JointInput& input = trajectory.input;
+  input.start.resize(block.frames.size());
+  for (const Frame& frame : block.frames) {
+    input.pass.push_back(frame.pass);
+    input.located.push_back(frame.position_prior.has_value());
+  }
+  for (const auto& [pass, frames] : passes_of(block)) {
+    check_times(block, frames);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const FrameIndex before = i > 0 ? frames[i - 1] : FrameIndex();
+      input.start[static_cast<std::size_t>(frames[i].value)] =
+          start_of(block, frames[i], input.start, before, relative);
+      if (i > 0) add_link(block, before, frames[i], relative, options, trajectory);
+    }
+  }
+  if (options.use_control) add_points(block, options, trajectory);
+  return trajectory;
+}
+
+}  // namespace megablock

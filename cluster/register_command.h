@@ -1,0 +1,17 @@
+// The commands `resect` and `register`.
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace megablock {
+
+class Communicator;
+
+void add_resect(CLI::App& app, std::function<int()>& action);
+void add_register(CLI::App& app, std::function<int()>& action, Communicator& ranks);
+
+}  // namespace megablock

@@ -1,0 +1,110 @@
+#!/usr/bin/python3
+"""The table of CN-30 on a simulated Stereopolis block: errors of the trajectory by method, one control zone left out in turn.
+
+Absolute: rms distance of the frames within 40 m of the held-out zone's points from their true positions. Relative: rms
+error of the vector between the frames of registered places (true ones). `control` holds the other zones' points.
+
+    megablock simulate --scene stereopolis --frames 45000 --control-zones 7 -o town
+    tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 7]
+"""
+import argparse
+import csv
+import math
+import pathlib
+import subprocess
+import time
+
+METHODS = [  # name, options of `register`
+    ("initial", None),
+    ("resections + chain", ["--no-registrations", "--resections", "--no-control", "--no-positions"]),
+    ("+ 2x2", ["--resections", "--no-control", "--no-positions"]),
+    ("chain + 2x2", ["--no-control", "--no-positions"]),
+    ("chain + 2x2 + control, zone not measured", ["--no-positions", "--check-points", "ignore"]),
+    ("chain + 2x2 + control, zone as tie points", ["--no-positions", "--check-points", "tie"]),
+    ("the same without 2x2", ["--no-positions", "--no-registrations", "--check-points", "tie"]),
+    ("all and the positions, reweighted", ["--check-points", "tie"]),
+]
+
+
+def read_poses(path):
+    with open(path) as file:
+        rows = csv.DictReader(line for line in file if not line.startswith("#"))
+        return {r["name"]: (tuple(float(r[k]) for k in ("qw", "qx", "qy", "qz")),
+                            tuple(float(r[k]) for k in ("x", "y", "z"))) for r in rows}
+
+
+def rotate(q, v):
+    w, x, y, z = q
+    t = (2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0]))
+    return (v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2],
+            v[2] + w * t[2] + x * t[1] - y * t[0])
+
+
+def minus(a, b):
+    return tuple(x - y for x, y in zip(a, b))
+
+
+def norm(v):
+    return math.sqrt(sum(x * x for x in v))
+
+
+def rms(values):
+    return math.sqrt(sum(v * v for v in values) / len(values)) if values else float("nan")
+
+
+def relative_error(poses, truth, places):
+    def base(p, a, c):
+        return rotate(p[a][0], minus(p[c][1], p[a][1]))
+    return rms([norm(minus(base(poses, a, c), base(truth, a, c))) for a, c in places])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("megablock")
+    parser.add_argument("block", type=pathlib.Path, help="folder of simulate")
+    parser.add_argument("job", type=pathlib.Path)
+    parser.add_argument("--zones", type=int, default=7)
+    arguments = parser.parse_args()
+    truth = read_poses(arguments.block / "truth.csv")
+
+    def register(options):
+        begun = time.time()
+        done = subprocess.run([arguments.megablock, "register", arguments.block / "block.yaml", "-j", arguments.job, "-q",
+                               *options], capture_output=True, text=True)
+        if done.returncode:
+            raise SystemExit(done.stderr)
+        return done.stdout, time.time() - begun
+
+    text, seconds = register([])
+    print(text, f"first run {seconds:.0f} s\n", sep="")
+    with open(arguments.job / "register/registrations.csv") as file:
+        rows = list(csv.DictReader(file))
+    places = [(r["a"], r["c"]) for r in rows]
+    import h5py  # of the input: start poses, control points
+    with h5py.File(arguments.block / "given.h5") as given:
+        names = [n.decode() for n in given["frames/name"][:]]
+        start = {n: (tuple(q), tuple(c)) for n, q, c in
+                 zip(names, given["frames/given_pose/rotation_wxyz"][:], given["frames/given_pose/centre"][:])}
+        control = {n.decode(): tuple(p) for n, p in
+                   zip(given["control_points/name"][:], given["control_points/position"][:])}
+    zones = []
+    for z in range(arguments.zones):
+        points = [p for n, p in control.items() if n.startswith(f"zone{z}_")]
+        if points:
+            zones.append((z, [n for n, (_, c) in truth.items() if min(norm(minus(c, p)) for p in points) < 40]))
+    print(f"{'method':44s} absolute, m: mean over zones (each)    relative, m    s")
+    for name, options in METHODS:
+        errors, relative, seconds = [], [], 0
+        for z, near in zones:
+            poses = start
+            if options is not None:
+                seconds += register([*options, "--check-prefix", f"zone{z}_"])[1]
+                poses = read_poses(arguments.job / "register/poses.csv")
+            errors.append(rms([norm(minus(poses[n][1], truth[n][1])) for n in near]))
+            relative.append(relative_error(poses, truth, places))
+        print(f"{name:44s} {rms(errors):.3f} ({' '.join(f'{e:.3f}' for e in errors)})   {rms(relative):.4f}   "
+              f"{seconds / max(1, len(zones)):.0f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
