@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
