@@ -20,7 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Kind = SimulationOptions::Scene;
+bool is_stereopolis(const SimulationOptions& options) {
+  return options.scene == SimulationOptions::Scene::kStereopolis;
+}
 
 Layout make_city_layout(const SimulationOptions& options) {
   Layout layout = make_layout(options);
@@ -117,7 +119,7 @@ void write_gcp_list(const Block& block, const fs::path& path) {
 
 void write_cameras(const SimulationOptions& options, const Block& block, std::ostream& yaml) {
   // The headers of the images say enough, unless there is a calibration to start from or to hold.
-  if (options.calibrate && options.scene != Kind::kStereopolis) return;
+  if (options.calibrate && !is_stereopolis(options)) return;
   yaml << "cameras:\n  grouping: " << (block.cameras.size() > 1 ? "exif" : "one") << '\n';
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
     const Camera& camera = block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
@@ -164,7 +166,7 @@ void write_project(const SimulationOptions& options, const Block& block, const W
          << "\n  sigma_rotation_deg: " << mount.rotation_sigma_rad * 180 / std::numbers::pi << '\n';
   }
   if (written.control) yaml << "control: control.csv\n";
-  if (written.poses && options.scene == Kind::kStereopolis)
+  if (written.poses && is_stereopolis(options))
     yaml << "poses: poses.csv  # the trajectory\n";
   else if (written.poses)
     yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
@@ -176,7 +178,7 @@ void write_project(const SimulationOptions& options, const Block& block, const W
 
 void write_rendered_block(const SimulationOptions& asked, const std::string& folder) {
   asked.check();
-  if (asked.scene == Kind::kTargetField)
+  if (asked.scene == SimulationOptions::Scene::kTargetField)
     throw InputError("simulation: the target field is made of tie points only; leave out --rendered");
   SimulationOptions options = asked;
   options.bridge = false;  // the renderer knows houses only

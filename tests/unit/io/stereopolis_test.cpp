@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "geometry/rotation.h"
@@ -15,11 +16,11 @@ namespace megablock {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-using Scene = SimulationOptions::Scene;
+using Kind = SimulationOptions::Scene;
 using Path = SimulationOptions::Path;
 
 SimulationOptions small(std::int64_t frames) {
-  SimulationOptions options = SimulationOptions::of(Scene::kStereopolis);
+  SimulationOptions options = SimulationOptions::of(Kind::kStereopolis);
   options.frames = frames;
   options.street_spacing_m = 60;
   options.points_per_frame = 100;
@@ -47,7 +48,7 @@ Eigen::Vector2d projected(const SimulatedBlock& s, ImageIndex image, const Eigen
 double rms(double sum, double n) { return std::sqrt(sum / n); }
 
 TEST(StereopolisTrajectory, ErrorsAreAsStated) {
-  const SimulationOptions options = SimulationOptions::of(Scene::kStereopolis);
+  const SimulationOptions options = SimulationOptions::of(Kind::kStereopolis);
   double clear = 0, clear_xy = 0, clear_z = 0, heading = 0, absent = 0, frames = 0, stretches = 0, step = 0;
   for (std::int64_t pass = 0; pass < 8; ++pass) {
     const PassErrors errors = draw_pass_errors(options, pass, 10000);
@@ -84,14 +85,14 @@ TEST(StereopolisTrajectory, ErrorsAreAsStated) {
 }
 
 TEST(StereopolisTrajectory, PassesDriftOnTheirOwn) {
-  const SimulationOptions options = SimulationOptions::of(Scene::kStereopolis);
+  const SimulationOptions options = SimulationOptions::of(Kind::kStereopolis);
   const PassErrors a = draw_pass_errors(options, 0, 2000), b = draw_pass_errors(options, 1, 2000);
   EXPECT_NE(a.gnss, b.gnss);
   EXPECT_NE(a.position.front(), b.position.front());
 }
 
 TEST(StereopolisTrajectory, ShortPassesAndOpenSkyWork) {
-  SimulationOptions options = SimulationOptions::of(Scene::kStereopolis);
+  SimulationOptions options = SimulationOptions::of(Kind::kStereopolis);
   for (const std::int64_t frames : {2, 3, 7, 20}) {
     const PassErrors errors = draw_pass_errors(options, 0, frames);
     for (const Eigen::Vector3d& e : errors.position) EXPECT_LT(e.norm(), 0.4 + 0.04 * static_cast<double>(frames));
@@ -112,10 +113,10 @@ TEST(Stereopolis, JobIsGivenTheTrajectoryAndSigmasThatLie) {
     EXPECT_LT(rotation_angle(frame.given_pose->rotation, s.truth.frames[index].rotation), 0.25 * kDegree);
     if (!frame.position_prior) continue;
     ++with;
-    EXPECT_EQ(frame.position_prior->sigma, Eigen::Vector3d::Constant(0.02));
+    EXPECT_TRUE((frame.position_prior->sigma.array() == 0.02).all());
     EXPECT_EQ(frame.position_prior->position, frame.given_pose->centre);
   }
-  EXPECT_NEAR(with / 480, 0.96, 0.01);
+  EXPECT_NEAR(with / 480, 0.96, 0.012);            // a frame more or less per stretch
   EXPECT_GT(worst, 1.9);                           // a hundred sigmas
   ASSERT_EQ(s.block.relative_poses.size(), 478u);  // two passes
   for (const RelativePose& r : s.block.relative_poses) {
@@ -292,26 +293,26 @@ TEST(Stereopolis, CamerasCarryTheirNumbers) {
 
 TEST(Stereopolis, ZonesLieOnCrossings) {
   const SimulatedBlock& s = town();
-  std::vector<int> control(3, 0), check(3, 0);
+  std::vector<int> control(3, 0), checks(3, 0);
   for (std::size_t p = 0; p < s.block.control_points.size(); ++p) {
     const ControlPoint& point = s.block.control_points[p];
     const auto zone = static_cast<std::size_t>(point.name[4] - '0');
     ASSERT_EQ(point.name.substr(0, 4), "zone");
-    (point.role == PointRole::kControl ? control : check)[zone]++;
+    (point.role == PointRole::kControl ? control : checks)[zone]++;
     for (const int axis : {0, 1}) {
       const double place = s.control_truth[p][axis] / 60;
       EXPECT_LT(60 * std::abs(place - std::round(place)), 13);
     }
     EXPECT_GE(point.measurements.size(), 3u);
-    EXPECT_EQ(point.sigma, Eigen::Vector3d::Constant(0.015));
+    EXPECT_TRUE((point.sigma.array() == 0.015).all());
     EXPECT_LT((point.position - s.control_truth[p]).norm(), 6 * 0.015);
     for (const ImageMeasurement& m : point.measurements)
       EXPECT_LT((projected(s, m.image, s.control_truth[p]) - m.pixel).norm(), 3);
   }
   for (std::size_t z = 0; z < 3; ++z) {
-    EXPECT_GE(control[z] + check[z], 8);
-    EXPECT_LE(control[z] + check[z], 40);
-    EXPECT_EQ(check[z], (control[z] + check[z]) / 7);
+    EXPECT_GE(control[z] + checks[z], 8);
+    EXPECT_LE(control[z] + checks[z], 40);
+    EXPECT_EQ(checks[z], (control[z] + checks[z]) / 7);
   }
 }
 
@@ -320,8 +321,13 @@ TEST(Stereopolis, AZoneCanBeHeldOut) {
   options.control_zones = 2;
   options.held_out_zone = 1;
   const SimulatedBlock s = simulate_block(options);
-  for (const ControlPoint& point : s.block.control_points)
-    if (point.name.starts_with("zone1")) EXPECT_EQ(point.role, PointRole::kCheck);
+  std::int64_t held_out = 0;
+  for (const ControlPoint& point : s.block.control_points) {
+    if (!point.name.starts_with("zone1")) continue;
+    EXPECT_EQ(point.role, PointRole::kCheck);
+    ++held_out;
+  }
+  EXPECT_GE(held_out, 8);
   EXPECT_EQ(s.block.control_points.front().role, PointRole::kControl);
 }
 
@@ -356,7 +362,7 @@ TEST(Stereopolis, NonsenseIsRefused) {
 class TargetFieldTest : public testing::TestWithParam<Path> {};
 
 TEST_P(TargetFieldTest, TargetsAndTiePointsAreMeasured) {
-  const SimulationOptions options = SimulationOptions::of(Scene::kTargetField, GetParam());
+  const SimulationOptions options = SimulationOptions::of(Kind::kTargetField, GetParam());
   const SimulatedBlock s = simulate_block(options);
   ASSERT_EQ(std::ssize(s.block.frames), options.frames);
   EXPECT_EQ(std::ssize(s.block.control_points), options.control_points + options.check_points);
