@@ -113,8 +113,8 @@ TEST_P(CameraModels, RefuseWhatTheyDoNotSee) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, CameraModels, testing::ValuesIn(every_model()), [](const auto& info) {
-  std::string name = model_name(info.param);
+INSTANTIATE_TEST_SUITE_P(All, CameraModels, testing::ValuesIn(every_model()), [](const auto& p) {
+  std::string name = model_name(p.param);
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 });

@@ -50,7 +50,9 @@ TEST(JointAdjustment, WrongRegistrationsDoNotMatter) {
   std::printf("moved by %.3f of its sigma at most\n", largest);
   EXPECT_LT(largest, 1);
   for (std::size_t i = 0; i < town.wrong.size(); ++i) {
-    if (town.wrong[i]) EXPECT_LT(with.registration_weight[i], 0.05) << i;
+    if (town.wrong[i]) {
+      EXPECT_LT(with.registration_weight[i], 0.05) << i;
+    }
   }
   JointOptions trusting = joint;
   trusting.covariance_of.clear();

@@ -377,7 +377,9 @@ TEST_P(TargetFieldTest, TargetsAndTiePointsAreMeasured) {
   std::set<std::int64_t> cameras;
   for (const ImageIndex image : s.tracks.image) cameras.insert(s.block.camera_of(image).value);
   EXPECT_EQ(cameras.size() == 10, !sparse);
-  if (!sparse) EXPECT_NEAR(static_cast<double>(s.tracks.observation_count()) / 30, 350, 40);
+  if (!sparse) {
+    EXPECT_NEAR(static_cast<double>(s.tracks.observation_count()) / 30, 350, 40);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Paths, TargetFieldTest,

@@ -101,8 +101,8 @@ INSTANTIATE_TEST_SUITE_P(Models, CameraModels,
                                          Case{"even-radial-3", 0}, Case{"opencv-fisheye", 50},
                                          Case{"equirectangular", 120}, Case{"polynomial-3", 0}, Case{"legendre-4", 0},
                                          Case{"fourier-1", 0}),
-                         [](const auto& info) {
-                           std::string name = info.param.model;
+                         [](const auto& p) {
+                           std::string name = p.param.model;
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });
