@@ -80,7 +80,7 @@ CameraIndex add_camera(const SimulationOptions& options, const std::string& name
     truth[kDecentring2] = 1e-4 * random.normal();
   }
   if (options.calibrate) {
-    camera.prior_sigma.fill(std::numeric_limits<double>::infinity());
+    std::fill_n(camera.prior_sigma.begin(), camera.intrinsics.size(), std::numeric_limits<double>::infinity());
     camera.prior_sigma[kRadial3] = 0;
   } else {
     camera.intrinsics = truth;

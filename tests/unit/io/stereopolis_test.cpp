@@ -3,14 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 #include <optional>
 #include <set>
 
 #include "geometry/rotation.h"
 #include "io/error.h"
+#include "io/project.h"
 #include "io/simulate/simulate.h"
 #include "io/simulate/trajectory.h"
+#include "io/unit_files.h"
 
 namespace megablock {
 namespace {
@@ -357,6 +360,47 @@ TEST(Stereopolis, NonsenseIsRefused) {
   refused([](SimulationOptions& o) { o.held_out_zone = 0; });
   refused([](SimulationOptions& o) { o.outlier_share = 0.5; });
   refused([](SimulationOptions& o) { o.mount_rotation_error_deg = -1; });
+}
+
+// Pictures, and a project that starts from the trajectory, the nominal mounts and the laboratory's calibration.
+TEST(StereopolisRendered, FilesAreAProject) {
+  SimulationOptions options = small(4);
+  options.rig_cameras = 3;
+  options.image_width = 160;
+  options.image_height = 90;
+  options.focal_px = 117;
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "rendered_stereopolis";
+  std::filesystem::remove_all(folder);
+  write_rendered_block(options, folder.string());
+  const Block block = read_project((folder / "block.yaml").string()).block;
+  const BlockState truth = read_state((folder / "truth.h5").string());
+  ASSERT_EQ(block.images.size(), 12u);
+  EXPECT_EQ(block.images.front().name, "f000000_c22.jpg");
+  ASSERT_EQ(block.frames.size(), 4u);
+  for (std::size_t f = 0; f < 4; ++f) {
+    const FrameIndex index(static_cast<std::int64_t>(f));
+    ASSERT_TRUE(block.frames[index].given_pose);
+    EXPECT_LT((block.frames[index].given_pose->centre - truth.frames[index].centre).norm(), 0.5);
+    EXPECT_LT(rotation_angle(block.frames[index].given_pose->rotation, truth.frames[index].rotation), 0.3 * kDegree);
+  }
+  const std::vector<Mount>& mounts = block.rigs.front().mounts;
+  ASSERT_EQ(mounts.size(), 3u);
+  EXPECT_TRUE(mounts[0].held());
+  for (std::size_t m = 1; m < 3; ++m) {
+    EXPECT_NEAR(mounts[m].position_sigma_m, 0.005, 1e-9);
+    EXPECT_NEAR(mounts[m].rotation_sigma_rad, 0.5 * kDegree, 1e-9);
+    const double off = rotation_angle(mounts[m].pose.rotation, truth.mounts.front()[m].rotation);
+    EXPECT_GT(off, 0.01 * kDegree);
+    EXPECT_LT(off, 3 * kDegree);
+  }
+  for (const Camera& camera : block.cameras) {
+    EXPECT_NEAR(camera.intrinsics[kFocal], 117, 1e-6);
+    EXPECT_NEAR(camera.intrinsics[kRadial1], 0.09, 1e-6);
+    EXPECT_GT(camera.prior_sigma[kFocal], 0);
+  }
+  std::filesystem::remove_all(folder);
+  options.scene = Kind::kTargetField;
+  EXPECT_THROW(write_rendered_block(options, folder.string()), InputError);
 }
 
 class TargetFieldTest : public testing::TestWithParam<Path> {};
