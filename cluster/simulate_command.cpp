@@ -90,6 +90,7 @@ void add_observation_options(SimulateOptions& s) {
   s.add("--width", &O::image_width, "Image width, px [1920]");
   s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
   s.add("--focal", &O::focal_px, "Focal length, px [1400]");
+  s.add("--camera-model", &O::camera_model, "Camera model, as in a project file [brown]");
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--no-calibration", &O::calibrate, "Hold cameras and mounts at the truth");
 }

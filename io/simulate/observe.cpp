@@ -32,6 +32,8 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
                                       {u * camera.width, v * camera.height});
         if (corner) radius_sq = std::max(radius_sq, corner->squaredNorm());
       }
+    const CameraModelKind kind = camera.intrinsics.model().kind;
+    all_around_.push_back(kind == CameraModelKind::kFisheye || kind == CameraModelKind::kEquirectangular);
     max_radius_sq_.push_back(1.05 * radius_sq);
   }
 
@@ -75,11 +77,13 @@ void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<S
 std::optional<Eigen::Vector2d> Observer::pixel_of(ImageIndex image, const Eigen::Vector3d& place) const {
   const View& view = views_[static_cast<std::size_t>(image.value)];
   const Eigen::Vector3d inside = view.rotation * (place - view.centre);
-  if (inside.z() < 0.5) return std::nullopt;
+  const bool all_around = all_around_[static_cast<std::size_t>(view.camera)] != 0;
+  if ((all_around ? inside.norm() : inside.z()) < 0.5) return std::nullopt;
   const CameraIndex camera(view.camera);
   const double radius_sq = inside.head<2>().squaredNorm() / (inside.z() * inside.z());
-  if (radius_sq > max_radius_sq_[static_cast<std::size_t>(view.camera)]) return std::nullopt;
+  if (!all_around && radius_sq > max_radius_sq_[static_cast<std::size_t>(view.camera)]) return std::nullopt;
   const Eigen::Vector2d pixel = project(layout_.truth.cameras[camera], inside);
+  if (!pixel.allFinite()) return std::nullopt;
   const Camera& size = layout_.block.cameras[camera];
   if (pixel.x() < margin_px_ || pixel.x() > size.width - margin_px_ || pixel.y() < margin_px_ ||
       pixel.y() > size.height - margin_px_)

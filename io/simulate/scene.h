@@ -94,8 +94,9 @@ class Observer {
 
   const Layout& layout_;
   double margin_px_;
-  std::vector<View> views_;            // [images]
-  std::vector<double> max_radius_sq_;  // [cameras] of normalised coordinates inside the image
+  std::vector<View> views_;               // [images]
+  std::vector<std::uint8_t> all_around_;  // [cameras] 1: sees beyond 90 degrees, so that the next does not count
+  std::vector<double> max_radius_sq_;     // [cameras] of normalised coordinates inside the image
   // Frames by square cells in plan, cells row by row: frames of cell c are rows [cell_begin_[c], cell_begin_[c + 1]).
   Eigen::Vector2d origin_;
   double cell_m_ = 1;

@@ -88,6 +88,8 @@ void SimulationOptions::check() const {
   require(control_points >= 0 && check_points >= 0, "control_points and check_points must not be negative");
   require(control_sigma_m > 0, "control_sigma_m must be positive");
   require(image_width >= 64 && image_height >= 64, "images must have at least 64 x 64 pixels");
+  const auto model = find_model(camera_model);
+  require(model.has_value(), "camera_model '" + camera_model + "' is none of: " + model_list());
   require(focal_px >= 0.3 * std::max(image_width, image_height), "focal_px must be at least 0.3 of the larger side");
 }
 
@@ -99,23 +101,33 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
   camera.width = options.image_width;
   camera.height = options.image_height;
   camera.focal_known = true;
-  camera.intrinsics = {options.focal_px, options.image_width / 2.0, options.image_height / 2.0, 0, 0, 0, 0, 0};
+  const CameraModel model = find_model(options.camera_model).value();
+  camera.intrinsics = start_intrinsics(model, options.focal_px, options.image_width, options.image_height);
 
   Intrinsics truth = camera.intrinsics;
+  const IntrinsicSigmas weak = weak_sigmas(truth, 0.01 * options.focal_px, options.image_width);
+  const auto estimated = [&](int parameter) { return weak[static_cast<std::size_t>(parameter)] > 0; };
   if (options.calibrate) {
-    truth[kFocal] *= 1 + 0.003 * random.uniform(-1, 1);
-    truth[kPrincipalX] += 0.003 * options.focal_px * random.uniform(-1, 1);
+    if (estimated(kFocal)) truth[kFocal] *= 1 + 0.003 * random.uniform(-1, 1);
+    if (estimated(kPrincipalX)) truth[kPrincipalX] += 0.003 * options.focal_px * random.uniform(-1, 1);
     truth[kPrincipalY] += 0.003 * options.focal_px * random.uniform(-1, 1);
   }
-  if (options.distortion) {
+  if (options.distortion && model != CameraModel()) {
+    constexpr double kShare = 0.15;  // of the weak prior sigmas
+    for (int p = kPrincipalY + 1; p < truth.size(); ++p)
+      truth[p] += kShare * weak[static_cast<std::size_t>(p)] * random.uniform(-1, 1);
+  } else if (options.distortion) {
     truth[kRadial1] = random.uniform(-0.04, -0.02);
     truth[kRadial2] = random.uniform(0.005, 0.012);
     truth[kDecentring1] = random.uniform(-4e-4, 4e-4);
     truth[kDecentring2] = random.uniform(-4e-4, 4e-4);
   }
   if (options.calibrate) {
-    std::fill_n(camera.prior_sigma.begin(), camera.intrinsics.size(), std::numeric_limits<double>::infinity());
-    camera.prior_sigma[kRadial3] = 0;
+    constexpr double kFree = std::numeric_limits<double>::infinity();
+    if (model == CameraModel())
+      camera.prior_sigma = {kFree, kFree, kFree, kFree, kFree, 0, kFree, kFree};
+    else
+      camera.prior_sigma = weak;
   } else {
     camera.intrinsics = truth;
   }

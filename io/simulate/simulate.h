@@ -55,7 +55,8 @@ struct SimulationOptions {
   // Camera truth and what the block says of it.
   int image_width = 1920, image_height = 1280;
   double focal_px = 1400;
-  bool distortion = true;  // true camera has k1, k2, p1, p2; the block starts from zero
+  std::string camera_model = "brown";
+  bool distortion = true;  // true camera has k1, k2, p1, p2 (other models: all terms); the block starts from zero
   bool calibrate = true;   // camera parameters free (else held at the truth)
   void check() const;      // throws InputError
 };

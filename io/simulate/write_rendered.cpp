@@ -117,9 +117,24 @@ void write_gcp_list(const Block& block, const fs::path& path) {
   if (!stream) throw InputError(path.string() + ": cannot be written");
 }
 
+// "    distortion: {k1: -0.03, ...}", a line of all parameters behind the principal point.
+void write_distortion(const Intrinsics& k, std::ostream& yaml) {
+  const char* separator = "    distortion: {";
+  for (int p = kPrincipalY + 1; p < k.size(); ++p) {
+    if (is_fixed(k.model(), p)) continue;
+    yaml << separator << parameter_name(k.model(), p) << ": " << k[p];
+    separator = ", ";
+  }
+  if (*separator == ',') yaml << "}\n";
+}
+
 void write_cameras(const SimulationOptions& options, const Block& block, std::ostream& yaml) {
+  const bool brown = options.camera_model == model_name(CameraModel());
   // The headers of the images say enough, unless there is a calibration to start from or to hold.
-  if (options.calibrate && !is_stereopolis(options)) return;
+  if (options.calibrate && !is_stereopolis(options)) {
+    if (!brown) yaml << "cameras:\n  default: {model: " << options.camera_model << "}\n";
+    return;
+  }
   yaml << "cameras:\n  grouping: " << (block.cameras.size() > 1 ? "exif" : "one") << '\n';
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
     const Camera& camera = block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
@@ -131,10 +146,11 @@ void write_cameras(const SimulationOptions& options, const Block& block, std::os
            << focal_mm.str() << "mm\":\n";
     else
       yaml << "  default:\n";
-    yaml << "    focal_px: " << k[kFocal] << "\n    principal_point_px: [" << k[kPrincipalX] << ", " << k[kPrincipalY]
-         << "]\n    distortion: {k1: " << k[kRadial1] << ", k2: " << k[kRadial2] << ", k3: " << k[kRadial3]
-         << ", p1: " << k[kDecentring1] << ", p2: " << k[kDecentring2]
-         << "}\n    calibrate: " << (options.calibrate ? "true" : "false") << '\n';
+    if (!brown) yaml << "    model: " << options.camera_model << '\n';
+    if (!is_fixed(k.model(), kFocal)) yaml << "    focal_px: " << k[kFocal] << '\n';
+    yaml << "    principal_point_px: [" << k[kPrincipalX] << ", " << k[kPrincipalY] << "]\n";
+    write_distortion(k, yaml);
+    yaml << "    calibrate: " << (options.calibrate ? "true" : "false") << '\n';
   }
 }
 

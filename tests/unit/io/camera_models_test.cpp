@@ -7,6 +7,7 @@
 #include "io/export.h"
 #include "io/import.h"
 #include "io/project.h"
+#include "io/simulate/simulate.h"
 #include "io/unit_files.h"
 #include "small_result.h"
 #include "tests/unit/geometry/camera_samples.h"
@@ -61,9 +62,11 @@ TEST(CameraModelFiles, KeepEveryModel) {
 
 class CameraModelProject : public ::testing::Test {
  protected:
-  Camera read(const std::string& camera) {
+  void SetUp() override {
     write_picture(folder_ / "images/a.jpg", 1920, 1080, 50);
     write_picture(folder_ / "images/b.jpg", 1920, 1080, 60);
+  }
+  Camera read(const std::string& camera) {
     write_file(folder_ / "block.yaml", "images: images\ncameras:\n  default:\n" + camera);
     return read_project(folder_ / "block.yaml").block.cameras[CameraIndex(0)];
   }
@@ -144,7 +147,8 @@ TEST(CameraModelExchange, RefusesByCamera) {
     EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder / "model"); }),
                 HasSubstr(camera + "which COLMAP does not have"));
   for (const char* format : {"bal", "bundler"})
-    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder / "file"); }), HasSubstr(camera));
+    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder / "file"); }),
+                HasSubstr("has the model equirectangular, whose images BAL"));
 }
 
 TEST(CameraModelExchange, BalTakesCorrectedPixels) {
@@ -167,6 +171,36 @@ TEST(CameraModelExchange, CsvLeavesCellsOfOtherModelsEmpty) {
   EXPECT_THAT(text, HasSubstr("name,width,height,model,f,cx,cy,k1,k2,k3,p1,p2\n"));
   EXPECT_THAT(text, HasSubstr(",,,,,\n"));
   EXPECT_THAT(text, HasSubstr(",brown,1000,500,400,-0.1,0,0,0,0\n"));
+}
+
+TEST(CameraModelSimulation, ObservesByTheModel) {
+  for (const char* model : {"ign-radial", "legendre-3", "opencv-fisheye", "equirectangular"}) {
+    SimulationOptions options;
+    options.scene = SimulationOptions::Scene::kStreet;
+    options.frames = 20;
+    options.rig_cameras = 2;
+    options.points_per_frame = 60;
+    options.camera_model = model;
+    const SimulatedBlock s = simulate_block(options);
+    double squares = 0;
+    int behind = 0, observations = 0;
+    for (std::int64_t t = 0; t < s.tracks.track_count(); ++t)
+      for (std::int64_t o = s.tracks.begin[t]; o < s.tracks.begin[t + 1]; ++o) {
+        const Image& image = s.block.images[s.tracks.image[o]];
+        const Pose& mount = s.truth.mounts[s.block.frames[image.frame].rig][static_cast<std::size_t>(image.mount)];
+        const Eigen::Vector3d inside = to_camera(s.truth.frames[image.frame], mount, s.points[t]);
+        const Eigen::Vector2d measured(from_fixed_pixel(s.tracks.x[o]), from_fixed_pixel(s.tracks.y[o]));
+        squares += reprojection(s.truth.cameras[s.block.camera_of(s.tracks.image[o])], inside, measured).squaredNorm();
+        behind += inside.z() < 0;
+        ++observations;
+      }
+    EXPECT_NEAR(std::sqrt(squares / (2 * observations)), options.image_noise_px, 0.05) << model;
+    EXPECT_EQ(behind > observations / 10, std::string(model) == "equirectangular") << model;
+    EXPECT_EQ(s.block.cameras[CameraIndex(0)].intrinsics.model(), s.truth.cameras[CameraIndex(0)].model());
+  }
+  SimulationOptions unknown;
+  unknown.camera_model = "fish";
+  EXPECT_THAT(message_of<InputError>([&] { unknown.check(); }), HasSubstr("camera_model 'fish' is none of: brown,"));
 }
 
 }  // namespace
