@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -13,6 +14,7 @@
 #include "cluster/communicator.h"
 #include "cluster/exit_codes.h"
 #include "cluster/monolithic_comparison.h"
+#include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
 #include "cluster/register_command.h"
 #include "cluster/simulate_command.h"
@@ -25,6 +27,7 @@
 #include "io/import.h"
 #include "io/project.h"
 #include "io/report.h"
+#include "io/settings_reader.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -38,6 +41,8 @@ BlockResult finished_result(const std::string& job) {
   if (!std::filesystem::exists(store.path("job.json")))
     throw InputError(job + ": is not a job directory (no job.json); name the folder given to 'run -j'");
   if (!store.seal(kResult)) throw InputError(job + ": the job has no result yet; run it to the end first");
+  for (const std::string& line : unfinished_stages(store))
+    std::fprintf(stderr, "megablock: warning: %s: this is an older result; %s\n", job.c_str(), line.c_str());
   return read_result(store.verified_path(kResult));
 }
 
@@ -76,15 +81,15 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   command->add_option("project", options->project, "Project file")->required();
   command->add_option("-j,--job", options->directory, "Job directory; an unfinished one is resumed")->required();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   command
       ->add_option("--memory", options->memory_mib,
                    "Memory per rank for factors of the merge, MiB; beyond it they go to the job's scratch")
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   command
       ->add_option("--scratch", options->scratch_mib,
                    "Scratch per rank for such factors, MiB; beyond it (0: at once) they are computed again")
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   command->add_flag("--strict", options->strict, "End at the first failed unit");
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   auto monolithic = std::make_shared<bool>(false);
@@ -109,6 +114,10 @@ int watch(const JobStore& store) {
     std::printf("%s%s", terminal ? "\033[H\033[J" : "", status_text(store).c_str());
     std::fflush(stdout);
     if (done) return kExitDone;
+    if (!is_in_use(store)) {
+      std::printf("  no run is working on this job\n");
+      return kExitDone;
+    }
     std::this_thread::sleep_for(std::chrono::seconds(2));
   }
 }
@@ -124,7 +133,7 @@ void add_status(CLI::App& app, Action& action) {
   command->add_option("job", options->job, "Job directory")->required();
   command->add_flag("--json", options->json, "All figures as JSON");
   command->add_flag("--digest", options->digest, "Hash of the exact bits of the result");
-  command->add_flag("--watch", options->watch, "Again every two seconds until the job is done");
+  command->add_flag("--watch", options->watch, "Again every two seconds until the job is done or its run has ended");
   command->callback([=, &action] {
     action = [options] {
       const JobStore store(options->job);
@@ -145,7 +154,10 @@ void add_check(CLI::App& app, Action& action) {
   command->add_option("job", *job, "Job directory")->required();
   command->callback([=, &action] {
     action = [job] {
-      const std::vector<std::string> problems = check_job(JobStore(*job));
+      const JobStore store(*job);
+      std::vector<std::string> problems = check_job(store);
+      if (std::filesystem::exists(store.path("job.json")))
+        for (const std::string& line : unfinished_stages(store)) problems.push_back(*job + ": " + line);
       for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
       if (problems.empty()) std::printf("%s: every file is whole\n", job->c_str());
       return problems.empty() ? kExitDone : kExitFailedUnits;
@@ -264,6 +276,24 @@ void add_evaluate(CLI::App& app, Action& action) {
   });
 }
 
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  return names;
+}
+
+bool is_unknown_command(const CLI::App& app, const std::string& name) {
+  const std::vector<std::string> known = command_names(app);
+  return !name.starts_with("-") && std::find(known.begin(), known.end(), name) == known.end();
+}
+
+std::string unknown_command_message(const CLI::App& app, const std::string& name) {
+  const std::string nearest = nearest_name(name, command_names(app));
+  return "megablock: unknown command '" + name + "'; " +
+         (nearest.empty() ? "see 'megablock --help'" : "did you mean '" + nearest + "'?");
+}
+
 int exit_code_of(const std::exception& error) {
   if (dynamic_cast<const Interrupted*>(&error)) return kExitInterrupted;
   return dynamic_cast<const InputError*>(&error) ? kExitBadInput : kExitFailedUnits;
@@ -289,7 +319,19 @@ int command_line(int argc, char** argv) {
   app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + kArithmeticLevel + ")");
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* command, const CLI::Error& error) {
-    return "megablock: " + std::string(error.what()) + "; see '" + command->get_name() + " --help'\n";
+    std::string name = command->get_name();
+    for (const CLI::App* chosen : command->get_subcommands()) {
+      name += " " + chosen->get_name();
+      if (error.get_name() != "ExtrasError") continue;
+      std::vector<std::string> unexpected = command->remaining(true);  // last first
+      std::reverse(unexpected.begin(), unexpected.end());
+      const auto option = std::find_if(unexpected.begin(), unexpected.end(),
+                                       [](const std::string& word) { return word.starts_with("-"); });
+      if (option != unexpected.end())
+        return "megablock: argument '" + *option + "' was not expected; see '" + name + " --help'
+";
+    }
+    return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
   });
   app.footer(
       "Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input, 75 interrupted and resumable.\n"
@@ -316,6 +358,12 @@ int command_line(int argc, char** argv) {
     add_evaluate(app, action);
     add_simulate(app, action);
     add_check(app, action);
+    if (const std::string name = argc > 1 ? argv[1] : "help"; name == "help" || is_unknown_command(app, name)) {
+      if (ranks.rank() != 0) return kExitBadInput;
+      if (name != "help") std::fprintf(stderr, "%s\n", unknown_command_message(app, name).c_str());
+      if (name == "help") std::fprintf(argc > 1 ? stdout : stderr, "%s", app.help().c_str());
+      return argc > 1 && name == "help" ? kExitDone : kExitBadInput;
+    }
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

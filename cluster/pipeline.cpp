@@ -77,6 +77,16 @@ Project read_whole_project(const RunOptions& options) {
   return project;
 }
 
+// A folder that holds other things than a job (photographs, say) does not become one.
+void refuse_other_folders(const JobStore& store) {
+  const std::filesystem::path folder(store.directory());
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error) || std::filesystem::is_empty(folder, error)) return;
+  for (const char* own : {"job.json", "lock", "events"})
+    if (std::filesystem::exists(folder / own, error)) return;
+  throw InputError(store.directory() + ": the folder holds other files and no job; name a new folder with -j");
+}
+
 // Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
 std::string prepare(const RunOptions& options, const JobStore& store, Project project) {
   store.remove_temporaries();
@@ -211,6 +221,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   std::optional<JobLock> lock;
   const std::string text = on_first_rank(ranks, [&] {
     Project project = read_whole_project(run_options);
+    refuse_other_folders(store);
     store.create();
     lock.emplace(store);
     return prepare(run_options, store, std::move(project));

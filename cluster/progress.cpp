@@ -21,10 +21,10 @@ std::string duration_text(double seconds) {
   return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
 }
 
-Progress::Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_begun, bool quiet)
+Progress::Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_done, bool quiet)
     : stage_(std::move(stage)),
       units_(units),
-      units_begun_(std::move(units_begun)),
+      units_done_(std::move(units_done)),
       terminal_(isatty(STDERR_FILENO) != 0),
       start_s_(monotonic_seconds()),
       history_{{start_s_, 0}} {
@@ -35,7 +35,7 @@ Progress::Progress(std::string stage, std::int64_t units, std::function<std::int
     while (!stop_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
       if (monotonic_seconds() < next_s) continue;
-      print(units_begun_(), false);
+      print(units_done_(), false);
       next_s = monotonic_seconds() + interval_s;
     }
   });
@@ -58,8 +58,8 @@ double Progress::units_per_second(std::int64_t done) {
   return seconds > 0 ? static_cast<double>(done - history_.front().second) / seconds : 0;
 }
 
-void Progress::print(std::int64_t begun, bool last) {
-  const std::int64_t done = std::clamp<std::int64_t>(last ? units_ : begun - 1, 0, units_);
+void Progress::print(std::int64_t done, bool last) {
+  done = std::clamp<std::int64_t>(last ? units_ : done, 0, units_);
   const double elapsed = monotonic_seconds() - start_s_;
   std::string line = stage_;
   line.resize(std::max<std::size_t>(line.size(), 12), ' ');

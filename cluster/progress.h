@@ -13,19 +13,19 @@ namespace megablock {
 
 class Progress {
  public:
-  // `units_begun` is polled from a thread of its own; quiet: prints nothing at all.
-  Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_begun, bool quiet);
+  // `units_done` is polled from a thread of its own; quiet: prints nothing at all.
+  Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_done, bool quiet);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
  private:
-  void print(std::int64_t begun, bool last);
+  void print(std::int64_t done, bool last);
   double units_per_second(std::int64_t done);
 
   std::string stage_;
   std::int64_t units_;
-  std::function<std::int64_t()> units_begun_;
+  std::function<std::int64_t()> units_done_;
   bool terminal_ = false;
   double start_s_ = 0;
   std::deque<std::pair<double, std::int64_t>> history_;  // time, units done

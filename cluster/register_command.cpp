@@ -10,6 +10,7 @@
 
 #include "adjust/registration/frame_resection.h"
 #include "cluster/exit_codes.h"
+#include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
 #include "io/error.h"
 #include "io/project.h"
@@ -97,7 +98,7 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
   command->add_option("project", options->run.project, "Project file")->required();
   command->add_option("-j,--job", options->run.directory, "Job directory; an unfinished one is resumed")->required();
   command->add_option("--threads", options->run.threads, "Threads per rank; 0 = cores of the host / ranks on it")
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   command->add_flag("-q,--quiet", options->run.quiet, "No progress");
   command->add_option("--alpha", s.places.alpha_m, "Radius of the alpha shape, m")->capture_default_str();
   command->add_option("--z-stretch", s.places.z_stretch, "Stretch of heights in it")->capture_default_str();

@@ -160,6 +160,21 @@ std::string status_text(const JobStore& store) {
 
 bool job_is_done(const JobStore& store) { return stages_of(store, job_json(store)).back().state == StageState::kDone; }
 
+std::vector<std::string> unfinished_stages(const JobStore& store) {
+  std::vector<std::string> lines;
+  for (const StageStatus& stage : stages_of(store, job_json(store))) {
+    const auto units = static_cast<std::int64_t>(stage.record.units.size());
+    const auto failed = static_cast<std::int64_t>(stage.record.failures.size());
+    const std::string name = "stage '" + stage.record.stage + "': ";
+    if (stage.state == StageState::kStale)
+      lines.push_back(name + "its input or options changed since; run the job again to bring it up to date");
+    else if (stage.done + failed < units)
+      lines.push_back(name + std::to_string(stage.done) + " of " + std::to_string(units) +
+                      " units are there; run the job again to complete it");
+  }
+  return lines;
+}
+
 std::string status_digest(const JobStore& store) {
   job_json(store);
   if (!store.seal(kResult))

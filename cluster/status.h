@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "io/job_store.h"
 
@@ -12,6 +13,8 @@ std::string status_json(const JobStore& store);
 std::string status_text(const JobStore& store);
 // Every stage is done and nothing was asked for since.
 bool job_is_done(const JobStore& store);
+// One line per stage that has begun and whose units are not all there, or that was asked for something else since.
+std::vector<std::string> unfinished_stages(const JobStore& store);
 // The digest of the finished result; InputError when the job has none yet.
 std::string status_digest(const JobStore& store);
 

@@ -109,8 +109,9 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   RankRecord mine;
   std::string fatal;  // concerns the run, not the unit: a full disk, a read-only job
   {
+    // Every rank has one claim more than it has finished units: the one in hand, or one beyond the end.
     Progress progress(
-        stage, static_cast<std::int64_t>(units.size()), [&] { return job.ranks.counter(); },
+        stage, static_cast<std::int64_t>(units.size()), [&] { return job.ranks.counter() - job.ranks.size(); },
         job.options.quiet || !job.is_first_rank());
     const std::vector<std::size_t> order = claim_order(units);
     while (!stop_requested()) {

@@ -40,6 +40,14 @@ std::string holder(int file) {
 
 }  // namespace
 
+bool is_in_use(const JobStore& store) {
+  const int file = ::open(store.path("lock").c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool free = ::flock(file, LOCK_SH | LOCK_NB) == 0;
+  ::close(file);
+  return !free;
+}
+
 JobLock::JobLock(const JobStore& store, double patience_s) {
   const std::string path = store.path("lock");
   file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);

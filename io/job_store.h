@@ -59,6 +59,9 @@ class JobStore {
   mutable std::map<std::string, std::pair<std::int64_t, std::int64_t>> verified_;  // unit -> (size, mtime in ns)
 };
 
+// Whether a run holds the job's lock.
+bool is_in_use(const JobStore& store);
+
 // The job's lock, held by rank 0 for the life of the object: flock on job/lock with host, pid and start time in it.
 class JobLock {
  public:

@@ -54,6 +54,9 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   const auto block_file = top.existing_file("block");
   if (images && block_file)
     throw InputError(top.where("block") + ": 'images' and 'block' exclude each other; give one of them");
+  for (const std::string& key : top.keys())
+    if (!images && !block_file && !nearest_name(key, {"images"}).empty())
+      throw InputError(top.where(key) + ": unknown key '" + key + "'; did you mean 'images'?");
   if (!images && !block_file)
     throw InputError(top.where() + ": key 'images' (a folder of images) is missing; add for example 'images: images'");
   if (const auto tie_points = top.existing_file("tie_points")) project.tie_points = *tie_points;
@@ -98,6 +101,7 @@ Project read_project(const std::string& path, const std::optional<GroundFrame>& 
   read_block_sections(top, project, ground);
   top.finish();
   check(project.block);
+  warn_of_distant_places(project);
   return project;
 }
 

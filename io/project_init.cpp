@@ -103,6 +103,11 @@ std::string init_project(const InitOptions& options) {
     write_file(output, text + found_text(project));
     fs::remove(draft, error);
     return summary(project, options.output);
+  } catch (const InputError& wrong) {
+    fs::remove(draft, error);
+    const std::string message = wrong.what(), place = draft.string() + ":";  // a line of a file nobody has seen
+    const std::size_t end = message.find(": ");
+    throw InputError(message.starts_with(place) && end != std::string::npos ? message.substr(end + 2) : message);
   } catch (...) {
     fs::remove(draft, error);
     throw;

@@ -32,4 +32,7 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
 // attitude: attitude priors from the images' angles, turned to the block's vertical.
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);
 
+// A warning for the origin and for each control point more than 50 km (or a tenth of the block's extent) from the images.
+void warn_of_distant_places(Project& project);
+
 }  // namespace megablock

@@ -65,21 +65,25 @@ bool parse_flag(const std::string& text, const std::string& what, const std::str
   throw InputError(where + ": " + what + ": " + quoted(text) + " is neither true nor false");
 }
 
+std::string nearest_name(const std::string& name, const std::vector<std::string>& known) {
+  std::string nearest;
+  std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance >= best) continue;
+    best = distance;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
 std::string unknown_key_message(const std::string& key, const std::string& section,
                                 const std::vector<std::string>& known) {
   std::string message = "unknown key " + quoted(key) + (section.empty() ? "" : " in " + quoted(section)) + ";";
-  const std::string* nearest = nullptr;
-  std::size_t best = std::max<std::size_t>(2, key.size() / 3) + 1;
+  const std::string nearest = nearest_name(key, known);
+  if (!nearest.empty()) message += " did you mean " + quoted(nearest) + "?";
   std::string list;
-  for (const std::string& name : known) {
-    const std::size_t distance = edit_distance(key, name);
-    if (distance < best) {
-      best = distance;
-      nearest = &name;
-    }
-    list += (list.empty() ? "" : ", ") + name;
-  }
-  if (nearest) message += " did you mean " + quoted(*nearest) + "?";
+  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
   return message + " known keys: " + (list.empty() ? "none" : list);
 }
 

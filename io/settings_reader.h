@@ -48,6 +48,8 @@ double parse_number(const std::string& text, const std::string& what, const std:
 std::int64_t parse_integer(const std::string& text, const std::string& what, const std::string& where);
 bool parse_flag(const std::string& text, const std::string& what, const std::string& where);
 
+// The known name nearest to a misspelled one; empty when none is near.
+std::string nearest_name(const std::string& name, const std::vector<std::string>& known);
 // "unknown key 'x' in 'section'; did you mean 'y'? known keys: ..." with the nearest known key when there is one.
 std::string unknown_key_message(const std::string& key, const std::string& section,
                                 const std::vector<std::string>& known);

@@ -66,6 +66,42 @@ class BadInput(unittest.TestCase):
         line = one_line(megablock("init", self.folder / "nowhere", "-o", self.folder / "x.yaml", expect=BAD_INPUT))
         self.assertIn("nowhere", line)
 
+    def test_misspelled_command_line(self):
+        self.assertIn("unknown command 'runn'; did you mean 'run'?", megablock("runn", expect=BAD_INPUT))
+        self.assertIn("Usage:", megablock(expect=BAD_INPUT))
+        self.assertIn("Usage:", megablock("help"))
+        said = megablock("run", self.project, "-j", self.job, "--threads", "two", expect=BAD_INPUT)
+        self.assertIn("'two' is not a number of 0 or more; see 'megablock run --help'", said)
+        said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
+        self.assertIn("argument '--thread' was not expected; see 'megablock run --help'", said)
+
+    def test_job_among_photographs(self):
+        before = sorted(self.images.iterdir())
+        line = one_line(megablock("run", self.project, "-j", self.images, "-q", expect=BAD_INPUT))
+        self.assertIn("holds other files and no job", line)
+        self.assertEqual(sorted(self.images.iterdir()), before)
+
+    def test_control_point_in_another_country(self):
+        image = self.pictures()[0].name
+        gcp = self.folder / "gcp_list.txt"
+        gcp.write_text(f"EPSG:4326\n2.35 48.85 100 200 150 {image} right\n48.85 2.35 100 200 150 {image} swapped\n")
+        said = megablock("init", self.images, "-o", self.folder / "new.yaml", "--control", gcp)
+        self.assertRegex(said, "warning: control point 'swapped' lies [0-9]+ km from the images; are latitude and "
+                               "longitude exchanged")
+        self.assertNotIn("'right' lies", said)
+
+    def test_missing_units_and_older_results_are_said(self):
+        shutil.copytree(work / "clean_job", self.job)
+        megablock("check", self.job)
+        shutil.rmtree(self.job / "features")
+        megablock("check", self.job, expect=FAILED_UNITS)
+        said = subprocess.run([MEGABLOCK, "check", self.job], capture_output=True, text=True).stdout
+        self.assertRegex(said, "stage 'features': 0 of [0-9]+ units are there; run the job again to complete it")
+        self.assertIn("warning: ", megablock("export", self.job, "--format", "csv", "-o", self.folder / "csv"))
+        self.assertIn("this is an older result", megablock("report", self.job))
+        self.assertIn("this is an older result",
+                      megablock("evaluate", self.job, self.folder / "truth.csv"))
+
     def test_unreadable_folder(self):
         nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
         if nobody and not shutil.which("setpriv"):

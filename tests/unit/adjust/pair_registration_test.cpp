@@ -61,13 +61,14 @@ TEST(PairRegistration, RefusesAndNamesWhatIsMissing) {
     EXPECT_FALSE(r.accepted) << seed;
     EXPECT_FALSE(r.reason.empty());
   }
-  CrossingOptions weak;
-  weak.points = 8;
-  weak.noise_px = 2;
-  int refused = 0;
-  for (std::uint64_t seed = 0; seed < 10; ++seed)
-    refused += registration_of(weak, seed).reason.find("the points give the pose to") != std::string::npos;
-  EXPECT_GE(refused, 5);
+  PairRegistrationOptions strict;
+  strict.max_position_sigma_m = 1e-4;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const Crossing crossing = make_crossing(seed, {});
+    const PairRegistration r = register_pair(crossing.trajectory, crossing.tracks, strict, seed);
+    EXPECT_THAT(r.reason, testing::HasSubstr("the points give the pose to")) << seed;
+    EXPECT_FALSE(r.accepted);
+  }
 }
 
 TEST(PairRegistration, RefusesAPlaceFarFromTheTrajectory) {

@@ -153,8 +153,8 @@ TEST(Import, BadBinaryModelsAreRefusedByByte) {
     EXPECT_THAT(refusal(name, [](std::string& content) { content += 'x'; }), HasSubstr("more bytes"));
     EXPECT_THAT(refusal(name, [](std::string& content) { content[7] = '\x7f'; }), HasSubstr("ends before"));
   }
-  EXPECT_THAT(refusal("cameras.bin", [](std::string& content) { content[12] = 5; }),
-              HasSubstr("camera model 'number 5' is not supported"));
+  EXPECT_THAT(refusal("cameras.bin", [](std::string& content) { content[12] = 10; }),
+              HasSubstr("camera model 'number 10' is not supported"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-bin", folder / "none"); }),
               HasSubstr("cannot be read"));
 }

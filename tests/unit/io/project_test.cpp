@@ -266,6 +266,8 @@ TEST(Project, RefusalsNameFileAndLine) {
   std::filesystem::create_directories(folder / "nothing");
   const std::string images = "images: images\n";
   EXPECT_THAT(refusal(folder, "imagse: images\n"), HasSubstr("block.yaml:1: "));
+  EXPECT_THAT(refusal(folder, "# a comment\nimges: images\n"),
+              HasSubstr("block.yaml:2: unknown key 'imges'; did you mean 'images'?"));
   EXPECT_THAT(refusal(folder, images + "# a comment\nimges: images\n"),
               HasSubstr("block.yaml:3: unknown key 'imges'; did you mean 'images'? known keys: "));
   EXPECT_EQ(refusal(folder, "\nimages: pictures\n"), "block.yaml:2: images: folder 'pictures' does not exist");

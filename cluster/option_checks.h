@@ -1,0 +1,21 @@
+// Checks of values on the command line, with messages of our own.
+#pragma once
+
+#include <CLI/Validators.hpp>
+#include <cmath>
+#include <string>
+
+namespace megablock {
+
+// A number of 0 or more.
+inline CLI::Validator not_negative() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = -1;
+        const bool number = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= 0;
+        return number ? std::string() : "'" + text + "' is not a number of 0 or more";
+      },
+      "NUMBER", "not negative");
+}
+
+}  // namespace megablock
