@@ -323,13 +323,10 @@ int command_line(int argc, char** argv) {
     for (const CLI::App* chosen : command->get_subcommands()) {
       name += " " + chosen->get_name();
       if (error.get_name() != "ExtrasError") continue;
-      std::vector<std::string> unexpected = command->remaining(true);  // last first
-      std::reverse(unexpected.begin(), unexpected.end());
-      const auto option = std::find_if(unexpected.begin(), unexpected.end(),
-                                       [](const std::string& word) { return word.starts_with("-"); });
-      if (option != unexpected.end())
-        return "megablock: argument '" + *option + "' was not expected; see '" + name + " --help'
-";
+      const std::string words = error.what();  // "...: value --option": the first argument comes last
+      const std::size_t option = words.rfind(" -");
+      if (option != std::string::npos)
+        return "megablock: argument '" + words.substr(option + 1) + "' was not expected; see '" + name + " --help'\n";
     }
     return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
   });

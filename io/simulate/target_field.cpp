@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kHalfLength = 30, kHalfWidth = 20;  // of the place, metres
-constexpr double kWallHeight = 12;
+constexpr double kWallHeight = 24;  // the cameras that look up must see walls from the middle of the place
 using Path = SimulationOptions::Path;
 
 class TargetField : public Scene {

@@ -52,13 +52,14 @@ double rms(double sum, double n) { return std::sqrt(sum / n); }
 
 TEST(StereopolisTrajectory, ErrorsAreAsStated) {
   const SimulationOptions options = SimulationOptions::of(Kind::kStereopolis);
-  double clear = 0, clear_xy = 0, clear_z = 0, heading = 0, absent = 0, frames = 0, stretches = 0, step = 0;
+  double clear = 0, clear_xy = 0, clear_z = 0, heading = 0, absent = 0, frames = 0, stretches = 0, step = 0, steps = 0;
   for (std::int64_t pass = 0; pass < 8; ++pass) {
     const PassErrors errors = draw_pass_errors(options, pass, 10000);
     double largest = 0, largest_z = 0;
     for (std::size_t i = 0; i < errors.gnss.size(); ++i, ++frames) {
       const Eigen::Vector3d& e = errors.position[i];
       if (i > 0) step = std::max(step, (e - errors.position[i - 1]).norm());
+      if (i > 0) steps += (e - errors.position[i - 1]).squaredNorm();
       absent += errors.gnss[i] == Gnss::kNone;
       if (errors.gnss[i] != Gnss::kClear) {
         largest = std::max(largest, e.head<2>().norm());
@@ -84,7 +85,9 @@ TEST(StereopolisTrajectory, ErrorsAreAsStated) {
   EXPECT_NEAR(rms(clear_z, clear), 0.05, 0.005);
   EXPECT_NEAR(rms(heading, clear), 0.025 * kDegree, 0.003 * kDegree);
   EXPECT_NEAR(frames / 2 / stretches, 400, 40);
-  EXPECT_LT(step, 0.2);  // smooth: nowhere a jump
+  // Smooth: centimetres from frame to frame; nowhere a jump, which would be one of metres.
+  EXPECT_LT(rms(steps, frames), 0.03);
+  EXPECT_LT(step, 0.3);
 }
 
 TEST(StereopolisTrajectory, PassesDriftOnTheirOwn) {
