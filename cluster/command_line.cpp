@@ -322,7 +322,7 @@ int command_line(int argc, char** argv) {
     std::string name = command->get_name();
     for (const CLI::App* chosen : command->get_subcommands()) {
       name += " " + chosen->get_name();
-      if (error.get_name() != "ExtrasError") continue;
+      if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::ExtrasError)) continue;
       const std::string words = error.what();  // "...: value --option": the first argument comes last
       const std::size_t option = words.rfind(" -");
       if (option != std::string::npos)
