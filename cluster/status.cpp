@@ -10,6 +10,7 @@
 #include "cluster/stage_record.h"
 #include "io/error.h"
 #include "io/events.h"
+#include "io/remarks.h"
 #include "io/result.h"
 #include "io/unit_files.h"
 
@@ -80,6 +81,9 @@ void add_figures(Json& json, const BlockResult& result) {
   json["global_iterations"] = result.global_iterations;
   json["newton_decrement"] = result.newton_decrement;
   json["gauge"] = result.gauge;
+  json["control_points_unused"] = unused_points(result, PointRole::kControl).size();
+  json["check_points_unused"] = unused_points(result, PointRole::kCheck).size();
+  json["remarks"] = remarks(result);
   json["digest"] = result.digest;
 }
 
@@ -92,7 +96,8 @@ Json status(const JobStore& store) {
   Json json{{"job", store.directory()}, {"stages", stages_json(store, stages)}};
   for (const char* key :
        {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px", "rms_reprojection_px",
-        "chi2_per_dof", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest"})
+        "chi2_per_dof", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
+        "control_points_unused", "check_points_unused", "remarks"})
     json[key] = nullptr;
   json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
   const bool current = stages.back().state == StageState::kDone;
@@ -155,7 +160,9 @@ std::string status_text(const JobStore& store) {
   if (json["result"] == "none") return text + "  no result yet: run the same command again to resume\n";
   if (json["result"] == "stale")
     text += "  the result is older than what was asked of the job since: run it to the end again\n";
-  return text + figures_text(json);
+  text += figures_text(json);
+  for (const std::string remark : json["remarks"]) text += "  look: " + remark + "\n";
+  return text;
 }
 
 bool job_is_done(const JobStore& store) { return stages_of(store, job_json(store)).back().state == StageState::kDone; }

@@ -82,6 +82,10 @@ struct BlockResult {
     Eigen::Vector3d adjusted;  // ground frame; NaN = not seen by two oriented images
     Eigen::Matrix3d covariance;
     std::vector<Eigen::Vector2d> residual_px;  // per measurement; NaN = image not oriented
+    std::vector<std::uint8_t> kept = {};       // per measurement: takes part in the adjustment; empty: not known
+    bool takes_part(std::size_t measurement) const {
+      return residual_px[measurement].allFinite() && (kept.empty() || kept[measurement]);
+    }
   };
   std::vector<ControlResult> control;  // in block order
 

@@ -48,9 +48,12 @@ void check_sizes(const BlockResult& result) {
   if (!result.point_covariance.empty()) require_size(result.point_covariance.size(), tracks, "point covariances");
   if (!result.control.empty())
     require_size(result.control.size(), result.block.control_points.size(), "control point results");
-  for (std::size_t p = 0; p < result.control.size(); ++p)
+  for (std::size_t p = 0; p < result.control.size(); ++p) {
     require_size(result.control[p].residual_px.size(), result.block.control_points[p].measurements.size(),
                  "residuals of a control point");
+    if (!result.control[p].kept.empty())
+      require_size(result.control[p].kept.size(), result.control[p].residual_px.size(), "verdicts on measurements");
+  }
   if (!result.image_records.empty())
     require_size(result.image_records.size(), result.block.images.size(), "image records");
 }
@@ -129,6 +132,10 @@ void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::Contro
     for (const Eigen::Vector2d& r : result.residual_px) residuals.insert(residuals.end(), {r.x(), r.y()});
   file.matrix("control/measurement/residual", residuals, 2,
               {"px", "adjusted minus measured, x, y; NaN: image not oriented"});
+  std::vector<std::uint8_t> kept;
+  for (const Result& result : control) kept.insert(kept.end(), result.kept.begin(), result.kept.end());
+  if (2 * kept.size() == residuals.size())
+    file.vector("control/measurement/kept", kept, {"", "1: kept, 0: takes no part"});
 }
 
 std::vector<BlockResult::ControlResult> get_control_results(const Hdf5Reader& file, const Block& block) {
@@ -138,12 +145,17 @@ std::vector<BlockResult::ControlResult> get_control_results(const Hdf5Reader& fi
   const auto covariances = square_matrices<Eigen::Matrix3d>(file.array<double>("control/covariance", {count, 3, 3}));
   const auto residuals =
       file.matrix<double>("control/measurement/residual", 2, file.shape("control/measurement/image").at(0));
+  const bool verdicts = file.has("control/measurement/kept");
+  const auto kept = verdicts ? file.vector<std::uint8_t>("control/measurement/kept", rows(residuals) / 2)
+                             : std::vector<std::uint8_t>();
   std::vector<BlockResult::ControlResult> control;
   std::size_t row = 0;
   for (std::size_t p = 0; p < block.control_points.size(); ++p) {
     BlockResult::ControlResult result{vector3(adjusted, p), covariances[p], {}};
-    for (std::size_t m = 0; m < block.control_points[p].measurements.size(); ++m, ++row)
+    for (std::size_t m = 0; m < block.control_points[p].measurements.size(); ++m, ++row) {
       result.residual_px.push_back({residuals[2 * row], residuals[2 * row + 1]});
+      if (verdicts) result.kept.push_back(kept[row]);
+    }
     control.push_back(std::move(result));
   }
   return control;

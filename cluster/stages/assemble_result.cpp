@@ -72,9 +72,9 @@ void append_tracks(BlockResult& result, const std::vector<TileResult>& parts) {
 void append_control(BlockResult& result, const std::vector<TileResult>& parts) {
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNaN);
   for (const ControlPoint& point : result.block.control_points)
-    result.control.push_back(
-        {unknown, Eigen::Matrix3d::Constant(kNaN),
-         std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kNaN))});
+    result.control.push_back({unknown, Eigen::Matrix3d::Constant(kNaN),
+                              std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kNaN)),
+                              std::vector<std::uint8_t>(point.measurements.size(), 0)});
   for (const TileResult& part : parts) {
     for (std::size_t p = 0; p < part.points.size(); ++p) {
       if (part.points[p].role == PointRole::kTie) continue;
@@ -85,6 +85,7 @@ void append_control(BlockResult& result, const std::vector<TileResult>& parts) {
       for (std::size_t m = 0; m < std::min(rows, control.residual_px.size()); ++m) {
         const auto o = static_cast<std::size_t>(part.begin[p]) + m;
         control.residual_px[m] = Eigen::Vector2d(part.residual_x[o], part.residual_y[o]);
+        control.kept[m] = part.kept[o];
       }
     }
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/remarks.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
 
@@ -103,6 +104,15 @@ std::string residuals_item(const BlockResult& result) {
   return item("good", "Residuals agree with the stated sigmas (σ₀ " + fixed(s0, 2) + ").");
 }
 
+std::string unused_points_item(const BlockResult& result) {
+  std::string list;
+  for (const PointRole role : {PointRole::kControl, PointRole::kCheck}) {
+    const std::string text = unused_points_text(result, role);
+    if (!text.empty()) list += item("bad", escape(text) + ": see <a href=\"#control\">control and check points</a>.");
+  }
+  return list;
+}
+
 std::string points_item(const BlockResult& result, const Figures& f, PointRole role) {
   std::int64_t known = 0, beyond = 0, all = 0;
   for (const PointResidual& r : f.points) {
@@ -170,7 +180,7 @@ std::string headline(const BlockResult& result, const Figures& f) {
 
 std::string assessment(const BlockResult& result, const Figures& f) {
   std::string list = convergence_item(result) + images_item(result, f) + parts_item(f) + seams_item(result) +
-                     residuals_item(result) + points_item(result, f, PointRole::kCheck) +
+                     unused_points_item(result) + residuals_item(result) + points_item(result, f, PointRole::kCheck) +
                      points_item(result, f, PointRole::kControl);
   if (!result.gauge.empty()) list += item("plain", "Datum: " + escape(result.gauge) + ".");
   for (const std::string& note : result.notes) list += item("look", escape(note));

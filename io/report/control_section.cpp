@@ -23,7 +23,9 @@ void add_point(const ControlPoint& point, const PointResidual& r, const LengthUn
   cells.push_back(fixed(r.ratio, 1));
   cells.push_back(fmt::format("{} of {}", r.images, point.measurements.size()));
   cells.push_back(fixed(r.rms_px, 2));
-  table.add(std::move(cells), r.ratio > kGrossRatio ? "bad" : r.difference.head<2>().allFinite() ? "" : "muted");
+  table.add(std::move(cells), r.ratio > kGrossRatio || r.images == 0 ? "bad"
+                              : r.difference.head<2>().allFinite()   ? ""
+                                                                     : "muted");
 }
 
 void add_points(const BlockResult& result, const Figures& f, PointRole role, const LengthUnit& unit, Table& table) {
@@ -88,7 +90,8 @@ std::string control_section(const BlockResult& result, const Figures& f) {
                  paragraph(fmt::format(
                      "Differences adjusted − given and their own sigmas: of a check point from the adjusted and the "
                      "given position together, of a control point, which took part, from the given less the "
-                     "adjusted variance. Beyond {} sigma a row is marked.",
+                     "adjusted variance. Images: measurements that take part, of all. Rows beyond {} sigma are marked, "
+                     "and points that no measurement touches: they stay where they were given.",
                      fixed(kGrossRatio, 0))) +
                      table.html("sortable") + measurements_table(result, f));
 }

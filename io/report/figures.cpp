@@ -199,7 +199,9 @@ class Gatherer {
       const ControlPoint& given = block_.control_points[p];
       PointResidual residual;
       residual.point = p;
+      measurements(p, residual);
       residual.difference = control.adjusted - given.position;
+      if (residual.images == 0) residual.difference.setConstant(kUnknown);  // it stays where it was given
       const bool check = given.role == PointRole::kCheck;
       const double factor = result_.sigma_scaled && !check ? result_.variance_factor : 1;  // as the covariance has it
       for (int k = 0; k < 3; ++k) {
@@ -209,7 +211,6 @@ class Gatherer {
         const double ratio = std::abs(residual.difference[k]) / residual.sigma[k];
         if (std::isfinite(ratio) && !(residual.ratio >= ratio)) residual.ratio = ratio;
       }
-      measurements(p, residual);
       f_.points.push_back(residual);
     }
     std::stable_sort(f_.measurements.begin(), f_.measurements.end(),
@@ -218,15 +219,23 @@ class Gatherer {
 
   void measurements(std::size_t p, PointResidual& residual) {
     const ControlPoint& given = block_.control_points[p];
-    double squares = 0;
+    double squares = 0, all_squares = 0;
+    std::int64_t all = 0;
     for (std::size_t m = 0; m < std::min(given.measurements.size(), result_.control[p].residual_px.size()); ++m) {
       const Eigen::Vector2d& r = result_.control[p].residual_px[m];
       if (!r.allFinite()) continue;
-      ++residual.images;
-      squares += r.squaredNorm();
+      ++all;
+      all_squares += r.squaredNorm();
+      if (result_.control[p].takes_part(m)) {
+        ++residual.images;
+        squares += r.squaredNorm();
+      }
       f_.measurements.push_back({p, m, r, r.cwiseAbs().maxCoeff() / given.measurements[m].sigma_px});
     }
-    if (residual.images) residual.rms_px = std::sqrt(squares / residual.images);
+    if (residual.images)
+      residual.rms_px = std::sqrt(squares / residual.images);
+    else if (all)
+      residual.rms_px = std::sqrt(all_squares / static_cast<double>(all));
   }
 
   void accuracy() {

@@ -53,9 +53,9 @@ struct PointResidual {
   // Of the difference: of a check point sqrt(adjusted + given variance), of a control point, which took part,
   // sqrt(given - adjusted variance). NaN where unknown.
   Eigen::Vector3d sigma = Eigen::Vector3d::Constant(kUnknown);
-  double ratio = kUnknown;  // largest |difference| / sigma of the axes
-  int images = 0;           // with a residual
-  double rms_px = kUnknown;
+  double ratio = kUnknown;   // largest |difference| / sigma of the axes
+  int images = 0;            // with a measurement that takes part
+  double rms_px = kUnknown;  // of these; of all measurements when none takes part
 };
 
 // An image measurement of a control or check point.

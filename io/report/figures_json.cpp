@@ -1,6 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "io/remarks.h"
 #include "io/report/sections.h"
 
 namespace megablock::report {
@@ -106,6 +107,8 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
                {"intersection_angle_deg", histogram(f.intersection_deg)},
                {"residual_px", histogram(f.residual_px)},
                {"control_points", points(result, f)},
+               {"control_points_unused", unused_points(result, PointRole::kControl).size()},
+               {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
                {"cameras", cameras(result)},
                {"failures", failures(result)},
                {"stages", stages(result)},

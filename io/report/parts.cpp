@@ -51,7 +51,7 @@ void join_control_points(const BlockResult& result, FrameSets& sets) {
     const auto& measurements = result.block.control_points[p].measurements;
     const ImageMeasurement* first = nullptr;
     for (std::size_t m = 0; m < std::min(measurements.size(), result.control[p].residual_px.size()); ++m) {
-      if (!result.control[p].residual_px[m].allFinite()) continue;
+      if (!result.control[p].takes_part(m)) continue;
       if (first) sets.join(frame_at(result, first->image), frame_at(result, measurements[m].image));
       first = &measurements[m];
     }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "io/remarks.h"
 #include "io/report/drawing.h"
 #include "io/report/figures.h"
 #include "io/report/html.h"
@@ -145,6 +146,33 @@ TEST(Report, ABlockThatDidNotConvergeIsSaidFirstAndInRed) {
                         "decrement is 0.37, the limit 0.010"));
   result.newton_decrement = std::nan("");
   EXPECT_THAT(report_html(result), HasSubstr("not converged"));
+}
+
+// A control point whose measurements are all rejected stays where it was given: that is no agreement.
+TEST(Report, PointsThatNoMeasurementHoldsRaiseAnAlarm) {
+  BlockResult result = made_up_result(small_block());
+  EXPECT_THAT(report_html(result), Not(HasSubstr("no part")));
+  std::size_t control = 0;
+  while (result.block.control_points[control].role != PointRole::kControl) ++control;
+  ControlPoint& given = result.block.control_points[control];
+  given.name = "pillar";
+  result.control[control].adjusted = given.position;
+  result.control[control].kept.assign(given.measurements.size(), 0);
+  result.control[control].residual_px[1] = {1.4e6, 0};
+  const std::string page = report_html(result);
+  expect_sound(page);
+  const std::string image = result.block.images[given.measurements[1].image].name;
+  EXPECT_THAT(page, HasSubstr("<li class=bad>1 control point takes no part: pillar (1.4e6 px in " + image));
+  EXPECT_THAT(page, HasSubstr("<tr class=\"bad\"><td class=t>pillar</td><td class=t>control</td><td>–</td><td>–</td>"
+                              "<td>–</td>"));
+  EXPECT_EQ(figures_in(page)["control_points_unused"], 1);
+  EXPECT_EQ(figures_in(page)["check_points_unused"], 0);
+
+  result.control[control].kept[0] = 1;  // one that holds
+  EXPECT_THAT(report_html(result), Not(HasSubstr("no part")));
+  for (auto& residual : result.control[control].residual_px) residual.setConstant(std::nan(""));
+  EXPECT_EQ(unused_points_text(result, PointRole::kControl),
+            "1 control point takes no part: pillar (not seen by an oriented image)");
 }
 
 // Two halves without a common tie point.

@@ -45,7 +45,7 @@ BlockResult example_result() {
   result.residual_x = {3, 0, 100, 100, 100, 1, 100};
   result.residual_y = {4, 1, 100, 100, 100, 0, 100};
   result.control.resize(2);
-  result.control[0] = {{10.5, 20.25, 30}, symmetric<Eigen::Matrix3d>(3), {{0.1, 0.2}, {nan, nan}}};
+  result.control[0] = {{10.5, 20.25, 30}, symmetric<Eigen::Matrix3d>(3), {{0.1, 0.2}, {nan, nan}}, {1, 0}};
   result.control[1] = {{nan, nan, nan}, symmetric<Eigen::Matrix3d>(0), {}};
   result.variance_factor = 1.0625;
   result.chi2 = 12345.678;
@@ -104,6 +104,7 @@ TEST(ResultFile, EverythingComesBack) {
   EXPECT_EQ(back.control[0].covariance, result.control[0].covariance);
   EXPECT_EQ(back.control[0].residual_px[0], result.control[0].residual_px[0]);
   EXPECT_TRUE(back.control[0].residual_px[1].hasNaN());
+  EXPECT_EQ(back.control[0].kept, result.control[0].kept);
   EXPECT_TRUE(back.control[1].residual_px.empty());
   EXPECT_EQ(back.variance_factor, result.variance_factor);
   EXPECT_EQ(back.chi2, result.chi2);

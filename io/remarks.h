@@ -1,0 +1,26 @@
+// What a reader of a result must not overlook, in plain words without markup: for the terminal and the report.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/result.h"
+
+namespace megablock {
+
+// A control or check point that no measurement holds: all were rejected, or none lies in an oriented image.
+struct UnusedPoint {
+  std::size_t point = 0;  // in block.control_points
+  ImageIndex image;       // of the worst measurement; invalid: none lies in an oriented image
+  double worst_px = 0;    // its residual
+};
+// Worst first; none when the result holds no points.
+std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role);
+
+// "2 control points take no part: 3 (1.4e6 px in 02.jpg), 7 (not seen by an oriented image)"; empty without such.
+std::string unused_points_text(const BlockResult& result, PointRole role);
+
+// All of this file, one line each.
+std::vector<std::string> remarks(const BlockResult& result);
+
+}  // namespace megablock

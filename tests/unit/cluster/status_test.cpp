@@ -1,0 +1,61 @@
+#include "cluster/status.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/unit/io/made_up_result.h"
+
+namespace megablock {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class StatusTest : public testing::Test {
+ protected:
+  StatusTest()
+      : store_(testing::TempDir() + "status_" + testing::UnitTest::GetInstance()->current_test_info()->name()) {
+    std::filesystem::remove_all(store_.directory());
+    store_.create();
+    std::ofstream(store_.path("job.json")) << "{}";
+    SimulationOptions options;
+    options.frames = 30;
+    options.control_points = 3;
+    options.check_points = 2;
+    result_ = made_up_result(options, 2);
+  }
+  ~StatusTest() override { std::filesystem::remove_all(store_.directory()); }
+
+  void write() {
+    store_.write("result/block.h5", 1, [&](const std::string& path) { write_result(path, result_); });
+  }
+  nlohmann::json json() const { return nlohmann::json::parse(status_json(store_)); }
+
+  JobStore store_;
+  BlockResult result_;
+};
+
+TEST_F(StatusTest, NamesControlPointsThatTakeNoPart) {
+  write();
+  EXPECT_EQ(json()["control_points_unused"], 0);
+  EXPECT_THAT(status_text(store_), Not(HasSubstr("look:")));
+  for (std::size_t p = 0; p < result_.control.size(); ++p) {
+    const bool control = result_.block.control_points[p].role == PointRole::kControl;
+    result_.control[p].kept.assign(result_.control[p].residual_px.size(), control ? 0 : 1);
+  }
+  write();
+  EXPECT_EQ(json()["control_points_unused"], 3);
+  EXPECT_EQ(json()["check_points_unused"], 0);
+  EXPECT_THAT(status_text(store_), HasSubstr("\n  look: 3 control points take no part: "));
+}
+
+TEST_F(StatusTest, KeysAreThereBeforeAResult) {
+  EXPECT_TRUE(json()["control_points_unused"].is_null());
+  EXPECT_EQ(json()["result"], "none");
+}
+
+}  // namespace
+}  // namespace megablock
