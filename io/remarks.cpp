@@ -4,12 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "io/report/figures.h"
 
 namespace megablock {
 
 namespace {
 
-constexpr std::size_t kNamed = 5;  // points by name
+constexpr std::size_t kNamed = 5;           // points by name
+constexpr std::size_t kParts = 5;           // of a free datum, described
+constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
+constexpr double kDegrees = 180 / std::numbers::pi;
 
 // Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
 std::string pixels(double value) {
@@ -17,6 +23,59 @@ std::string pixels(double value) {
   if (value < 1e5) return fmt::format("{:.0f}", value);
   const int power = static_cast<int>(std::floor(std::log10(value)));
   return fmt::format("{:.1f}e{}", value / std::pow(10, power), power);
+}
+
+// What places a part: positions of its frames and control points that hold, and whether any attitude is observed.
+struct Placing {
+  std::int64_t positions = 0, attitudes = 0;
+  double rotation_deg = report::kUnknown;  // median sigma of the frames, largest axis
+};
+
+Placing placing_of(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  Placing placing;
+  std::vector<double> sigmas;
+  for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
+    if (figures.part_of_frame[f] != part) continue;
+    placing.positions += result.block.frames[f].position_prior.has_value();
+    placing.attitudes += result.block.frames[f].attitude_prior.has_value();
+    if (result.frame_covariance.contains(f))
+      sigmas.push_back(std::sqrt(result.frame_covariance[f].diagonal().head<3>().maxCoeff()) * kDegrees);
+  }
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    if (given.role != PointRole::kControl) continue;
+    bool here = false;
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), result.control[p].residual_px.size()); ++m)
+      here = here || (result.control[p].takes_part(m) &&
+                      figures.part_of_frame[result.block.images[given.measurements[m].image].frame] == part);
+    placing.positions += here;
+  }
+  placing.rotation_deg = report::spread(std::move(sigmas)).median;
+  return placing;
+}
+
+// Several positions leave a rotation free only when they lie on a line (merge/gauge.h).
+std::string undetermined(int defect, const Placing& placing) {
+  if (defect >= 7) return "place, direction and scale";
+  if (defect == 6) return "place and direction";
+  if (defect == 4) return placing.positions == 0 && placing.attitudes > 0 ? "place and scale" : "direction and scale";
+  if (defect == 3) return placing.positions == 0 && placing.attitudes > 0 ? "its place" : "its direction";
+  if (defect == 1)
+    return placing.positions > 1 ? "the rotation about the line on which the positions or control points lie" : "scale";
+  return fmt::format("{} of the seven parameters of place, direction and scale", defect);
+}
+
+std::string consequence(int defect, const Placing& placing) {
+  if (defect >= 6) return "coordinates are relative; add positions or three control points";
+  if (defect == 1 && placing.positions > 1)
+    return "heights and attitudes are not usable; add attitudes, or control points away from that line";
+  if (defect == 1 || defect == 4) return "lengths or directions are not usable; add positions or control points";
+  return "coordinates are not usable as they are; add positions, attitudes or control points";
+}
+
+std::string sigma_text(const Placing& placing) {
+  if (!std::isfinite(placing.rotation_deg) || placing.rotation_deg < 1) return "";
+  return fmt::format(" (sigma of the rotations {:.0f} degrees)", placing.rotation_deg);
 }
 
 }  // namespace
@@ -60,8 +119,35 @@ std::string unused_points_text(const BlockResult& result, PointRole role) {
   return text;
 }
 
-std::vector<std::string> remarks(const BlockResult& result) {
+std::vector<std::string> datum_texts(const BlockResult& result) {
   std::vector<std::string> lines;
+  if (result.state.oriented.size() != result.block.frames.size()) return lines;  // nothing was oriented yet
+  report::Figures figures;
+  report::find_parts(result, figures);
+  std::size_t free = 0;
+  for (std::size_t p = 0; p < figures.parts.size(); ++p) {
+    const report::BlockPart& part = figures.parts[p];
+    const Placing placing = placing_of(result, figures, static_cast<std::int32_t>(p));
+    const bool whole = figures.parts.size() == 1;
+    if (part.defect > 0) {
+      if (++free > kParts) continue;
+      lines.push_back(
+          fmt::format("{} free: nothing determines {}{}; {}",
+                      whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
+                      undetermined(part.defect, placing), sigma_text(placing), consequence(part.defect, placing)));
+    } else if (placing.rotation_deg > kUnusableRotationDeg) {
+      lines.push_back(
+          fmt::format("The rotations{} are known to {:.0f} degrees only (sigma): heights and attitudes are "
+                      "not usable; add control points or attitudes",
+                      whole ? "" : fmt::format(" of part {}", p + 1), placing.rotation_deg));
+    }
+  }
+  if (free > kParts) lines.push_back(fmt::format("The datum of {} more parts is free", free - kParts));
+  return lines;
+}
+
+std::vector<std::string> remarks(const BlockResult& result) {
+  std::vector<std::string> lines = datum_texts(result);
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
   return lines;

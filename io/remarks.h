@@ -20,6 +20,11 @@ std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role
 // "2 control points take no part: 3 (1.4e6 px in 02.jpg), 7 (not seen by an oriented image)"; empty without such.
 std::string unused_points_text(const BlockResult& result, PointRole role);
 
+// What the observations leave undetermined of the datum, a line per part of the block whose datum is free, and whether
+// its rotations are known to several degrees only: "The datum is free: nothing determines the rotation about the line
+// of the positions (sigma of the rotations 28 degrees): ... add control points or attitudes". Empty for a sound datum.
+std::vector<std::string> datum_texts(const BlockResult& result);
+
 // All of this file, one line each.
 std::vector<std::string> remarks(const BlockResult& result);
 

@@ -52,6 +52,14 @@ TEST_F(StatusTest, NamesControlPointsThatTakeNoPart) {
   EXPECT_THAT(status_text(store_), HasSubstr("\n  look: 3 control points take no part: "));
 }
 
+TEST_F(StatusTest, SaysWhenTheDatumIsFree) {
+  result_.free_parts = {{FrameIndex(0), 7}};
+  write();
+  EXPECT_THAT(status_text(store_),
+              HasSubstr("\n  look: The datum is free: nothing determines place, direction and scale"));
+  EXPECT_EQ(json()["remarks"].size(), 1u);
+}
+
 TEST_F(StatusTest, KeysAreThereBeforeAResult) {
   EXPECT_TRUE(json()["control_points_unused"].is_null());
   EXPECT_EQ(json()["result"], "none");

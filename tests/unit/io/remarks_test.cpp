@@ -1,0 +1,86 @@
+#include "io/remarks.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "io/report.h"
+#include "tests/unit/io/made_up_result.h"
+
+namespace megablock {
+namespace {
+
+using testing::HasSubstr;
+
+SimulationOptions small_block() {
+  SimulationOptions options;
+  options.frames = 60;
+  options.control_points = 4;
+  options.check_points = 5;
+  options.attitude_sigma_deg = 1;
+  return options;
+}
+
+// One part whose positions leave `defect` parameters free.
+BlockResult free_result(std::int32_t defect, std::size_t positions, bool attitudes) {
+  BlockResult result = made_up_result(small_block());
+  result.block.control_points.clear();
+  result.control.clear();
+  std::size_t kept = 0;
+  for (Frame& frame : result.block.frames) {
+    if (!frame.position_prior) frame.position_prior = PositionPrior{};
+    if (kept++ >= positions) frame.position_prior.reset();
+    if (!attitudes) frame.attitude_prior.reset();
+  }
+  result.free_parts = {{FrameIndex(0), defect}};
+  result.gauge = "free, inner constraints: defect " + std::to_string(defect);
+  return result;
+}
+
+TEST(Remarks, SaysInPlainWordsWhatAFreeDatumLeavesOpen) {
+  EXPECT_TRUE(datum_texts(made_up_result(small_block())).empty());
+  BlockResult line = free_result(1, 3, false);
+  const double sigma = 28 * std::numbers::pi / 180;
+  for (auto& covariance : line.frame_covariance) covariance(1, 1) = sigma * sigma;
+  EXPECT_EQ(datum_texts(line),
+            std::vector<std::string>{
+                "The datum is free: nothing determines the rotation about the line on which the positions or control "
+                "points lie (sigma of the rotations 28 degrees); heights and attitudes are not usable; add attitudes, "
+                "or control points away from that line"});
+  EXPECT_THAT(report_html(line),
+              HasSubstr("<li class=look>The datum is free: nothing determines the rotation about the line"));
+
+  const auto first = [](const BlockResult& result) { return datum_texts(result).at(0); };
+  EXPECT_THAT(first(free_result(1, 1, true)), HasSubstr("nothing determines scale;"));
+  EXPECT_THAT(first(free_result(4, 0, true)), HasSubstr("nothing determines place and scale;"));
+  EXPECT_THAT(first(free_result(4, 1, false)), HasSubstr("nothing determines direction and scale;"));
+  EXPECT_THAT(first(free_result(7, 0, false)), HasSubstr("nothing determines place, direction and scale;"));
+
+  line.free_parts.clear();  // just not free
+  EXPECT_THAT(first(line), HasSubstr("known to 28 degrees only"));
+}
+
+TEST(Remarks, PointsThatAreNotSeenAndTheWorstFirst) {
+  BlockResult result = made_up_result(small_block());
+  EXPECT_TRUE(remarks(result).empty());
+  for (std::size_t p = 0; p < result.control.size(); ++p) {
+    result.block.control_points[p].name = std::to_string(p);
+    if (result.block.control_points[p].role != PointRole::kCheck) continue;
+    for (auto& residual : result.control[p].residual_px) residual.setConstant(std::nan(""));
+    if (p + 1 == result.control.size()) {
+      result.control[p].residual_px[0] = {4810, 0};
+      result.control[p].kept.assign(result.control[p].residual_px.size(), 0);
+    }
+  }
+  const auto& last = result.block.control_points.back();
+  ASSERT_EQ(last.role, PointRole::kCheck);
+  EXPECT_THAT(unused_points_text(result, PointRole::kCheck),
+              testing::StartsWith("5 check points take no part: " + last.name + " (4810 px in " +
+                                  result.block.images[last.measurements[0].image].name + ", rejected), "));
+  EXPECT_THAT(unused_points_text(result, PointRole::kCheck), HasSubstr(" (not seen by an oriented image), "));
+  EXPECT_EQ(unused_points_text(result, PointRole::kControl), "");
+}
+
+}  // namespace
+}  // namespace megablock
