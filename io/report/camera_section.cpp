@@ -89,10 +89,7 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
         {parameter_name(model, k) + (pixels ? " [px]" : ""), with_digits(model, k, start), with_digits(model, k, now),
          pixels || model.kind != CameraModelKind::kIgnRadial ? with_sign(now - start, pixels ? 2 : 6)
                                                              : significant(now - start, 4),
-         held     ? "held"
-         : pixels ? fixed(sigma, 3)
-                  : significant(sigma, 2),
-         tested ? fixed(ratio, 1) : "",
+         held ? "held" : significant(sigma, 2), tested ? fixed(ratio, 1) : "",
          prior == 0             ? "held"
          : std::isfinite(prior) ? "σ " + significant(prior, 2)
                                 : "free"},
@@ -125,13 +122,13 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
   for (CameraIndex camera(0); result.block.cameras.contains(camera) && camera.value < listed; ++camera.value) {
     const Camera& c = result.block.cameras[camera];
     const Intrinsics& k = result.state.cameras.contains(camera) ? result.state.cameras[camera] : c.intrinsics;
-    body += "<div class=aside><h3>" + escape(c.name) + "</h3>" +
+    body += "<h3>" + escape(c.name) + "</h3>" +
             paragraph(
                 fmt::format("{}, {} × {} px, {}° × {}°, {} oriented images{}", model_name(k.model()), c.width, c.height,
                             fixed(opening(c, k, {0.5 * c.width, 0}), 0), fixed(opening(c, k, {0, 0.5 * c.height}), 0),
                             count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
                 "muted") +
-            camera_table(result, camera) + correlation_table(result, camera) + "</div>";
+            camera_table(result, camera) + correlation_table(result, camera);
   }
   if (result.block.cameras.next_index().value > listed)
     body += paragraph("… and " + count(result.block.cameras.next_index().value - listed) + " more cameras.", "muted");
@@ -143,7 +140,7 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
       "÷ sigma: distance from no distortion, of the principal point from the image's centre; parameters within " +
           fixed(kSignificant, 0) + " sigma are not significant and shown faint.",
       "muted");
-  return section("cameras", "Cameras", note + "<div class=row>" + body + "</div>" + mounts);
+  return section("cameras", "Cameras", note + body + mounts);
 }
 
 }  // namespace megablock::report

@@ -25,6 +25,15 @@ std::string signed_text(double value, int decimals, bool plus) {
   return (value < 0 ? kMinus : plus ? "+" : "") + digits;
 }
 
+// Short texts stay on one line, notes break between words, and long names, where they must, anywhere.
+const char* text_class(const std::string& text) {
+  constexpr std::size_t kShort = 28, kLongWord = 40;
+  if (text.size() <= kShort) return " class=t";
+  std::size_t word = 0, longest = 0;
+  for (char c : text) longest = std::max(longest, word = c == ' ' || c == '<' || c == '>' ? 0 : word + 1);
+  return longest > kLongWord ? " class=\"t long\"" : " class=\"t note\"";
+}
+
 }  // namespace
 
 std::string escape(std::string_view text) {
@@ -119,11 +128,17 @@ void axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std
     cells.push_back(sign ? with_sign(c * unit.factor, unit.decimals) : fixed(c * unit.factor, unit.decimals));
 }
 
+std::string sigma_text(double value) { return significant(value, value > 0 && value < 1 ? 2 : 3); }
+
+void sigma_cells(const Eigen::Vector3d& sigmas, const LengthUnit& unit, std::vector<std::string>& cells) {
+  for (double s : sigmas) cells.push_back(sigma_text(s * unit.factor));
+}
+
 Table::Table(std::vector<std::string> headings, std::size_t text_columns)
     : headings_(std::move(headings)), text_columns_(text_columns) {}
 
 std::string Table::cell(const char* tag, const std::string& text, std::size_t column) const {
-  return fmt::format("<{0}{1}>{2}</{0}>", tag, column < text_columns_ ? " class=t" : "", text);
+  return fmt::format("<{0}{1}>{2}</{0}>", tag, column < text_columns_ ? text_class(text) : "", text);
 }
 
 void Table::add(std::vector<std::string> cells, const std::string& row_class) {

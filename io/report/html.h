@@ -16,6 +16,7 @@ inline constexpr const char* kMissing = "–";  // printed for what is not a fin
 std::string count(std::int64_t value);                  // 27 503, grouped by narrow spaces
 std::string fixed(double value, int decimals);          // kMissing when not finite
 std::string significant(double value, int digits = 3);  // plain decimals, or a power of ten for extremes
+std::string sigma_text(double value);                   // of a standard deviation: three digits at most say something
 std::string with_sign(double value, int decimals);      // +0.012, −0.003
 std::string percent(double part, double whole);         // 99.4 %; never rounded up to 100 %
 std::string duration(double seconds);                   // 0.4 s, 12 s, 3 min 05 s, 2 h 10 min
@@ -33,6 +34,7 @@ std::string in_unit(const std::string& name, const LengthUnit& unit);  // "ΔE [
 double largest(const std::vector<Eigen::Vector3d>& values);            // component by size, finite ones; else 0
 // One cell per component.
 void axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std::vector<std::string>& cells);
+void sigma_cells(const Eigen::Vector3d& sigmas, const LengthUnit& unit, std::vector<std::string>& cells);
 
 // Rows of cells under headings. The first column is text, the others are aligned as numbers unless said otherwise.
 class Table {

@@ -34,16 +34,23 @@ code{font:13px ui-monospace,Menlo,Consolas,monospace}
 .assessment .bad::before{background:var(--bad);border-radius:0;transform:rotate(45deg)}
 .assessment .bad{color:var(--bad)}
 .row{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,430px),1fr));gap:14px 26px;align-items:start}
+.row>:only-child{grid-column:1/-1}
+.row>figure:only-child{max-width:640px}
 figure{margin:0}
 figure svg{width:100%;height:auto;display:block}
 .aside{min-width:0}
-.wide{overflow-x:auto}
+.wide,.tall{overflow-x:auto}
+.wide::-webkit-scrollbar,.tall::-webkit-scrollbar{height:9px;width:9px}
+.wide::-webkit-scrollbar-thumb,.tall::-webkit-scrollbar-thumb{background:#a9b5c0;border-radius:5px}
+.wide::-webkit-scrollbar-track,.tall::-webkit-scrollbar-track{background:var(--ground)}
+.cut::before{content:"more columns: scroll sideways →";position:sticky;left:0;display:inline-block;color:var(--look);font-size:12px}
 table{border-collapse:collapse;width:100%;font-size:14px;font-variant-numeric:tabular-nums}
 th,td{text-align:right;padding:3px 8px;border-bottom:1px solid var(--line);white-space:nowrap}
 th{color:var(--muted);font-weight:500;font-size:13px}
 .t{text-align:left}
 .compact{max-width:720px}
-td.t{white-space:normal;overflow-wrap:anywhere}
+td.note{white-space:normal;min-width:15em}
+td.long{white-space:normal;overflow-wrap:anywhere;min-width:15em}
 th:first-child,td:first-child{padding-left:0}
 tr.sum td{font-weight:600}
 tr.bad td{color:var(--bad)}
@@ -77,6 +84,7 @@ svg .title{fill:var(--ink);font-size:12px}
 .curve{fill:none;stroke:#b26a00;stroke-width:1.5}
 .frame{fill:#fbfcfd;stroke:var(--line)}
 .shade{fill:#6fa3b5}
+.strip{fill:var(--paper)}
 .foot{stroke:#1c2733;stroke-width:2.6;stroke-linecap:round}
 .arrow{fill:none;stroke:#1c2733;stroke-width:1.2}
 .dot{fill:var(--accent);fill-opacity:.65}
@@ -114,6 +122,7 @@ footer{color:var(--muted);font-size:12px;padding:0 0 24px}
 @media print{body{background:#fff;font-size:11px}header{background:none;color:#000;padding:0}header p{color:#444}
 section,.card,.assessment{border-color:#bbb}figure,tr,.card{break-inside:avoid}h2,h3{break-after:avoid}.controls{display:none}
 main,header>div{max-width:none;padding:0}.row{grid-template-columns:1fr 1fr}figure .map{max-height:150mm}
+.cut::before{display:none}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 )css";
 
@@ -159,6 +168,12 @@ constexpr const char* kScript = R"js(
     });
     for (const end of ['pointerup', 'pointercancel']) map.addEventListener(end, e => fingers.delete(e.pointerId));
   }
+  const boxes = [...document.querySelectorAll('.wide,.tall')];
+  const hint = () => { for (const e of boxes) e.classList.toggle('cut', e.scrollWidth > e.clientWidth + 1 &&
+    getComputedStyle(e).overflowX === 'auto'); };
+  addEventListener('resize', hint);
+  for (const e of document.querySelectorAll('details')) e.addEventListener('toggle', hint);
+  hint();
   const whole = document.getElementById('whole');
   if (whole) whole.addEventListener('click', () => restore.forEach(f => f()));
   const numberIn = cell => {
