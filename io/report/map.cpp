@@ -71,12 +71,8 @@ class MapDrawing {
  private:
   static std::string dot(const Eigen::Vector2d& p) { return fmt::format("M{:.1f} {:.1f}h0", p.x(), p.y()); }
 
-  // A tie point of the frames that are drawn: its first image tells.
-  bool here(std::size_t track) const {
-    if (track + 1 >= result_.tracks.begin.size() || result_.tracks.begin[track] == result_.tracks.begin[track + 1])
-      return false;
-    const ImageIndex image = result_.tracks.image[static_cast<std::size_t>(result_.tracks.begin[track])];
-    return places_[result_.block.images[image].frame].has_value();
+  bool here(std::size_t track) const {  // a tie point of the frames that are drawn
+    return is_of(result_, track, [&](FrameIndex frame) { return places_[frame].has_value(); });
   }
 
   std::string background() const {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "io/report/drawing.h"
@@ -13,7 +14,29 @@ namespace megablock::report {
 namespace {
 
 constexpr double kMostHeight = 900, kLeastHeight = 320, kMargin = 40;
-constexpr int kGridLines = 8;  // at most, along the longer side
+constexpr int kGridLines = 8;                   // at most, along the longer side
+constexpr double kOutermost = 0.02;             // share of the tie points left out on each side
+constexpr std::size_t kFramingPoints = 100000;  // looked at
+
+// The corners of where the tie points of the selected frames lie.
+std::vector<Eigen::Vector2d> corners_of_tie_points(const BlockResult& result, const FrameSelection& selected) {
+  std::array<std::vector<double>, 2> values;
+  const std::size_t step = 1 + result.points.size() / kFramingPoints;
+  for (std::size_t t = 0; t < result.points.size(); t += step) {
+    if (!result.points[t].allFinite() || !is_of(result, t, selected)) continue;
+    for (int k = 0; k < 2; ++k) values[static_cast<std::size_t>(k)].push_back(result.points[t][k]);
+  }
+  if (values[0].empty()) return {};
+  Eigen::Vector2d low, high;
+  for (int k = 0; k < 2; ++k) {
+    std::vector<double>& axis = values[static_cast<std::size_t>(k)];
+    std::sort(axis.begin(), axis.end());
+    const auto out = static_cast<std::size_t>(kOutermost * static_cast<double>(axis.size()));
+    low[k] = axis[out];
+    high[k] = axis[axis.size() - 1 - out];
+  }
+  return {low, high};
+}
 
 }  // namespace
 
@@ -40,6 +63,13 @@ Plane plane_over(const std::vector<Eigen::Vector2d>& places) {
   return plane;
 }
 
+bool is_of(const BlockResult& result, std::size_t track, const FrameSelection& selected) {
+  if (track + 1 >= result.tracks.begin.size() || result.tracks.begin[track] == result.tracks.begin[track + 1])
+    return false;
+  const ImageIndex image = result.tracks.image[static_cast<std::size_t>(result.tracks.begin[track])];
+  return selected(result.block.images[image].frame);
+}
+
 std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex frame) {
   if (oriented(result, frame)) return result.state.frames[frame].centre.head<2>();
   if (const auto& prior = result.block.frames[frame].position_prior) return prior->position.head<2>();
@@ -60,6 +90,7 @@ std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& s
     for (const ControlPoint& point : result.block.control_points)
       if (point.position.head<2>().allFinite()) shown.emplace_back(point.position.head<2>());
   if (shown.empty()) return std::nullopt;
+  for (const Eigen::Vector2d& corner : corners_of_tie_points(result, selected)) shown.push_back(corner);
   return plane_over(shown);
 }
 
@@ -100,9 +131,11 @@ std::string scale_bar(const Plane& plane, const char* unit) {
   const bool kilometres = length >= 1000 && std::string(unit) == "m";
   const std::string label = kilometres ? significant(length / 1000, 2) + " km" : significant(length, 2) + " " + unit;
   return fmt::format(
-      "<g class=scale><rect x=8 y={:.1f} width={:.1f} height=26 rx=4 />"
+      // What is drawn beyond the map's foot does not run under the bar.
+      "<rect x=1 y={:.1f} width={:.0f} height={:.0f} class=strip /><g class=scale><rect x=8 y={:.1f} width={:.1f} "
+      "height=26 rx=4 />"
       "<path d=\"M16 {:.1f}v-6m0 3h{:.1f}m0 3v-6\"/><text x={:.1f} y={:.1f}>{}</text></g>",
-      y - 16, drawn + 90, y, drawn, drawn + 24, y + 2, label);
+      plane.height, kMapWidth - 2, kMapFoot - 1, y - 16, drawn + 90, y, drawn, drawn + 24, y + 2, label);
 }
 
 std::string north_arrow() {

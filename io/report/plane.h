@@ -25,9 +25,13 @@ Plane plane_over(const std::vector<Eigen::Vector2d>& places);
 // The frames of one drawing.
 using FrameSelection = std::function<bool(FrameIndex)>;
 
-// Over the selected frames that are oriented (all, when none is) and the control points with a place, if wanted. Empty
-// when nothing has a place.
+// Over the selected frames that are oriented (all, when none is), their tie points but for the outermost 2 % on each
+// side (a facade lies beside the frames, not under them), and the control points with a place, if wanted. Empty when
+// nothing has a place.
 std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control);
+
+// A tie point of the selected frames: its first image tells.
+bool is_of(const BlockResult& result, std::size_t track, const FrameSelection& selected);
 
 // Where a frame is drawn: its pose, else its GNSS position.
 std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex frame);
