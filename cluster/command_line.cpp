@@ -237,22 +237,6 @@ void add_report(CLI::App& app, Action& action) {
   });
 }
 
-std::string to_text(const Evaluation& e) {
-  char text[1024];
-  std::snprintf(text, sizeof text,
-                "frames compared             %lld (%lld of the truth have no pose)%s\n"
-                "position                    rms %.4f m, largest %.4f m; between neighbours rms %.4f m\n"
-                "rotation                    rms %.5f deg\n"
-                "check points                %lld, rms %.4f m horizontal, %.4f m vertical\n"
-                "error / stated sigma        position %.3f, rotation %.3f, check points %.3f (1: the sigmas are true)",
-                static_cast<long long>(e.frames), static_cast<long long>(e.frames_missing),
-                e.aligned ? ", after a similarity" : "", e.position_rms_m, e.position_max_m, e.relative_position_rms_m,
-                e.rotation_rms_deg, static_cast<long long>(e.check_points), e.check_rms_horizontal_m,
-                e.check_rms_vertical_m, e.normalised_error_position, e.normalised_error_rotation,
-                e.normalised_error_check);
-  return text;
-}
-
 void add_evaluate(CLI::App& app, Action& action) {
   struct Options {
     std::string job, truth;

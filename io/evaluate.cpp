@@ -1,5 +1,7 @@
 #include "io/evaluate.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <filesystem>
@@ -206,6 +208,28 @@ Evaluation evaluate(const BlockResult& result, const std::string& path, const Ev
   if (fs::is_directory(path)) return evaluate(result, (fs::path(path) / "truth.csv").string(), options);
   if (fs::path(path).extension() == ".h5") return evaluate(result, read_state(path), options);
   return evaluate(result, read_pose_csv(path), options);
+}
+
+std::string to_text(const Evaluation& e) {
+  std::string text = fmt::format("frames compared             {} ({} of the truth have no pose){}", e.frames,
+                                 e.frames_missing, e.aligned ? ", after a similarity" : "");
+  text +=
+      fmt::format("\nposition                    rms {:.4f} m, largest {:.4f} m", e.position_rms_m, e.position_max_m);
+  if (std::isfinite(e.relative_position_rms_m))
+    text += fmt::format("; between neighbours rms {:.4f} m", e.relative_position_rms_m);
+  text += fmt::format("\nrotation                    rms {:.5f} deg", e.rotation_rms_deg);
+  if (e.check_points > 0)
+    text += fmt::format("\ncheck points                {}, rms {:.4f} m horizontal, {:.4f} m vertical", e.check_points,
+                        e.check_rms_horizontal_m, e.check_rms_vertical_m);
+  std::string ratios;
+  const auto add = [&](const char* name, double ratio) {
+    if (std::isfinite(ratio)) ratios += fmt::format("{}{} {:.3f}", ratios.empty() ? "" : ", ", name, ratio);
+  };
+  add("position", e.normalised_error_position);
+  add("rotation", e.normalised_error_rotation);
+  add("check points", e.normalised_error_check);
+  if (!ratios.empty()) text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true)";
+  return text;
 }
 
 std::string to_json(const Evaluation& e) {

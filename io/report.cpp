@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "io/report/figures.h"
@@ -30,6 +31,22 @@ std::string subtitle_of(const BlockResult& result, const report::Figures& figure
   return text;
 }
 
+std::string name_of(const std::string& job);
+
+// What the block is called: by its project file, unless that has the usual name; else by its image folder; else by the
+// job's directory.
+std::string title_of(const BlockResult& result, const std::string& job) {
+  const std::string project = std::filesystem::path(result.provenance.project).stem().string();
+  if (!project.empty() && project != "block") return project;
+  if (result.block.images.contains(ImageIndex(0))) {
+    const Image& first = result.block.images[ImageIndex(0)];
+    const std::size_t folder = first.path.size() - std::min(first.path.size(), first.name.size() + 1);
+    if (folder > 0 && first.path.ends_with("/" + first.name))
+      if (std::string name = name_of(first.path.substr(0, folder)); !name.empty()) return name;
+  }
+  return name_of(job);
+}
+
 // The name of the job's directory, also of one given as "job/" or ".".
 std::string name_of(const std::string& job) {
   if (job.empty()) return "";
@@ -49,7 +66,7 @@ std::string report_html(const BlockResult& result, const ReportContext& context)
       control_section(result, figures) + cameras_section(result, figures) + accuracy_section(result, figures) +
       tiles_section(result, figures) + failures_section(result, figures) + stages_section(result) +
       provenance_section(result, context);
-  const std::string name = name_of(context.job);
+  const std::string name = title_of(result, context.job);
   return page(name.empty() ? "Block report" : "Block report: " + escape(name), subtitle_of(result, figures, context),
               body, figures_json(result, figures));
 }

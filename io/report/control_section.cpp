@@ -19,7 +19,7 @@ const char* name_of(PointRole role) { return role == PointRole::kCheck ? "check"
 void add_point(const ControlPoint& point, const PointResidual& r, const LengthUnit& unit, Table& table) {
   std::vector<std::string> cells = {escape(point.name), name_of(point.role)};
   axes_cells(r.difference, unit, true, cells);
-  axes_cells(r.sigma, unit, false, cells);
+  sigma_cells(r.sigma, unit, cells);
   cells.push_back(fixed(r.ratio, 1));
   cells.push_back(fmt::format("{} of {}", r.images, point.measurements.size()));
   cells.push_back(fixed(r.rms_px, 2));

@@ -48,4 +48,9 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
 // A step of 1, 2 or 5 times a power of ten that divides `range` into at most `parts`.
 double round_step(double range, int parts);
 
+// The largest 1, 2 or 5 times a power of ten that is not above `value`; 1 for what is not positive.
+double step_below(double value);
+// "exaggerated 20-fold", "reduced tenfold", "drawn to scale".
+std::string exaggeration_text(double exaggeration);
+
 }  // namespace megablock::report

@@ -56,8 +56,8 @@ void add_pose(const BlockResult& result, ImageIndex image, std::vector<std::stri
 
 void add_sigmas(const BlockResult& result, FrameIndex frame, const LengthUnit& unit, std::vector<std::string>& cells) {
   const auto variance = result.frame_covariance[frame].diagonal().cwiseMax(0).eval();
-  for (int k = 3; k < 6; ++k) cells.push_back(fixed(std::sqrt(variance[k]) * unit.factor, unit.decimals));
-  cells.push_back(fixed(std::sqrt(variance.head<3>().maxCoeff()) * kDegrees, 4));
+  sigma_cells(variance.tail<3>().cwiseSqrt(), unit, cells);
+  cells.push_back(sigma_text(std::sqrt(variance.head<3>().maxCoeff()) * kDegrees));
 }
 
 void add_image(const BlockResult& result, const Figures& f, const Columns& columns, ImageIndex image, Table& table) {

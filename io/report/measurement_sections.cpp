@@ -56,7 +56,7 @@ std::string positions_section(const BlockResult& result, const Figures& f) {
   add_row(table, "stated sigma (rms)", root_mean_square(sigmas), unit, false);
   table.add({"rms of residual ÷ sigma", fixed(relative.x(), 2), fixed(relative.y(), 2), fixed(relative.z(), 2)});
 
-  Table worst({in_unit("largest ÷ sigma", unit), "east", "north", "up", "× sigma"});
+  Table worst({"worst frames", in_unit("east", unit), in_unit("north", unit), in_unit("up", unit), "÷ sigma"});
   for (const std::size_t i : largest_rows(normalised, kWorst)) {
     const PositionResidual& r = f.positions[i];
     const double ratio = normalised[i].cwiseAbs().maxCoeff();
@@ -94,7 +94,7 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
   add_row(table, "largest", extreme, degrees, false);
   add_row(table, "stated sigma (rms)", root_mean_square(sigmas), degrees, false);
   add_row(table, "rms of residual ÷ sigma", root_mean_square(normalised), {1, "", 2}, false);
-  Table worst({"largest ÷ sigma", "about x [°]", "about y [°]", "about z [°]", "× sigma"});
+  Table worst({"worst frames", "about x [°]", "about y [°]", "about z [°]", "÷ sigma"});
   for (const std::size_t i : largest_rows(normalised, kWorst)) {
     std::vector<std::string> cells = {escape(result.block.frames[f.attitudes[i].frame].name)};
     axes_cells(differences[i], degrees, true, cells);
@@ -120,17 +120,17 @@ std::string accuracy_section(const BlockResult& result, const Figures& f) {
     if (std::isfinite(s->p95)) most = std::max(most, s->p95);
   const LengthUnit unit = length_unit(most);
   Table table({"standard deviation", "median", "95 %", "largest", "median × σ₀"});
-  const auto add = [&](const std::string& name, const Spread& s, double factor, int decimals) {
+  const auto add = [&](const std::string& name, const Spread& s, double factor) {
     if (!std::isfinite(s.median)) return;
-    table.add({name, fixed(s.median * factor, decimals), fixed(s.p95 * factor, decimals),
-               fixed(s.largest * factor, decimals), fixed(s.median * scale * factor, decimals)});
+    table.add({name, sigma_text(s.median * factor), sigma_text(s.p95 * factor), sigma_text(s.largest * factor),
+               sigma_text(s.median * scale * factor)});
   };
-  add(in_unit("frames, east", unit), f.sigma_east, unit.factor, unit.decimals);
-  add(in_unit("frames, north", unit), f.sigma_north, unit.factor, unit.decimals);
-  add(in_unit("frames, up", unit), f.sigma_up, unit.factor, unit.decimals);
-  add("frames, rotation [°]", f.sigma_rotation, kDegrees, 4);
-  add(in_unit("tie points, horizontal", unit), f.point_sigma_horizontal, unit.factor, unit.decimals);
-  add(in_unit("tie points, up", unit), f.point_sigma_up, unit.factor, unit.decimals);
+  add(in_unit("frames, east", unit), f.sigma_east, unit.factor);
+  add(in_unit("frames, north", unit), f.sigma_north, unit.factor);
+  add(in_unit("frames, up", unit), f.sigma_up, unit.factor);
+  add("frames, rotation [°]", f.sigma_rotation, kDegrees);
+  add(in_unit("tie points, horizontal", unit), f.point_sigma_horizontal, unit.factor);
+  add(in_unit("tie points, up", unit), f.point_sigma_up, unit.factor);
   return section(
       "accuracy", "Accuracy from the adjustment",
       paragraph(std::string("Standard deviations from the covariance of the whole block, ") +

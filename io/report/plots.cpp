@@ -110,6 +110,23 @@ double round_step(double range, int parts) {
   return 10 * power;
 }
 
+double step_below(double value) {
+  if (!(value > 0) || !std::isfinite(value)) return 1;
+  const double power = std::pow(10, std::floor(std::log10(value) + 1e-9));
+  for (double factor : {5.0, 2.0})
+    if (factor * power <= value * (1 + 1e-9)) return factor * power;
+  return power;
+}
+
+std::string exaggeration_text(double exaggeration) {
+  const auto fold = [](double factor) {
+    const std::int64_t n = std::llround(factor);
+    return n == 2 ? "twofold" : n == 5 ? "fivefold" : n == 10 ? "tenfold" : count(n) + "-fold";
+  };
+  if (std::abs(exaggeration - 1) < 1e-9) return "drawn to scale";
+  return exaggeration > 1 ? "exaggerated " + fold(exaggeration) : "reduced " + fold(1 / exaggeration);
+}
+
 std::string draw(const BarChart& chart) {
   const Histogram& h = chart.histogram;
   const std::int64_t most = h.bins.empty() ? 0 : *std::max_element(h.bins.begin(), h.bins.end());
@@ -175,7 +192,7 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   // The 95 % arrow is as long as a cell; exaggeration rounded so that it can be told.
   const double typical = spread(lengths).p95;
   const double wanted = typical > 0 ? cell_width / (typical * scale) : 1;
-  const double exaggeration = round_step(wanted, 1) > wanted ? round_step(wanted / 2, 1) : round_step(wanted, 1);
+  const double exaggeration = step_below(wanted);
   std::string shades, arrows, feet;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.columns; ++c) {
@@ -203,14 +220,13 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
                            height + 26) +
                fmt::format("<rect width={:.0f} height={:.1f} class=frame />", width, height) + shades + "<path d=\"" +
                arrows + "\" class=arrow /><path d=\"" + feet + "\" class=foot />" +
+               fmt::format("<rect x=-1 y={:.1f} width={:.0f} height=26 class=strip />", height + 1, width + 2) +
                fmt::format("<path d=\"M4 {0:.1f}h{1:.1f}\" class=arrow />", height + 15, bar) +
                text(bar + 12, height + 19, "start", significant(reference, 2) + " px in the image") + "</svg>";
   result.caption = fmt::format(
-      "Mean residual (adjusted − measured) per part of the sensor, from the dot, exaggerated {}-fold; darker = more "
-      "observations (up "
-      "to "
-      "{} a part). Single residuals: {} px rms.",
-      exaggeration >= 1 ? count(std::llround(exaggeration)) : significant(exaggeration, 2), count(most),
+      "Mean residual (adjusted − measured) per part of the sensor, from the dot, {}; darker = more "
+      "observations (up to {} a part). Single residuals: {} px rms.",
+      exaggeration_text(exaggeration), count(most),
       field.observations ? fixed(std::sqrt(field.squares / static_cast<double>(field.observations)), 3) : kMissing);
   return result;
 }

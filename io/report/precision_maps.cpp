@@ -125,9 +125,9 @@ std::string draw(const Ellipse& e, double pixels_per_metre, const LengthUnit& un
   std::string svg = fmt::format(
       "<g transform=\"translate({:.1f} {:.1f})\"><title>{}: {} × {} {}, up {} {}</title>"
       "<ellipse rx={:.1f} ry={:.1f} transform=\"rotate({:.1f})\"/>",
-      e.place.x(), e.place.y(), escape(*e.name), fixed(e.major * unit.factor, unit.decimals),
-      fixed(e.minor * unit.factor, unit.decimals), unit.name, fixed(e.up * unit.factor, unit.decimals), unit.name,
-      e.major * pixels_per_metre, e.minor * pixels_per_metre, e.angle);
+      e.place.x(), e.place.y(), escape(*e.name), sigma_text(e.major * unit.factor), sigma_text(e.minor * unit.factor),
+      unit.name, sigma_text(e.up * unit.factor), unit.name, e.major * pixels_per_metre, e.minor * pixels_per_metre,
+      e.angle);
   return svg + fmt::format("<path d=\"M0 0v{:.1f}\"/></g>", -e.up * pixels_per_metre);
 }
 
@@ -166,7 +166,7 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   // for.
   const double spacing = std::sqrt(kMapWidth * plane->height / static_cast<double>(all.size()));
   const double wanted = std::min(kMapWidth / 28, 0.3 * spacing) / (typical * plane->scale);
-  const double exaggeration = round_step(wanted, 1);
+  const double exaggeration = step_below(wanted);
   const LengthUnit unit = length_unit(typical);
   const std::size_t step = 1 + all.size() / kEllipses;
   std::string body;
@@ -174,11 +174,10 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   FieldDrawing drawing;
   drawing.svg = open_map(*plane, "Error ellipses") + coordinate_grid(*plane, unit_name) + "<g class=ellipses>" + body +
                 "</g>" + scale_bar(*plane, unit_name) + "</svg>";
-  drawing.caption = fmt::format(
-      "Positions of the frames: ellipse of one sigma in plan and, as a bar, the sigma of the height, exaggerated "
-      "{}-fold.{}",
-      exaggeration >= 1 ? count(std::llround(exaggeration)) : significant(exaggeration, 2),
-      step > 1 ? " Every " + count(static_cast<std::int64_t>(step)) + "th frame." : "");
+  drawing.caption =
+      fmt::format("Positions of the frames: ellipse of one sigma in plan and, as a bar, the sigma of the height, {}.{}",
+                  exaggeration_text(exaggeration),
+                  step > 1 ? " Every " + count(static_cast<std::int64_t>(step)) + "th frame." : "");
   return drawing;
 }
 

@@ -16,6 +16,20 @@
 namespace megablock {
 namespace {
 
+TEST(EvaluationText, LeavesOutWhatIsNotKnown) {
+  Evaluation evaluation;
+  evaluation.frames = 3;
+  evaluation.position_rms_m = evaluation.position_max_m = evaluation.rotation_rms_deg = 0.5;
+  const std::string without = to_text(evaluation);
+  EXPECT_EQ(without.find("nan"), std::string::npos) << without;
+  EXPECT_EQ(without.find("check points"), std::string::npos);
+  evaluation.check_points = 2;
+  evaluation.check_rms_horizontal_m = 0.0123;
+  evaluation.check_rms_vertical_m = 0.0456;
+  EXPECT_NE(to_text(evaluation).find("check points                2, rms 0.0123 m horizontal, 0.0456 m vertical"),
+            std::string::npos);
+}
+
 constexpr double kDegree = std::numbers::pi / 180;
 
 // A result whose errors are drawn from the covariances it states.

@@ -8,8 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "io/remarks.h"
-#include "io/report/drawing.h"
 #include "io/report/figures.h"
 #include "io/report/html.h"
 #include "tests/unit/io/made_up_result.h"
@@ -133,6 +131,15 @@ TEST(Report, SaysWhatTheResultComesFrom) {
   EXPECT_THAT(page, HasSubstr("2025-11-21 10:07 UTC"));
   for (const char* words : {"block.yaml", "megablock 0.1.0", "avx2", "matching.ratio", "merge.decrement"})
     EXPECT_THAT(visible_text(page), HasSubstr(words));
+}
+
+TEST(Report, IsCalledByTheProjectOrTheImageFolder) {
+  BlockResult result = made_up_result(small_block());
+  Image& first = result.block.images[ImageIndex(0)];
+  first.path = "/data/photos/" + first.name;
+  EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: photos</h1>"));
+  result.provenance.project = "harbour-2024.yaml";
+  EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: harbour-2024</h1>"));
 }
 
 TEST(Report, ABlockThatDidNotConvergeIsSaidFirstAndInRed) {
@@ -445,29 +452,6 @@ TEST(ReportFigures, HistogramsAndSpreads) {
   EXPECT_EQ(spread.p95, 95);
   EXPECT_EQ(spread.largest, 100);
   EXPECT_TRUE(std::isnan(report::spread({}).median));
-}
-
-TEST(ReportNumbers, ReadWell) {
-  EXPECT_EQ(report::count(27503), "27\u202f503");
-  EXPECT_EQ(report::count(-1234567), "\u22121\u202f234\u202f567");
-  EXPECT_EQ(report::count(999), "999");
-  EXPECT_EQ(report::fixed(-0.0001, 2), "0.00");
-  EXPECT_EQ(report::with_sign(0.0123, 3), "+0.012");
-  EXPECT_EQ(report::with_sign(-0.0123, 3), "\u22120.012");
-  EXPECT_EQ(report::fixed(std::nan(""), 2), report::kMissing);
-  EXPECT_EQ(report::significant(0.012345), "0.0123");
-  EXPECT_EQ(report::significant(12345), "12345");
-  EXPECT_EQ(report::significant(3.1e-7, 2), "3.1\u00b710<sup>\u22127</sup>");
-  EXPECT_EQ(report::percent(9999, 10000), "99.9\u202f%");
-  EXPECT_EQ(report::percent(5, 5), "100\u202f%");
-  EXPECT_EQ(report::percent(1, 0), report::kMissing);
-  EXPECT_EQ(report::duration(0.44), "0.4\u202fs");
-  EXPECT_EQ(report::duration(59.9), "1\u202fmin 00\u202fs");
-  EXPECT_EQ(report::duration(7800), "2\u202fh 10\u202fmin");
-  EXPECT_EQ(report::memory(2150), "2.1\u202fGiB");
-  EXPECT_EQ(report::round_step(10, 5), 2);
-  EXPECT_EQ(report::round_step(11, 5), 5);
-  EXPECT_DOUBLE_EQ(report::round_step(0.7, 6), 0.2);
 }
 
 }  // namespace
