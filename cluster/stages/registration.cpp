@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "adjust/registration/four_frames.h"
 #include "adjust/registration/frame_resection.h"
@@ -22,7 +23,7 @@ namespace megablock {
 
 namespace {
 
-constexpr int kAlgorithm = 1;  // of the registration's stages, part of their fingerprints
+constexpr int kAlgorithm = 2;  // of the registration's stages, part of their fingerprints
 constexpr const char* kPlaces = "register/places.h5";
 constexpr const char* kTrajectory = "register/trajectory.h5";
 
@@ -152,8 +153,10 @@ RegisteredTrajectory adjust_trajectory(const Job& job, Trajectory trajectory, co
                                        const RegistrationSettings& settings) {
   JointInput& input = trajectory.input;
   std::vector<std::size_t> row_of;
+  std::set<std::pair<FrameIndex, FrameIndex>> seen;
   for (std::size_t i = 0; settings.use_registrations && i < rows.size(); ++i) {
-    if (!rows[i].registration.accepted) continue;
+    // Neighbouring places may have been moved to the same frames: each counts once.
+    if (!rows[i].registration.accepted || !seen.emplace(rows[i].place.a, rows[i].place.c).second) continue;
     row_of.push_back(i);
     input.registrations.push_back(
         {rows[i].place.a, rows[i].place.c, rows[i].registration.relative, rows[i].registration.covariance});

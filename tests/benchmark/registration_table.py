@@ -84,9 +84,9 @@ def main():
     with h5py.File(arguments.block / "given.h5") as given:
         names = [n.decode() for n in given["frames/name"][:]]
         start = {n: (tuple(q), tuple(c)) for n, q, c in
-                 zip(names, given["frames/given_pose/rotation_wxyz"][:], given["frames/given_pose/centre"][:])}
+                 zip(names, given["frames/given/rotation_wxyz"][:], given["frames/given/centre"][:])}
         control = {n.decode(): tuple(p) for n, p in
-                   zip(given["control_points/name"][:], given["control_points/position"][:])}
+                   zip(given["control/name"][:], given["control/position"][:])}
     zones = []
     for z in range(arguments.zones):
         points = [p for n, p in control.items() if n.startswith(f"zone{z}_")]
