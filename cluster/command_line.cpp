@@ -278,6 +278,18 @@ std::string unknown_command_message(const CLI::App& app, const std::string& name
          (nearest.empty() ? "see 'megablock --help'" : "did you mean '" + nearest + "'?");
 }
 
+// 'help', no command at all, or an unknown one: the exit code, the same on every rank; one of them says why.
+std::optional<int> answer_without_command(const CLI::App& app, int argc, char** argv, bool speaks) {
+  const std::string name = argc > 1 ? argv[1] : "";
+  if (name.empty() || name == "help") {
+    if (speaks) std::fprintf(name.empty() ? stderr : stdout, "%s", app.help().c_str());
+    return name.empty() ? kExitBadInput : kExitDone;
+  }
+  if (!is_unknown_command(app, name)) return std::nullopt;
+  if (speaks) std::fprintf(stderr, "%s\n", unknown_command_message(app, name).c_str());
+  return kExitBadInput;
+}
+
 int exit_code_of(const std::exception& error) {
   if (dynamic_cast<const Interrupted*>(&error)) return kExitInterrupted;
   return dynamic_cast<const InputError*>(&error) ? kExitBadInput : kExitFailedUnits;
@@ -339,12 +351,7 @@ int command_line(int argc, char** argv) {
     add_evaluate(app, action);
     add_simulate(app, action);
     add_check(app, action);
-    if (const std::string name = argc > 1 ? argv[1] : "help"; name == "help" || is_unknown_command(app, name)) {
-      if (ranks.rank() != 0) return kExitBadInput;
-      if (name != "help") std::fprintf(stderr, "%s\n", unknown_command_message(app, name).c_str());
-      if (name == "help") std::fprintf(argc > 1 ? stdout : stderr, "%s", app.help().c_str());
-      return argc > 1 && name == "help" ? kExitDone : kExitBadInput;
-    }
+    if (const std::optional<int> code = answer_without_command(app, argc, argv, ranks.rank() == 0)) return *code;
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
