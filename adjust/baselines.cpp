@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "adjust/disjoint_sets.h"
+#include "geometry/median.h"
 
 namespace megablock {
 
@@ -15,12 +16,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct TrackRay {
   std::int32_t track;

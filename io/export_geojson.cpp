@@ -3,6 +3,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "geometry/median.h"
 #include "io/crs.h"
 #include "io/export_tables.h"
 #include "io/export_view.h"
@@ -13,12 +14,6 @@ namespace megablock {
 namespace {
 
 using Json = nlohmann::json;
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Median height of the points each image sees; NaN where it sees none.
 std::vector<double> ground_heights(const ExportView& view) {

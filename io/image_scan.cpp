@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 
+#include "geometry/median.h"
 #include "io/error.h"
 #include "io/hash.h"
 
@@ -143,12 +144,6 @@ void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping groupin
 }
 
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::string text_of(const Geodetic& p) {
   char text[64];

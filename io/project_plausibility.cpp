@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/median.h"
 #include "io/project_sections.h"
 
 namespace megablock {
@@ -13,12 +14,6 @@ namespace {
 constexpr double kFar_m = 50e3;
 
 std::string kilometres(double metres) { return std::to_string(std::lround(metres / 1000)) + " km"; }
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

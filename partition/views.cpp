@@ -9,6 +9,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "geometry/median.h"
 #include "partition/kd_tree.h"
 
 namespace megablock {
@@ -48,13 +49,6 @@ bool natural_less(std::string_view a, std::string_view b) {
   }
   if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
   return a < b;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 void rank_by_name(const Block& block, Views& views) {

@@ -8,6 +8,7 @@
 
 #include "adjust/registration/four_frames.h"
 #include "adjust/rig_resection.h"
+#include "geometry/median.h"
 #include "geometry/similarity.h"
 #include "io/error.h"
 
@@ -16,13 +17,6 @@ namespace megablock {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<FourFrameTrack> seen_by_enough(const std::vector<FourFrameTrack>& tracks, int min_frames) {
   std::vector<FourFrameTrack> result;
