@@ -22,15 +22,19 @@ if(MEGABLOCK_SANITIZE)
   target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)
 endif()
 
+# Tests only call the rooms, which keep the full optimisation: at -O1 they compile in half the time.
+set(megablock_test_options $<$<CONFIG:Release>:-O1>)
+
 # Headers that nearly every file reads, precompiled once for all rooms and once for all tests: half of the build's time.
 if(NOT EXISTS ${CMAKE_BINARY_DIR}/headers.cpp)
   file(WRITE ${CMAKE_BINARY_DIR}/headers.cpp "")
 endif()
 function(megablock_headers target)
-  cmake_parse_arguments(HEADERS "" "" "LINK;HEADERS" ${ARGN})
+  cmake_parse_arguments(HEADERS "" "" "LINK;HEADERS;OPTIONS" ${ARGN})
   add_library(${target} OBJECT ${CMAKE_BINARY_DIR}/headers.cpp)
   target_link_libraries(${target} PRIVATE megablock_options ${HEADERS_LINK})
   target_precompile_headers(${target} PRIVATE ${HEADERS_HEADERS})
+  target_compile_options(${target} PRIVATE ${HEADERS_OPTIONS})
 endfunction()
 
 function(megablock_room name)
@@ -67,6 +71,7 @@ function(megablock_tests target folder)
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE ${TESTS_LINK} GTest::gmock GTest::gtest_main)
   target_precompile_headers(${target} REUSE_FROM megablock_test_headers)
+  target_compile_options(${target} PRIVATE ${megablock_test_options})
   gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS ${TESTS_LABEL} TIMEOUT ${TESTS_TIMEOUT}
                                   ENVIRONMENT OPENBLAS_NUM_THREADS=1)  # as the program itself; more threads spin
