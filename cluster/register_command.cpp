@@ -100,9 +100,15 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
   command->add_option("--threads", options->run.threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(not_negative());
   command->add_flag("-q,--quiet", options->run.quiet, "No progress");
+  command->add_flag_callback(
+      "--hold-rig", [options] { options->settings.estimate_rig = false; },
+      "Cameras and mounts as given; else free ones are estimated first");
   command->add_option("--alpha", s.places.alpha_m, "Radius of the alpha shape, m")->capture_default_str();
   command->add_option("--z-stretch", s.places.z_stretch, "Stretch of heights in it")->capture_default_str();
   command->add_option("--d-cons", s.places.registration_spacing, "Frames between two registrations of a pass pair")
+      ->capture_default_str();
+  command->add_option("--places-per-unit", s.units_places, "2x2: places that a rank registers at a time")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--iterations", s.pairs.iterations, "2x2: iterations")->capture_default_str();
   command->add_option("--first-threshold", s.pairs.first_threshold_px, "2x2: threshold of the published start, px")

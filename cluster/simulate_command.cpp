@@ -101,8 +101,11 @@ void add_prior_options(SimulateOptions& s) {
   s.add("--gps-share", &O::gps_share, "Share of frames with a position prior [1]");
   s.add("--masked-share", &O::gnss_masked_share, "Stereopolis: share of frames with masked satellites [0.5]");
   s.add("--absent-share", &O::gnss_absent_share, "Stereopolis: share of them without any [0.04]");
-  s.add("--masked-frames", &O::gnss_masked_frames, "Stereopolis: mean length of a masked stretch, frames [400]");
+  s.add("--masked-frames", &O::gnss_masked_frames, "Stereopolis: mean length of a masked stretch, frames [1500]");
   s.add("--drift", &O::drift_m, "Stereopolis: mean largest drift of a masked stretch, m [3]");
+  s.add(
+      "--drift-per-frame", &O::drift_per_frame_m,
+      "Stereopolis: largest change of the drift between successive frames, m [0.007]; more makes a short block drift");
   s.add("--attitude-sigma", &O::attitude_sigma_deg, "Attitude priors, degrees; 0 = none [0; stereopolis 0.03]");
   s.add("--relative-position-sigma", &O::relative_position_sigma_m,
         "Relative poses, m; 0 = none [0; stereopolis 0.005]");

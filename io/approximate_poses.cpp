@@ -51,6 +51,13 @@ Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, Angles angl
   return rotation_from(BodyAttitude{angle("yaw_deg"), angle("pitch_deg"), angle("roll_deg")});
 }
 
+std::optional<std::int64_t> pass_of(const CsvTable& csv, std::size_t row) {
+  if (!csv.has("pass")) return std::nullopt;
+  const double pass = csv.needed_number(row, "pass");
+  if (pass != std::floor(pass)) throw InputError(csv.where(row) + ": pass: not a whole number");
+  return static_cast<std::int64_t>(pass);
+}
+
 ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column) {
   const bool geodetic = csv.has("latitude_deg");
   const Angles angles = angles_of(csv);
@@ -73,6 +80,7 @@ ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column
     else
       entry.pose.centre = {csv.needed_number(row, "x_m"), csv.needed_number(row, "y_m"), csv.needed_number(row, "z_m")};
     entry.pose.rotation = rotation_of(csv, row, angles);
+    entry.pass = pass_of(csv, row);
     poses.rows.push_back(std::move(entry));
   }
   return poses;
@@ -83,7 +91,12 @@ ApproximatePoses read_quaternions(const std::string& path) {
   ApproximatePoses poses;
   poses.ground = table.ground;
   for (std::size_t i = 0; i < table.names.size(); ++i)
-    poses.rows.push_back({table.names[i], path, false, {}, table.poses[i]});
+    poses.rows.push_back({table.names[i],
+                          path,
+                          false,
+                          {},
+                          table.poses[i],
+                          table.passes.empty() ? std::nullopt : std::optional(table.passes[i])});
   return poses;
 }
 
@@ -158,9 +171,12 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
       const Pose& mount = block.mount_of(image->second).pose;
       const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
       Frame& target = block.frames[block.images[image->second].frame];
+      if (row.pass) target.pass = *row.pass;
       if (!target.given_pose) target.given_pose = Pose{rotation, camera.centre - rotation.conjugate() * mount.centre};
     } else if (frame != frames.end()) {
-      block.frames[frame->second].given_pose = to_block(row);
+      Frame& target = block.frames[frame->second];
+      if (row.pass) target.pass = *row.pass;
+      target.given_pose = to_block(row);
     } else {
       throw InputError(row.where + ": pose of '" + row.name + "', which is no image or frame of the block");
     }

@@ -6,8 +6,9 @@
 //     omega_deg,phi_deg,kappa_deg  or  yaw_deg,pitch_deg,roll_deg
 //                    (geometry/rotation.h) in the vertical of the image's own place with WGS84, else in the block's
 //                    frame
+//     pass                                                   if there: number of the drive or line it belongs to
 //     further columns are not read
-// or the quaternion form of io/pose_csv.h (name,qw,qx,qy,qz,x,y,z; its "# origin:" tells the frame).
+// or the quaternion form of io/pose_csv.h (name,qw,qx,qy,qz,x,y,z[,pass]; its "# origin:" tells the frame).
 // A pose given by the name of an image is that of the image's camera, by the name of a frame that of the rig.
 #pragma once
 
@@ -25,6 +26,7 @@ struct ApproximatePoses {
     bool geodetic = false;  // else local
     Geodetic position;      // geodetic
     Pose pose;              // local: pose; geodetic: rotation in the own vertical
+    std::optional<std::int64_t> pass;
   };
   std::vector<Row> rows;
   std::optional<GroundFrame> ground;  // of local rows; none: the block's
@@ -35,7 +37,8 @@ struct ApproximatePoses {
 // InputError with file:line for missing columns, numbers that are none, names that appear twice.
 ApproximatePoses read_approximate_poses(const std::string& path);
 
-// Sets Frame::given_pose. InputError with file:line for a name the block does not have (a warning for `left_out`).
+// Sets Frame::given_pose, and Frame::pass where the file has it. InputError with file:line for a name the block does
+// not have (a warning for `left_out`).
 void set_given_poses(const ApproximatePoses& poses, const std::vector<std::string>& left_out, Block& block,
                      std::vector<std::string>& warnings);
 

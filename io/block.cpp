@@ -33,8 +33,9 @@ void require(bool condition, const std::string& message) {
 }
 
 void check_unit(const Pose& pose, const std::string& what) {
-  require(std::abs(pose.rotation.norm() - 1) < 1e-9, what + ": rotation is not a unit quaternion");
-  require(pose.centre.allFinite(), what + ": position is not finite");
+  require(std::abs(pose.rotation.norm() - 1) < 1e-9,
+          what + ": rotation is not a unit quaternion; leave the pose out or correct it");
+  require(pose.centre.allFinite(), what + ": position is not finite; leave the pose out or correct it");
 }
 
 void check_names(const auto& items, const std::string& kind) {
@@ -71,7 +72,9 @@ void check(const Block& block) {
       require(frame.position_prior->position.allFinite() && positive(frame.position_prior->sigma),
               "frame '" + frame.name + "': position prior must be finite with positive sigmas (metres)");
     if (frame.attitude_prior)
-      require(positive(frame.attitude_prior->sigma_rad), "frame '" + frame.name + "': attitude sigmas must be positive");
+      require(positive(frame.attitude_prior->sigma_rad) &&
+                  std::abs(frame.attitude_prior->rotation_cw.norm() - 1) < 1e-9,
+              "frame '" + frame.name + "': attitude prior must be a unit quaternion with positive sigmas");
     if (frame.given_pose) check_unit(*frame.given_pose, "frame '" + frame.name + "'");
   }
   for (const Image& image : block.images) {
@@ -82,7 +85,10 @@ void check(const Block& block) {
   for (const RelativePose& relative : block.relative_poses) {
     require(block.frames.contains(relative.from) && block.frames.contains(relative.to),
             "a relative pose names no frame of the block");
-    require(relative.rotation_sigma_rad > 0 && relative.position_sigma_m > 0, "a relative pose has no positive sigmas");
+    const std::string what = "relative pose of frames '" + block.frames[relative.from].name + "' and '" +
+                             block.frames[relative.to].name + "'";
+    require(relative.rotation_sigma_rad > 0 && relative.position_sigma_m > 0, what + " has no positive sigmas");
+    check_unit(relative.pose, what);
   }
   for (const ControlPoint& point : block.control_points) {
     require(positive(point.sigma), "control point '" + point.name + "': sigmas must be positive (metres)");

@@ -73,6 +73,16 @@ class CsvReader {
         fail(std::string("column '") + column + "' is missing; expected name,qw,qx,qy,qz,x,y,z");
       columns_.push_back(static_cast<std::size_t>(found - fields.begin()));
     }
+    const auto pass = std::find(fields.begin(), fields.end(), "pass");
+    if (pass != fields.end()) pass_ = static_cast<std::size_t>(pass - fields.begin());
+  }
+
+  void read_pass(const std::vector<std::string>& fields) {
+    const std::string field = *pass_ < fields.size() ? fields[*pass_] : "";
+    std::int64_t pass = 0;
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), pass);
+    if (error != std::errc() || end != field.data() + field.size()) fail("pass: '" + field + "' is not a whole number");
+    table_.passes.push_back(pass);
   }
 
   void read_row(const std::vector<std::string>& fields) {
@@ -83,7 +93,7 @@ class CsvReader {
       if (c == 0) continue;
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
       if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
-        fail(std::string(kColumns[c]) + ": '" + field + "' is not a number");
+        fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; take the line out if there is no pose");
     }
     Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
     if (std::abs(rotation.norm() - 1) > 1e-3) fail("qw,qx,qy,qz is not a unit quaternion");
@@ -92,12 +102,14 @@ class CsvReader {
     if (!seen_.insert(name).second) fail("frame '" + name + "' appears twice");
     table_.names.push_back(name);
     table_.poses.push_back({rotation, {value[5], value[6], value[7]}});
+    if (pass_) read_pass(fields);
   }
 
   std::string path_;
   std::ifstream stream_;
   std::int64_t line_ = 0;
   std::vector<std::size_t> columns_;  // position of each of kColumns
+  std::optional<std::size_t> pass_;   // its position
   std::unordered_set<std::string> seen_;
   PoseTable table_;
 };

@@ -1,7 +1,8 @@
 // Poses of frames as a CSV file: the truth that `simulate` writes and `evaluate` reads, or any other program's poses.
 //
-//     # origin: 48.85 2.35 100            (optional: latitude, longitude [deg], ellipsoidal height [m] of the ground
-//     frame) name,qw,qx,qy,qz,x,y,z[,pass] f000012.jpg,0.707...,...
+//     # origin: 48.85 2.35 100     (optional: latitude, longitude [deg], ellipsoidal height [m] of the ground frame)
+//     name,qw,qx,qy,qz,x,y,z[,pass]
+//     f000012.jpg,0.707...,...
 //
 // name: the frame's (of a single photo: the image's). qw qx qy qz: unit quaternion of the rotation ground -> rig (R_cw;
 // camera x right, y down, looking along +z). x y z: the rig's origin in the ground frame, metres (east, north, up).
@@ -21,7 +22,7 @@ struct PoseTable {
   std::optional<GroundFrame> ground;  // of the file's origin comment
   std::vector<std::string> names;
   std::vector<Pose> poses;           // [names]
-  std::vector<std::int64_t> passes;  // [names] or empty; written, not read
+  std::vector<std::int64_t> passes;  // [names] or empty: no such column
 };
 
 // Oriented frames of the state, by name.

@@ -41,9 +41,10 @@ void read_simulated_block(YamlReader& top, Project& project, const std::string& 
   }
 }
 
-// Images that are in the folder and not in the block: files that refer to them are not wrong.
+// Images that are not in the block for a reason that was told: files that refer to them are not wrong.
 std::vector<std::string> names_left_out(const Project& project) {
   std::vector<std::string> names = project.copies;
+  names.insert(names.end(), project.missing.begin(), project.missing.end());
   for (const auto& [name, reason] : project.unreadable) names.push_back(name);
   return names;
 }
@@ -100,7 +101,11 @@ Project read_project(const std::string& path, const std::optional<GroundFrame>& 
   project.settings = read_stage_settings(top);
   read_block_sections(top, project, ground);
   top.finish();
-  check(project.block);
+  try {
+    check(project.block);
+  } catch (const InputError& error) {
+    throw InputError(project.file + ": " + error.what());
+  }
   warn_of_distant_places(project);
   return project;
 }

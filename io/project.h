@@ -26,6 +26,7 @@ struct Project {
   StageSettings settings;
   std::vector<std::pair<std::string, std::string>> unreadable;  // image file and reason, reported and skipped
   std::vector<std::string> copies;    // image files left out because an earlier one has the same bytes
+  std::vector<std::string> missing;   // images and exposures that the rigs' assignments name and that are not there
   std::vector<std::string> warnings;                            // one line each: GPS at 0,0, duplicates, outliers ...
 };
 

@@ -100,6 +100,24 @@ class RigBuilder {
     left_out_.insert(left_out_.end(), project.copies.begin(), project.copies.end());
   }
 
+  // After build(): images that are assigned and not there, and named exposures of which none is.
+  std::vector<std::string> missing() const {
+    std::vector<std::string> names = missing_;
+    for (const Exposure& exposure : exposures_)
+      if (!exposure.name.empty() && std::all_of(exposure.images.begin(), exposure.images.end(), [&](const auto& image) {
+            return std::find(missing_.begin(), missing_.end(), image.first) != missing_.end();
+          }))
+        names.push_back(exposure.name);
+    return names;
+  }
+  std::string warning() const {
+    std::size_t images = 0;
+    for (const Exposure& exposure : exposures_) images += exposure.images.size();
+    return assignments_file_ + ": " + std::to_string(missing_.size()) + " of " + std::to_string(images) +
+           " images are not in the images folder, '" + missing_.front() +
+           "' for example; their frames do without them. Restore them, or take them out of the file";
+  }
+
   // The block with one frame per exposure; images keep their order, frames that of their first image.
   Block build(double position_sigma_m, double rotation_sigma_rad) {
     assign();
@@ -141,7 +159,10 @@ class RigBuilder {
         const int camera = rig_camera_named(rig_camera, name);
         if (std::find(left_out_.begin(), left_out_.end(), name) != left_out_.end()) continue;
         const auto image = images_.find(name);
-        if (image == images_.end()) fail("image '" + name + "' is not in the block");
+        if (image == images_.end()) {
+          missing_.push_back(name);
+          continue;
+        }
         if (!places_.emplace(image->second, Place{e, camera}).second) fail("image '" + name + "' is assigned twice");
         const auto [known, inserted] = camera_of_.emplace(camera, old_.camera_of(image->second));
         if (known->second != old_.camera_of(image->second))
@@ -150,7 +171,9 @@ class RigBuilder {
                "'); group them with cameras: {grouping: folder} or check the assignment");
         if (inserted) used_.push_back(camera);
       }
-    if (places_.empty()) fail("assigns no image of the block");
+    if (places_.empty())
+      fail("assigns no image of the block" +
+           (missing_.empty() ? std::string() : "; '" + missing_.front() + "' for example is not there"));
   }
 
   void add_frames(const std::map<int, int>& mount_of_camera, Block& block) const {
@@ -186,7 +209,7 @@ class RigBuilder {
   std::vector<Exposure> exposures_;
   Block old_;
   std::map<std::string, ImageIndex> images_;
-  std::vector<std::string> left_out_;
+  std::vector<std::string> left_out_, missing_;
   std::map<ImageIndex, Place> places_;
   std::map<int, CameraIndex> camera_of_;  // of each rig camera used
   std::vector<int> used_;
@@ -209,7 +232,10 @@ void read_rigs(YamlReader& top, Project& project) {
                      ": rigs: sigma_position_m and sigma_rotation_deg must both be positive, or both 0 "
                      "(mounts held)");
   reader->finish();
-  project.block = RigBuilder(*cameras, *assignments, project).build(position, rotation * std::numbers::pi / 180);
+  RigBuilder builder(*cameras, *assignments, project);
+  project.block = builder.build(position, rotation * std::numbers::pi / 180);
+  project.missing = builder.missing();
+  if (!project.missing.empty()) project.warnings.push_back(builder.warning());
 }
 
 std::optional<ApproximatePoses> read_poses(YamlReader& top) {

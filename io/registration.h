@@ -36,10 +36,12 @@ struct RegisteredPlace {
 // What the joint adjustment leaves.
 struct RegisteredTrajectory {
   std::vector<Pose> frames;                  // [frames]
+  std::vector<double> position_weight;       // [frames] 0..1, of the trajectory's position; 0: none
   std::vector<double> weight, residual;      // [places] weight 0..1, length of the normalised residual; 0: not used
   std::vector<std::int64_t> control_points;  // rows of Block::control_points that took part
   std::vector<Eigen::Vector3d> points;       // [control_points] adjusted positions, metres
   std::int64_t resections = 0;               // frames
+  std::vector<std::string> not_resected;     // why, of each other frame that sees control
 };
 
 void write_places(const std::string& path, const std::vector<Place>& places);

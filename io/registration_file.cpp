@@ -105,14 +105,17 @@ void write_trajectory(const std::string& path, const RegisteredTrajectory& traje
   Hdf5Writer file(path, "trajectory");
   file.group("frames");
   write_poses(file, "frames", trajectory.frames, "rig", "ground frame");
+  file.vector("frames/position_weight", trajectory.position_weight,
+              {"", "of the trajectory's position, 0: wrong or none, 1: right"});
   file.group("registrations", "one row per place, in the order of the files of pairs");
-  file.vector("registrations/weight", trajectory.weight, {"", "0: wrong or not used, 1: right"});
+  file.vector("registrations/weight", trajectory.weight, {"", "0: wrong or refused, 1: right"});
   file.vector("registrations/residual", trajectory.residual, {"sigmas", "length of six numbers"});
   file.group("points", "control and check points measured along the path");
   file.integers("points/control_point", trajectory.control_points, {"", "row in the block's control points"});
   file.matrix("points/position", vectors3(trajectory.points, [](const Eigen::Vector3d& p) { return p; }), 3,
               {"m", "adjusted, ground frame"});
   file.attribute("frames", "resections", trajectory.resections);
+  file.texts("not_resected", trajectory.not_resected, {"", "why, of each other frame that sees control"});
   file.close();
 }
 
@@ -120,6 +123,8 @@ RegisteredTrajectory read_trajectory(const std::string& path) {
   const Hdf5Reader file(path, "trajectory");
   RegisteredTrajectory trajectory;
   trajectory.frames = read_poses(file, "frames");
+  trajectory.position_weight =
+      file.vector<double>("frames/position_weight", static_cast<std::int64_t>(trajectory.frames.size()));
   trajectory.weight = file.vector<double>("registrations/weight");
   trajectory.residual =
       file.vector<double>("registrations/residual", static_cast<std::int64_t>(trajectory.weight.size()));
@@ -128,6 +133,7 @@ RegisteredTrajectory read_trajectory(const std::string& path) {
   const auto positions = file.matrix<double>("points/position", 3, count);
   for (std::size_t i = 0; i < trajectory.control_points.size(); ++i) trajectory.points.push_back(vector3(positions, i));
   trajectory.resections = file.attribute<std::int64_t>("frames", "resections");
+  trajectory.not_resected = file.texts("not_resected");
   return trajectory;
 }
 

@@ -131,7 +131,7 @@ class JointProblem {
     for (std::size_t f = 0; f < frames_; ++f) to_block(input.start[f], frame(f));
     for (std::size_t p = 0; p < input.points.size(); ++p) std::copy_n(input.points[p].position.data(), 3, point(p));
     registration_weight_.assign(input.registrations.size(), 1);
-    position_weight_.assign(frames_, 1);
+    position_weight_.assign(frames_, options.use_positions ? 1 : 0);
     inverse_position_sigma_.assign(frames_, 0);
     ceres::Problem::Options problem_options;
     problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;

@@ -93,7 +93,7 @@ struct JointResult {
   std::vector<Pose> frames;
   std::vector<double> registration_weight;    // [registrations] 0..1
   std::vector<double> registration_residual;  // [registrations] length of the normalised residual (6 numbers)
-  std::vector<double> position_weight;        // [frames] 0..1
+  std::vector<double> position_weight;        // [frames] 0..1; 0: took no part
   std::vector<Eigen::Vector3d> points;        // [points]
   std::vector<Matrix6> covariances;           // [covariance_of] of PoseIncrement
   int iterations = 0;

@@ -16,7 +16,8 @@ namespace megablock {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kFree = 1e6;  // sigma of a coordinate that is not known, metres
+constexpr double kFree = 1e6;        // sigma of a coordinate that is not known, metres
+constexpr double kSamePlace = 1e-3;  // metres
 
 using RelativeOf = std::map<std::pair<FrameIndex, FrameIndex>, const RelativePose*>;
 
@@ -31,24 +32,21 @@ Pose carry_on(const Pose& from, const Pose& relative) {
   return {(relative.rotation * from.rotation).normalized(), from.centre + from.rotation.conjugate() * relative.centre};
 }
 
-void check_times(const Block& block, const std::vector<FrameIndex>& pass) {
-  int ascending = 0, descending = 0;
-  for (int attempt = 0; attempt < 2; ++attempt)  // counted first, so that the message names a frame of the minority
-    for (std::size_t i = 1; i < pass.size(); ++i) {
-      const Frame &before = block.frames[pass[i - 1]], &now = block.frames[pass[i]];
-      if (!std::isfinite(before.time_s) || !std::isfinite(now.time_s)) continue;
-      if (attempt == 0) {
-        if (now.time_s == before.time_s)
-          throw InputError(fmt::format("frames '{}' and '{}' of pass {} have the same time; remove one", before.name,
-                                       now.name, now.pass));
-        ++(now.time_s > before.time_s ? ascending : descending);
-      } else if (ascending > 0 && descending > 0 && (now.time_s > before.time_s) == (ascending < descending)) {
-        throw InputError(
-            fmt::format("frame '{}': the clock of pass {} runs backwards from frame '{}' on; list the "
-                        "frames of a pass in the order of their times",
-                        now.name, now.pass, before.name));
-      }
-    }
+// Throws for a frame of the minority, whose clock runs against that of the others.
+void check_clock(const Block& block, const std::vector<FrameIndex>& pass) {
+  const auto run = [&](std::size_t i) {  // of the clock: 1 on, -1 back, 0 unknown or none
+    const double before = block.frames[pass[i - 1]].time_s, now = block.frames[pass[i]].time_s;
+    return now > before ? 1 : now < before ? -1 : 0;
+  };
+  std::int64_t on = 0, back = 0;
+  for (std::size_t i = 1; i < pass.size(); ++i) on += run(i) > 0, back += run(i) < 0;
+  if (on == 0 || back == 0) return;
+  for (std::size_t i = 1; i < pass.size(); ++i)
+    if (run(i) == (on < back ? 1 : -1))
+      throw InputError(fmt::format(
+          "frame '{}': the clock of pass {} runs backwards from frame '{}' on; list the frames of a pass in the order "
+          "of their times, or give passes of their own to frames of another clock",
+          block.frames[pass[i]].name, block.frames[pass[i]].pass, block.frames[pass[i - 1]].name));
 }
 
 // Frames of each pass in their order.
@@ -59,13 +57,23 @@ std::map<std::int64_t, std::vector<FrameIndex>> passes_of(const Block& block) {
   return passes;
 }
 
+// The relative pose of two successive frames, stated in either direction: a pass may be listed backwards.
+std::optional<RelativePose> stated_link(FrameIndex from, FrameIndex to, const RelativeOf& relative) {
+  if (const auto found = relative.find({from, to}); found != relative.end()) return *found->second;
+  const auto found = relative.find({to, from});
+  if (found == relative.end()) return std::nullopt;
+  RelativePose turned = *found->second;
+  turned.pose = relative_to(turned.pose, Pose{});
+  return turned;
+}
+
 Pose start_of(const Block& block, FrameIndex f, const std::vector<Pose>& starts, FrameIndex before,
               const RelativeOf& relative) {
   const Frame& frame = block.frames[f];
   std::optional<Pose> pose = stated_pose(frame);
-  const auto link = relative.find({before, f});
-  if (!pose && link != relative.end())
-    pose = carry_on(starts[static_cast<std::size_t>(before.value)], link->second->pose);
+  if (!pose)
+    if (const auto link = stated_link(before, f, relative))
+      pose = carry_on(starts[static_cast<std::size_t>(before.value)], link->pose);
   if (!pose)
     throw InputError(
         fmt::format("frame '{}' has no pose in the trajectory; give an approximate pose, or position and "
@@ -79,23 +87,26 @@ Pose start_of(const Block& block, FrameIndex f, const std::vector<Pose>& starts,
 
 void add_link(const Block& block, FrameIndex from, FrameIndex to, const RelativeOf& relative,
               const TrajectoryOptions& options, Trajectory& trajectory) {
-  const auto stated = relative.find({from, to});
-  if (stated != relative.end()) {
-    const RelativePose& r = *stated->second;
+  if (const auto stated = stated_link(from, to, relative)) {
     const bool uniform = options.chain_position_sigma_m > 0;
-    trajectory.input.chain.push_back({from, to, r.pose,
-                                      uniform ? options.chain_rotation_sigma_deg * kDegree : r.rotation_sigma_rad,
-                                      uniform ? options.chain_position_sigma_m : r.position_sigma_m, false});
+    trajectory.input.chain.push_back({from, to, stated->pose,
+                                      uniform ? options.chain_rotation_sigma_deg * kDegree : stated->rotation_sigma_rad,
+                                      uniform ? options.chain_position_sigma_m : stated->position_sigma_m, false});
     return;
   }
+  const Frame &first = block.frames[from], &second = block.frames[to];
   const Pose &a = trajectory.input.start[static_cast<std::size_t>(from.value)],
              &b = trajectory.input.start[static_cast<std::size_t>(to.value)];
-  const double distance = (b.centre - a.centre).norm();
-  if (distance > options.max_gap_m) {
-    trajectory.notes.push_back(fmt::format("gap of {:.0f} m between frames '{}' and '{}': not linked", distance,
-                                           block.frames[from].name, block.frames[to].name));
+  const double distance = (b.centre - a.centre).norm(), seconds = std::abs(second.time_s - first.time_s);
+  if (distance > options.max_gap_m || seconds > options.max_gap_s) {
+    trajectory.notes.push_back(fmt::format("gap of {:.0f} m{} between frames '{}' and '{}': not linked", distance,
+                                           std::isfinite(seconds) ? fmt::format(" and {:.1f} s", seconds) : "",
+                                           first.name, second.name));
     return;
   }
+  if (distance < kSamePlace && seconds == 0)
+    trajectory.notes.push_back(fmt::format("frames '{}' and '{}' have the same time and place: is one of them a copy?",
+                                           first.name, second.name));
   trajectory.input.chain.push_back({from,
                                     to,
                                     {(b.rotation * a.rotation.conjugate()).normalized(), b.centre - a.centre},
@@ -153,7 +164,7 @@ void TrajectoryOptions::check() const {
     throw InputError("chain_position_sigma_m and chain_rotation_sigma_deg are both zero or neither");
   if (!(difference_position_sigma_m > 0) || !(difference_rotation_sigma_deg > 0))
     throw InputError("difference_position_sigma_m and difference_rotation_sigma_deg must be positive");
-  if (!(max_gap_m > 0)) throw InputError("max_gap_m must be positive");
+  if (!(max_gap_m > 0) || !(max_gap_s > 0)) throw InputError("max_gap_m and max_gap_s must be positive");
 }
 
 Trajectory trajectory_of(const Block& block, const TrajectoryOptions& options) {
@@ -167,7 +178,7 @@ Trajectory trajectory_of(const Block& block, const TrajectoryOptions& options) {
     input.located.push_back(frame.position_prior.has_value());
   }
   for (const auto& [pass, frames] : passes_of(block)) {
-    check_times(block, frames);
+    check_clock(block, frames);
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const FrameIndex before = i > 0 ? frames[i - 1] : FrameIndex();
       input.start[static_cast<std::size_t>(frames[i].value)] =

@@ -12,6 +12,8 @@ class FrameTracks {
  public:
   FrameTracks(const Block& block, TrackSet tracks);
 
+  const TrackSet& tracks() const { return tracks_; }
+
   // Of a place and the ones a frame before or after along either pass: that with most tracks in `min_frames` frames.
   Place richest(const Place& place, int min_frames) const;
 

@@ -12,18 +12,20 @@
 #include "adjust/registration/four_frames.h"
 #include "adjust/registration/frame_resection.h"
 #include "cluster/collective.h"
+#include "cluster/stages/block_hash.h"
 #include "cluster/stages/frame_tracks.h"
+#include "cluster/stages/registration_output.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
-#include "io/pose_csv.h"
 #include "io/unit_files.h"
 
 namespace megablock {
 
 namespace {
 
-constexpr int kAlgorithm = 2;  // of the registration's stages, part of their fingerprints
+constexpr int kAlgorithm = 3;  // of the registration's stages, part of their fingerprints
+constexpr const char* kRig = "register/rig.h5";
 constexpr const char* kPlaces = "register/places.h5";
 constexpr const char* kTrajectory = "register/trajectory.h5";
 
@@ -38,9 +40,20 @@ void add(Hasher& h, const PairRegistrationOptions& o) {
   h.add(o.max_rotation_sigma_deg).add(o.max_shift_m).add(o.max_turn_deg);
 }
 
-void add(Hasher& h, const TrajectoryOptions& o) {
+// What the chain is made with; the rest of the options says which control points take part.
+void add_chain(Hasher& h, const TrajectoryOptions& o) {
   h.add(o.chain_position_sigma_m).add(o.chain_rotation_sigma_deg).add(o.difference_position_sigma_m);
-  h.add(o.difference_rotation_sigma_deg).add(o.max_gap_m).add(o.check_points).add(o.use_control).add(o.check_prefix);
+  h.add(o.difference_rotation_sigma_deg).add(o.max_gap_m).add(o.max_gap_s);
+}
+
+void add(Hasher& h, const TrajectoryOptions& o) {
+  add_chain(h, o);
+  h.add(o.check_points).add(o.use_control).add(o.check_prefix);
+}
+
+void add(Hasher& h, const RigEstimateOptions& o) {
+  h.add(o.window_frames).add(o.windows).add(o.min_track).add(o.max_turn_deg);
+  add_to_hash(h, o.adjustment);
 }
 
 void add(Hasher& h, const JointOptions& o) {
@@ -48,6 +61,92 @@ void add(Hasher& h, const JointOptions& o) {
   h.add(o.first_position_sigma_m).add(o.position_sigma_m).add(o.position_scale).add(o.position_neighbours);
   h.add(o.use_attitudes).add(o.attitude_sigma_deg).add(o.first_image_scale).add(o.image_scale);
   h.add(o.rounds).add(o.iterations).add(o.last_iterations);
+}
+
+// The tracks of the block, read by ranks that compute.
+class LazyTracks {
+ public:
+  LazyTracks(const Block& block, const TrackSource& source) : block_(block), source_(source) {}
+  const FrameTracks& operator()() {
+    if (!tracks_) tracks_ = std::make_unique<FrameTracks>(block_, source_.read());
+    return *tracks_;
+  }
+  std::uint64_t fingerprint() const { return source_.fingerprint; }
+
+ private:
+  const Block& block_;
+  const TrackSource& source_;
+  std::unique_ptr<FrameTracks> tracks_;
+};
+
+// What is wrong with the trajectory is wrong on every rank.
+Trajectory agreed_trajectory(const Job& job, const TrajectoryOptions& options) {
+  try {
+    return trajectory_of(job.block, options);
+  } catch (const InputError& error) {
+    throw AgreedError<InputError>(job.options.project + ": " + error.what());
+  }
+}
+
+TileAdjustment rig_file_of(const RigEstimate& estimate) {
+  TileAdjustment file;
+  for (std::size_t c = 0; c < estimate.cameras.size(); ++c) {
+    file.cameras.emplace_back(static_cast<std::int64_t>(c));
+    file.intrinsics.push_back(estimate.cameras[file.cameras.back()]);
+  }
+  for (std::size_t r = 0; r < estimate.mounts.size(); ++r) {
+    const RigIndex rig(static_cast<std::int64_t>(r));
+    for (std::size_t m = 0; m < estimate.mounts[rig].size(); ++m) {
+      file.mount_rigs.push_back(rig);
+      file.mount_numbers.push_back(static_cast<std::int32_t>(m));
+      file.mounts.push_back(estimate.mounts[rig][m]);
+    }
+  }
+  file.camera_observations.assign(file.cameras.size(), 0);
+  file.mount_observations.assign(file.mounts.size(), 0);
+  file.summary = estimate.kept_as_given.empty()
+                     ? fmt::format(
+                           "estimated from {} observations in {} frames, median residual {:.2f} px before, {:.2f} "
+                           "px after",
+                           estimate.observations, estimate.frames, estimate.median_before_px, estimate.median_after_px)
+                     : "as given: " + estimate.kept_as_given;
+  return file;
+}
+
+// From here on the block's cameras and mounts start from the estimated ones. Returns what was done.
+std::string run_rig(Job& job, LazyTracks& tracks, const RegistrationSettings& settings) {
+  if (!settings.estimate_rig || !has_free_rig(job.block)) return "as given";
+  const Trajectory trajectory = agreed_trajectory(job, settings.trajectory);
+  Hasher hasher;
+  hasher.add(kAlgorithm).add(tracks.fingerprint()).add(job.store.seal("block.h5")->content_hash);
+  add_chain(hasher, settings.trajectory);
+  RigEstimateOptions options = settings.rig;
+  options.adjustment = job.settings.adjustment;
+  add(hasher, options);
+  Unit unit;
+  unit.name = kRig;
+  unit.fingerprint = hasher.value();
+  unit.write = [&](const std::string& path) {
+    write_adjustment(path, rig_file_of(estimate_rig(job.block, trajectory.input, tracks().tracks(), options)));
+  };
+  run_stage(job, "rig", {unit});
+  if (!job.store.seal(kRig)) return "as given: " + job.failures.back().reason;
+  const TileAdjustment file = read_adjustment(job.store.verified_path(kRig));
+  for (std::size_t c = 0; c < file.cameras.size(); ++c)
+    job.block.cameras[file.cameras[c]].intrinsics = file.intrinsics[c];
+  for (std::size_t m = 0; m < file.mounts.size(); ++m)
+    job.block.rigs[file.mount_rigs[m]].mounts[static_cast<std::size_t>(file.mount_numbers[m])].pose = file.mounts[m];
+  return file.summary;
+}
+
+// Of the block with its rig.
+std::uint64_t block_fingerprint(const Job& job) {
+  Hasher hasher;
+  hasher.add(job.store.seal("block.h5")->content_hash);
+  for (const Camera& camera : job.block.cameras) add_to_hash(hasher, camera.intrinsics);
+  for (const Rig& rig : job.block.rigs)
+    for (const Mount& mount : rig.mounts) add_to_hash(hasher, mount.pose);
+  return hasher.value();
 }
 
 std::vector<Eigen::Vector3d> positions_of(const JointInput& input) {
@@ -109,29 +208,24 @@ struct Registrations {
   std::uint64_t hash = 0;  // of the units' contents
 };
 
-Registrations run_registrations(Job& job, const TrackSource& source, const Trajectory& trajectory,
+Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& trajectory,
                                 const std::vector<Place>& places, const RegistrationSettings& settings) {
-  std::unique_ptr<FrameTracks> tracks;  // read by ranks that compute
-  const auto loaded = [&]() -> const FrameTracks& {
-    if (!tracks) tracks = std::make_unique<FrameTracks>(job.block, source.read());
-    return *tracks;
-  };
   const auto size = static_cast<std::size_t>(settings.units_places);
   std::vector<Unit> units;
   for (std::size_t begin = 0; begin < places.size(); begin += size) {
     const std::vector<Place> part(places.begin() + static_cast<std::ptrdiff_t>(begin),
                                   places.begin() + static_cast<std::ptrdiff_t>(std::min(places.size(), begin + size)));
     Hasher hasher;
-    hasher.add(kAlgorithm).add(source.fingerprint).add(job.store.seal("block.h5")->content_hash);
+    hasher.add(kAlgorithm).add(tracks.fingerprint()).add(block_fingerprint(job));
     hasher.add(job.store.seal(kPlaces)->content_hash).add(begin).add(part.size());
     add(hasher, settings.pairs);
-    add(hasher, settings.trajectory);
+    add_chain(hasher, settings.trajectory);
     Unit unit;
     unit.name = unit_name("register/pairs", static_cast<std::int64_t>(units.size()));
     unit.fingerprint = hasher.value();
     unit.cost = static_cast<double>(part.size());
     unit.write = [&, part](const std::string& path) {
-      write_registrations(path, register_places(job, loaded(), trajectory.input, part, settings.pairs));
+      write_registrations(path, register_places(job, tracks(), trajectory.input, part, settings.pairs));
     };
     units.push_back(std::move(unit));
   }
@@ -152,26 +246,32 @@ Registrations run_registrations(Job& job, const TrackSource& source, const Traje
 RegisteredTrajectory adjust_trajectory(const Job& job, Trajectory trajectory, const std::vector<RegisteredPlace>& rows,
                                        const RegistrationSettings& settings) {
   JointInput& input = trajectory.input;
-  std::vector<std::size_t> row_of;
-  std::set<std::pair<FrameIndex, FrameIndex>> seen;
+  // Neighbouring places may have been moved to the same frames: these count once.
+  std::map<std::pair<FrameIndex, FrameIndex>, std::size_t> link_of;
   for (std::size_t i = 0; settings.use_registrations && i < rows.size(); ++i) {
-    // Neighbouring places may have been moved to the same frames: each counts once.
-    if (!rows[i].registration.accepted || !seen.emplace(rows[i].place.a, rows[i].place.c).second) continue;
-    row_of.push_back(i);
-    input.registrations.push_back(
-        {rows[i].place.a, rows[i].place.c, rows[i].registration.relative, rows[i].registration.covariance});
+    const auto& [place, registration] = rows[i];
+    if (!registration.accepted || !link_of.try_emplace({place.a, place.c}, input.registrations.size()).second) continue;
+    input.registrations.push_back({place.a, place.c, registration.relative, registration.covariance});
   }
-  if (settings.use_resections)
-    for (const FrameResection& r : resect_frames(job.block, input.start, settings.trajectory, {}))
-      if (r.refused.empty()) input.resections.push_back({r.frame, r.resection.pose, r.resection.covariance});
-  const JointResult result = adjust_jointly(input, settings.joint);
   RegisteredTrajectory registered;
+  if (settings.use_resections) {
+    for (const FrameResection& r : resect_frames(job.block, input.start, settings.trajectory, {})) {
+      if (r.refused.empty())
+        input.resections.push_back({r.frame, r.resection.pose, r.resection.covariance});
+      else
+        registered.not_resected.push_back(r.refused);
+    }
+  }
+  const JointResult result = adjust_jointly(input, settings.joint);
   registered.frames = result.frames;
+  registered.position_weight = result.position_weight;
   registered.weight.assign(rows.size(), 0);
   registered.residual.assign(rows.size(), 0);
-  for (std::size_t i = 0; i < row_of.size(); ++i) {
-    registered.weight[row_of[i]] = result.registration_weight[i];
-    registered.residual[row_of[i]] = result.registration_residual[i];
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto link = link_of.find({rows[i].place.a, rows[i].place.c});
+    if (!rows[i].registration.accepted || link == link_of.end()) continue;
+    registered.weight[i] = result.registration_weight[link->second];
+    registered.residual[i] = result.registration_residual[link->second];
   }
   registered.control_points = trajectory.point_row;
   registered.points = result.points;
@@ -182,7 +282,7 @@ RegisteredTrajectory adjust_trajectory(const Job& job, Trajectory trajectory, co
 RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, const Registrations& registrations,
                                     const RegistrationSettings& settings) {
   Hasher hasher;
-  hasher.add(kAlgorithm).add(job.store.seal("block.h5")->content_hash);
+  hasher.add(kAlgorithm).add(block_fingerprint(job));
   hasher.add(settings.use_registrations).add(settings.use_resections);
   add(hasher, settings.trajectory);
   add(hasher, settings.joint);
@@ -197,62 +297,6 @@ RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, cons
   if (!job.store.seal(kTrajectory))
     throw AgreedError<ComputeError>("the trajectory could not be adjusted: " + job.failures.back().reason);
   return read_trajectory(job.store.verified_path(kTrajectory));
-}
-
-constexpr double kHolds = 0.25;  // weight from which a registration counts as right
-
-std::string registrations_csv(const Block& block, const std::vector<RegisteredPlace>& rows,
-                              const RegisteredTrajectory& registered) {
-  std::string text =
-      "a,b,c,d,accepted,holds,weight,residual_sigmas,tracks,measurements,kept,median_before_px,median_after_px,"
-      "position_sigma_m,rotation_sigma_deg,shift_m,reason\n";
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Place& p = rows[i].place;
-    const PairRegistration& r = rows[i].registration;
-    text += fmt::format("{},{},{},{},{:d},{:d},{:.4f},{:.3f},{},{},{},{:.3f},{:.3f},{:.5f},{:.5f},{:.3f},\"{}\"\n",
-                        block.frames[p.a].name, block.frames[p.b].name, block.frames[p.c].name, block.frames[p.d].name,
-                        r.accepted, registered.weight[i] >= kHolds, registered.weight[i], registered.residual[i],
-                        r.tracks, r.measurements, r.kept, r.median_before_px, r.median_after_px, r.position_sigma_m,
-                        r.rotation_sigma_deg, r.shift_m, r.reason);
-  }
-  return text;
-}
-
-// The block with registered poses; registrations that hold are relative poses of it, with isotropic sigmas.
-Block registered_block(const Block& block, const std::vector<RegisteredPlace>& rows,
-                       const RegisteredTrajectory& registered) {
-  Block result = block;
-  for (std::size_t f = 0; f < registered.frames.size(); ++f)
-    result.frames[FrameIndex(static_cast<std::int64_t>(f))].given_pose = registered.frames[f];
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (registered.weight[i] < kHolds) continue;
-    const PairRegistration& r = rows[i].registration;
-    result.relative_poses.push_back({rows[i].place.a, rows[i].place.c, r.relative,
-                                     std::sqrt(r.covariance.topLeftCorner<3, 3>().trace() / 3),
-                                     std::sqrt(r.covariance.bottomRightCorner<3, 3>().trace() / 3)});
-  }
-  return result;
-}
-
-void write_outputs(const Job& job, const std::vector<RegisteredPlace>& rows, const RegisteredTrajectory& registered,
-                   const std::string& tie_points) {
-  PoseTable table;
-  table.ground = job.block.ground;
-  for (std::size_t f = 0; f < registered.frames.size(); ++f) {
-    const Frame& frame = job.block.frames[FrameIndex(static_cast<std::int64_t>(f))];
-    table.names.push_back(frame.name);
-    table.poses.push_back(registered.frames[f]);
-    table.passes.push_back(frame.pass);
-  }
-  write_pose_csv(job.store.path("register/poses.csv"), table);
-  job.store.write_text("register/registrations.csv", registrations_csv(job.block, rows, registered));
-  const Block block = registered_block(job.block, rows, registered);
-  job.store.write("register/block.h5", job.store.seal(kTrajectory)->content_hash,
-                  [&](const std::string& path) { write_block(path, block); });
-  std::string yaml =
-      "# The block with its registered trajectory and registrations as relative poses.\nblock: block.h5\n";
-  if (!tie_points.empty()) yaml += "tie_points: " + tie_points + "\n";
-  job.store.write_text("register/block.yaml", yaml);
 }
 
 // A reason without its numbers.
@@ -274,12 +318,17 @@ RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, cons
   s.places = std::ssize(rows);
   s.resections = registered.resections;
   s.points = std::ssize(registered.points);
-  std::map<std::string, std::int64_t> reasons;
+  std::map<std::string, std::int64_t> reasons, not_resected;
+  for (const std::string& reason : registered.not_resected) ++not_resected[kind_of(reason)];
+  s.not_resected.assign(not_resected.begin(), not_resected.end());
+  std::set<std::pair<FrameIndex, FrameIndex>> different;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     s.accepted += rows[i].registration.accepted;
+    if (rows[i].registration.accepted) different.emplace(rows[i].place.a, rows[i].place.c);
     s.used += registered.weight[i] >= kHolds;
     if (!rows[i].registration.accepted) ++reasons[kind_of(rows[i].registration.reason)];
   }
+  s.different = std::ssize(different);
   s.refusals.assign(reasons.begin(), reasons.end());
   std::vector<double> moves;
   for (std::size_t f = 0; f < registered.frames.size(); ++f)
@@ -295,6 +344,7 @@ RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, cons
     s.check_points.push_back(fmt::format("{} {:.4f} {:.4f} {:.4f} m", control.name, off.x(), off.y(), off.z()));
   }
   if (!s.check_points.empty()) s.check_rms_m = std::sqrt(squares / static_cast<double>(s.check_points.size()));
+  s.notes = trajectory.notes;
   s.digest = job.store.seal(kTrajectory)->content_hash;
   return s;
 }
@@ -304,35 +354,46 @@ RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, cons
 void RegistrationSettings::check() const {
   places.check();
   pairs.check();
+  rig.check();
   trajectory.check();
   joint.check();
   if (units_places < 1) throw InputError("units_places must be at least 1");
 }
 
-RegistrationSummary run_registration(Job& job, const TrackSource& tracks, const RegistrationSettings& settings) {
-  const Trajectory trajectory = trajectory_of(job.block, settings.trajectory);
+RegistrationSummary run_registration(Job& job, const TrackSource& source, const RegistrationSettings& settings) {
+  LazyTracks tracks(job.block, source);
+  const std::string rig = run_rig(job, tracks, settings);
+  const Trajectory trajectory = agreed_trajectory(job, settings.trajectory);
   Registrations registrations;
   if (settings.use_registrations)
     registrations = run_registrations(job, tracks, trajectory, run_places(job, trajectory, settings), settings);
   const std::vector<RegisteredPlace>& rows = registrations.rows;
   const RegisteredTrajectory registered = run_trajectory(job, trajectory, registrations, settings);
   on_first_rank(job.ranks, [&] {
-    write_outputs(job, rows, registered, tracks.file);
+    write_registration_outputs(job, rows, registered, settings.joint, source.file);
     return std::string();
   });
-  return summarise(job, trajectory, rows, registered);
+  RegistrationSummary summary = summarise(job, trajectory, rows, registered);
+  summary.rig = rig;
+  return summary;
 }
 
 std::string to_text(const RegistrationSummary& s) {
   std::string text = fmt::format(
       "frames                {} in a chain of {} links\n"
-      "places                {}, registered {}, of these {} hold in the joint adjustment\n",
-      s.frames, s.chain, s.places, s.accepted, s.used);
+      "rig                   {}\n"
+      "places                {}, registered {} (on {} different pairs of frames), of these {} hold in the joint "
+      "adjustment\n",
+      s.frames, s.chain, s.rig, s.places, s.accepted, s.different, s.used);
   for (const auto& [reason, count] : s.refusals) text += fmt::format("  refused             {}: {}\n", count, reason);
-  text += fmt::format("resections            {}\ncontrol measured      {} points\n", s.resections, s.points);
+  text += fmt::format("resections            {}\n", s.resections);
+  for (const auto& [reason, count] : s.not_resected)
+    text += fmt::format("  refused             {}: {}\n", count, reason);
+  text += fmt::format("control measured      {} points\n", s.points);
   text += fmt::format("frames moved by       median {:.3f} m, largest {:.3f} m\n", s.median_move_m, s.largest_move_m);
   if (!s.check_points.empty())
     text += fmt::format("check points          {}, rms {:.4f} m\n", s.check_points.size(), s.check_rms_m);
+  for (const std::string& note : s.notes) text += "look: " + note + "\n";
   return text + fmt::format("digest                {}\n", hex(s.digest));
 }
 

@@ -77,6 +77,12 @@ void write_jpeg(const std::string& path, const cv::Mat& image, const SimulatedEx
     data["Exif.Photo.PixelXDimension"] = static_cast<std::uint32_t>(image.cols);
     data["Exif.Photo.PixelYDimension"] = static_cast<std::uint32_t>(image.rows);
     data["Exif.Photo.DateTimeOriginal"] = date_text(exif.time_s);
+    const auto milliseconds = std::llround(1000 * (exif.time_s - std::floor(exif.time_s)));
+    if (milliseconds > 0 && milliseconds < 1000) {
+      char fraction[4];
+      std::snprintf(fraction, sizeof fraction, "%03d", static_cast<int>(milliseconds));
+      data["Exif.Photo.SubSecTimeOriginal"] = fraction;
+    }
     if (exif.position) set_position(data, exif);
     file->writeMetadata();
   } catch (const Exiv2::AnyError& error) {

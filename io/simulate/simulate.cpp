@@ -70,6 +70,7 @@ void SimulationOptions::check() const {
           "gnss_absent_share must lie in [0, gnss_masked_share]");
   require(gnss_masked_frames >= 1, "gnss_masked_frames must be at least 1");
   require(drift_m >= 0, "drift_m must not be negative");
+  require(drift_per_frame_m > 0, "drift_per_frame_m must be positive");
   require(control_zones >= 0, "control_zones must not be negative");
   require(held_out_zone == -1 || (held_out_zone >= 0 && held_out_zone < control_zones),
           "held_out_zone must be -1 or one of the control zones, counted from 0");

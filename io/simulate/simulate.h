@@ -30,10 +30,11 @@ struct SimulationOptions {
   int drives = 2, days = 2;
   bool bridge = true;  // one street passes over another one, where a drive is long enough for both
   // Stereopolis: trajectory. Shares of the frames whose satellites are masked, and that have none (a part of those);
-  // mean length of a masked stretch (at most a quarter of a drive); mean of the largest horizontal drift in one, m.
+  // mean length of a masked stretch; mean of the largest horizontal drift in one, m, and its largest change from frame
+  // to frame, m, which keeps the drift of shorter stretches smaller.
   double gnss_masked_share = 0.5, gnss_absent_share = 0.04;
-  int gnss_masked_frames = 400;
-  double drift_m = 3;
+  int gnss_masked_frames = 1500;
+  double drift_m = 3, drift_per_frame_m = 0.007;
   // Stereopolis: crossings with 8 to 40 control points each, a seventh of them check points; all of zone
   // `held_out_zone` are (-1: of none).
   int control_zones = 0, held_out_zone = -1;

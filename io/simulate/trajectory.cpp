@@ -1,6 +1,7 @@
 #include "io/simulate/trajectory.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -9,10 +10,30 @@ namespace megablock {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kMemory = 0.98;             // of the errors under a clear sky, from frame to frame
-constexpr double kFastestDrift = 0.04;       // metres of largest drift per frame of a stretch
+constexpr double kMemory_frames = 40;  // of the errors under a clear sky
+constexpr double kAnySpeed = 1e9;
+constexpr int kWaves = 4;                    // of a drift
 constexpr double kDriftHeight = 0.3;         // of the horizontal drift
 constexpr double kHeadingDrift_deg = 0.045;  // mean of the largest of a stretch
+
+// Smooth stationary process of unit variance: an autoregressive process through the same filter again, e_i = c e_{i-1}
+// + u_i, u_i = c u_{i-1} + n_i. Its steps have the sigma 1 - c; those of e_i = c e_{i-1} + n_i had sqrt(2 (1 - c)).
+class SmoothError {
+ public:
+  explicit SmoothError(Random& random)
+      : u_(random.normal3() / std::sqrt(kLoss)), e_((u_ + kKept * random.normal3() / std::sqrt(kLoss)) / kLoss) {}
+  Eigen::Vector3d next(Random& random) {
+    const Eigen::Vector3d now = e_ / std::sqrt((1 + kKept * kKept) / (kLoss * kLoss * kLoss));
+    u_ = kKept * u_ + random.normal3();
+    e_ = kKept * e_ + u_;
+    return now;
+  }
+
+ private:
+  static constexpr double kKept = 1 - 1 / kMemory_frames;  // c
+  static constexpr double kLoss = 1 - kKept * kKept;
+  Eigen::Vector3d u_, e_;
+};
 
 struct Stretch {
   std::int64_t begin, end;
@@ -24,7 +45,7 @@ std::vector<Stretch> draw_stretches(double share, double mean, std::int64_t fram
   const auto count = static_cast<std::size_t>(std::max<std::int64_t>(1, std::llround(masked / mean)));
   std::vector<double> lengths(2 * count + 1);  // clear, masked, clear, ...
   double sums[] = {0, 0};
-  for (std::size_t k = 0; k < lengths.size(); ++k) sums[k % 2] += lengths[k] = random.uniform(0.5, 1.5);
+  for (std::size_t k = 0; k < lengths.size(); ++k) sums[k % 2] += lengths[k] = random.uniform(0.75, 1.25);
   std::vector<Stretch> stretches;
   double place = 0;
   for (std::size_t k = 0; k < lengths.size(); ++k) {
@@ -35,24 +56,28 @@ std::vector<Stretch> draw_stretches(double share, double mean, std::int64_t fram
   return stretches;
 }
 
-// Integral of a Gauss-Markov velocity over a stretch, zero before and after it, largest length `largest` over the first
-// `axes` coordinates.
-std::vector<Eigen::Vector3d> draw_drift(std::int64_t length, double largest, int axes, Random& random) {
-  const double memory = std::exp(-2 / static_cast<double>(length));  // of the velocity
-  Eigen::Vector3d velocity = random.normal3(), place = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Vector3d> drift;
-  for (std::int64_t i = 0; i <= length; ++i) {
-    drift.push_back(place += velocity);
-    velocity = memory * velocity + std::sqrt(1 - memory * memory) * random.normal3();
-  }
-  const Eigen::Vector3d chord = drift.back() / static_cast<double>(length + 1);
-  drift.pop_back();
-  double longest = 0;
+// Drift over a stretch, zero before and after it: half waves of random amplitudes ~ 1/k^3 (a Karhunen-Loeve series as
+// that of the Brownian bridge, and smoother) times `shape` along the axes; the first one is a unit vector in the first
+// `axes` coordinates. Scaled to a largest length of `largest` over these, but to steps of at most `fastest`.
+std::vector<Eigen::Vector3d> draw_drift(std::int64_t length, double largest, double fastest, int axes,
+                                        const Eigen::Vector3d& shape, Random& random) {
+  std::array<Eigen::Vector3d, kWaves> amplitudes;
+  for (int k = 0; k < kWaves; ++k) amplitudes[k] = shape.cwiseProduct(random.normal3()) / std::pow(k + 1, 3);
+  amplitudes[0].head(axes).normalize();
+  std::vector<Eigen::Vector3d> drift(static_cast<std::size_t>(length) + 1);  // and the frame after it
+  double longest = 0, steepest = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < drift.size(); ++i) {
-    drift[i] -= static_cast<double>(i + 1) * chord;
+    const double phase = std::numbers::pi * static_cast<double>(i + 1) / static_cast<double>(length + 1);
+    drift[i].setZero();
+    for (int k = 0; k < kWaves; ++k) drift[i] += std::sin((k + 1) * phase) * amplitudes[k];
     longest = std::max(longest, drift[i].head(axes).norm());
+    steepest = std::max(steepest, (drift[i] - before).norm());
+    before = drift[i];
   }
-  for (Eigen::Vector3d& d : drift) d *= largest / longest;
+  drift.pop_back();
+  const double scale = std::min(largest / longest, fastest / steepest);
+  for (Eigen::Vector3d& d : drift) d *= scale;
   return drift;
 }
 
@@ -64,22 +89,20 @@ PassErrors draw_pass_errors(const SimulationOptions& options, std::int64_t pass,
   errors.gnss.assign(static_cast<std::size_t>(frames), Gnss::kClear);
   const Eigen::Vector3d position_sigma(0.02, 0.02, 0.05);
   const Eigen::Vector3d rotation_sigma = kDegree * Eigen::Vector3d(0.02, 0.025, 0.02);
-  Eigen::Vector3d position = random.normal3(), rotation = random.normal3();
+  SmoothError position(random), rotation(random);
   for (std::int64_t i = 0; i < frames; ++i) {
-    errors.position.push_back(position_sigma.cwiseProduct(position));
-    errors.rotation.push_back(rotation_sigma.cwiseProduct(rotation));
-    position = kMemory * position + std::sqrt(1 - kMemory * kMemory) * random.normal3();
-    rotation = kMemory * rotation + std::sqrt(1 - kMemory * kMemory) * random.normal3();
+    errors.position.push_back(position_sigma.cwiseProduct(position.next(random)));
+    errors.rotation.push_back(rotation_sigma.cwiseProduct(rotation.next(random)));
   }
   if (options.gnss_masked_share == 0) return errors;
-  const double mean = std::min(static_cast<double>(options.gnss_masked_frames), static_cast<double>(frames) / 4);
-  for (const Stretch& s : draw_stretches(options.gnss_masked_share, std::max(1.0, mean), frames, random)) {
+  for (const Stretch& s : draw_stretches(options.gnss_masked_share, options.gnss_masked_frames, frames, random)) {
     const std::int64_t length = s.end - s.begin;
     if (length < 1) continue;
     const double share = random.uniform(2.0 / 3, 4.0 / 3);
     const auto shift =
-        draw_drift(length, std::min(options.drift_m * share, kFastestDrift * static_cast<double>(length)), 2, random);
-    const auto turn = draw_drift(length, kDegree * kHeadingDrift_deg * random.uniform(2.0 / 3, 4.0 / 3), 3, random);
+        draw_drift(length, options.drift_m * share, options.drift_per_frame_m, 2, {1, 1, kDriftHeight}, random);
+    const auto turn = draw_drift(length, kDegree * kHeadingDrift_deg * random.uniform(2.0 / 3, 4.0 / 3), kAnySpeed, 3,
+                                 {0.5, 1, 0.5}, random);
     // Without any satellite: a part of the stretch, somewhere in it.
     const double absent = static_cast<double>(length) * options.gnss_absent_share / options.gnss_masked_share;
     const double absent_from = random.uniform(0, static_cast<double>(length) - absent);
@@ -87,8 +110,8 @@ PassErrors draw_pass_errors(const SimulationOptions& options, std::int64_t pass,
       const auto row = static_cast<std::size_t>(s.begin + i), k = static_cast<std::size_t>(i);
       const double place = static_cast<double>(i) + 0.5;
       errors.gnss[row] = place >= absent_from && place < absent_from + absent ? Gnss::kNone : Gnss::kMasked;
-      errors.position[row] += Eigen::Vector3d(1, 1, kDriftHeight).cwiseProduct(shift[k]);
-      errors.rotation[row] += Eigen::Vector3d(0.5, 1, 0.5).cwiseProduct(turn[k]);
+      errors.position[row] += shift[k];
+      errors.rotation[row] += turn[k];
     }
   }
   return errors;

@@ -6,16 +6,17 @@
 
 namespace megablock {
 
-// Errors of one pass, frame by frame. With c the memory from frame to frame:
+// Errors of one pass, frame by frame:
 //
-//   clear      stationary Gauss-Markov process, e_i = c e_{i-1} + sigma sqrt(1 - c^2) n_i: 2 cm in x and y, 5 cm in z,
-//              0.02 deg in roll and pitch, 0.025 deg in heading
-//   masked     on top of it, in each stretch of masked frames, the integral of a Gauss-Markov velocity, less its chord
-//              (satellites return, and the trajectory was smoothed afterwards), scaled so that its largest horizontal
-//              value is drift_m times 2/3 to 4/3, but at most 4 cm per frame of the stretch; in z 0.3 of it; in heading
-//              up to 0.06 deg, in roll and pitch half of that
+//   clear      stationary Gauss-Markov process of second order, 2 cm in x and y, 5 cm in z, 0.02 deg in roll and pitch,
+//              0.025 deg in heading; it changes over 40 frames, by 1.4 mm from one to the next
+//   masked     on top of it, in each stretch of masked frames, a smooth drift that is zero at both ends (satellites
+//              return, and the trajectory was smoothed afterwards); its largest horizontal value is drift_m times 2/3
+//              to 4/3, but it changes by at most drift_per_frame_m from frame to frame; in z 0.3 of it; in heading up
+//              to 0.06 deg, in roll and pitch half of that
 //
-// Stretches take exactly gnss_masked_share of the pass; gnss_absent_share lies inside of them.
+// Stretches take exactly gnss_masked_share of the pass; gnss_absent_share lies inside of them. Successive frames agree
+// to less than 1 cm, as published, which is why a drift of metres takes a stretch of a thousand frames and more.
 struct PassErrors {
   std::vector<Gnss> gnss;
   std::vector<Eigen::Vector3d> position;  // metres, east north up

@@ -5,7 +5,9 @@ Absolute: rms distance of the frames within 40 m of the held-out zone's points f
 error of the vector between the frames of registered places (true ones). `control` holds the other zones' points.
 
     megablock simulate --scene stereopolis --frames 45000 --control-zones 7 -o town
-    tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 7]
+    tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 7] [--only all ...]
+
+Places are registered once; rows differ by the joint adjustment alone.
 """
 import argparse
 import csv
@@ -64,6 +66,7 @@ def main():
     parser.add_argument("block", type=pathlib.Path, help="folder of simulate")
     parser.add_argument("job", type=pathlib.Path)
     parser.add_argument("--zones", type=int, default=7)
+    parser.add_argument("--only", nargs="+", help="methods whose names begin so")
     arguments = parser.parse_args()
     truth = read_poses(arguments.block / "truth.csv")
 
@@ -94,6 +97,8 @@ def main():
             zones.append((z, [n for n, (_, c) in truth.items() if min(norm(minus(c, p)) for p in points) < 40]))
     print(f"{'method':44s} absolute, m: mean over zones (each)    relative, m    s")
     for name, options in METHODS:
+        if arguments.only and not any(name.startswith(begin) for begin in arguments.only):
+            continue
         errors, relative, seconds = [], [], 0
         for z, near in zones:
             poses = start

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A run killed by SIGKILL at random moments and started again gives the same bits, and computes no unit twice.
 
-usage: kill_resume.py MEGABLOCK [--kills 10] [--ranks 2] [--rendered | --project FILE] [--seed 4711]
+usage: kill_resume.py MEGABLOCK [--kills 10] [--ranks 2] [--rendered | --register | --project FILE] [--seed 4711]
 
 Moments are drawn evenly over the measured length of an undisturbed run. A unit has its event once its file is sealed,
 so that a unit with two events was computed again although it was there; a kill may lose the event of a unit that was
@@ -27,9 +27,11 @@ parser.add_argument("megablock")
 parser.add_argument("--kills", type=int, default=10)
 parser.add_argument("--ranks", type=int, default=2)
 parser.add_argument("--rendered", action="store_true", help="pictures: features and matches are killed too")
+parser.add_argument("--register", action="store_true", help="a trajectory is registered in place of a run")
 parser.add_argument("--project", type=pathlib.Path)
 parser.add_argument("--seed", type=int, default=4711)
 options = parser.parse_args()
+COMMAND = ["register", "--places-per-unit", "4"] if options.register else ["run"]
 
 
 def processes_of(session):
@@ -61,7 +63,7 @@ def print_stacks(session):
 
 def start(project, job, log):
     command = ["mpirun", "--bind-to", "none", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1",
-               "-n", str(options.ranks), options.megablock, "run", str(project), "-j", str(job), "--quiet"]
+               "-n", str(options.ranks), options.megablock, *COMMAND, str(project), "-j", str(job), "--quiet"]
     environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
     return subprocess.Popen(command, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL,
                             start_new_session=True)
@@ -100,7 +102,10 @@ def events(job):
     return found
 
 
-def digest(job):
+def digest(project, job):
+    if options.register:  # said by a run that finds everything there
+        text = subprocess.check_output([options.megablock, *COMMAND, str(project), "-j", str(job), "--quiet"], text=True)
+        return next(line.split()[1] for line in text.splitlines() if line.startswith("digest"))
     return subprocess.check_output([options.megablock, "status", str(job), "--digest"], text=True).strip()
 
 
@@ -108,7 +113,9 @@ with tempfile.TemporaryDirectory() as folder:
     work = pathlib.Path(folder)
     project = options.project
     if project is None:
-        scene = (["--rendered", "--frames", "12", "--width", "400", "--image-height", "320", "--focal", "320"]
+        scene = (["--scene", "stereopolis", "--frames", "200", "--street-spacing", "60", "--points-per-frame", "150",
+                  "--drift-per-frame", "0.05", "--control-zones", "2"] if options.register else
+                 ["--rendered", "--frames", "12", "--width", "400", "--image-height", "320", "--focal", "320"]
                  if options.rendered else ["--scene", "aerial", "--frames", "120", "--outliers", "0.01"])
         subprocess.run([options.megablock, "simulate", *scene, "-o", str(work / "block")], check=True,
                        stdout=subprocess.DEVNULL)
@@ -124,11 +131,11 @@ with tempfile.TemporaryDirectory() as folder:
         for _ in range(options.kills):
             kill_after(project, work / "job", log, length_s * moments.random())
         run(project, work / "job", log)
-    reference, resumed = digest(work / "reference"), digest(work / "job")
     wanted = {event["unit"] for event in events(work / "reference")}
     done = [event["unit"] for event in events(work / "job")]
     twice = sorted({unit for unit in done if done.count(unit) > 1})
     unseen = wanted - set(done)
+    reference, resumed = digest(project, work / "reference"), digest(project, work / "job")
     print(f"undisturbed {length_s:.1f} s, digest {reference}, {len(wanted)} units; after {options.kills} kills digest "
           f"{resumed}, {len(done)} units computed, {len(twice)} of them twice")
     if resumed != reference:

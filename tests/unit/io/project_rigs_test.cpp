@@ -87,13 +87,41 @@ TEST_F(ProjectRigs, NamedExposuresAndHeldMounts) {
   EXPECT_TRUE(block.rigs[RigIndex(0)].mounts[1].held());
 }
 
+// Cameras fail, disks fill: frames do with the images that are there, and what refers to the others is no error.
+TEST_F(ProjectRigs, MissingImagesAreToldAndDoneWithout) {
+  write_file(folder_ / "poses.csv",
+             "name,qw,qx,qy,qz,x,y,z,pass\nfirst,1,0,0,0,1,2,3,7\ngone,1,0,0,0,1,2,3,7\nleft/9.jpg,1,0,0,0,1,2,3,7\n");
+  const Project project = read(kCameras,
+                               R"({"first": [["left/1.jpg", "left"], ["right/9.jpg", "right"]],
+               "second": [["left/2.jpg", "left"], ["right/2.jpg", "right"]],
+               "gone": [["left/9.jpg", "left"]]})",
+                               "poses: poses.csv\norigin: [52.52, 13.4, 40]\n");
+  EXPECT_NO_THROW(check(project.block));
+  const auto frame = [&](const std::string& name) -> const Frame* {
+    for (const Frame& f : project.block.frames)
+      if (f.name == name) return &f;
+    return nullptr;
+  };
+  ASSERT_TRUE(frame("first") && frame("second"));
+  EXPECT_FALSE(frame("gone"));
+  EXPECT_EQ(frame("first")->pass, 7);
+  EXPECT_TRUE(frame("first")->given_pose);
+  EXPECT_EQ(project.block.images.size(), 6u);
+  ASSERT_EQ(project.warnings.size(), 3u);
+  EXPECT_THAT(project.warnings[0], HasSubstr("rig_assignments.json: 2 of 5 images are not in the images folder, "
+                                             "'right/9.jpg' for example"));
+  EXPECT_THAT(project.warnings[1], HasSubstr("pose of 'gone', which was left out"));
+  EXPECT_THAT(project.warnings[2], HasSubstr("pose of 'left/9.jpg', which was left out"));
+}
+
 TEST_F(ProjectRigs, Refusals) {
   EXPECT_THAT(refusal("{", kAssignments), HasSubstr("rig_cameras.json: not valid JSON"));
   EXPECT_THAT(refusal("[]", kAssignments), HasSubstr("expected an object of rig cameras"));
   EXPECT_THAT(refusal(R"({"left": {"rotation": [0, 0]}})", kAssignments), HasSubstr("'rotation' must be a list of 3"));
   EXPECT_THAT(refusal(kCameras, "[[1]]"), HasSubstr("exposure 1 must be a list of [image, rig camera]"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "top"]]])"), HasSubstr("rig camera 'top', which"));
-  EXPECT_THAT(refusal(kCameras, R"([[["left/9.jpg", "left"]]])"), HasSubstr("image 'left/9.jpg' is not in the block"));
+  EXPECT_THAT(refusal(kCameras, R"([[["left/9.jpg", "left"]]])"),
+              HasSubstr("assigns no image of the block; 'left/9.jpg' for example is not there"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "left"]], [["left/1.jpg", "left"]]])"),
               HasSubstr("assigned twice"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "left"]], [["right/1.jpg", "left"]]])"),

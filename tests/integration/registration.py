@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""A street-rig block from its trajectory to the bundle adjustment: simulate, register, run, evaluate, report.
+
+usage: registration.py MEGABLOCK
+The mounts are off by their default 5 mm and 0.5 degrees, the trajectory by metres where satellites are masked.
+"""
+import csv
+import json
+import pathlib
+import sys
+import tempfile
+
+from program import megablock, status
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "benchmark"))
+from registration_table import norm, minus, read_poses, relative_error, rms  # noqa: E402
+
+
+def figure(text, line, word):
+    """The number before or after a word in a line of the summary."""
+    return next(t for t in text.splitlines() if t.startswith(line)).split(word)[1].split()[0].rstrip(",")
+
+
+def errors(poses, truth):
+    return rms([norm(minus(poses[n][1], truth[n][1])) for n in truth])
+
+
+with tempfile.TemporaryDirectory() as folder:
+    work = pathlib.Path(folder)
+    megablock("simulate", "--scene", "stereopolis", "--frames", 300, "--street-spacing", 60, "--drift-per-frame", 0.05,
+              "--control-zones", 2, "-o", work / "block")
+    truth = read_poses(work / "block/truth.csv")
+    project = work / "block/block.yaml"
+
+    megablock("register", project, "-j", work / "trajectory", "-q", "--hold-rig", "--no-registrations", "--no-control")
+    said = megablock("register", project, "-j", work / "job", "-q")
+    print(said)
+    before, after = (read_poses(work / job / "register/poses.csv") for job in ("trajectory", "job"))
+    with open(work / "job/register/registrations.csv") as file:
+        places = [(row["a"], row["c"]) for row in csv.DictReader(file) if row["holds"] == "1"]
+    print(f"{len(places)} places: trajectory {errors(before, truth):.3f} m, where passes meet "
+          f"{relative_error(before, truth, places):.3f} m; registered {errors(after, truth):.3f} m, "
+          f"{relative_error(after, truth, places):.4f} m")
+    assert len(places) >= 30, places
+    assert errors(before, truth) > 0.3 and relative_error(before, truth, places) > 0.5, "the trajectory drifts"
+    assert relative_error(after, truth, places) < 0.01, "published: 0.01 to 0.05 m"
+    assert errors(after, truth) < 0.1, "published: 0.30 m"
+    assert errors(before, truth) > 3 * errors(after, truth)
+
+    # Without an estimated rig hardly a place can be registered: that is what the estimate is for.
+    held = megablock("register", project, "-j", work / "held", "-q", "--hold-rig")
+    assert int(figure(held, "places", "registered ")) < len(places) / 2, held
+
+    # The bundle adjustment from there.
+    megablock("run", work / "job/register/block.yaml", "-j", work / "run", "-q")
+    figures = status(work / "run")
+    judged = json.loads(megablock("evaluate", work / "run", work / "block/truth.csv", "--json"))
+    print(json.dumps(figures), json.dumps(judged))
+    assert figures["oriented"] == 3000, figures
+    assert judged["position_rms_m"] < 0.05 and not judged["aligned"], judged
+    assert judged["relative_position_rms_m"] < 0.01, judged
+    assert judged["check_rms_m"] < 0.05, judged
+    assert 0.7 < judged["normalised_error_position"] < 1.4, judged
+    assert (work / "run/result/report.html").exists()
