@@ -370,7 +370,7 @@ RegistrationSummary run_registration(Job& job, const TrackSource& source, const 
   const std::vector<RegisteredPlace>& rows = registrations.rows;
   const RegisteredTrajectory registered = run_trajectory(job, trajectory, registrations, settings);
   on_first_rank(job.ranks, [&] {
-    write_registration_outputs(job, rows, registered, settings.joint, source.file);
+    write_registration_outputs(job, trajectory.input.start, rows, registered, settings.joint, source.file);
     return std::string();
   });
   RegistrationSummary summary = summarise(job, trajectory, rows, registered);

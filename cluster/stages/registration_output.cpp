@@ -29,13 +29,12 @@ std::string registrations_csv(const Block& block, const std::vector<RegisteredPl
   return text;
 }
 
-PoseTable pose_table(const Block& block, const RegisteredTrajectory& registered) {
+PoseTable pose_table(const Block& block, const std::vector<Pose>& poses) {
   PoseTable table;
   table.ground = block.ground;
-  for (std::size_t f = 0; f < registered.frames.size(); ++f) {
-    const Frame& frame = block.frames[FrameIndex(static_cast<std::int64_t>(f))];
+  table.poses = poses;
+  for (const Frame& frame : block.frames) {
     table.names.push_back(frame.name);
-    table.poses.push_back(registered.frames[f]);
     table.passes.push_back(frame.pass);
   }
   return table;
@@ -61,10 +60,11 @@ Block registered_block(const Block& block, const RegisteredTrajectory& registere
   return result;
 }
 
-void write_registration_outputs(const Job& job, const std::vector<RegisteredPlace>& rows,
-                                const RegisteredTrajectory& registered, const JointOptions& joint,
-                                const std::string& tie_points) {
-  write_pose_csv(job.store.path("register/poses.csv"), pose_table(job.block, registered));
+void write_registration_outputs(const Job& job, const std::vector<Pose>& start,
+                                const std::vector<RegisteredPlace>& rows, const RegisteredTrajectory& registered,
+                                const JointOptions& joint, const std::string& tie_points) {
+  write_pose_csv(job.store.path("register/start.csv"), pose_table(job.block, start));
+  write_pose_csv(job.store.path("register/poses.csv"), pose_table(job.block, registered.frames));
   job.store.write_text("register/registrations.csv", registrations_csv(job.block, rows, registered));
   const Block block = registered_block(job.block, registered, joint);
   job.store.write("register/block.h5", job.store.seal("register/trajectory.h5")->content_hash,

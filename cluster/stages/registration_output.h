@@ -1,5 +1,5 @@
-// What `register` leaves for people and for other commands: register/poses.csv, register/registrations.csv, and
-// register/block.yaml with register/block.h5, a project that `run` adjusts.
+// What `register` leaves for people and for other commands: register/poses.csv, register/start.csv (the trajectory as
+// it was), register/registrations.csv, and register/block.yaml with register/block.h5, a project that `run` adjusts.
 #pragma once
 
 #include "cluster/stages/registration.h"
@@ -15,9 +15,9 @@ inline constexpr double kHolds = 0.25;
 // poses: they were made of the same tie points.
 Block registered_block(const Block& block, const RegisteredTrajectory& registered, const JointOptions& joint);
 
-// By rank 0. `tie_points`: file of given tracks, or empty.
-void write_registration_outputs(const Job& job, const std::vector<RegisteredPlace>& rows,
-                                const RegisteredTrajectory& registered, const JointOptions& joint,
-                                const std::string& tie_points);
+// By rank 0. `start`: [frames]; `tie_points`: file of given tracks, or empty.
+void write_registration_outputs(const Job& job, const std::vector<Pose>& start,
+                                const std::vector<RegisteredPlace>& rows, const RegisteredTrajectory& registered,
+                                const JointOptions& joint, const std::string& tie_points);
 
 }  // namespace megablock

@@ -83,11 +83,9 @@ def main():
     with open(arguments.job / "register/registrations.csv") as file:
         rows = list(csv.DictReader(file))
     places = [(r["a"], r["c"]) for r in rows]
-    import h5py  # of the input: start poses, control points
+    start = read_poses(arguments.job / "register/start.csv")
+    import h5py  # control points of the input
     with h5py.File(arguments.block / "given.h5") as given:
-        names = [n.decode() for n in given["frames/name"][:]]
-        start = {n: (tuple(q), tuple(c)) for n, q, c in
-                 zip(names, given["frames/given/rotation_wxyz"][:], given["frames/given/centre"][:])}
         control = {n.decode(): tuple(p) for n, p in
                    zip(given["control/name"][:], given["control/position"][:])}
     zones = []

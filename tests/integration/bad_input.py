@@ -234,6 +234,60 @@ class BadInput(unittest.TestCase):
             self.assert_reported(name + ".{0,80}no other image shares enough verified matches with it")
         self.assertLess(self.errors()["position_max_m"], 0.5)
 
+    # --- rigs --------------------------------------------------------------------------------------------------------
+    def rig_block(self):
+        """A street-mapping vehicle with two cameras, three frames."""
+        if not (work / "vehicle").exists():
+            simulate("vehicle", 3, 320, 180, "--scene", "stereopolis", "--rig-cameras", 2, "--drives", 1, "--days", 1)
+        folder = self.folder / "vehicle"
+        shutil.copytree(work / "vehicle", folder)
+        return folder
+
+    def refused(self, folder):
+        before = sorted(folder.rglob("*"))
+        line = one_line(megablock("run", folder / "block.yaml", "-j", self.job, "-q", expect=BAD_INPUT))
+        self.assertEqual(sorted(folder.rglob("*")), before)
+        return line
+
+    def test_mount_of_an_unknown_camera(self):
+        folder = self.rig_block()
+        file = folder / "rig_assignments.json"
+        file.write_text(file.read_text().replace('"c42"', '"c99"', 1))
+        line = self.refused(folder)
+        self.assertIn("rig_assignments.json: image 'f000000_c42.jpg' is assigned to rig camera 'c99', which the file of "
+                      "rig cameras does not have", line)
+
+    def test_missing_camera_images(self):
+        folder = self.rig_block()
+        (folder / "images/f000001_c22.jpg").unlink()
+        megablock("match", folder / "block.yaml", "-j", self.job, "-q")
+        warnings = json.loads((self.job / "job.json").read_text())["warnings"]
+        self.assertEqual(len(warnings), 1, warnings)
+        self.assertIn("rig_assignments.json: 1 of 6 images are not in the images folder, 'f000001_c22.jpg' for example; "
+                      "their frames do without them", warnings[0])
+
+    def test_mask_of_the_wrong_size(self):
+        folder = self.rig_block()
+        camera = re.search('"(Megablock Simulated c22 [^"]*)"', (folder / "block.yaml").read_text()).group(1)
+        (folder / "masks").mkdir()
+        pictures.write_png(folder / f"masks/{camera}.png", 64, 48, lambda y: bytes(64))
+        with (folder / "block.yaml").open("a") as f:
+            f.write("masks: masks\n")
+        line = self.refused(folder)
+        self.assertRegex(line, f"block.yaml: mask '.*{camera}.png' has 64 x 48 pixels, camera '{camera}' has 320 x 180")
+
+    def test_trajectory_with_numbers_that_are_none(self):
+        folder = self.rig_block()
+        rows = (folder / "poses.csv").read_text().splitlines()
+        for wrong in ("nan", "inf", "none"):
+            values = rows[-1].split(",")
+            values[5] = wrong
+            (folder / "poses.csv").write_text("\n".join([*rows[:-1], ",".join(values)]) + "\n")
+            line = self.refused(folder)
+            self.assertIn(f"poses.csv:{len(rows)}: x: '{wrong}' is not a number; take the line out", line)
+        (folder / "poses.csv").write_text("\n".join([*rows, rows[-1]]) + "\n")
+        self.assertRegex(self.refused(folder), f"poses.csv:{len(rows) + 1}: frame '.*' appears twice")
+
     # --- the job directory -------------------------------------------------------------------------------------------
     def test_job_of_another_version(self):
         shutil.copytree(work / "clean_job", self.job)

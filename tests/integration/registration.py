@@ -13,7 +13,7 @@ import tempfile
 from program import megablock, status
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "benchmark"))
-from registration_table import norm, minus, read_poses, relative_error, rms  # noqa: E402
+from registration_table import minus, norm, read_poses, relative_error, rms  # noqa: E402
 
 
 def figure(text, line, word):
@@ -32,16 +32,15 @@ with tempfile.TemporaryDirectory() as folder:
     truth = read_poses(work / "block/truth.csv")
     project = work / "block/block.yaml"
 
-    megablock("register", project, "-j", work / "trajectory", "-q", "--hold-rig", "--no-registrations", "--no-control")
     said = megablock("register", project, "-j", work / "job", "-q")
     print(said)
-    before, after = (read_poses(work / job / "register/poses.csv") for job in ("trajectory", "job"))
+    before, after = (read_poses(work / "job/register" / name) for name in ("start.csv", "poses.csv"))
     with open(work / "job/register/registrations.csv") as file:
         places = [(row["a"], row["c"]) for row in csv.DictReader(file) if row["holds"] == "1"]
     print(f"{len(places)} places: trajectory {errors(before, truth):.3f} m, where passes meet "
           f"{relative_error(before, truth, places):.3f} m; registered {errors(after, truth):.3f} m, "
           f"{relative_error(after, truth, places):.4f} m")
-    assert len(places) >= 30, places
+    assert len(places) >= 15, places
     assert errors(before, truth) > 0.3 and relative_error(before, truth, places) > 0.5, "the trajectory drifts"
     assert relative_error(after, truth, places) < 0.01, "published: 0.01 to 0.05 m"
     assert errors(after, truth) < 0.1, "published: 0.30 m"
@@ -57,8 +56,8 @@ with tempfile.TemporaryDirectory() as folder:
     judged = json.loads(megablock("evaluate", work / "run", work / "block/truth.csv", "--json"))
     print(json.dumps(figures), json.dumps(judged))
     assert figures["oriented"] == 3000, figures
-    assert judged["position_rms_m"] < 0.05 and not judged["aligned"], judged
-    assert judged["relative_position_rms_m"] < 0.01, judged
+    assert judged["position_rms_m"] < 0.02 and not judged["aligned"], judged
+    assert judged["relative_position_rms_m"] < 0.005 and judged["rotation_rms_deg"] < 0.015, judged
     assert judged["check_rms_m"] < 0.05, judged
-    assert 0.7 < judged["normalised_error_position"] < 1.4, judged
+    assert judged["normalised_error_position"] < 1.4, "the sigmas are true or cautious"
     assert (work / "run/result/report.html").exists()
