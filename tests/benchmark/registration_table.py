@@ -4,7 +4,7 @@
 Absolute: rms distance of the frames within 40 m of the held-out zone's points from their true positions. Relative: rms
 error of the vector between the frames of registered places (true ones). `control` holds the other zones' points.
 
-    megablock simulate --scene stereopolis --frames 45000 --control-zones 7 -o town
+    megablock simulate --scene stereopolis --frames 45000 --drives 4 --control-zones 7 -o town
     tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 7] [--only all ...]
 
 Places are registered once; rows differ by the joint adjustment alone.
