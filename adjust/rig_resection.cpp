@@ -10,6 +10,7 @@
 #include <set>
 
 #include "geometry/gp3p.h"
+#include "geometry/line_ratio.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -179,18 +180,11 @@ std::size_t distinct_points(std::span<const RigSight> sights, const std::vector<
   return ids.size();
 }
 
-// Standard deviation of the points across the line that fits them best, divided by that along it.
-double line_ratio(std::span<const RigSight> sights, const std::vector<std::uint8_t>& agrees) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  double count = 0;
+double line_ratio_of(std::span<const RigSight> sights, const std::vector<std::uint8_t>& agrees) {
+  std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < sights.size(); ++i)
-    if (agrees[i]) mean += sights[i].point, ++count;
-  mean /= count;
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < sights.size(); ++i)
-    if (agrees[i]) spread += (sights[i].point - mean) * (sights[i].point - mean).transpose();
-  const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-  return values[2] > 0 ? std::sqrt(std::max(values[1], 0.0) / values[2]) : 0;
+    if (agrees[i]) points.push_back(sights[i].point);
+  return line_ratio(points);
 }
 
 double largest_angle_deg(std::span<const RigSight> sights, const std::vector<std::uint8_t>& agrees, const Pose& pose) {
@@ -244,7 +238,7 @@ void assess(std::span<const RigSight> sights, const Approximate& known, const Ri
   if (result.points < needed)
     throw ComputeError(
         fmt::format("only {} of {} points agree with one pose, {} are needed", result.points, all, needed));
-  if (line_ratio(sights, result.agrees) < options.min_line_ratio)
+  if (line_ratio_of(sights, result.agrees) < options.min_line_ratio)
     throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
   PoseIncrement right;
   const Matrix6 normal = normal_matrix(sights, known, result.pose, limit_squared, right);
@@ -277,7 +271,7 @@ RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOpti
   const std::size_t points = distinct_points(sights);
   if (points < 3) throw ComputeError(fmt::format("{} known points are seen, at least 3 are needed", points));
   const std::vector<std::uint8_t> all(sights.size(), 1);
-  if (line_ratio(sights, all) < options.min_line_ratio)
+  if (line_ratio_of(sights, all) < options.min_line_ratio)
     throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
   const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
   const std::vector<Candidate> found = sample(sights, options, limit_squared, seed);

@@ -308,6 +308,16 @@ class TileBuilder {
 
 }  // namespace
 
+Tiles single_tile(const Block& block) {
+  Tiles tiles;
+  tiles.tile_count = 1;
+  tiles.tile_of_frame.assign(block.frames.size(), TileIndex(0));
+  tiles.component.assign(block.frames.size(), 0);
+  tiles.tree.nodes.resize(1);
+  tiles.tree.nodes[0].tile = TileIndex(0);
+  return tiles;
+}
+
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options) {
   options.check();

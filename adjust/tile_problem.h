@@ -142,6 +142,9 @@ struct ObservationOptions {
 // Tracks: the tile with most of its observations' frames, ties to the lower tile number.
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end);
 
+// The whole block as one tile.
+Tiles single_tile(const Block& block);
+
 // Builds a tile's problem: all rows of `owned` (the tile's track file) whose images belong to oriented frames, the
 // control points, priors and relative poses that the tile owns (a frame's priors: the frame's tile; a camera's prior:
 // the tile of the first oriented image that uses it; a relative pose: lower tile number of its two frames).

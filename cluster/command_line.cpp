@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "cluster/arithmetic.h"
+#include "cluster/calibrate_command.h"
 #include "cluster/collective.h"
 #include "cluster/communicator.h"
 #include "cluster/exit_codes.h"
@@ -342,6 +343,7 @@ int command_line(int argc, char** argv) {
     add_run(app, action, ranks, "orient", "orient", "Run as far as the initial orientation");
     add_run(app, action, ranks, "adjust", "adjust", "Run as far as the adjustment of the tiles");
     add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
+    add_calibrate(app, action, ranks);
     add_resect(app, action);
     add_register(app, action, ranks);
     add_status(app, action);

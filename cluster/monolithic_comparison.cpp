@@ -60,13 +60,6 @@ SingleTile single_tile(const BlockResult& result, const ObservationOptions& opti
   return single;
 }
 
-MergeTree one_leaf() {
-  MergeTree tree;
-  tree.nodes.emplace_back();
-  tree.nodes.back().tile = TileIndex(0);
-  return tree;
-}
-
 double cost_after_ceres(const SingleTile& tile) {
   CeresTile ceres_tile(tile.problem, tile.state);
   ceres::Solver::Options options;
@@ -106,7 +99,7 @@ struct OwnRun {
 };
 
 OwnRun adjust_single_tile(const BlockResult& result, const SingleTile& tile) {
-  SerialRunner runner(one_leaf(), {tile.problem}, {disturbed(result, tile)});
+  SerialRunner runner(single_tile(result.block).tree, {tile.problem}, {disturbed(result, tile)});
   GlobalOptions options;
   options.max_decrement = 1e-6;
   OwnRun run;
@@ -130,7 +123,7 @@ std::string compare_with_monolithic(const JobStore& store) {
   if (!store.seal(kResult)) throw InputError(store.path(kResult) + ": the job has no result yet; run it to the end");
   const BlockResult result = read_result(store.verified_path(kResult));
   const SingleTile tile = single_tile(result, observation_options(store));
-  SerialRunner runner(one_leaf(), {tile.problem}, {tile.state});
+  SerialRunner runner(single_tile(result.block).tree, {tile.problem}, {tile.state});
   const SubtreeSums sums = runner.up(0).sums;
   Json json{{"images", tile.problem.images.size()},
             {"tiles", result.tiles.tile_count},

@@ -199,7 +199,7 @@ TrackSet read_all_tracks(const Job& job, const std::vector<std::string>& units) 
 
 TrackSource track_source(Job& job, const std::string& tie_points) {
   if (!tie_points.empty()) {
-    TrackSource source{tie_points, 0, [tie_points] { return read_tracks(tie_points); }};
+    TrackSource source{tie_points, 0, [tie_points] { return read_tracks(tie_points); }, {}};
     source.fingerprint = std::stoull(on_first_rank(job.ranks, [&] { return std::to_string(hash_file(tie_points)); }));
     return source;
   }
@@ -210,7 +210,23 @@ TrackSource track_source(Job& job, const std::string& tie_points) {
   const std::vector<std::string> tracks = run_tracks(job, matches, tiles);
   Hasher hasher;
   for (const std::string& unit : tracks) hasher.add(job.store.seal(unit)->content_hash);
-  return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }};
+  return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }, matches};
+}
+
+// Tracks and start poses of a calibration. Off-line nothing is matched.
+void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSettings& settings) {
+  const bool targets_alone = settings.rig.mode == CalibrationMode::kOffLine;
+  const TrackSource source = targets_alone ? TrackSource() : track_source(job, tie_points);
+  BlockState start = source.matches.empty() ? initial_state(job.block) : run_orientation(job, source.matches);
+  if (settings.rig.mode != CalibrationMode::kOnLine) resect_missing(job.block, start);
+  TrackSet tracks;
+  tracks.begin.push_back(0);
+  if (source.read) tracks = source.read();
+  if (std::none_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; }))
+    throw AgreedError<InputError>(job.options.project +
+                                  ": no frame has a pose and none sees three control points; give 'poses' in the "
+                                  "project file");
+  run_calibration(job, start, tracks, settings);
 }
 
 using Stages = std::function<void(Job& job, const std::string& tie_points)>;
@@ -256,6 +272,15 @@ int register_job(const RunOptions& options, const RegistrationSettings& settings
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
     const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
     if (job.is_first_rank()) std::printf("%s", to_text(summary).c_str());
+  });
+}
+
+int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks) {
+  settings.rig.check();
+  return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+    CalibrationSettings own = settings;
+    own.rig.adjustment = job.settings.adjustment;
+    calibrate_rigs(job, tie_points, own);
   });
 }
 

@@ -6,6 +6,7 @@
 
 #include "cluster/communicator.h"
 #include "cluster/job.h"
+#include "cluster/stages/calibration.h"
 #include "cluster/stages/registration.h"
 
 namespace megablock {
@@ -19,5 +20,9 @@ int run_job(const RunOptions& options, Communicator& ranks);
 
 // Collective. Opens the same job, brings its tracks up to date and registers its trajectory (stages/registration.h).
 int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks);
+
+// Collective. Opens the same kind of job, brings its tracks and poses up to date and calibrates its rigs
+// (stages/calibration.h).
+int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks);
 
 }  // namespace megablock

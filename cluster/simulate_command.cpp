@@ -76,6 +76,7 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--drives", &O::drives, "Stereopolis: drives over every street [2]");
   s.add("--days", &O::days, "Stereopolis: days of the drives [2]");
   s.add_switch("--no-bridge", &O::bridge, "Stereopolis: no street passes over another");
+  s.add("--vehicle-seed", &O::vehicle_seed, "Stereopolis, target field: seed of cameras and mounts [that of --seed]");
   s.add("--mount-position-error", &O::mount_position_error_m,
         "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]");
   s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]");

@@ -79,6 +79,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (cameras) read_cameras(*cameras, project.block);
   if (const auto masks = top.existing_folder("masks")) read_masks(*masks, project);
   read_rigs(top, project);
+  read_calibration(top, project);
 
   const auto poses = read_poses(top);
   const auto control = read_control(top);

@@ -77,7 +77,9 @@ void read_distortion(YamlReader& reader, Camera& camera) {
   distortion->finish();
 }
 
-void read_camera(YamlReader& reader, Camera& camera) {
+}  // namespace
+
+void read_intrinsics(YamlReader& reader, Camera& camera) {
   read_model(reader, camera);
   read_focal(reader, camera);
   if (const auto point = reader.numbers("principal_point_px", 2)) {
@@ -89,6 +91,12 @@ void read_camera(YamlReader& reader, Camera& camera) {
     }
   }
   read_distortion(reader, camera);
+}
+
+namespace {
+
+void read_camera(YamlReader& reader, Camera& camera) {
+  read_intrinsics(reader, camera);
   camera.prior_sigma = default_intrinsic_sigmas(camera);
   if (const auto calibrate = reader.node("calibrate")) {
     const std::string where = reader.where("calibrate");

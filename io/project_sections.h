@@ -11,6 +11,11 @@ namespace megablock {
 // cameras: grouping and overrides by camera name ("default" for all of them).
 CameraGrouping read_camera_grouping(YamlReader& cameras);
 void read_cameras(YamlReader& cameras, Block& block);
+// model, focal length, principal point and distortion of one camera; its prior sigmas are left as they are.
+void read_intrinsics(YamlReader& reader, Camera& camera);
+
+// calibration: cameras and mounts as calibrated, in place of those that the block has.
+void read_calibration(YamlReader& top, Project& project);
 
 // masks: a folder with one PNG per camera, "<camera name>.png" ('/' in a name written as '_').
 void read_masks(const std::string& folder, Project& project);

@@ -34,6 +34,7 @@ struct TrackSource {
   std::string file;  // of given tracks; empty: the job's own
   std::uint64_t fingerprint = 0;
   std::function<TrackSet()> read;
+  std::vector<std::string> matches;  // units of verified pairs that they were made of; empty: given tracks
 };
 
 struct RegistrationSummary {

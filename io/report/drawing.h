@@ -26,6 +26,8 @@ struct FieldDrawing {
   std::string svg, caption;
 };
 FieldDrawing draw(const ResidualField& field, const Camera& camera);
+// How many measurements lie in each part of the sensor, with the borders of its quadrants.
+std::string draw_density(const ResidualField& field, const Camera& camera);
 
 // Horizontal GNSS residuals in plan, and the vertical ones in block order.
 std::string draw_horizontal(const std::vector<PositionResidual>& residuals);

@@ -13,7 +13,6 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::size_t kSampleLimit = 500000;  // values a median is taken from
 constexpr std::int64_t kRayLimit = 24;        // rays of a track compared for its intersection angle
-constexpr int kFieldCells = 24;               // along the longer side of a sensor
 
 // The observations of one triangulated point that count.
 struct Track {
@@ -69,16 +68,7 @@ class Gatherer {
     f_.image_squares.assign(block_.images.size(), 0);
     for (const ImageIndex image : result_.tracks.image) ++f_.measured[image];
     f_.camera_images.assign(block_.cameras.size(), 0);
-    for (const Camera& camera : block_.cameras) {
-      ResidualField field;
-      const double cell = std::max(camera.width, camera.height) / static_cast<double>(kFieldCells);
-      field.columns = std::clamp(static_cast<int>(std::lround(camera.width / cell)), 1, kFieldCells);
-      field.rows = std::clamp(static_cast<int>(std::lround(camera.height / cell)), 1, kFieldCells);
-      const auto cells = static_cast<std::size_t>(field.columns * field.rows);
-      field.sum.assign(cells, Eigen::Vector2d::Zero());
-      field.count.assign(cells, 0);
-      f_.fields.push_back(std::move(field));
-    }
+    for (const Camera& camera : block_.cameras) f_.fields.push_back(ResidualField(camera));
     const auto tiles = static_cast<std::size_t>(result_.tiles.tile_count);
     f_.tile_frames.assign(tiles, 0);
     f_.tile_boundary.assign(tiles, 0);
@@ -148,16 +138,8 @@ class Gatherer {
     f_.residual_px.add(residual.x());
     f_.residual_px.add(residual.y());
     const CameraIndex camera = block_.camera_of(image);
-    ResidualField& field = f_.fields[camera];
-    const auto cell = [](std::int32_t position, int size, int cells) {
-      return std::clamp(static_cast<int>(from_fixed_pixel(position) / size * cells), 0, cells - 1);
-    };
-    const int column = cell(result_.tracks.x[o], block_.cameras[camera].width, field.columns);
-    const int row = cell(result_.tracks.y[o], block_.cameras[camera].height, field.rows);
-    field.sum[static_cast<std::size_t>(row * field.columns + column)] += residual;
-    ++field.count[static_cast<std::size_t>(row * field.columns + column)];
-    field.squares += residual.squaredNorm();
-    ++field.observations;
+    const Eigen::Vector2d pixel(from_fixed_pixel(result_.tracks.x[o]), from_fixed_pixel(result_.tracks.y[o]));
+    f_.fields[camera].add(block_.cameras[camera], pixel, residual);
     const TileIndex tile = tile_of(block_.images[image].frame);
     if (!tile.valid()) return;
     ++f_.tile_observations[static_cast<std::size_t>(tile.value)];
@@ -290,11 +272,6 @@ Spread spread(std::vector<double> values) {
     return *n;
   };
   return {at(0.5), at(0.95), at(1)};
-}
-
-Eigen::Vector2d ResidualField::mean(int row, int column) const {
-  const auto cell = static_cast<std::size_t>(row * columns + column);
-  return count[cell] ? Eigen::Vector2d(sum[cell] / static_cast<double>(count[cell])) : Eigen::Vector2d::Zero();
 }
 
 bool oriented(const BlockResult& result, FrameIndex frame) {

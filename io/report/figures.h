@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "io/residual_field.h"
 #include "io/result.h"
 
 namespace megablock::report {
@@ -25,15 +26,7 @@ struct Spread {
 };
 Spread spread(std::vector<double> values);
 
-// Kept residuals binned over the sensor of a camera.
-struct ResidualField {
-  int columns = 0, rows = 0;
-  std::vector<Eigen::Vector2d> sum;  // adjusted minus measured, px
-  std::vector<std::int64_t> count;
-  double squares = 0;
-  std::int64_t observations = 0;
-  Eigen::Vector2d mean(int row, int column) const;
-};
+using megablock::ResidualField;
 
 struct PositionResidual {
   FrameIndex frame;
@@ -78,8 +71,8 @@ struct Figures {
   std::int64_t frames = 0, oriented_frames = 0, boundary_frames = 0, components = 0;
   std::int64_t all_observations = 0;  // of triangulated points, rejected ones included
   Histogram track_length, intersection_deg, residual_px, observations_per_image;
-  IndexedVector<ImageIndex, std::int64_t> observations;  // kept, per image
-  IndexedVector<CameraIndex, ResidualField> fields;
+  IndexedVector<ImageIndex, std::int64_t> observations;      // kept, per image
+  IndexedVector<CameraIndex, ResidualField> fields;          // kept residuals over the sensors
   IndexedVector<CameraIndex, std::int64_t> camera_images;    // oriented
   double ground_resolution_m = kUnknown;                     // median of distance over focal length
   std::vector<PositionResidual> positions;                   // frames with GNSS and pose, block order

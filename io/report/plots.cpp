@@ -231,6 +231,28 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   return result;
 }
 
+std::string draw_density(const ResidualField& field, const Camera& camera) {
+  constexpr double width = 480;
+  const double height = camera.height * width / camera.width;
+  const double cell_width = width / field.columns, cell_height = height / field.rows;
+  const std::int64_t most = std::max<std::int64_t>(1, *std::max_element(field.count.begin(), field.count.end()));
+  std::string svg = fmt::format("<svg viewBox=\"-1 -1 {:.0f} {:.0f}\" role=img aria-label=\"Coverage of the sensor\">",
+                                width + 2, height + 2) +
+                    fmt::format("<rect width={:.0f} height={:.1f} class=frame />", width, height);
+  for (int r = 0; r < field.rows; ++r)
+    for (int c = 0; c < field.columns; ++c) {
+      const std::int64_t n = field.count[static_cast<std::size_t>(r * field.columns + c)];
+      if (n == 0) continue;
+      svg += fmt::format(
+          "<rect x={:.1f} y={:.1f} width={:.1f} height={:.1f} class=shade fill-opacity={:.2f}><title>{} "
+          "measurements</title></rect>",
+          c * cell_width, r * cell_height, cell_width, cell_height,
+          0.15 + 0.85 * std::sqrt(static_cast<double>(n) / static_cast<double>(most)), count(n));
+    }
+  return svg + fmt::format("<path d=\"M{:.1f} 0V{:.1f}M0 {:.1f}H{:.1f}\" class=axis /></svg>", width / 2, height,
+                           height / 2, width);
+}
+
 std::string draw_horizontal(const std::vector<PositionResidual>& residuals) {
   std::vector<double> sizes;
   for (const PositionResidual& r : residuals) sizes.push_back(r.difference.head<2>().cwiseAbs().maxCoeff());

@@ -38,6 +38,7 @@ struct SimulationOptions {
   // Stereopolis: crossings with 8 to 40 control points each, a seventh of them check points; all of zone
   // `held_out_zone` are (-1: of none).
   int control_zones = 0, held_out_zone = -1;
+  std::uint64_t vehicle_seed = 0;  // Stereopolis, target field: seed of cameras and mounts; 0: `seed`
   // Stereopolis, target field: sigmas per axis of the given mounts, which are also stated; 0: held at the truth.
   double mount_position_error_m = 0.005, mount_rotation_error_deg = 0.5;
   // Observations.

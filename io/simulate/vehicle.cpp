@@ -102,7 +102,8 @@ void add_vehicle(const SimulationOptions& options, Layout& layout) {
   for (const Place& place : chosen) {
     std::string name("c");
     name.append(std::to_string(place.id));
-    Random random(options.seed, Random::Purpose::kCamera, 2000 + static_cast<std::uint64_t>(place.id));
+    Random random(options.vehicle_seed ? options.vehicle_seed : options.seed, Random::Purpose::kCamera,
+                  2000 + static_cast<std::uint64_t>(place.id));
     Mount mount;
     mount.pose = nominal_mount(place);
     Pose real = mount.pose;

@@ -14,13 +14,6 @@ extern "C" void openblas_set_num_threads(int threads);
 namespace megablock {
 namespace {
 
-Tiles one_tile(const Block& block) {
-  Tiles tiles;
-  tiles.tile_count = 1;
-  tiles.tile_of_frame.assign(block.frames.size(), TileIndex(0));
-  return tiles;
-}
-
 void adjust_aerial_tile(benchmark::State& state) {
   openblas_set_num_threads(1);
   SimulationOptions options;
@@ -30,7 +23,7 @@ void adjust_aerial_tile(benchmark::State& state) {
   const SimulatedBlock simulated = simulate_block(options);
   const BlockState start = initial_state(simulated.block);
   const AdjustOptions adjust;
-  TileProblem problem = make_tile_problem(simulated.block, start, one_tile(simulated.block), TileIndex(0),
+  TileProblem problem = make_tile_problem(simulated.block, start, single_tile(simulated.block), TileIndex(0),
                                           simulated.tracks, adjust.observations);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   AdjustSummary summary;

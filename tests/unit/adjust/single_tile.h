@@ -9,16 +9,6 @@
 
 namespace megablock {
 
-inline Tiles single_tile(const Block& block) {
-  Tiles tiles;
-  tiles.tile_count = 1;
-  tiles.tile_of_frame.assign(block.frames.size(), TileIndex(0));
-  tiles.component.assign(block.frames.size(), 0);
-  tiles.tree.nodes.resize(1);
-  tiles.tree.nodes[0].tile = TileIndex(0);
-  return tiles;
-}
-
 inline std::vector<Eigen::Vector3d> no_points(const TileProblem& problem) {
   return std::vector<Eigen::Vector3d>(problem.points.size(),
                                       Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));

@@ -1,0 +1,74 @@
+#include "cluster/calibrate_command.h"
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "cluster/option_checks.h"
+#include "cluster/pipeline.h"
+
+namespace megablock {
+
+namespace {
+
+const std::map<std::string, CalibrationMode> kModes = {
+    {"all", CalibrationMode::kAll}, {"off-line", CalibrationMode::kOffLine}, {"on-line", CalibrationMode::kOnLine}};
+const std::map<std::string, MountFreedom> kMounts = {{"stated", MountFreedom::kStated}, {"free", MountFreedom::kFree}};
+
+void add_rig_options(CLI::App& command, CalibrationSettings& settings) {
+  RigCalibrationOptions& rig = settings.rig;
+  command.add_option("--mode", rig.mode, "all: what the project has | off-line: control points | on-line: tie points")
+      ->transform(CLI::CheckedTransformer(kModes).description("{all,off-line,on-line} [all]"));
+  command
+      .add_option("--mounts", rig.mounts, "stated: sigmas of the project are priors | free: all but the first, without")
+      ->transform(CLI::CheckedTransformer(kMounts).description("{stated,free} [stated]"));
+  command.add_flag_callback(
+      "--hold-intrinsics", [&rig] { rig.estimate_intrinsics = false; },
+      "Cameras are held; else estimated as the project says");
+  command
+      .add_option("--verify", settings.verification,
+                  "Project of another site that the rig recorded: decides whether the result is better than the start")
+      ->check(CLI::ExistingFile);
+  command.add_option("--held-out", rig.held_out_share, "Share of the points held out for that decision")
+      ->capture_default_str();
+  command.add_option("--max-position-sigma", rig.max_position_sigma_m, "Of a mount, m; above: warning")
+      ->capture_default_str();
+  command.add_option("--max-rotation-sigma", rig.max_rotation_sigma_deg, "Of a mount, degrees; above: warning")
+      ->capture_default_str();
+  command
+      .add_option("--min-quadrant", rig.min_quadrant_measurements,
+                  "Measurements in a quadrant of a sensor; below: warning")
+      ->capture_default_str();
+  command.add_flag("--json", settings.json, "Figures as JSON");
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ranks) {
+  auto options = std::make_shared<RunOptions>();
+  auto settings = std::make_shared<CalibrationSettings>();
+  options->directory = "calibration";
+  CLI::App* command = app.add_subcommand("calibrate", "Calibrate the mounts and cameras of a rig");
+  command->footer(
+      "Example: megablock calibrate field.yaml -o calibration --mode off-line\n"
+      "         megablock calibrate drive.yaml -o calibration --mode on-line --verify site.yaml\n"
+      "Then: 'calibration: calibration/calibration.yaml' in the project file of any block of this rig");
+  command->add_option("project", options->project, "Project file")->required();
+  command->add_option("-o,--output", options->directory, "Folder for the calibration and its page")
+      ->capture_default_str();
+  command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
+      ->check(not_negative());
+  command->add_flag("-q,--quiet", options->quiet, "No progress");
+  add_rig_options(*command, *settings);
+  auto modes = std::make_shared<std::vector<CalibrateMode>>();  // each added here by a function of its own file
+  command->callback([=, &action, &ranks] {
+    action = [options, settings, modes, &ranks] {
+      for (const CalibrateMode& mode : *modes)
+        if (mode.chosen()) return mode.run(*options);
+      return calibrate_job(*options, *settings, ranks);
+    };
+  });
+}
+
+}  // namespace megablock

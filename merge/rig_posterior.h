@@ -1,0 +1,35 @@
+// What the measurements of a block say of the mounts of its rigs: the normal equations condensed on the free mounts,
+// frames, cameras and points eliminated.
+//
+// With S the condensed matrix without the mounts' priors and P the matrix of these, the directions
+//
+//     S v = mu P v
+//
+// of mu < 1 are those that the priors know better than the measurements: not determined by these. The movement of all
+// free mounts of a rig away from its reference is its scale, which tie points alone never give. Covariances: (S +
+// P)^-1, or, for mounts that are tied to their start only so that the system is regular, its part along the determined
+// directions (inner constraints over the mounts, in the metric of P).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "adjust/tile_problem.h"
+
+namespace megablock {
+
+struct RigPosterior {
+  struct MountPosterior {
+    std::int32_t mount = -1;                                                       // row of TileProblem::mounts
+    Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  // of PoseIncrement
+    bool rotation_determined = true, position_determined = true;
+  };
+  std::vector<MountPosterior> mounts;  // the free ones, ascending
+  bool scale_determined = true;        // of every rig
+};
+
+// `problem` holds the whole block at its solution; every free mount has a prior. `determined_only`: covariances along
+// the determined directions alone.
+RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool determined_only);
+
+}  // namespace megablock
