@@ -93,6 +93,8 @@ void add_observation_options(SimulateOptions& s) {
   s.add("--focal", &O::focal_px, "Focal length, px [1400]");
   s.add("--camera-model", &O::camera_model, "Camera model, as in a project file [brown]");
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
+  s.add_switch("--known-cameras", &O::free_cameras,
+               "Stereopolis, target field: cameras are known and held at the truth, mounts are not");
   s.add_switch("--no-calibration", &O::calibrate, "Hold cameras and mounts at the truth");
 }
 

@@ -84,8 +84,8 @@ double MountCalibration::rotation_sigma_rad() const { return worst_axis(covarian
 double MountCalibration::position_sigma_m() const { return worst_axis(covariance.bottomRightCorner<3, 3>()); }
 
 double expected_rms_px(const RigCalibration& calibration, double sigma_px) {
-  if (calibration.residuals == 0 || calibration.redundancy <= 0) return kUnknown;
-  return sigma_px * std::sqrt(static_cast<double>(calibration.redundancy) / static_cast<double>(calibration.residuals));
+  if (calibration.residuals == 0 || !(calibration.redundancy > 0)) return kUnknown;
+  return sigma_px * std::sqrt(calibration.redundancy / static_cast<double>(calibration.residuals));
 }
 
 std::string mount_name(const Block& block, RigIndex rig, std::int32_t mount) {

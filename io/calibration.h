@@ -74,7 +74,8 @@ struct RigCalibration {
   std::vector<MountCalibration> mounts;
   // The adjustment.
   std::int64_t frames = 0, points = 0, control_points = 0;
-  std::int64_t residuals = 0, redundancy = 0;  // scalar
+  std::int64_t residuals = 0;  // of image measurements, scalar
+  double redundancy = 0;       // of these: what the other observations take is off
   std::int64_t iterations = 0;
   double seconds = 0;
   double sigma0 = 0, image_sigma_px = 0;  // a posteriori; of tie point measurements

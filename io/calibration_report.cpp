@@ -80,7 +80,8 @@ std::string calibration_text(const RigCalibration& c) {
                       "px", "ul ur ll lr");
   for (const MountCalibration& mount : c.mounts) text += mount_line(mount);
   text += fmt::format(
-      "\n{}: {} frames, {} points, {} control points; redundancy {} of {} residuals, sigma0 {:.3f}, {} steps, {:.1f} "
+      "\n{}: {} frames, {} points, {} control points; redundancy {:.0f} of {} residuals, sigma0 {:.3f}, {} steps, "
+      "{:.1f} "
       "s\n",
       c.mode, c.frames, c.points, c.control_points, c.redundancy, c.residuals, c.sigma0, c.iterations, c.seconds);
   const auto images = [](const ImageFit& fit) {
@@ -114,7 +115,7 @@ std::string calibration_json(const RigCalibration& c) {
             {"points", c.points},
             {"control_points", c.control_points},
             {"residuals", c.residuals},
-            {"redundancy", c.redundancy},
+            {"redundancy", number(c.redundancy)},
             {"iterations", c.iterations},
             {"sigma0", number(c.sigma0)},
             {"image_sigma_px", number(c.image_sigma_px)},

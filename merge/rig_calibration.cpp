@@ -59,6 +59,37 @@ std::optional<PointFit> check_points(const Block& block, const WholeBlock& whole
   return fit;
 }
 
+// Redundancy that falls to the priors: one less what each residual's own sigma is covered by the unknowns. Relative
+// poses are taken as fully redundant.
+double prior_redundancy(const WholeBlock& whole, const TileCovariance& covariance) {
+  const TileProblem& problem = whole.problem;
+  const auto uncovered = [](const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& c) {
+    return static_cast<double>(jacobian.rows()) - (jacobian * c * jacobian.transpose()).trace();
+  };
+  double sum = 6.0 * static_cast<double>(problem.relatives.size());
+  for (const auto& term : problem.point_priors) {
+    if (!problem.active(term.point.value)) continue;
+    const Eigen::Vector3d inverse = term.sigma.cwiseInverse();  // zero along an open axis
+    sum += static_cast<double>((inverse.array() > 0).count()) -
+           inverse.cwiseAbs2().dot(covariance.points[at(term.point.value)].diagonal());
+  }
+  for (const auto& term : problem.mount_priors)
+    sum += uncovered(linearise_mount(whole.state.mounts[at(term.mount)], term).by_mount,
+                     covariance.mounts[at(term.mount)]);
+  for (const auto& term : problem.positions)
+    sum += uncovered(linearise_position(whole.state.frames[at(term.frame.value)], term.prior).by_frame,
+                     covariance.frames[at(term.frame.value)]);
+  for (const auto& term : problem.attitudes)
+    sum += uncovered(linearise_attitude(whole.state.frames[at(term.frame.value)], term.prior).by_frame,
+                     covariance.frames[at(term.frame.value)]);
+  for (const auto& term : problem.intrinsic_priors)
+    for (int k = 0; k < term.value.size(); ++k) {
+      const double weight = intrinsic_prior_weight(term, k);
+      if (weight > 0) sum += 1 - weight * weight * covariance.cameras[at(term.camera.value)](k, k);
+    }
+  return sum;
+}
+
 class RigCalibrator {
  public:
   RigCalibrator(const Block& block, const BlockState& start, const TrackSet& tracks,
@@ -126,7 +157,7 @@ class RigCalibrator {
     result_.held_out = out.track_count() + std::ssize(left_out.control_points);
     if (result_.held_out == 0) return;
     const WholeBlock after = adjust_whole(training, start_, kept, options_.adjustment);
-    const WholeBlock before = adjust_with_rig_held(training, start_, after, kept, options_.adjustment.observations);
+    const WholeBlock before = adjust_with_rig_held(training, start_, after, kept, options_.adjustment);
     result_.held_out_px = intersection_sigma_px(left_out, state_of(block_, start_, after), out, options_.adjustment);
     result_.held_out_before_px =
         intersection_sigma_px(left_out, state_of(block_, start_, before), out, options_.adjustment);
@@ -157,14 +188,16 @@ class RigCalibrator {
       if (!whole.problem.active(p)) continue;
       ++(whole.problem.points[at(p)].role == PointRole::kControl ? result_.control_points : result_.points);
     }
-    result_.residuals = sums.residuals;
-    result_.redundancy =
+    const std::int64_t redundancy =
         sums.residuals - sums.unknowns + std::ssize(sums.held) + sums.held_points + runner.block_gauge().defect();
-    result_.sigma0 =
-        result_.redundancy > 0 ? std::sqrt(sums.weighted_squares / static_cast<double>(result_.redundancy)) : 0;
+    result_.residuals = 2 * sums.observations;
+    result_.redundancy = static_cast<double>(redundancy) - prior_redundancy(whole, covariances.front());
+    result_.sigma0 = redundancy > 0 ? std::sqrt(sums.weighted_squares / static_cast<double>(redundancy)) : 0;
     result_.image_sigma_px = whole.problem.image_sigma_px;
-    result_.gauge = runner.gauge().text;
     free_datum_ = runner.block_gauge().free();
+    result_.gauge =
+        free_datum_ ? fmt::format("free network of {} frames, defect {}", result_.frames, runner.block_gauge().defect())
+                    : "fixed by control and priors";
     if (free_datum_ && result_.control_points > 0)
       warn("control and priors do not fix the datum (" + result_.gauge +
            "): positions are good up to it, the mounts do not depend on it; measure control points off one line");
@@ -269,16 +302,19 @@ class RigCalibrator {
                                                                                : "position"));
       return;
     }
+    std::string weak;
     if (mount.position_sigma_m() > options_.max_position_sigma_m)
-      warn(fmt::format("{}: posterior sigma of its position {:.1f} mm, above the bound of {:.1f} mm", mount.name,
-                       1e3 * mount.position_sigma_m(), 1e3 * options_.max_position_sigma_m));
+      weak = fmt::format(" of its position {:.1f} mm (bound {:.1f})", 1e3 * mount.position_sigma_m(),
+                         1e3 * options_.max_position_sigma_m);
     if (mount.rotation_sigma_rad() > kDegree * options_.max_rotation_sigma_deg)
-      warn(fmt::format("{}: posterior sigma of its rotation {:.3f} degrees, above the bound of {:.3f}", mount.name,
-                       mount.rotation_sigma_rad() / kDegree, options_.max_rotation_sigma_deg));
+      weak += fmt::format("{} of its rotation {:.3f} degrees (bound {:.3f})", weak.empty() ? "" : ",",
+                          mount.rotation_sigma_rad() / kDegree, options_.max_rotation_sigma_deg);
+    if (!weak.empty())
+      warn(mount.name + ": posterior sigma" + weak + "; measure more points, or hold the cameras (--hold-intrinsics)");
   }
 
   void compare_with_start(const WholeBlock& whole) {
-    const WholeBlock before = adjust_with_rig_held(block_, start_, whole, *tracks_, options_.adjustment.observations);
+    const WholeBlock before = adjust_with_rig_held(block_, start_, whole, *tracks_, options_.adjustment);
     const std::vector<ImageFit> fits = fit_by_mount(whole), earlier = fit_by_mount(before);
     for (std::size_t m = 0; m < fits.size(); ++m)
       if (MountCalibration* row = row_of(whole.problem.mounts[m])) row->after = fits[m], row->before = earlier[m];

@@ -126,16 +126,16 @@ WholeBlock adjust_whole(const Block& block, const BlockState& start, const Track
   return whole;
 }
 
-WholeBlock adjust_with_rig_held(const Block& block, const BlockState& rig, const WholeBlock& like,
-                                const TrackSet& tracks, const ObservationOptions& options) {
-  const Block held = with_rig_held(block, rig);
+WholeBlock adjust_with_rig_held(const Block& block, const BlockState& start, const WholeBlock& like,
+                                const TrackSet& tracks, const AdjustOptions& options) {
+  const Block held = with_rig_held(block, start);
   BlockState state = initial_state(held);
   store_tile_state(like.problem, like.state, state);
   std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
   for (const FrameIndex frame : like.problem.frames) state.oriented[frame] = 1;
-  state.cameras = rig.cameras;
-  state.mounts = rig.mounts;
-  WholeBlock whole = whole_block(held, state, tracks, options);
+  state.cameras = start.cameras;
+  state.mounts = start.mounts;
+  WholeBlock whole = whole_block(held, state, tracks, options.observations);
   whole.state.points = like.state.points;
   whole.problem.kept = like.problem.kept;
   whole.problem.inverse_sigma = like.problem.inverse_sigma;
@@ -144,8 +144,9 @@ WholeBlock adjust_with_rig_held(const Block& block, const BlockState& rig, const
   constexpr int kIterations = 50;
   constexpr double kTolerance = 1e-9;  // of the cost
   const AdjustSummary summary = solve_with_ceres(whole.problem, whole.state, kIterations, kTolerance);
-  if (!summary.usable) throw ComputeError("the frames cannot be adjusted with the rig held: " + summary.text);
-  return whole;
+  if (summary.usable) return whole;
+  // The mounts were moved so far that the start sees points of the result behind it.
+  return adjust_whole(held, start, tracks, options);
 }
 
 std::vector<ImageFit> fit_by_mount(const WholeBlock& block) {

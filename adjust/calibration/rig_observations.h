@@ -58,10 +58,11 @@ WholeBlock whole_block(const Block& block, const BlockState& state, const TrackS
 WholeBlock adjust_whole(const Block& block, const BlockState& start, const TrackSet& tracks,
                         const AdjustOptions& options);
 
-// Frames and points adjusted to the measurements that `like` keeps, in least squares, with the rig held at the values
-// of `rig`.
-WholeBlock adjust_with_rig_held(const Block& block, const BlockState& rig, const WholeBlock& like,
-                                const TrackSet& tracks, const ObservationOptions& options);
+// Frames and points adjusted in least squares, to the measurements that `like` keeps and from its frames, with the rig
+// held at the values of `start`. Where these cannot be projected so, from the frames of `start`, with a screening of
+// its own.
+WholeBlock adjust_with_rig_held(const Block& block, const BlockState& start, const WholeBlock& like,
+                                const TrackSet& tracks, const AdjustOptions& options);
 
 // Of the kept image measurements, by row of problem.mounts.
 std::vector<ImageFit> fit_by_mount(const WholeBlock& block);

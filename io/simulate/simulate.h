@@ -58,9 +58,10 @@ struct SimulationOptions {
   int image_width = 1920, image_height = 1280;
   double focal_px = 1400;
   std::string camera_model = "brown";
-  bool distortion = true;  // true camera has k1, k2, p1, p2 (other models: all terms); the block starts from zero
-  bool calibrate = true;   // camera parameters free (else held at the truth)
-  void check() const;      // throws InputError
+  bool distortion = true;    // true camera has k1, k2, p1, p2 (other models: all terms); the block starts from zero
+  bool calibrate = true;     // camera parameters free (else held at the truth)
+  bool free_cameras = true;  // Stereopolis, target field: cameras free (else held at the truth, mounts as `calibrate`)
+  void check() const;        // throws InputError
 };
 
 // What a simulated observation shows.

@@ -55,7 +55,6 @@ TEST(RigCalibration, OffLineOnFourPanoramas) {
   RigCalibrationOptions options;
   options.mode = CalibrationMode::kOffLine;
   options.mounts = MountFreedom::kFree;
-  options.estimate_intrinsics = true;
   const CalibratedRig rig = calibrate(s, options);
   expect_noise(rig.calibration, 0.5);
   EXPECT_NEAR(normalised_error(rig, s), 1, 0.35);  // 54 correlated components
@@ -118,6 +117,23 @@ TEST(RigCalibration, BoundsOfTheSigmasAreWatched) {
   EXPECT_EQ(c.held_out, 0);
 }
 
+// Ahead and behind, from one standpoint: nothing ties the two cameras to one another.
+TEST(RigCalibration, NamesCamerasThatShareNoView) {
+  SimulationOptions simulation = field(Path::kSingle, 6);
+  simulation.rig_cameras = 2;
+  simulation.points_per_frame = 150;
+  simulation.control_points = simulation.check_points = 0;
+  const SimulatedBlock s = simulate_block(simulation);
+  RigCalibrationOptions options;
+  options.mode = CalibrationMode::kOnLine;
+  options.mounts = MountFreedom::kFree;
+  const RigCalibration c = calibrate(s, options).calibration;
+  ASSERT_EQ(c.mounts.size(), 2u);
+  EXPECT_FALSE(c.mounts[1].position_determined);
+  EXPECT_THAT(::testing::PrintToString(c.warnings),
+              AllOf(HasSubstr("c42: the measurements do not determine the position"), HasSubstr("Drive curves")));
+}
+
 TEST(RigCalibration, IsTheSameEveryTime) {
   SimulationOptions simulation = field(Path::kS, 6);
   simulation.points_per_frame = 60;
@@ -150,7 +166,10 @@ TEST(RigCalibration, SaysWhatIsMissing) {
   EXPECT_THAT(refusal(CalibrationMode::kOffLine,
                       [](SimulatedBlock& b) {
                         double along = 0;
-                        for (ControlPoint& point : b.block.control_points) point.position << ++along, 2 * along, 5;
+                        for (ControlPoint& point : b.block.control_points) {
+                          along += 1;
+                          point.position << along, 2 * along, 5;
+                        }
                       }),
               HasSubstr("lie on one straight line"));
   EXPECT_THAT(refusal(CalibrationMode::kOnLine, [](SimulatedBlock& b) { b.tracks = {{}, {0}, {}, {}, {}, {}}; }),
