@@ -103,6 +103,7 @@ class RigCalibrator {
   CalibratedRig run(const std::optional<VerificationSite>& verification) {
     const auto begun = std::chrono::steady_clock::now();
     check_input();
+    need_points();
     compare_held_out();
     const WholeBlock whole = adjust();
     describe_mounts(whole);
@@ -136,6 +137,18 @@ class RigCalibrator {
           fmt::format("the {} control points lie on one straight line: they do not give the rotation about it; "
                       "measure one off the line",
                       control.size()));
+  }
+
+  // From one standpoint nothing can be intersected.
+  void need_points() const {
+    WholeBlock whole = whole_block(block_, start_, *tracks_, options_.adjustment.observations);
+    triangulate_points(whole.problem, whole.state, options_.adjustment);
+    for (std::int64_t p = 0; p < whole.problem.point_count(); ++p)
+      if (whole.problem.active(p)) return;
+    throw InputError(
+        fmt::format("no point is seen from two places that lie apart (rays of all meet at less than {} degrees): the "
+                    "vehicle must move, or targets be measured for --mode off-line",
+                    options_.adjustment.min_intersection_deg));
   }
 
   // Tracks left out in turn decide whether the result is better than the start.

@@ -83,7 +83,7 @@ Eigen::MatrixXd scale_directions(const TileProblem& problem, const TileState& st
 
 }  // namespace
 
-RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool determined_only) {
+RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool without_scale) {
   RigPosterior posterior;
   const UpdateMatrix update = condense_on_mounts(problem, state);
   const UnknownList& mounts = update.unknowns;
@@ -93,27 +93,25 @@ RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, b
   const Eigen::VectorXd values = metric.values.cwiseSqrt();
   const Eigen::MatrixXd root = metric.vectors * values.asDiagonal() * metric.vectors.transpose();
   const Eigen::MatrixXd inverse_root = metric.vectors * values.cwiseInverse().asDiagonal() * metric.vectors.transpose();
-  const Eigen::MatrixXd whitened = inverse_root * (full(update) - prior) * inverse_root;
-  const SymmetricEigen eigen = symmetric_eigen(whitened);
+  const SymmetricEigen eigen = symmetric_eigen(inverse_root * (full(update) - prior) * inverse_root);
+  const Eigen::VectorXd variance = (eigen.values.cwiseMax(0).array() + 1).inverse();
+  Eigen::MatrixXd whitened = eigen.vectors * variance.asDiagonal() * eigen.vectors.transpose();
 
   Eigen::Index open = 0;  // directions that the priors know better
   while (open < eigen.values.size() && eigen.values(open) < 1) ++open;
-  Eigen::VectorXd variance(eigen.values.size());
-  for (Eigen::Index k = 0; k < variance.size(); ++k)
-    variance(k) = determined_only && k < open ? 0 : 1 / (std::max(0.0, eigen.values(k)) + 1);
-  const Eigen::MatrixXd covariance =
-      inverse_root * eigen.vectors * variance.asDiagonal() * eigen.vectors.transpose() * inverse_root;
-
-  // What is open besides the scale.
   Eigen::MatrixXd directions = eigen.vectors.leftCols(open);
-  const Eigen::MatrixXd scale = scale_directions(problem, state, mounts, root);
+  const Eigen::MatrixXd scales = scale_directions(problem, state, mounts, root);
   constexpr double kSame = 0.8;  // squared cosine between a scale and the open directions
-  for (Eigen::Index s = 0; s < scale.cols(); ++s) {
-    const Eigen::VectorXd along = directions.transpose() * scale.col(s);
+  for (Eigen::Index s = 0; s < scales.cols(); ++s) {
+    const Eigen::VectorXd scale = scales.col(s), along = directions.transpose() * scale;
     if (along.squaredNorm() < kSame) continue;
     posterior.scale_determined = false;
     directions -= (directions * along.normalized()) * along.normalized().transpose();
+    if (!without_scale) continue;
+    whitened -= scale * (scale.transpose() * whitened);
+    whitened -= (whitened * scale) * scale.transpose();
   }
+  const Eigen::MatrixXd covariance = inverse_root * whitened * inverse_root;
   constexpr double kPart = 0.25;  // squared share of an open direction that a mount must have to be named
   for (std::size_t u = 0; u < mounts.size(); ++u) {
     const auto first = static_cast<Eigen::Index>(6 * u);

@@ -7,8 +7,8 @@
 //
 // of mu < 1 are those that the priors know better than the measurements: not determined by these. The movement of all
 // free mounts of a rig away from its reference is its scale, which tie points alone never give. Covariances: (S +
-// P)^-1, or, for mounts that are tied to their start only so that the system is regular, its part along the determined
-// directions (inner constraints over the mounts, in the metric of P).
+// P)^-1, or, for mounts that are tied to their start only so that the system is regular, without the scale where
+// nothing gives it (inner constraint over the mounts, in the metric of P).
 #pragma once
 
 #include <Eigen/Core>
@@ -28,8 +28,8 @@ struct RigPosterior {
   bool scale_determined = true;        // of every rig
 };
 
-// `problem` holds the whole block at its solution; every free mount has a prior. `determined_only`: covariances along
-// the determined directions alone.
-RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool determined_only);
+// `problem` holds the whole block at its solution; every free mount has a prior. `without_scale`: covariances at the
+// scale that the rig has, where the measurements do not determine it.
+RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool without_scale);
 
 }  // namespace megablock

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Rig calibration of the simulated vehicle (mounts off by 5 mm and 0.5 degrees): off-line, on-line and both (CN-06, CN-07),
-and by path shape (CN-08), each on another site: 4 panoramas on a loop, 3 control and 92 check points, rig held as calibrated.
+and by path shape (CN-08), each on another site: 8 panoramas on a loop, 3 control and 92 check points, rig held as calibrated.
 
     tests/benchmark/calibration_table.py build/release/megablock [--seeds 5] [--mounts free]
 """
@@ -39,7 +39,7 @@ def main():
         def calibrate(seed, label, project, mode):
             site = folder / f"site{seed}" / "block.yaml"
             if not site.exists():
-                simulate(1000 + seed, site.parent, "loop", "--vehicle-seed", seed, "--frames", 4, "--control-points", 3,
+                simulate(1000 + seed, site.parent, "loop", "--vehicle-seed", seed, "--frames", 8, "--control-points", 3,
                          "--check-points", 92)
             done = megablock("calibrate", project, "-o", folder / f"{label}-{mode}-{seed}", "--mode", mode, "--mounts",
                              arguments.mounts, "--verify", site, "--json", "-q")
@@ -48,24 +48,29 @@ def main():
             except json.JSONDecodeError:
                 raise SystemExit(done.stderr)
 
-        print("mode      measurements   rms px (expected)     before   site: rms px (before)   check points mean, rms, mm (before)"
-              "   rms / sigma     s")
-        for mode, path, frames in (("off-line", "loop", 4), ("on-line", "s", 30), ("all", "s", 30)):
+        print("mode                     measurements  rms px (expected)    before   site: rms px (before)   "
+              "check points mean, rms, mm (before)   rms / sigma  worst sigma mm, deg")
+        for label, mode, path, frames, options in (
+                ("off-line", "off-line", "loop", 4, ()), ("off-line, known cameras", "off-line", "loop", 4, ("--known-cameras",)),
+                ("on-line", "on-line", "s", 30, ()), ("all", "all", "s", 30, ())):
             found = []
             for seed in range(1, arguments.seeds + 1):
-                project = simulate(seed, folder / f"{mode}{seed}", path, "--frames", frames)
-                found.append(calibrate(seed, mode, project, mode))
+                project = simulate(seed, folder / f"{label}{seed}", path, "--frames", frames, *options)
+                found.append(calibrate(seed, label, project, mode))
+            free = [m for f in found for m in f["mounts"] if not m["held"]]
 
             def mean(of):
                 return sum(map(of, found)) / len(found)
-            print(f"{mode:10s}{mean(lambda f: f['after']['measurements']):10.0f}"
+            print(f"{label:25s}{mean(lambda f: f['after']['measurements']):10.0f}"
                   f"{mean(lambda f: f['after']['rms_px']):12.4f} ({mean(lambda f: 0.5 * (f['redundancy'] / f['residuals']) ** 0.5):.4f})"
                   f"{mean(lambda f: f['before']['rms_px']):12.2f}"
                   f"{mean(lambda f: f['verification']['rms_px']):16.3f} ({mean(lambda f: f['verification_before']['rms_px']):.2f})"
                   f"{mean(lambda f: 1e3 * f['verification']['check_points']['mean_m']):20.1f}"
                   f"{rms([1e3 * f['verification']['check_points']['rms_m'] for f in found]):8.1f}"
                   f" ({rms([1e3 * f['verification_before']['check_points']['rms_m'] for f in found]):.1f})"
-                  f"{rms([f['verification']['check_points']['normalised'] for f in found]):14.2f}", flush=True)
+                  f"{rms([f['verification']['check_points']['normalised'] for f in found]):14.2f}"
+                  f"{max(1e3 * m['position_sigma_m'] for m in free):14.1f}{max(m['rotation_sigma_deg'] for m in free):9.3f}",
+                  flush=True)
 
         print("\npath      site: rms px   mean length px   check points rms, mm   worst sigma mm, deg   refused   warnings   "
               "(start: rms px)")

@@ -40,7 +40,9 @@ double largest_difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 TEST(RigPosterior, EqualsTheInverseOfTheWholeNormalEquations) {
   const SimulatedBlock simulated = field(8);
-  const WholeBlock whole = at_truth(simulated, simulated.block);
+  RigCalibrationOptions options;
+  options.mounts = MountFreedom::kFree;
+  const WholeBlock whole = at_truth(simulated, calibration_block(simulated.block, options));
   const RigPosterior posterior = rig_posterior(whole.problem, whole.state, false);
   const MonolithicSystem system = monolithic_system(whole.problem, whole.state);
   const Eigen::MatrixXd covariance = monolithic_covariance(system);
