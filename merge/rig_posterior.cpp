@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "adjust/linearise.h"
 #include "geometry/decompositions.h"
@@ -57,21 +58,29 @@ Eigen::MatrixXd prior_information(const TileProblem& problem, const TileState& s
   return information;
 }
 
-// Unit directions, in the metric of the priors, in which the rigs grow about their references.
+// Increments in units of what counts as not known.
+Eigen::VectorXd units(std::size_t mounts) {
+  constexpr double kOpenRotation = 5 * std::numbers::pi / 180, kOpenPosition = 0.1;  // rad, m
+  Eigen::VectorXd unit(6 * static_cast<Eigen::Index>(mounts));
+  for (Eigen::Index i = 0; i < unit.size(); ++i) unit(i) = i % 6 < 3 ? kOpenRotation : kOpenPosition;
+  return unit;
+}
+
+// Unit directions, of increments in these units, in which the rigs grow about their references.
 Eigen::MatrixXd scale_directions(const TileProblem& problem, const TileState& state, const UnknownList& mounts,
-                                 const Eigen::MatrixXd& root) {
-  Eigen::MatrixXd directions(root.rows(), 0);
+                                 const Eigen::VectorXd& unit) {
+  Eigen::MatrixXd directions(unit.size(), 0);
   for (std::size_t first = 0; first < mounts.size();) {
     const std::int64_t rig = mounts[first].id.index;
     const auto reference = std::find_if(problem.mounts.begin(), problem.mounts.end(),
                                         [&](const MountId& id) { return id.rig.value == rig; });
     const Eigen::Vector3d origin = state.mounts[static_cast<std::size_t>(reference - problem.mounts.begin())].centre;
-    Eigen::VectorXd growth = Eigen::VectorXd::Zero(root.rows());
+    Eigen::VectorXd growth = Eigen::VectorXd::Zero(unit.size());
     std::size_t u = first;
     for (; u < mounts.size() && mounts[u].id.index == rig; ++u)
       growth.segment<3>(static_cast<Eigen::Index>(6 * u + 3)) =
           state.mounts[static_cast<std::size_t>(mount_row(problem, mounts[u].id))].centre - origin;
-    growth = root * growth;
+    growth = growth.cwiseQuotient(unit);
     if (growth.norm() > 0) {
       directions.conservativeResize(Eigen::NoChange, directions.cols() + 1);
       directions.rightCols<1>() = growth.normalized();
@@ -89,18 +98,16 @@ RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, b
   const UnknownList& mounts = update.unknowns;
   if (mounts.empty()) return posterior;
   const Eigen::MatrixXd prior = prior_information(problem, state, mounts);
-  const SymmetricEigen metric = symmetric_eigen(prior);
-  const Eigen::VectorXd values = metric.values.cwiseSqrt();
-  const Eigen::MatrixXd root = metric.vectors * values.asDiagonal() * metric.vectors.transpose();
-  const Eigen::MatrixXd inverse_root = metric.vectors * values.cwiseInverse().asDiagonal() * metric.vectors.transpose();
-  const SymmetricEigen eigen = symmetric_eigen(inverse_root * (full(update) - prior) * inverse_root);
-  const Eigen::VectorXd variance = (eigen.values.cwiseMax(0).array() + 1).inverse();
-  Eigen::MatrixXd whitened = eigen.vectors * variance.asDiagonal() * eigen.vectors.transpose();
+  const Eigen::VectorXd unit = units(mounts.size());
+  const Eigen::MatrixXd information = full(update);
+  Eigen::MatrixXd covariance =  // in units
+      inverse(unit.asDiagonal() * information * unit.asDiagonal());
+  const SymmetricEigen eigen = symmetric_eigen(unit.asDiagonal() * (information - prior) * unit.asDiagonal());
 
-  Eigen::Index open = 0;  // directions that the priors know better
+  Eigen::Index open = 0;
   while (open < eigen.values.size() && eigen.values(open) < 1) ++open;
   Eigen::MatrixXd directions = eigen.vectors.leftCols(open);
-  const Eigen::MatrixXd scales = scale_directions(problem, state, mounts, root);
+  const Eigen::MatrixXd scales = scale_directions(problem, state, mounts, unit);
   constexpr double kSame = 0.8;  // squared cosine between a scale and the open directions
   for (Eigen::Index s = 0; s < scales.cols(); ++s) {
     const Eigen::VectorXd scale = scales.col(s), along = directions.transpose() * scale;
@@ -108,10 +115,10 @@ RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, b
     posterior.scale_determined = false;
     directions -= (directions * along.normalized()) * along.normalized().transpose();
     if (!without_scale) continue;
-    whitened -= scale * (scale.transpose() * whitened);
-    whitened -= (whitened * scale) * scale.transpose();
+    covariance -= scale * (scale.transpose() * covariance);
+    covariance -= (covariance * scale) * scale.transpose();
   }
-  const Eigen::MatrixXd covariance = inverse_root * whitened * inverse_root;
+  covariance = unit.asDiagonal() * covariance * unit.asDiagonal();
   constexpr double kPart = 0.25;  // squared share of an open direction that a mount must have to be named
   for (std::size_t u = 0; u < mounts.size(); ++u) {
     const auto first = static_cast<Eigen::Index>(6 * u);

@@ -1,14 +1,10 @@
 // What the measurements of a block say of the mounts of its rigs: the normal equations condensed on the free mounts,
 // frames, cameras and points eliminated.
 //
-// With S the condensed matrix without the mounts' priors and P the matrix of these, the directions
-//
-//     S v = mu P v
-//
-// of mu < 1 are those that the priors know better than the measurements: not determined by these. The movement of all
-// free mounts of a rig away from its reference is its scale, which tie points alone never give. Covariances: (S +
-// P)^-1, or, for mounts that are tied to their start only so that the system is regular, without the scale where
-// nothing gives it (inner constraint over the mounts, in the metric of P).
+// With S the condensed matrix without the mounts' priors, directions that S knows to no better than 0.1 m or 5 degrees
+// are not determined by the measurements. The movement of all free mounts of a rig away from its reference is its
+// scale, which tie points alone never give. With P the information of the priors the covariance is (S + P)^-1; or, for
+// mounts that are tied to their start only so that the system is regular, that at the scale which the rig has.
 #pragma once
 
 #include <Eigen/Core>

@@ -6,13 +6,13 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "image_files.h"
 #include "io/calibration_report.h"
 #include "io/error.h"
 #include "io/project.h"
 #include "io/simulate/simulate.h"
 #include "io/unit_files.h"
-#include "tests/unit/io/image_files.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -146,8 +146,8 @@ TEST_F(CalibrationFile, PageAndFiguresNameEveryCamera) {
 
 TEST(ImageFit, IsRootMeanSquareAndMeanOfLengths) {
   ImageFit fit;
-  fit.add({3, 4});
-  fit.add({0, 1});
+  fit.add(Eigen::Vector2d(3, 4));
+  fit.add(Eigen::Vector2d(0, 1));
   EXPECT_DOUBLE_EQ(fit.rms_px(), std::sqrt(26.0 / 4));
   EXPECT_DOUBLE_EQ(fit.mean_px(), 3);
   EXPECT_DOUBLE_EQ(fit.deviation_px(), 2);
