@@ -1,5 +1,6 @@
 #include "geometry/camera.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 #include <numbers>
@@ -239,6 +240,28 @@ std::optional<Eigen::Vector3d> viewing_ray(const Intrinsics& k, const Eigen::Vec
   const auto p = unproject(k, pixel);
   if (!p) return std::nullopt;
   return Eigen::Vector3d(p->x(), p->y(), 1).normalized();
+}
+
+Eigen::Matrix<double, 3, 2> tangent_plane(const Eigen::Vector3d& direction) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = direction.unitOrthogonal();
+  basis.col(1) = direction.cross(basis.col(0));
+  return basis;
+}
+
+RayJacobian ray_with_jacobian(const Intrinsics& k, const Eigen::Vector2d& pixel) {
+  RayJacobian result;
+  const auto ray = viewing_ray(k, pixel);
+  if (!ray) return result;
+  const ProjectionJacobian projection = project_with_jacobian(k, *ray);
+  if (!projection.valid) return result;
+  const Eigen::Matrix<double, 3, 2> tangent = tangent_plane(*ray);
+  const Eigen::Matrix2d by_tangent = projection.by_point * tangent;
+  result.ray = *ray;
+  result.by_pixel = tangent * by_tangent.inverse();
+  result.by_intrinsics = -result.by_pixel * projection.by_intrinsics;
+  result.valid = result.by_pixel.allFinite();
+  return result;
 }
 
 }  // namespace megablock

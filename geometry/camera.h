@@ -62,6 +62,19 @@ ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vecto
 // at which the radial polynomial turns back, where a correction folds the image, above the poles of a panorama.
 std::optional<Eigen::Vector3d> viewing_ray(const Intrinsics& k, const Eigen::Vector2d& pixel);
 
+// The ray of viewing_ray with its derivatives by the pixel and by the parameters (fixed ones: zero), by the implicit
+// function theorem: with the tangent basis T of the ray and the projection p, dray = T (p_X T)^-1 (dm - p_k dk).
+struct RayJacobian {
+  bool valid = false;  // otherwise the rest is undefined
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 3, 2> by_pixel;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxIntrinsics> by_intrinsics;
+};
+RayJacobian ray_with_jacobian(const Intrinsics& k, const Eigen::Vector2d& pixel);
+
+// Two unit vectors (columns) that complete the unit vector `direction` to an orthogonal basis.
+Eigen::Matrix<double, 3, 2> tangent_plane(const Eigen::Vector3d& direction);
+
 // The normalised image point (x, y) = (X/Z, Y/Z) of a pixel. Empty as viewing_ray, and where the ray has Z <= 0.
 std::optional<Eigen::Vector2d> unproject(const Intrinsics& k, const Eigen::Vector2d& pixel);
 

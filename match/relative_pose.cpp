@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "geometry/rotation.h"
+#include "geometry/rotation_fit.h"
 
 namespace megablock {
 
@@ -180,14 +181,12 @@ RelativePoseEstimate refine(const RelativePoseEstimate& start, const PointPairs&
 }
 
 Eigen::Quaterniond fit_rotation(const PointPairs& points, const std::vector<std::size_t>& rows) {
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  std::vector<Eigen::Vector3d> from, to;
   for (const std::size_t i : rows) {
-    sum += points.b[i].homogeneous().normalized() * points.a[i].homogeneous().normalized().transpose();
+    from.push_back(points.a[i].homogeneous().normalized());
+    to.push_back(points.b[i].homogeneous().normalized());
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d middle = Eigen::Matrix3d::Identity();
-  middle(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * middle * svd.matrixV().transpose())).normalized();
+  return fit_rotation(from, to);
 }
 
 }  // namespace megablock

@@ -44,9 +44,6 @@ struct TileCheck {
 TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
                      double probability, double variance_factor = 1);
 
-// Upper quantile of the chi-square distribution: P(T > quantile) = probability.
-double chi_square_quantile(double probability, std::int64_t degrees);
-
 // One line per alarm: the seam, its figures, and the tile under it that disagrees most with the rest.
 std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles);
 
