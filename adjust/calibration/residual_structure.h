@@ -1,0 +1,42 @@
+// Whether the residuals of a camera, seen over its sensor, have structure: what a lens does that the model does not
+// say.
+//
+// The sensor is cut into C cells. With n_c residuals in cell c, their mean r_c, and sigma^2 the scatter about the
+// cells' own means, pooled over all cells (2 (n - C) degrees of freedom; structure finer than a cell goes there),
+//
+//     T = sum_c n_c |r_c|^2 / sigma^2
+//
+// is chi-square distributed with 2C - p degrees of freedom if nothing but noise is left: the adjustment has made the
+// residuals orthogonal to the fields of the p parameters of the camera. What poses and points absorb besides makes T
+// smaller, so that the test errs on the side of calling a field clean. sigma is known from many residuals; with few, T
+// over its degrees of freedom is Fisher distributed, and the cells are made larger instead (kPerCell).
+//
+// The part of the mean square of a residual that is structure is (T - (2C - p)) sigma^2 / n; its root is
+// `structure_px`.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "io/report/figures.h"
+
+namespace megablock {
+
+struct ResidualAtPixel {
+  Eigen::Vector2d pixel;     // measured
+  Eigen::Vector2d residual;  // adjusted minus measured, px
+};
+
+struct ResidualStructure {
+  report::ResidualField field;
+  std::int64_t residuals = 0;
+  double statistic = 0, degrees = 0;  // T and 2C - p; degrees 0: too few residuals to tell
+  double probability = 1;             // of a T as large or larger from noise alone
+  double structure_px = 0;            // root mean square of the structure, length of the vectors; 0: none shows
+};
+
+// `parameters`: of the camera that were estimated from these residuals. width, height: of the sensor, px.
+ResidualStructure residual_structure(const std::vector<ResidualAtPixel>& residuals, int width, int height,
+                                     int parameters);
+
+}  // namespace megablock
