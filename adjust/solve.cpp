@@ -105,6 +105,7 @@ AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, con
   for (const DatumDefect& defect : defects) freedom += defect.dimension;
   result.observations = sum.observations;
   result.points = sum.points;
+  result.degrees_of_freedom = freedom;
   result.sigma0 = freedom > 0 ? std::sqrt(sum.squares / static_cast<double>(freedom)) : 0;
   result.text = fmt::format("{} images, {} points, {} observations: sigma0 {:.3f}, {} iterations",
                             problem.images.size(), sum.points, sum.observations, result.sigma0, result.iterations);

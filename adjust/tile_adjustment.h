@@ -46,6 +46,7 @@ struct AdjustSummary {
   double sigma0 = 0;
   int iterations = 0;
   std::int64_t observations = 0, points = 0;
+  std::int64_t degrees_of_freedom = 0;  // residuals - unknowns + datum defect
   std::int64_t rejected = 0;  // observations that take no part in the end (points held out included)
   std::int64_t restored = 0;  // observations that came back in a later round
   bool usable = false;

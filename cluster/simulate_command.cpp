@@ -17,7 +17,8 @@ using Path = SimulationOptions::Path;
 const std::map<std::string, Scene> kScenes = {{"aerial", Scene::kAerial},
                                               {"street", Scene::kStreet},
                                               {"stereopolis", Scene::kStereopolis},
-                                              {"target-field", Scene::kTargetField}};
+                                              {"target-field", Scene::kTargetField},
+                                              {"panorama", Scene::kPanorama}};
 const std::map<std::string, Path> kPaths = {{"single", Path::kSingle}, {"line", Path::kLine},
                                             {"loop", Path::kLoop},     {"s", Path::kS},
                                             {"all", Path::kAll},       {"sparse", Path::kSparse}};
@@ -49,6 +50,7 @@ class SimulateOptions {
     SimulationOptions options = SimulationOptions::of(kScenes.at(scene), kPaths.at(path));
     for (const auto& settle : settle_) settle(options);
     for (const auto member : off_) options.*member = false;
+    if (options.published_camera != 0) options.use_published_camera(options.published_camera);
     return options;
   }
 
@@ -64,7 +66,7 @@ class SimulateOptions {
 
 void add_scene_options(SimulateOptions& s) {
   using O = SimulationOptions;
-  s.add("--frames", &O::frames, "Frames [100; stereopolis 800, target-field 30]");
+  s.add("--frames", &O::frames, "Frames [100; stereopolis 800, target-field 30, panorama 42]");
   s.add("--seed", &O::seed, "Seed [1]");
   s.add("--forward-overlap", &O::forward_overlap, "Aerial: along the row, 0..1 [0.8]");
   s.add("--side-overlap", &O::side_overlap, "Aerial: between rows, 0..1 [0.6]");
@@ -77,6 +79,9 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--days", &O::days, "Stereopolis: days of the drives [2]");
   s.add_switch("--no-bridge", &O::bridge, "Stereopolis: no street passes over another");
   s.add("--vehicle-seed", &O::vehicle_seed, "Stereopolis, target field: seed of cameras and mounts [that of --seed]");
+  s.add("--panorama-radius", &O::panorama_radius_m, "Panorama: mean distance of the points, m [10]");
+  s.add("--depth-spread", &O::depth_spread, "Panorama: distances are that, times 1 +- this [0]");
+  s.add("--off-centre", &O::off_centre_m, "Panorama: projection centre ahead of the point it turns about, m [0]");
   s.add("--mount-position-error", &O::mount_position_error_m,
         "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]");
   s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]");
@@ -84,7 +89,8 @@ void add_scene_options(SimulateOptions& s) {
 
 void add_observation_options(SimulateOptions& s) {
   using O = SimulationOptions;
-  s.add("--points-per-frame", &O::points_per_frame, "Observations per frame [300; stereopolis 200, target-field 350]");
+  s.add("--points-per-frame", &O::points_per_frame,
+        "Observations per frame [300; stereopolis, panorama 200, target-field 350]");
   s.add("--mean-track", &O::mean_track, "Observations per point [5]");
   s.add("--noise", &O::image_noise_px, "Image noise per axis, px [0.5]");
   s.add("--outliers", &O::outlier_share, "Share of wrong observations, 0..1 [0; stereopolis 0.03]");
@@ -92,6 +98,9 @@ void add_observation_options(SimulateOptions& s) {
   s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
   s.add("--focal", &O::focal_px, "Focal length, px [1400]");
   s.add("--camera-model", &O::camera_model, "Camera model, as in a project file [brown]");
+  s.add("--published-camera", &O::published_camera,
+        "True camera of the published simulations, 1 to 4, with its size; aerial, street, panorama");
+  s.add("--start-focal", &O::start_focal, "Focal length that the block starts from, over the nominal one [1]");
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--known-cameras", &O::free_cameras,
                "Stereopolis, target field: cameras are known and held at the truth, mounts are not");

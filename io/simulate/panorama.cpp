@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <numbers>
 
+#include "geometry/camera.h"
 #include "io/simulate/scene.h"
 
 namespace megablock {
@@ -73,6 +75,53 @@ std::vector<Eigen::Vector3d> geodesic_sphere(int times) {
     faces = std::move(finer);
   }
   return points;
+}
+
+namespace {
+
+// Points all around, each seen by whatever image holds it.
+class PanoramaScene : public Scene {
+ public:
+  PanoramaScene(const SimulationOptions& options, const Intrinsics& intrinsics)
+      : options_(options), intrinsics_(intrinsics) {}
+
+  // Behind a random pixel of the frame's image.
+  std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
+    const Eigen::Vector2d pixel(random.uniform(0, options_.image_width), random.uniform(0, options_.image_height));
+    const double distance = options_.panorama_radius_m * (1 + options_.depth_spread * random.uniform(-1, 1));
+    const auto ray = viewing_ray(intrinsics_, pixel);
+    if (!ray) return std::nullopt;
+    const Eigen::Vector3d direction = frame.rotation.conjugate() * *ray;
+    return SurfacePoint{distance * direction, -direction};
+  }
+  bool visible(const Eigen::Vector3d&, const SurfacePoint&) const override { return true; }
+  double range_m() const override { return 3 * options_.panorama_radius_m; }
+  bool along_passes() const override { return false; }
+
+ private:
+  SimulationOptions options_;
+  Intrinsics intrinsics_;
+};
+
+}  // namespace
+
+Layout make_panorama_layout(const SimulationOptions& options) {
+  Layout layout;
+  const CameraIndex camera = add_simulated_camera(options, layout);
+  Rig rig;
+  rig.name = "rig0";
+  rig.mounts.push_back({camera, Pose(), 0, 0});
+  layout.block.rigs.push_back(rig);
+  layout.truth.mounts.push_back({Pose()});
+  const double across = 2 * std::atan(0.5 * options.image_width / options.focal_px),
+               up = 2 * std::atan(0.5 * options.image_height / options.focal_px);
+  double time_s = 0;
+  for (const Eigen::Quaterniond& rotation : panorama_rotations(across, up, options.frames)) {
+    const Eigen::Vector3d ahead = rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    add_simulated_frame(layout, {rotation, options.off_centre_m * ahead}, 0, time_s += 2);
+  }
+  layout.scene = std::make_unique<PanoramaScene>(options, layout.truth.cameras[camera]);
+  return layout;
 }
 
 }  // namespace megablock

@@ -63,6 +63,7 @@ Layout make_aerial_layout(const SimulationOptions& options);
 Layout make_street_layout(const SimulationOptions& options);
 Layout make_stereopolis_layout(const SimulationOptions& options);
 Layout make_target_field_layout(const SimulationOptions& options);
+Layout make_panorama_layout(const SimulationOptions& options);
 
 // Adds a camera: nominal in the block, true in the state (SimulationOptions::distortion, calibrate).
 CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layout);

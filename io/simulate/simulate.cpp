@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "io/error.h"
+#include "io/simulate/panorama.h"
 #include "io/simulate/scene.h"
 #include "io/simulate/trajectory.h"
 
@@ -23,6 +24,10 @@ std::string frame_name(std::int64_t index) {
   return name.str();
 }
 
+bool has_vehicle(SimulationOptions::Scene scene) {
+  return scene == SimulationOptions::Scene::kStereopolis || scene == SimulationOptions::Scene::kTargetField;
+}
+
 }  // namespace
 
 SimulationOptions SimulationOptions::of(Scene scene, Path path) {
@@ -30,6 +35,13 @@ SimulationOptions SimulationOptions::of(Scene scene, Path path) {
   options.scene = scene;
   options.path = path;
   if (scene == Scene::kAerial || scene == Scene::kStreet) return options;
+  if (scene == Scene::kPanorama) {
+    options.frames = 42;
+    options.points_per_frame = 200;
+    options.gps_sigma_m = 0;
+    options.start_position_error_m = -1;
+    return options;
+  }
   options.rig_cameras = 10;
   options.image_height = 1080;
   options.points_per_frame = 200;
@@ -51,6 +63,16 @@ SimulationOptions SimulationOptions::of(Scene scene, Path path) {
     options.control_sigma_m = 0.002;
   }
   return options;
+}
+
+void SimulationOptions::use_published_camera(int number) {
+  const auto count = static_cast<int>(published_cameras().size());
+  require(number >= 1 && number <= count, "published_camera must lie in [1, " + std::to_string(count) + "]");
+  const PublishedCamera& camera = published_cameras()[static_cast<std::size_t>(number - 1)];
+  published_camera = number;
+  image_width = camera.width;
+  image_height = camera.height;
+  focal_px = camera.truth[kFocal];
 }
 
 void SimulationOptions::check() const {
@@ -78,6 +100,11 @@ void SimulationOptions::check() const {
   require(control_zones == 0 || scene == Scene::kStereopolis, "control_zones are those of the stereopolis scene");
   require(mount_position_error_m >= 0 && mount_rotation_error_deg >= 0 && mount_rotation_error_deg < 10,
           "mount errors must not be negative, mount_rotation_error_deg below 10");
+  require(panorama_radius_m > 0, "panorama_radius_m must be positive");
+  require(depth_spread >= 0 && depth_spread < 0.9, "depth_spread must lie in [0, 0.9)");
+  require(std::abs(off_centre_m) < 0.05 * panorama_radius_m, "off_centre_m must be below 5 % of panorama_radius_m");
+  require(start_focal > 0.2 && start_focal < 5, "start_focal must lie in (0.2, 5)");
+  require(published_camera == 0 || !has_vehicle(scene), "published_camera is not for scenes with the vehicle's rig");
   require(points_per_frame >= 10, "points_per_frame must be at least 10");
   require(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");
   require(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");
@@ -106,6 +133,7 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
   camera.intrinsics = start_intrinsics(model, options.focal_px, options.image_width, options.image_height);
 
   Intrinsics truth = camera.intrinsics;
+  if (!is_fixed(model, kFocal)) camera.intrinsics[kFocal] *= options.start_focal;
   const IntrinsicSigmas weak = weak_sigmas(truth, 0.01 * options.focal_px, options.image_width);
   const auto estimated = [&](int parameter) { return weak[static_cast<std::size_t>(parameter)] > 0; };
   if (options.calibrate) {
@@ -123,6 +151,8 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
     truth[kDecentring1] = random.uniform(-4e-4, 4e-4);
     truth[kDecentring2] = random.uniform(-4e-4, 4e-4);
   }
+  if (options.published_camera > 0)
+    truth = published_cameras()[static_cast<std::size_t>(options.published_camera - 1)].truth;
   if (options.calibrate) {
     constexpr double kFree = std::numeric_limits<double>::infinity();
     if (model == CameraModel())
@@ -172,6 +202,8 @@ Layout make_layout(const SimulationOptions& options) {
       return make_street_layout(options);
     case SimulationOptions::Scene::kStereopolis:
       return make_stereopolis_layout(options);
+    case SimulationOptions::Scene::kPanorama:
+      return make_panorama_layout(options);
     case SimulationOptions::Scene::kTargetField:
       break;
   }

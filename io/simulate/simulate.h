@@ -11,7 +11,7 @@
 namespace megablock {
 
 struct SimulationOptions {
-  enum class Scene { kAerial, kStreet, kStereopolis, kTargetField } scene = Scene::kAerial;
+  enum class Scene { kAerial, kStreet, kStereopolis, kTargetField, kPanorama } scene = Scene::kAerial;
   // Target field: how the vehicle moves (docs/simulate.md).
   enum class Path { kSingle, kLine, kLoop, kS, kAll, kSparse } path = Path::kS;
   // The defaults of a scene (and of a path on the target field); those below are of the aerial and the street scene.
@@ -41,6 +41,9 @@ struct SimulationOptions {
   std::uint64_t vehicle_seed = 0;  // Stereopolis, target field: seed of cameras and mounts; 0: `seed`
   // Stereopolis, target field: sigmas per axis of the given mounts, which are also stated; 0: held at the truth.
   double mount_position_error_m = 0.005, mount_rotation_error_deg = 0.5;
+  // Panorama: a camera turned about a point (panorama_rotations), from which the projection centre lies off_centre_m
+  // ahead; distances of the points are panorama_radius_m times 1 +- depth_spread.
+  double panorama_radius_m = 10, depth_spread = 0, off_centre_m = 0;
   // Observations.
   int points_per_frame = 300;  // observations per frame
   double mean_track = 5;
@@ -58,10 +61,15 @@ struct SimulationOptions {
   int image_width = 1920, image_height = 1280;
   double focal_px = 1400;
   std::string camera_model = "brown";
+  int published_camera = 0;  // 1 to 4: the true camera is one of panorama.h; see use_published_camera. 0: none
+  double start_focal = 1;    // focal length that the block starts from, over the nominal one
   bool distortion = true;    // true camera has k1, k2, p1, p2 (other models: all terms); the block starts from zero
   bool calibrate = true;     // camera parameters free (else held at the truth)
   bool free_cameras = true;  // Stereopolis, target field: cameras free (else held at the truth, mounts as `calibrate`)
-  void check() const;        // throws InputError
+  // Aerial, street, panorama: the true camera is that of the published simulations (1 to 4), with its size and focal
+  // length. Throws InputError for another number.
+  void use_published_camera(int number);
+  void check() const;  // throws InputError
 };
 
 // What a simulated observation shows.

@@ -1,0 +1,26 @@
+// A connected part of a block, small enough to be adjusted many times.
+#pragma once
+
+#include "io/block.h"
+#include "io/tracks.h"
+
+namespace megablock {
+
+struct BlockSampleOptions {
+  std::int64_t max_frames = 60;           // frames
+  std::int64_t max_observations = 60000;  // of tie points; of more tracks every second, third ... is taken
+  void check() const;                     // throws InputError
+};
+
+struct BlockSample {
+  BlockState state;  // frames outside of the sample are not oriented
+  TrackSet tracks;   // their observations in the sample, two or more frames each
+  std::int64_t frames = 0, images = 0;
+};
+
+// Grown from the oriented frame with most observations, always by the frame that shares most tracks with those taken
+// (ties: the lower index). Throws InputError when no two oriented frames share tracks.
+BlockSample sample_block(const Block& block, const BlockState& state, const TrackSet& tracks,
+                         const BlockSampleOptions& options);
+
+}  // namespace megablock

@@ -1,0 +1,80 @@
+// Which camera model the images ask for (Cannelle 2013, 2.2: "the right one is the smallest whose residual field has no
+// structure").
+//
+// One block, one set of measurements, one weight for all of them; models of growing order in turn, each with poses,
+// points, free mounts and cameras adjusted in least squares without any robust loss. Which measurements take part is
+// settled before, with the richest model, so that no model chooses its own data. Every camera of the block gets the
+// model of the trial, and its residuals a test of their own (residual_structure.h). Of the models that leave a field
+// without structure the one with fewest parameters is recommended; the lowest RMS is always that of the largest model
+// and says nothing.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "adjust/calibration/block_sample.h"
+#include "adjust/calibration/residual_structure.h"
+#include "adjust/tile_adjustment.h"
+
+namespace megablock {
+
+// A model, of whose radial terms only the first ones are estimated.
+struct ModelCandidate {
+  CameraModel model;
+  ParameterMask free = 0;
+  std::string name;  // "brown", "ign-radial/2": with two radial terms (and no decentring)
+  int parameters() const { return count_of(free); }
+};
+
+// Throws InputError for what is no model or has fewer radial terms.
+ModelCandidate find_candidate(const std::string& name);
+// Candidates for a camera of this kind in the order of their parameters: fisheyes for fisheyes, else pinhole, radial
+// corrections of one to three terms and more, Brown's model and parts of it, polynomials, Legendre polynomials, Fourier
+// series, fisheye. Throws InputError for a stitched panorama, which has no lens.
+std::vector<ModelCandidate> default_candidates(const CameraModel& given);
+
+struct ModelComparisonOptions {
+  AdjustOptions adjustment;
+  BlockSampleOptions sample;
+  double probability = 0.01;  // a field of which noise makes as much less often has structure
+  int max_iterations = 60;    // of a trial
+  void check() const;         // throws InputError
+};
+
+// One camera in a trial.
+struct ModelFigures {
+  Intrinsics camera;
+  double rms_px = 0;  // of the lengths of the residuals
+  ResidualStructure structure;
+};
+
+struct ModelTrial {
+  ModelCandidate candidate;
+  std::string failure;  // why there are no figures; empty: there are
+  std::int64_t degrees_of_freedom = 0;
+  double rms_px = 0, sigma_px = 0;    // of all cameras; sigma: per axis, squares over degrees of freedom
+  std::vector<ModelFigures> cameras;  // [ModelComparison::cameras]
+};
+
+struct ModelComparison {
+  std::vector<CameraIndex> cameras;  // of the sample
+  std::vector<ModelTrial> trials;    // by number of parameters
+  // [cameras] row of trials: the smallest without structure; where every model leaves some, that which leaves least
+  // (no other one less by a tenth and smaller).
+  std::vector<int> recommended;
+  std::vector<std::uint8_t> without_structure;  // [cameras] 0: every model leaves structure
+  double probability = 0;
+  std::int64_t frames = 0, images = 0, points = 0, observations = 0;
+};
+
+// `state`: poses to start from. `tracks`: measurements, wrong ones are screened out. Throws InputError when there is
+// nothing to compare, ComputeError when no model can be adjusted.
+ModelComparison compare_models(const Block& block, const BlockState& state, const TrackSet& tracks,
+                               const std::vector<ModelCandidate>& candidates, const ModelComparisonOptions& options);
+
+// One line per model: parameters, RMS, degrees of freedom, structure.
+std::string comparison_table(const ModelComparison& comparison, std::size_t camera);
+// A page with the table and the residual vectors over the sensor.
+std::string comparison_page(const ModelComparison& comparison, const Block& block, const std::string& source);
+
+}  // namespace megablock
