@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "cluster/camera_modes.h"
 #include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
 
@@ -53,6 +54,8 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   command->footer(
       "Example: megablock calibrate field.yaml -o calibration --mode off-line\n"
       "         megablock calibrate drive.yaml -o calibration --mode on-line --verify site.yaml\n"
+      "         megablock calibrate --panoramic panorama.yaml -o calibration\n"
+      "         megablock calibrate --compare-models job -o models\n"
       "Then: 'calibration: calibration/calibration.yaml' in the project file of any block of this rig");
   command->add_option("project", options->project, "Project file")->required();
   command->add_option("-o,--output", options->directory, "Folder for the calibration and its page")
@@ -62,6 +65,8 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   add_rig_options(*command, *settings);
   auto modes = std::make_shared<std::vector<CalibrateMode>>();  // each added here by a function of its own file
+  modes->push_back(add_panoramic(*command));
+  modes->push_back(add_compare_models(*command));
   command->callback([=, &action, &ranks] {
     action = [options, settings, modes, &ranks] {
       for (const CalibrateMode& mode : *modes)

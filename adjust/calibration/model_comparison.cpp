@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "adjust/calibration/camera_fit.h"
+#include "adjust/calibration/loose_sigmas.h"
+#include "adjust/calibration/rig_observations.h"
 #include "adjust/linearise.h"
 #include "io/error.h"
 
@@ -93,16 +95,9 @@ class Comparer {
   // The block's own models, wrong measurements screened out.
   void prepare(const BlockState& state, const TrackSet& tracks) {
     const BlockSample sample = sample_block(block_, state, tracks, options_.sample);
-    Tiles one;
-    one.tile_count = 1;
-    one.tile_of_frame.assign(block_.frames.size(), TileIndex(0));
-    one.component.assign(block_.frames.size(), 0);
-    problem_ =
-        make_tile_problem(block_, sample.state, one, TileIndex(0), sample.tracks, options_.adjustment.observations);
-    start_ = make_tile_state(
-        problem_, sample.state,
-        std::vector<Eigen::Vector3d>(problem_.points.size(), Eigen::Vector3d::Constant(report::kUnknown)));
-    adjust_tile(problem_, start_, options_.adjustment);
+    WholeBlock whole = adjust_whole(block_, sample.state, sample.tracks, options_.adjustment);
+    problem_ = std::move(whole.problem);
+    start_ = std::move(whole.state);
     given_ = start_.cameras;
     result_.cameras = problem_.cameras;
     result_.frames = sample.frames;
@@ -115,7 +110,6 @@ class Comparer {
   // The problem with every camera of the candidate's model, weakly held where nothing else determines it, and the state
   // with these cameras as near to the given ones as they come.
   TileProblem problem_of(const ModelCandidate& candidate, TileState& state) const {
-    constexpr double kWeaker = 10;  // than weak_sigmas
     TileProblem problem = problem_;
     problem.intrinsic_priors.clear();
     for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
@@ -123,11 +117,9 @@ class Comparer {
           fit_camera(candidate.model, candidate.free, given_[c], camera(c).width, camera(c).height).camera;
       problem.camera_free[c] = candidate.free;
       TileProblem::IntrinsicTerm term{LocalCamera(static_cast<std::int32_t>(c)), state.cameras[c], {}};
-      term.sigma = weak_sigmas(state.cameras[c], 0, camera(c).width);
-      for (int p = 0; p < state.cameras[c].size(); ++p) {
-        double& sigma = term.sigma[static_cast<std::size_t>(p)];
-        sigma = contains(candidate.free, p) ? kWeaker * sigma : 0;
-      }
+      term.sigma = loose_sigmas(state.cameras[c], camera(c).width, camera(c).height);
+      for (int p = 0; p < state.cameras[c].size(); ++p)
+        if (!contains(candidate.free, p)) term.sigma[static_cast<std::size_t>(p)] = 0;
       problem.intrinsic_priors.push_back(term);
     }
     return problem;

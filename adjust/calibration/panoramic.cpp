@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "adjust/calibration/loose_sigmas.h"
 #include "adjust/calibration/panoramic_system.h"
 #include "adjust/rotation_averaging.h"
 #include "geometry/chi_square.h"
@@ -115,14 +116,20 @@ class Calibration {
 
   PanoramicSystem& system() { return system_; }
 
-  // Rounds of linearisation, screening and adjustment, until nothing moves.
-  void adjust(PanoramicState& state, ParameterMask free, bool screening) {
+  // Linearises anew, screens at `width` times the threshold, and adjusts; the same again until nothing moves.
+  void adjust(PanoramicState& state, ParameterMask free, double width) {
     constexpr int kMaxRounds = 12;
     for (int round = 0; round < kMaxRounds; ++round) {
       system_.linearise_at(state);
-      const std::int64_t changed = screening ? system_.screen(state, threshold(state, free)) : 0;
+      const std::int64_t changed = system_.screen(state, width * threshold(state, free));
       if (changed > 0) system_.linearise_at(state);
       if (solve(state, free) && changed == 0) return;
+    }
+  }
+  void adjust_without_screening(PanoramicState& state, ParameterMask free) {
+    for (int round = 0; round < 3; ++round) {
+      system_.linearise_at(state);
+      if (solve(state, free)) return;
     }
   }
 
@@ -136,6 +143,9 @@ class Calibration {
   // Of the free parameters and rotations for unit noise; scaled to unit diagonal before it is inverted.
   Eigen::MatrixXd covariance(const PanoramicState& state, ParameterMask free) const {
     const Eigen::MatrixXd normal = system_.normal(state, free).matrix;
+    if (normal.size() == 0)
+      throw ComputeError("the images do not determine the model " + model_name(state.camera.model()) +
+                         ": its correction folds the image; turn the camera by larger angles, or take a smaller model");
     const Eigen::VectorXd scale = scale_of(normal);
     return scale.asDiagonal() * inverse(scale.asDiagonal() * normal * scale.asDiagonal()) * scale.asDiagonal();
   }
@@ -164,6 +174,7 @@ class Calibration {
     double damping = 1e-4;
     bool settled_at_once = false;
     PanoramicSystem::Normal normal = system_.normal(state, free);
+    if (!std::isfinite(normal.cost)) return false;  // some pixels have no ray: linearised anew, they are left out
     for (int step = 0; step < kMaxSteps; ++step) {
       const Eigen::VectorXd scale = scale_of(normal.matrix);
       const Eigen::MatrixXd scaled = scale.asDiagonal() * normal.matrix * scale.asDiagonal();
@@ -179,6 +190,7 @@ class Calibration {
       if (system_.cost(next) < normal.cost) {
         state = next;
         normal = system_.normal(state, free);
+        if (!std::isfinite(normal.cost)) return false;
         damping = std::max(1e-12, 0.1 * damping);
       } else {
         damping *= 10;
@@ -191,13 +203,6 @@ class Calibration {
   const PanoramicOptions& options_;
   PanoramicSystem system_;
 };
-
-// Ten times the weak sigmas; none of the focal length.
-PanoramicPrior weak_prior(const Intrinsics& start, int width, double image_sigma_px) {
-  PanoramicPrior prior{start, weak_sigmas(start, 0, width), image_sigma_px};
-  for (double& sigma : prior.sigma) sigma *= 10;
-  return prior;
-}
 
 ParameterMask estimated(const Intrinsics& start, ParameterMask held) {
   ParameterMask free = 0;
@@ -355,6 +360,7 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
         fmt::format("no two of the {} images share {} homologous points; turn the camera by less than its field of "
                     "view between images, or match them again",
                     tracks.images.size(), options.min_common));
+  constexpr double kRough = 4;
   PanoramicResult result;
   result.free = estimated(start, held);
   result.linked.assign(tracks.images.size(), 0);
@@ -362,12 +368,15 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   PanoramicState state = start_state(camera, start_rotations(tracks, pairs, camera), result.linked);
   warn_of_left_out(tracks, options, result);
 
-  const PanoramicPrior prior = weak_prior(start, width, options.image_sigma_px);
+  const PanoramicPrior prior{start, loose_sigmas(start, width, height), options.image_sigma_px};
   Calibration calibration(tracks, result.linked, prior, options);
   calibration.system().linearise_at(state);
   require_freedom(tracks, start, calibration.freedom(result.free));
+  // Where a circle closes, a focal length that is off by little pulls right measurements far apart: once it is known
+  // they are given a chance to come back.
   for (const ParameterMask free : {ParameterMask{0}, leading(start.model(), result.free), result.free})
-    calibration.adjust(state, free, true);
+    calibration.adjust(state, free, kRough);
+  for (const double wider : {64.0, 16.0, 4.0, 1.0}) calibration.adjust(state, result.free, wider);
   require_freedom(tracks, start, calibration.freedom(result.free));
 
   result.camera = state.camera;
@@ -380,7 +389,7 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   warn_of_structure(options, result);
 
   PanoramicState before{start, state.rotations};
-  calibration.adjust(before, 0, false);
+  calibration.adjust_without_screening(before, 0);
   result.start_rms_px = rms_of(calibration.system().residuals(before));
   if (!(result.rms_px < result.start_rms_px))
     throw ComputeError(

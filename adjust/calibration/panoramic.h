@@ -21,8 +21,7 @@
 //
 // Start. Focal length: of the given one times 2^-1 to 2^1, that with which pairs of images agree best under rotations
 // of their own; rotations of pairs are then averaged (rotation_averaging.h). Rotations alone, then focal length and
-// first radial term, then everything. Priors ten times weak_sigmas() (geometry/intrinsics.h) keep parameters that the
-// images do not determine from running away; they say nothing about those that they do.
+// first radial term, then everything; loose priors (loose_sigmas.h) hold what the images do not determine.
 #pragma once
 
 #include <Eigen/Core>

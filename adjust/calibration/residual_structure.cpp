@@ -14,11 +14,11 @@ constexpr int kMostCells = 16;   // along the longer side
 constexpr int kFewestCells = 3;
 
 // Square cells, as many as the residuals allow.
-report::ResidualField empty_field(std::size_t residuals, int width, int height) {
+ResidualField empty_field(std::size_t residuals, int width, int height) {
   const double area = static_cast<double>(width) * height, longer = std::max(width, height);
   const double cells = std::max(1.0, static_cast<double>(residuals) / kPerCell);
   const double side = std::max(std::sqrt(area / cells), longer / kMostCells);
-  report::ResidualField field;
+  ResidualField field;
   field.columns = std::max(kFewestCells, static_cast<int>(width / side));
   field.rows = std::max(kFewestCells, static_cast<int>(height / side));
   const auto count = static_cast<std::size_t>(field.columns * field.rows);
@@ -32,7 +32,7 @@ report::ResidualField empty_field(std::size_t residuals, int width, int height) 
 ResidualStructure residual_structure(const std::vector<ResidualAtPixel>& residuals, int width, int height,
                                      int parameters) {
   ResidualStructure result;
-  report::ResidualField& field = result.field = empty_field(residuals.size(), width, height);
+  ResidualField& field = result.field = empty_field(residuals.size(), width, height);
   double squares = 0;
   for (const ResidualAtPixel& r : residuals) {
     const int column = std::clamp(static_cast<int>(r.pixel.x() / width * field.columns), 0, field.columns - 1);

@@ -18,7 +18,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "io/report/figures.h"
+#include "io/residual_field.h"
 
 namespace megablock {
 
@@ -28,7 +28,7 @@ struct ResidualAtPixel {
 };
 
 struct ResidualStructure {
-  report::ResidualField field;
+  ResidualField field;
   std::int64_t residuals = 0;
   double statistic = 0, degrees = 0;  // T and 2C - p; degrees 0: too few residuals to tell
   double probability = 1;             // of a T as large or larger from noise alone
