@@ -3,6 +3,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -20,6 +22,14 @@
 namespace megablock {
 
 namespace {
+
+JobStore output_folder(const RunOptions& run) {
+  std::error_code error;
+  std::filesystem::create_directories(run.directory, error);
+  if (!std::filesystem::is_directory(run.directory))
+    throw InputError(run.directory + ": the folder cannot be made; check the path and its permissions");
+  return JobStore(std::filesystem::absolute(run.directory).string());
+}
 
 struct PanoramicSettings {
   bool chosen = false;
@@ -86,6 +96,11 @@ CameraCalibration calibration_of(const Camera& camera, const Intrinsics& start, 
   return calibration;
 }
 
+void add_to(RigFit& fit, double rms_px, std::int64_t observations) {
+  fit.images.squares += rms_px * rms_px * static_cast<double>(observations);
+  fit.images.observations += observations;
+}
+
 int calibrate_panoramic_cameras(const PanoramicSettings& settings, const RunOptions& run) {
   const CalibrationInput input = read_calibration_input(run.project, JobTracks::kAll);
   PanoramicOptions options;
@@ -94,7 +109,6 @@ int calibrate_panoramic_cameras(const PanoramicSettings& settings, const RunOpti
   RigCalibration calibration;
   calibration.project = run.project;
   calibration.mode = "panoramic";
-  std::string refused;
   for (CameraIndex c(0); input.block.cameras.contains(c); ++c.value) {
     const Camera& camera = input.block.cameras[c];
     try {
@@ -103,14 +117,16 @@ int calibrate_panoramic_cameras(const PanoramicSettings& settings, const RunOpti
           calibrate_panoramic(tracks_of(input, c), start, camera.width, camera.height, options);
       std::printf("%s", text_of(camera, start, result).c_str());
       calibration.cameras.push_back(calibration_of(camera, start, result));
+      calibration.frames += std::count(result.linked.begin(), result.linked.end(), 1);
+      add_to(calibration.before, result.start_rms_px, result.observations);
+      add_to(calibration.after, result.rms_px, result.observations);
     } catch (const InputError& error) {
       throw InputError(camera.name + ": " + error.what());
     } catch (const ComputeError& error) {
       throw ComputeError(camera.name + ": " + error.what());
     }
   }
-  const JobStore folder(std::filesystem::absolute(run.directory).string());
-  folder.create();
+  const JobStore folder = output_folder(run);
   folder.write_text("calibration.yaml", calibration_yaml(calibration, kProgram));
   std::printf("%s\n", folder.path("calibration.yaml").c_str());
   return kExitDone;
@@ -142,8 +158,7 @@ int compare_camera_models(const ComparisonSettings& settings, const RunOptions& 
   for (std::size_t c = 0; c < comparison.cameras.size(); ++c)
     std::printf("%s\n%s", input.block.cameras[comparison.cameras[c]].name.c_str(),
                 comparison_table(comparison, c).c_str());
-  const JobStore folder(std::filesystem::absolute(run.directory).string());
-  folder.create();
+  const JobStore folder = output_folder(run);
   folder.write_text("models.html", comparison_page(comparison, input.block, run.project));
   std::printf("%s\n", folder.path("models.html").c_str());
   return kExitDone;

@@ -105,7 +105,8 @@ std::string calibration_yaml(const RigCalibration& calibration, const std::strin
       program, calibration.project, calibration.mode, calibration.frames, calibration.after.images.observations,
       calibration.after.images.rms_px(), calibration.before.images.rms_px());
   for (const CameraCalibration& camera : calibration.cameras) text += camera_yaml(camera);
-  text += "mounts:  # X_cam = rotation X_rig + translation; rotation vectors in radians, metres; posterior sigmas\n";
+  if (!calibration.mounts.empty())
+    text += "mounts:  # X_cam = rotation X_rig + translation; rotation vectors in radians, metres; posterior sigmas\n";
   for (const MountCalibration& mount : calibration.mounts) text += mount_yaml(mount);
   return text;
 }

@@ -391,7 +391,8 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   PanoramicState before{start, state.rotations};
   calibration.adjust_without_screening(before, 0);
   result.start_rms_px = rms_of(calibration.system().residuals(before));
-  if (!(result.rms_px < result.start_rms_px))
+  constexpr double kSame = 1 + 1e-6;  // a start that is the optimum is found again
+  if (!(result.rms_px <= kSame * result.start_rms_px))
     throw ComputeError(
         fmt::format("the calibration (RMS {:.3f} px) is not better than its start ({:.3f} px), which is kept",
                     result.rms_px, result.start_rms_px));
