@@ -1,17 +1,14 @@
 // Intersection and screening of single points at held poses.
 //
 // A point is settled as follows. When all kept rays pass the test at the current point, only rejected rays that pass
-// as well come back. Otherwise every pair of rays (a fixed number of them for long tracks) proposes a point; the one
-// with the least truncated cost sum min(r^2, t^2) is refined with the rays that pass, and these are kept: when the
-// observations split into consistent parts, that is the larger part.
+// as well come back. Otherwise the largest consistent part of its rays is kept (consistent_rays.h).
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <random>
 
+#include "adjust/consistent_rays.h"
 #include "adjust/tile_adjustment.h"
 #include "geometry/triangulation.h"
 #include "io/error.h"
@@ -20,9 +17,7 @@ namespace megablock {
 
 namespace {
 
-constexpr int kMaxPairs = 36;  // all pairs of nine rays
-constexpr double kGenerous =
-    1.5;  // times the threshold: for points of two rays, which are less exact than those of all
+constexpr double kGenerous = 1.5;  // times the threshold: for a point that may stay where the adjustment put it
 const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 class PointSettler {
@@ -76,7 +71,6 @@ class PointSettler {
   void load(std::int64_t p) {
     rows_.clear();
     views_.clear();
-    rays_.clear();
     kept_.clear();
     for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
       const LocalImage local = problem_.image[row];
@@ -104,13 +98,7 @@ class PointSettler {
       kept_[i] = known && kept_[i] && std::isfinite(residual(i, state_.points[p]));
   }
 
-  // Length of the residual in sigmas; infinite behind the camera.
-  double residual(std::size_t i, const Eigen::Vector3d& point) const {
-    const PointView& view = views_[i];
-    const double length =
-        view.inverse_sigma * reprojection(*view.intrinsics, to_inside(view.camera, point), view.pixel).norm();
-    return std::isfinite(length) ? length : std::numeric_limits<double>::infinity();
-  }
+  double residual(std::size_t i, const Eigen::Vector3d& point) const { return residual_sigmas(views_[i], point); }
   bool passes_all_kept(const Eigen::Vector3d& point, double threshold) const {
     for (std::size_t i = 0; i < views_.size(); ++i)
       if (kept_[i] && !(residual(i, point) <= threshold)) return false;
@@ -127,89 +115,17 @@ class PointSettler {
   }
 
   bool settle_by_parts(std::int64_t p, double threshold) {
-    if (views_.size() < 2) return false;
-    make_rays();
-    Eigen::Vector3d best = kNowhere;
-    double best_cost = std::numeric_limits<double>::infinity();
-    for (const auto& [a, b] : pairs(p)) {
-      if (!rays_[a] || !rays_[b]) continue;
-      const std::array<Ray, 2> two{*rays_[a], *rays_[b]};
-      const auto point = intersect_rays(two);
-      if (!point) continue;
-      const double cost = truncated_cost(*point, threshold);
-      if (cost < best_cost) best_cost = cost, best = *point;
-    }
-    if (!best.allFinite()) return false;
-    return keep_around(p, best, threshold);
-  }
-
-  // Refines with the rays that pass until they no longer change.
-  bool keep_around(std::int64_t p, Eigen::Vector3d point, double threshold) {
-    constexpr int kRounds = 4;
-    std::vector<std::uint8_t> passing(views_.size()), before;
-    for (int round = 0; round < kRounds; ++round) {
-      std::vector<PointView> used;
-      for (std::size_t i = 0; i < views_.size(); ++i) {
-        passing[i] = residual(i, point) <= (round == 0 ? kGenerous * threshold : threshold);
-        if (passing[i]) used.push_back(views_[i]);
-      }
-      if (used.size() < 2) return false;
-      if (round > 0 && passing == before) break;
-      const auto refined = refine_point(point, used);
-      if (!refined) return false;
-      point = refined->position;
-      before = passing;
-    }
-    for (std::size_t i = 0; i < views_.size(); ++i) passing[i] = passing[i] && residual(i, point) <= threshold;
-    if (std::count(passing.begin(), passing.end(), 1) < 2) return false;
-    kept_ = passing;
-    state_.points[p] = point;
+    const auto part = find_consistent_rays(views_, threshold, static_cast<std::uint64_t>(problem_.points[p].index));
+    if (!part) return false;
+    kept_ = part->passing;
+    state_.points[p] = part->point;
     return true;
-  }
-
-  void make_rays() {
-    for (const PointView& view : views_) rays_.push_back(ground_ray(view.camera, *view.intrinsics, view.pixel));
-  }
-
-  double truncated_cost(const Eigen::Vector3d& point, double threshold) const {
-    const double most = threshold * threshold;
-    double sum = 0;
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      const double r = residual(i, point);
-      sum += std::min(r * r, most);
-    }
-    return sum;
-  }
-
-  // All pairs of rays; of long tracks a fixed number, drawn with the point's own seed.
-  std::vector<std::pair<std::size_t, std::size_t>> pairs(std::int64_t p) const {
-    const std::size_t n = views_.size();
-    std::vector<std::pair<std::size_t, std::size_t>> result;
-    if (n * (n - 1) / 2 <= kMaxPairs) {
-      for (std::size_t a = 0; a < n; ++a)
-        for (std::size_t b = a + 1; b < n; ++b) result.emplace_back(a, b);
-      return result;
-    }
-    std::mt19937_64 random(static_cast<std::uint64_t>(problem_.points[p].index));
-    while (result.size() < kMaxPairs) {
-      const std::size_t a = random() % n, b = random() % n;
-      if (a != b) result.emplace_back(a, b);
-    }
-    return result;
   }
 
   // Rays that meet at too small an angle do not fix the distance of the point: it is held out.
   void hold_out_narrow(std::int64_t p) {
-    if (prior_[p] != nullptr) return;
-    std::vector<Eigen::Vector3d> directions;
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      if (!kept_[i]) continue;
-      const Eigen::Vector3d direction = (state_.points[p] - views_[i].camera.centre).normalized();
-      for (const Eigen::Vector3d& other : directions)
-        if (direction.dot(other) <= cos_min_angle_) return;
-      directions.push_back(direction);
-    }
-    std::fill(kept_.begin(), kept_.end(), 0);
+    if (prior_[p] == nullptr && !meet_wider_than(views_, kept_, state_.points[p], cos_min_angle_))
+      std::fill(kept_.begin(), kept_.end(), 0);
   }
 
   TileProblem& problem_;
@@ -220,7 +136,6 @@ class PointSettler {
   // Of the point at hand:
   std::vector<std::int64_t> rows_;
   std::vector<PointView> views_;
-  std::vector<std::optional<Ray>> rays_;
   std::vector<std::uint8_t> kept_;
 };
 

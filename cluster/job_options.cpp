@@ -90,6 +90,7 @@ void describe(Visitor& visit, MergeSettings& o) {
   visit.integer("max_iterations", o.max_iterations);
   visit.number("decrement", o.decrement);
   visit.integer("screening_rounds", o.screening_rounds);
+  visit.flag("estimate_sigmas", o.estimate_sigmas);
   visit.flag("scale_sigma", o.scale_sigma);
 }
 

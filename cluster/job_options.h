@@ -22,6 +22,9 @@ struct MergeSettings {
   int max_iterations = 50;   // global Levenberg-Marquardt steps per round
   double decrement = 1e-4;   // Newton decrement at which the block is adjusted (merge.md, 5)
   int screening_rounds = 2;  // re-tests of kept/rejected after convergence
+  // Sigmas of positions, attitudes and relative poses from their residuals (adjust/sigma_scales.h), in at most ten
+  // rounds.
+  bool estimate_sigmas = false;
   bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
   void check() const;        // throws InputError
 };

@@ -10,6 +10,7 @@
 #include "adjust/ceres_problem.h"
 #include "adjust/image_sigma.h"
 #include "adjust/linearise.h"
+#include "adjust/sigma_scales.h"
 #include "cluster/job_options.h"
 #include "io/error.h"
 #include "io/result.h"
@@ -44,6 +45,9 @@ SingleTile single_tile(const BlockResult& result, const ObservationOptions& opti
   single.problem = make_tile_problem(result.block, result.state, one, TileIndex(0), result.tracks, options);
   TileProblem& problem = single.problem;
   set_image_sigma(problem, result.image_sigma_px);
+  SigmaScales scales;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] = result.observation_table.kinds[k].scale;
+  scale_sigmas(problem, scales);
   std::vector<Eigen::Vector3d> points = result.points;
   for (std::size_t row = 0; row < result.kept.size(); ++row) problem.kept[row] &= result.kept[row];
   for (std::size_t p = points.size(); p < problem.points.size(); ++p) {

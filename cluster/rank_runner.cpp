@@ -336,6 +336,10 @@ RankRunner::Posterior RankRunner::posterior() {
   ranks_.flush_sends();
   with_columns_ = false;
   posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
+  std::vector<ObservationTable> tables;
+  for (const TileCovariance& covariance : posterior.covariances) tables.push_back(covariance.observations);
+  for (const ObservationTable& table : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, tables))
+    posterior.observations.add(table);
 
   ByteWriter writer;
   writer.values(seams_);

@@ -51,6 +51,7 @@ class RankRunner : public TreeRunner {
     std::vector<SeamReport> seams;            // of all inner nodes, in node order; on every rank
     std::vector<TileCheck> tile_checks;       // of all tiles, in tile order; on every rank
     std::vector<TileCovariance> covariances;  // of this rank's tiles
+    ObservationTable observations;            // of the whole block, on every rank
   };
   Posterior posterior();
 

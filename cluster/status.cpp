@@ -65,6 +65,19 @@ Json failures_json(const Json& job, const std::vector<StageStatus>& stages, cons
   return list;
 }
 
+Json observation_kinds(const ObservationTable& table) {
+  Json kinds = Json::object();
+  for (std::size_t k = 0; k < kObservationKinds; ++k) {
+    const ObservationStatistics& s = table.kinds[k];
+    if (s.count == 0) continue;
+    const double factor = s.sigma_factor();
+    kinds[word_of(static_cast<ObservationKind>(k))] = {{"count", s.count},
+                                                       {"redundancy", s.redundancy},
+                                                       {"sigma_factor", std::isfinite(factor) ? Json(factor) : Json()}};
+  }
+  return kinds;
+}
+
 void add_figures(Json& json, const BlockResult& result) {
   const ReprojectionStatistics statistics = reprojection_statistics(result);
   json["images"] = result.block.images.size();
@@ -76,6 +89,7 @@ void add_figures(Json& json, const BlockResult& result) {
   json["rms_reprojection_px"] = statistics.rms_px;
   json["chi2_per_dof"] = result.variance_factor;
   json["image_sigma_px"] = result.image_sigma_px;
+  json["observation_kinds"] = observation_kinds(result.observation_table);
   json["tiles"] = result.tiles.tile_count;
   json["boundary_frames"] = std::count(result.boundary.begin(), result.boundary.end(), 1);
   json["global_iterations"] = result.global_iterations;
@@ -96,7 +110,7 @@ Json status(const JobStore& store) {
   Json json{{"job", store.directory()}, {"stages", stages_json(store, stages)}};
   for (const char* key :
        {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px", "rms_reprojection_px",
-        "chi2_per_dof", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
+        "chi2_per_dof", "observation_kinds", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
         "control_points_unused", "check_points_unused", "remarks"})
     json[key] = nullptr;
   json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;

@@ -22,10 +22,13 @@ void write_adjustment(const std::string& path, const TileAdjustment& adjustment)
   file.vector("mounts/mount", adjustment.mount_numbers, {"", "number of the mount in its rig"});
   write_poses(file, "mounts", adjustment.mounts, "camera", "rig");
   file.vector("mounts/observations", adjustment.mount_observations, {"", "number of kept observations"});
-  file.group("points", "rows of the tile's track file, then its control points in block order");
+  file.group("tracks", "of the tile's track file");
+  file.vector("tracks/part", adjustment.parts,
+              {"", "per observation: part of its track; parts above 0 are tracks of their own, behind it"});
+  file.group("points", "the tile's tracks, split into their parts, then its control points in block order");
   file.matrix("points/position", vectors3(adjustment.points, [](const Eigen::Vector3d& p) { return p; }), 3,
               {"m", "ground frame; NaN: not triangulated"});
-  file.group("observations", "rows of the tile's track file, then those of its control points");
+  file.group("observations", "of the tile's tracks, split into their parts, then of its control points");
   file.vector("observations/kept", adjustment.kept, {"", "1: kept, 0: rejected"});
   file.close();
 }
@@ -48,6 +51,7 @@ TileAdjustment read_adjustment(const std::string& path) {
   adjustment.mount_numbers = file.vector<std::int32_t>("mounts/mount", mounts);
   adjustment.mounts = read_poses(file, "mounts", mounts);
   adjustment.mount_observations = file.vector<std::int64_t>("mounts/observations", mounts);
+  adjustment.parts = file.vector<std::uint8_t>("tracks/part");
   const auto points = file.matrix<double>("points/position", 3);
   for (std::size_t p = 0; p < points.size() / 3; ++p) adjustment.points.push_back(vector3(points, p));
   adjustment.kept = file.vector<std::uint8_t>("observations/kept");

@@ -8,6 +8,7 @@
 
 #include "io/block.h"
 #include "io/image_graph.h"
+#include "io/observation_statistics.h"
 #include "io/tracks.h"
 
 namespace megablock {
@@ -94,6 +95,7 @@ struct BlockResult {
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
   double image_sigma_px = 0;  // of tie point measurements per axis, as adjusted with (stated or estimated)
+  ObservationTable observation_table;  // by kind: count, weighted squares, redundancy; empty: not known
   bool sigma_scaled = false;  // covariances are multiplied by variance_factor
   int global_iterations = 0;
   double newton_decrement = 0;

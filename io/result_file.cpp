@@ -188,6 +188,37 @@ void get_figures(const Hdf5Reader& file, BlockResult& result) {
   result.digest = file.text_attribute("/", "digest");
 }
 
+void put_observation_table(Hdf5Writer& file, const ObservationTable& table) {
+  std::vector<std::string> words;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) words.push_back(word_of(static_cast<ObservationKind>(k)));
+  const auto& kinds = table.kinds;
+  file.group("statistics", "of the observations, by kind");
+  file.texts("statistics/kind", words);
+  file.vector("statistics/count", column(kinds, [](const ObservationStatistics& s) { return s.count; }),
+              {"", "scalar residuals"});
+  file.vector("statistics/weighted_squares",
+              column(kinds, [](const ObservationStatistics& s) { return s.weighted_squares; }),
+              {"", "sum of (residual / sigma)^2, with the weights of the robust loss"});
+  file.vector("statistics/redundancy", column(kinds, [](const ObservationStatistics& s) { return s.redundancy; }),
+              {"", "sum of redundancy numbers"});
+  file.vector("statistics/scale", column(kinds, [](const ObservationStatistics& s) { return s.scale; }),
+              {"", "sigma of the adjustment over the stated one"});
+}
+
+// Kinds are found by their word; results of earlier programs have none.
+void get_observation_table(const Hdf5Reader& file, ObservationTable& table) {
+  if (!file.has("statistics")) return;
+  const std::vector<std::string> words = file.texts("statistics/kind");
+  const auto count = file.vector<std::int64_t>("statistics/count", rows(words));
+  const auto squares = file.vector<double>("statistics/weighted_squares", rows(words));
+  const auto redundancy = file.vector<double>("statistics/redundancy", rows(words));
+  const auto scale = file.vector<double>("statistics/scale", rows(words));
+  for (std::size_t row = 0; row < words.size(); ++row)
+    for (std::size_t k = 0; k < kObservationKinds; ++k)
+      if (words[row] == word_of(static_cast<ObservationKind>(k)))
+        table.kinds[k] = {count[row], squares[row], redundancy[row], scale[row]};
+}
+
 void put_seams(Hdf5Writer& file, const std::vector<SeamCheck>& seams) {
   file.group("seams", "chi-square test of each merge of two sub-blocks");
   file.vector("seams/node", column(seams, [](const SeamCheck& s) { return s.node; }), {"", "of the merge tree"});
@@ -324,6 +355,7 @@ void write_result(const std::string& path, const BlockResult& result) {
   put_points(file, result);
   put_control_results(file, result.control);
   put_free_parts(file, result.free_parts);
+  put_observation_table(file, result.observation_table);
   put_seams(file, result.seams);
   put_record(file, result);
   file.close();
@@ -344,6 +376,7 @@ BlockResult read_result(const std::string& path) {
   get_points(file, result);
   result.control = get_control_results(file, result.block);
   get_free_parts(file, result);
+  get_observation_table(file, result.observation_table);
   result.seams = get_seams(file);
   get_record(file, result);
   return result;

@@ -57,6 +57,8 @@ struct TileAdjustment {
   std::vector<std::int32_t> mount_numbers;       // [mount_rigs] of the mount in its rig
   std::vector<Pose> mounts;                      // [mount_rigs]
   std::vector<std::int64_t> mount_observations;  // [mount_rigs]
+  std::vector<std::uint8_t> parts;               // [rows of the track file] part of its track (adjust/track_parts.h)
+  // Of the tracks split into these parts:
   std::vector<Eigen::Vector3d> points;           // [tracks + control points]; NaN = not triangulated
   std::vector<std::uint8_t> kept;                // [observations of tracks, then of control points] 1 = kept
   double image_sigma_px = 0;                     // of tie point measurements, with which the tile was adjusted

@@ -12,6 +12,7 @@
 #pragma once
 
 #include "adjust/tile_problem.h"
+#include "io/observation_statistics.h"
 #include "merge/front.h"
 #include "merge/plan.h"
 
@@ -94,6 +95,7 @@ struct TileCovariance {
   std::vector<Eigen::MatrixXd> cameras;             // [cameras] of the model's parameters; held ones zero
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
   std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part
+  ObservationTable observations;                    // of everything the tile observes
   // [points] of the further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

@@ -1,4 +1,5 @@
-// Covariances of a tile: down through the cells' fronts, then C_pp = V^-1 + V^-1 W' C_ff W V^-1 per point.
+// Covariances of a tile: down through the cells' fronts, then per point; with them the redundancy numbers of all
+// observations (io/observation_statistics.h), which are the same whatever holds a free datum.
 #include "merge/condense.h"
 #include "merge/tile_linearisation.h"
 
@@ -8,11 +9,22 @@ namespace {
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
+ObservationKind image_kind(PointRole role) {
+  return role == PointRole::kControl ? ObservationKind::kControlImage
+         : role == PointRole::kCheck ? ObservationKind::kCheckImage
+                                     : ObservationKind::kTieImage;
+}
+
 class TileCovarianceBuilder {
  public:
   TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                         const TileFactor& factor, const Step& columns)
-      : problem_(problem), plan_(plan), factor_(factor), columns_(columns), equations_(problem, plan, state) {
+      : problem_(problem),
+        plan_(plan),
+        state_(state),
+        factor_(factor),
+        columns_(columns),
+        equations_(problem, plan, state) {
     offsets_ = row_offsets(plan.unknowns);
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
@@ -81,26 +93,94 @@ class TileCovarianceBuilder {
   }
 
   void add_points(std::size_t cell, const CovarianceMatrix& covariance) {
+    cell_ = covariance.matrix.data();
     const std::vector<std::int64_t> offsets = row_offsets(covariance.unknowns);
+    cell_rows_ = offsets.back();
     for (std::size_t i = 0; i < covariance.unknowns.size(); ++i)
       row_of_unknown_[at(find_unknown(plan_.unknowns, covariance.unknowns[i].id))] = offsets[i];
-    const std::int64_t n = offsets.back();
     for (std::int64_t point : plan_.points[cell]) {
       equations_.linearise(point, 0);
-      const auto& blocks = equations_.blocks();
-      Eigen::Matrix3d inner = Eigen::Matrix3d::Identity();
-      for (const auto& a : blocks) {
-        for (const auto& b : blocks) {
-          const double* first =
-              covariance.matrix.data() + row_of_unknown_[at(a.unknown)] + row_of_unknown_[at(b.unknown)] * n;
-          const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> block(first, a.dimension, b.dimension,
-                                                                                 Eigen::OuterStride<>(n));
-          inner += a.w.transpose() * block * b.w;
+      add_point(point);
+      if (columns_.columns > 1) add_point_columns(point);
+    }
+    visit_terms(problem_, plan_, state_, 0, cell, [&](const TermResidual& term) { add_term(term); });
+  }
+
+  using CovarianceBlock = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  // Of two unknowns of the cell.
+  CovarianceBlock covariance_of(std::int64_t a, std::int64_t rows, std::int64_t b, std::int64_t columns) const {
+    const double* first = cell_ + row_of_unknown_[at(a)] + row_of_unknown_[at(b)] * cell_rows_;
+    return {first, rows, columns, Eigen::OuterStride<>(cell_rows_)};
+  }
+
+  // With Y_a = W_a C^-T of the unknowns a that see the point:
+  // C_ap = -sum_b C_ab Y_b C^-1,  C_pp = C^-T (I + sum_a Y_a' sum_b C_ab Y_b) C^-1.
+  void add_point(std::int64_t point) {
+    const auto& blocks = equations_.blocks();
+    const Eigen::Matrix3d& inverse = equations_.inverse_factor();
+    Eigen::Matrix3d inner = Eigen::Matrix3d::Identity();
+    with_point_.resize(blocks.size());
+    for (std::size_t a = 0; a < blocks.size(); ++a) {
+      auto& sum = with_point_[a];
+      sum.setZero(blocks[a].dimension, 3);
+      for (const auto& b : blocks)
+        sum.noalias() += covariance_of(blocks[a].unknown, blocks[a].dimension, b.unknown, b.dimension) * b.w;
+      inner.noalias() += blocks[a].w.transpose() * sum;
+      sum = (-sum * inverse).eval();
+    }
+    const Eigen::Matrix3d covariance = inverse.transpose() * inner * inverse;
+    result_.points[at(point)] = covariance;
+    add_image_redundancy(point, covariance);
+    add_prior_redundancy(point, covariance);
+  }
+
+  void add_image_redundancy(std::int64_t point, const Eigen::Matrix3d& covariance) {
+    ObservationStatistics& sums = result_.observations[image_kind(problem_.points[at(point)].role)];
+    for (const auto& observation : equations_.observations()) {
+      const auto& by_point = observation.by_point;
+      Eigen::Vector2d variance = (by_point * covariance).cwiseProduct(by_point).rowwise().sum();
+      for (int i = 0; i < observation.block_count; ++i) {
+        const auto& a = observation.blocks[at(i)];
+        const auto& with_point = with_point_[at(equations_.slot(a.unknown))];
+        variance += 2 * (a.jacobian * with_point).cwiseProduct(by_point).rowwise().sum();
+        for (int j = 0; j < observation.block_count; ++j) {
+          const auto& b = observation.blocks[at(j)];
+          variance += (a.jacobian * covariance_of(a.unknown, a.jacobian.cols(), b.unknown, b.jacobian.cols()))
+                          .cwiseProduct(b.jacobian)
+                          .rowwise()
+                          .sum();
         }
       }
-      if (columns_.columns > 1) add_point_columns(point);
-      result_.points[at(point)] = equations_.inverse_factor().transpose() * inner * equations_.inverse_factor();
+      for (int k = 0; k < 2; ++k) sums.add(observation.residual[k] * observation.residual[k], 1 - variance[k]);
     }
+  }
+
+  void add_prior_redundancy(std::int64_t point, const Eigen::Matrix3d& covariance) {
+    const std::int64_t row = equations_.prior_row(point);
+    if (row < 0) return;
+    const auto& term = problem_.point_priors[at(row)];
+    const Eigen::Vector3d residual = point_prior_residual(state_.points[at(point)], term);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::isinf(term.sigma[axis])) continue;
+      const double variance = covariance(axis, axis) / (term.sigma[axis] * term.sigma[axis]);
+      result_.observations[axis < 2 ? ObservationKind::kControlHorizontal : ObservationKind::kControlHeight].add(
+          residual[axis] * residual[axis], 1 - variance);
+    }
+  }
+
+  void add_term(const TermResidual& term) {
+    Eigen::VectorXd variance = Eigen::VectorXd::Zero(term.residual.size());
+    for (int i = 0; i < term.block_count; ++i) {
+      for (int j = 0; j < term.block_count; ++j) {
+        const auto &a = term.blocks[at(i)], &b = term.blocks[at(j)];
+        variance += (a.jacobian * covariance_of(a.unknown, a.jacobian.cols(), b.unknown, b.jacobian.cols()))
+                        .cwiseProduct(b.jacobian)
+                        .rowwise()
+                        .sum();
+      }
+    }
+    for (Eigen::Index k = 0; k < variance.size(); ++k)
+      result_.observations[term.kinds[at(k)]].add(term.residual[k] * term.residual[k], 1 - variance[k]);
   }
 
   // Their own right-hand side is zero: x_p = -C^-T sum Y_i' x_i.
@@ -118,11 +198,16 @@ class TileCovarianceBuilder {
 
   const TileProblem& problem_;
   const TilePlan& plan_;
+  const TileState& state_;
   const TileFactor& factor_;
   const Step& columns_;
   std::vector<std::int64_t> offsets_;
   PointEquations equations_;
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_, row_of_unknown_;
+  // Of the cell at hand: covariance of its unknowns.
+  const double* cell_ = nullptr;
+  std::int64_t cell_rows_ = 0;
+  std::vector<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMaxIntrinsics, 3>> with_point_;  // C_ap
   TileCovariance result_;
 };
 

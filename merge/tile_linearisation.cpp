@@ -2,6 +2,84 @@
 
 namespace megablock {
 
+namespace {
+
+using enum ObservationKind;
+constexpr std::array<ObservationKind, 6> kPositionKinds{kPositionHorizontal, kPositionHorizontal, kPositionHeight};
+constexpr std::array<ObservationKind, 6> kRelativeKinds{kRelativeRotation, kRelativeRotation, kRelativeRotation,
+                                                        kRelativePosition, kRelativePosition, kRelativePosition};
+
+}  // namespace
+
+void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                 std::size_t cell, const std::function<void(const TermResidual&)>& visit) {
+  const RobustLoss none;
+  for (std::int64_t i : plan.positions[cell]) {
+    const auto& term = problem.positions[static_cast<std::size_t>(i)];
+    const FrameResidual3 r = linearise_position(state.frames[term.frame.value], term.prior);
+    TermResidual out;
+    out.residual = r.residual;
+    out.kinds = kPositionKinds;
+    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
+    out.weight(problem.position_loss, pass);
+    visit(out);
+  }
+  for (std::int64_t i : plan.attitudes[cell]) {
+    const auto& term = problem.attitudes[static_cast<std::size_t>(i)];
+    const FrameResidual3 r = linearise_attitude(state.frames[term.frame.value], term.prior);
+    TermResidual out;
+    out.residual = r.residual;
+    out.kinds.fill(ObservationKind::kAttitude);
+    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
+    out.weight(none, pass);
+    visit(out);
+  }
+  for (std::int64_t i : plan.relatives[cell]) {
+    const auto& term = problem.relatives[static_cast<std::size_t>(i)];
+    const RelativeResidual r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term);
+    TermResidual out;
+    out.residual = r.residual;
+    out.kinds = kRelativeKinds;
+    out.add_block(plan.unknown_of_frame[term.from.value], r.by_from);
+    out.add_block(plan.unknown_of_frame[term.to.value], r.by_to);
+    out.weight(problem.relative_loss, pass);
+    visit(out);
+  }
+  for (std::int64_t i : plan.intrinsic_priors[cell]) {
+    const auto& term = problem.intrinsic_priors[static_cast<std::size_t>(i)];
+    const auto camera = static_cast<std::size_t>(term.camera.value);
+    const int free_count = count_of(problem.camera_free[camera]);
+    int column = 0;
+    for (int k = 0; k < term.value.size(); ++k) {
+      const bool free = contains(problem.camera_free[camera], k);
+      const double weight = intrinsic_prior_weight(term, k);
+      if (weight != 0) {
+        TermResidual out;
+        out.residual = Eigen::Matrix<double, 1, 1>(intrinsic_prior_residual(state.cameras[camera], term, k));
+        out.kinds.fill(ObservationKind::kIntrinsics);
+        Eigen::MatrixXd row = Eigen::MatrixXd::Zero(1, free_count);
+        if (free) {
+          row(0, column) = weight;
+          out.add_block(plan.unknown_of_camera[camera], row);
+        }
+        out.weight(none, pass);
+        visit(out);
+      }
+      column += free;
+    }
+  }
+  for (std::int64_t i : plan.mount_priors[cell]) {
+    const auto& term = problem.mount_priors[static_cast<std::size_t>(i)];
+    const MountResidual r = linearise_mount(state.mounts[static_cast<std::size_t>(term.mount)], term);
+    TermResidual out;
+    out.residual = r.residual;
+    out.kinds.fill(ObservationKind::kMount);
+    out.add_block(plan.unknown_of_mount[static_cast<std::size_t>(term.mount)], r.by_mount);
+    out.weight(none, pass);
+    visit(out);
+  }
+}
+
 std::vector<std::int64_t> prior_rows(const TileProblem& problem) {
   std::vector<std::int64_t> rows(problem.points.size(), -1);
   for (std::size_t i = 0; i < problem.point_priors.size(); ++i)
@@ -62,6 +140,7 @@ void PointEquations::add_observation(std::int64_t point, std::int64_t row, bool 
   Observation& observation = observations_.emplace_back();
   observation.residual = weight.residual_scale * r.residual;
   const Eigen::Matrix<double, 2, 3> by_point = weight.weighted(r.by_point, r.residual);
+  observation.by_point = by_point;
   v_.noalias() += by_point.transpose() * by_point;
   b_.noalias() -= by_point.transpose() * observation.residual;
 

@@ -12,9 +12,11 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include "adjust/linearise.h"
 #include "io/error.h"
+#include "io/observation_statistics.h"
 #include "merge/condense.h"
 
 namespace megablock {
@@ -58,8 +60,9 @@ struct TermResidual {
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
   std::array<JacobianBlock<Jacobian>, 2> blocks;
   int block_count = 0;
-  double rho = 0;               // of the squared norm
-  double weighted_squares = 0;  // rho' |r|^2
+  std::array<ObservationKind, 6> kinds{};  // [residual]
+  double rho = 0;                          // of the squared norm
+  double weighted_squares = 0;             // rho' |r|^2
 
   void add_block(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& jacobian) {
     if (unknown < 0) return;
@@ -79,71 +82,9 @@ struct TermResidual {
   }
 };
 
-// Calls visit(TermResidual) for every observation without a point of a cell.
-template <typename Visitor>
+// Calls visit for every observation without a point of a cell.
 void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                 std::size_t cell, Visitor&& visit) {
-  const RobustLoss none;
-  for (std::int64_t i : plan.positions[cell]) {
-    const auto& term = problem.positions[static_cast<std::size_t>(i)];
-    const FrameResidual3 r = linearise_position(state.frames[term.frame.value], term.prior);
-    TermResidual out;
-    out.residual = r.residual;
-    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(problem.position_loss, pass);
-    visit(out);
-  }
-  for (std::int64_t i : plan.attitudes[cell]) {
-    const auto& term = problem.attitudes[static_cast<std::size_t>(i)];
-    const FrameResidual3 r = linearise_attitude(state.frames[term.frame.value], term.prior);
-    TermResidual out;
-    out.residual = r.residual;
-    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(none, pass);
-    visit(out);
-  }
-  for (std::int64_t i : plan.relatives[cell]) {
-    const auto& term = problem.relatives[static_cast<std::size_t>(i)];
-    const RelativeResidual r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term);
-    TermResidual out;
-    out.residual = r.residual;
-    out.add_block(plan.unknown_of_frame[term.from.value], r.by_from);
-    out.add_block(plan.unknown_of_frame[term.to.value], r.by_to);
-    out.weight(problem.relative_loss, pass);
-    visit(out);
-  }
-  for (std::int64_t i : plan.intrinsic_priors[cell]) {
-    const auto& term = problem.intrinsic_priors[static_cast<std::size_t>(i)];
-    const auto camera = static_cast<std::size_t>(term.camera.value);
-    const int free_count = count_of(problem.camera_free[camera]);
-    int column = 0;
-    for (int k = 0; k < term.value.size(); ++k) {
-      const bool free = contains(problem.camera_free[camera], k);
-      const double weight = intrinsic_prior_weight(term, k);
-      if (weight != 0) {
-        TermResidual out;
-        out.residual = Eigen::Matrix<double, 1, 1>(intrinsic_prior_residual(state.cameras[camera], term, k));
-        Eigen::MatrixXd row = Eigen::MatrixXd::Zero(1, free_count);
-        if (free) {
-          row(0, column) = weight;
-          out.add_block(plan.unknown_of_camera[camera], row);
-        }
-        out.weight(none, pass);
-        visit(out);
-      }
-      column += free;
-    }
-  }
-  for (std::int64_t i : plan.mount_priors[cell]) {
-    const auto& term = problem.mount_priors[static_cast<std::size_t>(i)];
-    const MountResidual r = linearise_mount(state.mounts[static_cast<std::size_t>(term.mount)], term);
-    TermResidual out;
-    out.residual = r.residual;
-    out.add_block(plan.unknown_of_mount[static_cast<std::size_t>(term.mount)], r.by_mount);
-    out.weight(none, pass);
-    visit(out);
-  }
-}
+                 std::size_t cell, const std::function<void(const TermResidual&)>& visit);
 
 // Row of the point's prior in TileProblem::point_priors, -1: none. [points]
 std::vector<std::int64_t> prior_rows(const TileProblem& problem);
@@ -161,6 +102,7 @@ class PointEquations {
   struct Observation {
     Eigen::Vector2d residual;
     std::array<JacobianBlock<IntrinsicJacobian>, 3> blocks;  // 2 x dimension, weighted
+    Eigen::Matrix<double, 2, 3> by_point;                    // weighted
     int block_count = 0;
     Observation() {}  // as Block
   };
@@ -183,6 +125,9 @@ class PointEquations {
   std::int64_t residual_count() const { return residual_count_; }
   std::int64_t observation_count() const { return static_cast<std::int64_t>(observations_.size()); }
   int held() const { return held_; }
+  // Place of an unknown that sees the point in blocks(), and of the point's prior in TileProblem::point_priors (-1).
+  std::int64_t slot(std::int64_t unknown) const { return slot_[static_cast<std::size_t>(unknown)]; }
+  std::int64_t prior_row(std::int64_t point) const { return prior_[static_cast<std::size_t>(point)]; }
 
  private:
   Block& block_of(std::int64_t unknown, int dimension);

@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <limits>
+#include <utility>
 
+#include "adjust/image_sigma.h"
 #include "adjust/tile_adjustment.h"
+#include "adjust/track_parts.h"
 #include "cluster/collective.h"
 #include "cluster/stages/problem_hash.h"
 #include "cluster/stages/stages.h"
@@ -13,26 +16,57 @@ namespace megablock {
 
 namespace {
 
+// A tile before its adjustment.
 struct TileStart {
+  TrackSet tracks;
   TileProblem problem;
   TileState state;
 };
 
-TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
-                     const std::string& tracks_unit) {
-  const TrackSet tracks = read_tracks(job.store.verified_path(tracks_unit));
+TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile, TrackSet tracks) {
   TileStart start;
-  start.problem = make_tile_problem(job.block, oriented, tiles, tile, tracks, job.settings.adjustment.observations);
+  start.tracks = std::move(tracks);
+  start.problem =
+      make_tile_problem(job.block, oriented, tiles, tile, start.tracks, job.settings.adjustment.observations);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   start.state =
       make_tile_state(start.problem, oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
   return start;
 }
 
-TileAdjustment adjust_one(TileStart start, const AdjustOptions& options) {
-  TileProblem& problem = start.problem;
-  TileState& state = start.state;
-  const AdjustSummary summary = adjust_tile(problem, state, options);
+// An adjusted tile, its tracks split; the merge intersects the parts that are put back.
+TileStart with_parts(const TileStart& adjusted, const TrackParts& parts, TileStart split) {
+  const std::vector<std::int64_t> rows = rows_of_split(adjusted.tracks, parts);
+  split.problem.kept = adjusted.problem.kept;  // control points' rows are behind the tracks'
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto row = static_cast<std::size_t>(rows[i]);
+    split.problem.kept[i] = parts[row] > 0 || adjusted.problem.kept[row];
+  }
+  set_image_sigma(split.problem, adjusted.problem.image_sigma_px);
+  const std::vector<Eigen::Vector3d> unknown = std::exchange(split.state.points, {});
+  split.state = adjusted.state;
+  split.state.points.clear();
+  const std::vector<TilePoint>& points = split.problem.points;
+  for (std::size_t p = 0, whole = 0; p < points.size(); ++p) {
+    const bool further = p > 0 && points[p].role == PointRole::kTie && points[p - 1].role == PointRole::kTie &&
+                         points[p].index == points[p - 1].index;
+    split.state.points.push_back(further ? unknown[p] : adjusted.state.points[whole++]);
+  }
+  return split;
+}
+
+TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
+                          const std::string& tracks_unit) {
+  const AdjustOptions& options = job.settings.adjustment;
+  const auto start = [&](TrackSet tracks) { return make_start(job, oriented, tiles, tile, std::move(tracks)); };
+  TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)));
+  const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options);
+  TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
+                                      screening_threshold(adjusted.problem, adjusted.state, options), options);
+  const auto restored = parts.size() - static_cast<std::size_t>(std::count(parts.begin(), parts.end(), 0));
+  if (restored > 0) adjusted = with_parts(adjusted, parts, start(split_tracks(adjusted.tracks, parts)));
+  TileProblem& problem = adjusted.problem;
+  TileState& state = adjusted.state;
 
   TileAdjustment result;
   result.frames = problem.frames;
@@ -54,10 +88,11 @@ TileAdjustment adjust_one(TileStart start, const AdjustOptions& options) {
     ++result.camera_observations[static_cast<std::size_t>(image.camera.value)];
     ++result.mount_observations[static_cast<std::size_t>(image.mount)];
   }
+  result.parts = std::move(parts);
   result.points = std::move(state.points);
   result.kept = std::move(problem.kept);
   result.image_sigma_px = problem.image_sigma_px;
-  result.summary = summary.text;
+  result.summary = summary.text + ", " + std::to_string(restored) + " of them put back as tracks of their own";
   return result;
 }
 
@@ -69,7 +104,7 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
   std::vector<std::string> names;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const TileIndex tile(static_cast<std::int64_t>(t));
-    const TileStart start = make_start(job, oriented, tiles, tile, tracks[t]);
+    const TileStart start = make_start(job, oriented, tiles, tile, read_tracks(job.store.verified_path(tracks[t])));
     Hasher hasher;
     hasher.add(algorithm::kAdjustment);
     add_to_hash(hasher, job.settings.adjustment);
@@ -79,7 +114,7 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
     unit.fingerprint = hasher.value();
     unit.cost = static_cast<double>(start.problem.observation_count());
     unit.write = [&job, &oriented, &tiles, tile, track = tracks[t]](const std::string& path) {
-      write_adjustment(path, adjust_one(make_start(job, oriented, tiles, tile, track), job.settings.adjustment));
+      write_adjustment(path, adjust_one(job, oriented, tiles, tile, track));
     };
     names.push_back(unit.name);
     units.push_back(std::move(unit));

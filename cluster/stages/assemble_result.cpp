@@ -40,7 +40,8 @@ std::vector<TrackRow> ordered_tracks(const std::vector<TileResult>& parts) {
   for (std::size_t p = 0; p < parts.size(); ++p)
     for (std::int64_t t = 0; t < parts[p].tracks.track_count(); ++t)
       rows.push_back({parts[p].tracks.id[static_cast<std::size_t>(t)], p, t});
-  std::sort(rows.begin(), rows.end(), [](const TrackRow& a, const TrackRow& b) { return a.key < b.key; });
+  // Parts of one track have one key; they lie behind one another in one tile.
+  std::stable_sort(rows.begin(), rows.end(), [](const TrackRow& a, const TrackRow& b) { return a.key < b.key; });
   return rows;
 }
 
@@ -230,6 +231,7 @@ BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutco
   result.provenance = provenance_of(job);
   result.gauge = outcome.gauge;
   result.seams = outcome.seams;
+  result.observation_table = outcome.observations;
   result.notes = job.notes;
   list_failures(job, result);
   result.digest = result_digest(result);

@@ -21,6 +21,7 @@ struct MergeOutcome {
   std::string gauge;
   std::vector<FreePart> free_parts;
   std::vector<SeamCheck> seams;
+  ObservationTable observations;
 };
 
 // What one tile contributes to the result.

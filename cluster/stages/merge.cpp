@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "adjust/image_sigma.h"
+#include "adjust/sigma_scales.h"
 #include "cluster/collective.h"
 #include "cluster/matrix_bytes.h"
 #include "cluster/process_memory.h"
@@ -135,6 +136,20 @@ std::vector<std::int64_t> observation_counts(const Job& job, const MergeInputs& 
   return counts;
 }
 
+int most_rounds(const MergeSettings& settings) {
+  constexpr int kSigmaRounds = 10;
+  return settings.estimate_sigmas ? std::max(settings.screening_rounds, kSigmaRounds) : settings.screening_rounds;
+}
+
+// Whether the sigmas of positions, attitudes and relative poses have changed enough to matter. Collective.
+bool adopt_sigma_scales(RankRunner& runner, SigmaScales& scales) {
+  const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
+  if (!change.matter()) return false;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] *= change.of[k];
+  for (RankTile& tile : runner.tiles()) scale_sigmas(tile.problem, change);
+  return true;
+}
+
 // Re-tests every observation at the solution; how many verdicts changed in the whole block.
 std::int64_t screen(Job& job, RankRunner& runner) {
   std::int64_t changed = 0;
@@ -208,7 +223,10 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
   BlockState block = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
   std::vector<RankTile> tiles = load_own_tiles(job, inputs, block, rank_of_tile);
   if (found) {
-    for (RankTile& tile : tiles) checkpoint.load_tile(tile);
+    for (RankTile& tile : tiles) {
+      checkpoint.load_tile(tile);
+      scale_sigmas(tile.problem, found->scales);
+    }
   } else {
     const double sigma = start_image_sigma(job, inputs.adjusted);
     for (RankTile& tile : tiles) set_image_sigma(tile.problem, sigma);
@@ -216,7 +234,7 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
 
   Adjusted adjusted;
   MergePosition& position = adjusted.position;
-  position = found ? *found : MergePosition{0, start_global(options)};
+  position = found ? *found : MergePosition{0, start_global(options), {}};
   std::int32_t saved = position.global.accepted;
   for (;;) {
     RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, std::move(tiles), memory_options(job));
@@ -234,8 +252,10 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
                          position.global.outcome == GlobalOutcome::kRoundingFloor;
     block = gather_state(job, block, runner.tiles());
     follow(block, runner.tiles());
-    const bool last = position.round >= job.settings.merge.screening_rounds;
-    const bool reweighted = !last && adopt_image_sigma(job, runner.tiles(), rank_of_tile.size(), block);
+    const bool last = position.round >= most_rounds(job.settings.merge);
+    bool reweighted = !last && adopt_image_sigma(job, runner.tiles(), rank_of_tile.size(), block);
+    if (!last && job.settings.merge.estimate_sigmas)
+      reweighted = adopt_sigma_scales(runner, position.scales) || reweighted;
     if (last || (screen(job, runner) == 0 && !reweighted)) {
       adjusted.posterior = runner.posterior();
       say_memory(job, runner.memory());
@@ -288,8 +308,8 @@ std::vector<TileResult> gather_parts(Job& job, const MergeInputs& inputs, Adjust
   std::vector<TileResult> parts(inputs.tracks.size());
   const auto part_of = [&](std::size_t row) {
     const RankTile& tile = adjusted.tiles[row];
-    MergeTile merge{TileIndex(tile.tile),
-                    read_tracks(job.store.verified_path(inputs.tracks[static_cast<std::size_t>(tile.tile)])),
+    const auto number = static_cast<std::size_t>(tile.tile);
+    MergeTile merge{TileIndex(tile.tile), read_split_tracks(job, inputs.tracks[number], inputs.adjusted[number]),
                     tile.problem, tile.state};
     return make_tile_result(merge, adjusted.posterior.covariances[row].points);
   };
@@ -339,6 +359,9 @@ MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {
     if (part.defect > 0)
       outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
   outcome.seams = seam_checks(adjusted.posterior);
+  outcome.observations = adjusted.posterior.observations;
+  for (std::size_t k = 0; k < kObservationKinds; ++k)
+    outcome.observations.kinds[k].scale = adjusted.position.scales.of[k];
   return outcome;
 }
 

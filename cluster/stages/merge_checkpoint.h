@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "adjust/sigma_scales.h"
 #include "cluster/job.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
@@ -15,6 +16,7 @@ namespace megablock {
 struct MergePosition {
   std::int32_t round = 0;        // of screening
   GlobalState global;
+  SigmaScales scales;  // of the stated sigmas
 };
 
 class MergeCheckpoint {

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "adjust/tile_adjustment.h"
+#include "adjust/track_parts.h"
 #include "geometry/rotation.h"
 #include "geometry/similarity.h"
 #include "merge/tile_alignment.h"
@@ -135,11 +136,16 @@ BlockState merge_start(const Job& job, const BlockState& oriented, const std::ve
   return start;
 }
 
+TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std::string& adjusted) {
+  TrackSet all = read_tracks(job.store.verified_path(tracks));
+  return adjusted.empty() ? all : split_tracks(all, read_adjustment(job.store.verified_path(adjusted)).parts);
+}
+
 MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& tiles, TileIndex tile,
                           const std::string& tracks, const std::string& adjusted) {
   MergeTile merge;
   merge.tile = tile;
-  merge.tracks = read_tracks(job.store.verified_path(tracks));
+  merge.tracks = read_split_tracks(job, tracks, adjusted);
   const AdjustOptions& options = job.settings.adjustment;
   merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations);
   const std::size_t points = merge.problem.points.size();

@@ -26,6 +26,9 @@ struct MergeTile {
 // observations. Frames that no adjusted tile holds lose their orientation.
 BlockState merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
 
+// The tracks of a tile, split into the parts that its adjustment found. `adjusted` empty: as they are.
+TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std::string& adjusted);
+
 // A tile's problem with the kept flags of its adjustment, its points re-triangulated in `state`.
 MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& tiles, TileIndex tile,
                           const std::string& tracks, const std::string& adjusted);

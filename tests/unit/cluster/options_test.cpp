@@ -35,6 +35,7 @@ TEST(JobOptions, ReadsEverySectionOfTheProjectFile) {
   EXPECT_EQ(cauchy.adjustment.observations.image_loss.kind, RobustLoss::Kind::kCauchy);
   EXPECT_EQ(cauchy.orientation.observations.image_loss.kind, RobustLoss::Kind::kCauchy);
   EXPECT_EQ(read_options(setting("merge", "scale_sigma", "true")).merge.scale_sigma, true);
+  EXPECT_EQ(read_options(setting("merge", "estimate_sigmas", "true")).merge.estimate_sigmas, true);
 }
 
 TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
