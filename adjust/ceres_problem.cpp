@@ -180,7 +180,9 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
       point_used_(problem.points.size(), 0),
       image_loss_(ceres_loss(problem.image_loss)),
       position_loss_(ceres_loss(problem.position_loss)),
+      attitude_loss_(ceres_loss(problem.attitude_loss)),
       relative_loss_(ceres_loss(problem.relative_loss)),
+      line_loss_(ceres_loss(problem.line_loss)),
       ceres_(std::make_unique<ceres::Problem>(problem_options())) {
   const auto& camera_free = options.camera_free.empty() ? problem.camera_free : options.camera_free;
   if (state.frames.size() != problem.frames.size() || state.cameras.size() != problem.cameras.size() ||
@@ -229,8 +231,16 @@ void CeresTile::add_priors(const TileProblem& problem) {
     ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::PositionMeasured{term.prior}), position_loss_.get(),
                              frame(term.frame.value));
   for (const auto& term : problem.attitudes)
-    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}), nullptr,
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}), attitude_loss_.get(),
                              frame(term.frame.value));
+  for (const auto& term : problem.lines) {
+    if (term.other.valid())
+      ceres_->AddResidualBlock(automatic<1, kPoseBlock, kPoseBlock>(residual::HorizontalLine{term}), line_loss_.get(),
+                               frame(term.frame.value), frame(term.other.value));
+    else
+      ceres_->AddResidualBlock(automatic<1, kPoseBlock>(residual::VerticalLine{term}), line_loss_.get(),
+                               frame(term.frame.value));
+  }
   for (const auto& term : problem.relatives)
     ceres_->AddResidualBlock(automatic<6, kPoseBlock, kPoseBlock>(residual::RelativeMeasured{term}),
                              relative_loss_.get(), frame(term.from.value), frame(term.to.value));

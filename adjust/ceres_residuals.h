@@ -151,6 +151,43 @@ struct RelativeMeasured {
   }
 };
 
+// line_terms.h. Both are zero where linearise_line says that nothing is observed.
+template <typename Scalar>
+Scalar off_direction(const TileProblem::LineTerm& term, const Vector3<Scalar>& direction) {
+  const Vector3<Scalar> normal = term.middle.cast<Scalar>().cross(direction);
+  const Scalar squares = normal.squaredNorm();
+  if (squares < Scalar(1e-12)) return Scalar(0);
+  return direction.dot(term.across.cast<Scalar>()) * term.weight / sqrt(squares);
+}
+
+struct VerticalLine {
+  TileProblem::LineTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, Scalar* result) const {
+    const Vector3<Scalar> up(Scalar(0), Scalar(0), Scalar(1));
+    const Vector3<Scalar> direction = rotation_of(frame) * up;
+    result[0] = off_direction(term, direction);
+    return true;
+  }
+};
+
+struct HorizontalLine {
+  TileProblem::LineTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* other, Scalar* result) const {
+    const Vector3<Scalar> up(Scalar(0), Scalar(0), Scalar(1)), seen = term.other_normal.cast<Scalar>();
+    const Vector3<Scalar> normal = rotation_of(other).conjugate() * seen;
+    const Vector3<Scalar> horizontal = normal.cross(up);
+    const Scalar squares = horizontal.squaredNorm();
+    result[0] = Scalar(0);
+    if (squares < Scalar(1e-12)) return true;
+    const Vector3<Scalar> unit = horizontal / sqrt(squares);
+    const Vector3<Scalar> direction = rotation_of(frame) * unit;
+    result[0] = off_direction(term, direction);
+    return true;
+  }
+};
+
 struct PointKnown {
   TileProblem::PointTerm term;
   template <typename Scalar>

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "adjust/line_terms.h"
 #include "adjust/linearise.h"
 #include "geometry/decompositions.h"
 
@@ -29,6 +30,7 @@ class Components {
         if (problem.kept[row]) join(first, problem.images[problem.image[row].value].frame.value);
     }
     for (const auto& term : problem.relatives) join(term.from.value, term.to.value);
+    for (const auto& term : problem.lines) join(term.frame.value, term.seen_by().value);
   }
   std::int32_t of(std::int32_t frame) {
     while (parent_[frame] != frame) frame = parent_[frame] = parent_[parent_[frame]];
@@ -101,6 +103,12 @@ void add_priors(const TileProblem& problem, const TileState& state, Components& 
     Component& c = all[components.of(term.frame.value)];
     const Pose& frame = state.frames[term.frame.value];
     c.add(linearise_attitude(frame, term.prior).by_frame * c.move(frame));
+  }
+  for (const auto& term : problem.lines) {
+    Component& c = all[components.of(term.frame.value)];
+    const Pose& frame = state.frames[term.frame.value];
+    const LineResidual line = linearise_line(frame, state.frames[term.seen_by().value], term);
+    c.add((line.by_frame + line.by_other) * c.move(frame));
   }
   for (const auto& term : problem.relatives) {
     Component& c = all[components.of(term.from.value)];

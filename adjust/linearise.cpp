@@ -9,6 +9,8 @@
 
 #include <limits>
 
+#include "adjust/line_terms.h"
+
 namespace megablock {
 
 namespace {
@@ -129,10 +131,15 @@ double prior_cost(const TileProblem& problem, const TileState& state) {
     sum += problem.position_loss.evaluate(s)[0];
   }
   for (const auto& term : problem.attitudes)
-    sum += linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm();
+    sum += problem.attitude_loss.evaluate(
+        linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm())[0];
   for (const auto& term : problem.relatives) {
     const auto r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual;
     sum += problem.relative_loss.evaluate(r.squaredNorm())[0];
+  }
+  for (const auto& term : problem.lines) {
+    const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
+    sum += problem.line_loss.evaluate(r * r)[0];
   }
   for (const auto& term : problem.point_priors)
     if (problem.active(term.point.value))

@@ -5,6 +5,7 @@
 
 #include "adjust/ceres_problem.h"
 #include "adjust/datum.h"
+#include "adjust/line_terms.h"
 #include "adjust/linearise.h"
 #include "adjust/tile_adjustment.h"
 #include "io/error.h"
@@ -42,7 +43,13 @@ void add_priors(const TileProblem& problem, const TileState& state, ResidualSum&
     add(linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
         problem.position_loss);
   for (const auto& term : problem.attitudes)
-    add(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3);
+    add(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
+        problem.attitude_loss);
+  for (const auto& term : problem.lines) {
+    const double r =
+        linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
+    add(r * r, 1, problem.line_loss);
+  }
   for (const auto& term : problem.relatives)
     add(linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual.squaredNorm(), 6,
         problem.relative_loss);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "adjust/line_terms.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -41,7 +42,7 @@ bool TileProblem::active(std::int64_t point) const {
 
 void ObservationOptions::check() const {
   if (!(image_sigma_px > 0)) throw InputError("image_sigma_px must be positive (pixels)");
-  for (const RobustLoss& loss : {image_loss, position_loss, relative_loss})
+  for (const RobustLoss& loss : {image_loss, position_loss, attitude_loss, relative_loss, line_loss})
     if (loss.kind != RobustLoss::Kind::kNone && !(loss.scale > 0))
       throw InputError("the scale of a robust loss must be positive (sigmas)");
 }
@@ -95,7 +96,10 @@ class TileBuilder {
     problem_.image_sigma_px = options_.image_sigma_px;
     problem_.image_loss = options_.image_loss;
     problem_.position_loss = options_.position_loss;
+    problem_.attitude_loss = options_.attitude_loss;
     problem_.relative_loss = options_.relative_loss;
+    problem_.line_loss = options_.line_loss;
+    lines_ = line_terms(block_, state_, tiles_, tile_);
     select_control_points();
     select_relative_poses();
     select_prior_owners();
@@ -104,6 +108,7 @@ class TileBuilder {
     for (std::int64_t row : control_points_) add_control_point(row);
     add_frame_priors();
     add_relative_poses();
+    add_lines();
     add_camera_priors();
     add_mount_priors();
     return std::move(problem_);
@@ -194,6 +199,10 @@ class TileBuilder {
       frames.push_back(block_.relative_poses[row].from);
       frames.push_back(block_.relative_poses[row].to);
     }
+    for (const BlockLineTerm& line : lines_) {
+      frames.push_back(line.frame);
+      if (line.other.valid()) frames.push_back(line.other);
+    }
     make_distinct(frames);
     make_distinct(problem_.cameras);
     make_distinct(problem_.mounts);
@@ -271,6 +280,14 @@ class TileBuilder {
     }
   }
 
+  void add_lines() {
+    for (const BlockLineTerm& line : lines_) {
+      problem_.lines.push_back(line.term);
+      problem_.lines.back().frame = LocalFrame(row_of(problem_.frames, line.frame));
+      if (line.other.valid()) problem_.lines.back().other = LocalFrame(row_of(problem_.frames, line.other));
+    }
+  }
+
   void add_camera_priors() {
     for (CameraIndex index : prior_cameras_) {
       const Camera& camera = block_.cameras[index];
@@ -301,6 +318,7 @@ class TileBuilder {
   TileProblem problem_;
   std::vector<std::int64_t> control_points_;
   std::vector<std::size_t> relative_poses_;
+  std::vector<BlockLineTerm> lines_;
   std::vector<CameraIndex> prior_cameras_;
   std::vector<MountId> prior_mounts_;
   std::vector<ImageIndex> image_table_;

@@ -9,7 +9,8 @@
 //   point prior      X - X_0                               (control points)                              [3]
 //   intrinsics prior k - k_0                               (per parameter with finite sigma)             [1 each]
 //   mount prior      Log(R R_0'), C - C_0                                                                [6]
-// Robust losses act on image residuals (all), position priors and relative poses (their own option).
+//   line             off the vertical, or the horizontal (line_terms.h)                                 [1]
+// Robust losses act on image residuals (all), position and attitude priors, relative poses and lines (their own option).
 //
 // Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3).
 // Every table is ascending by global index; a local index is a row of its table.
@@ -99,14 +100,24 @@ struct TileProblem {
     Pose value;
     double rotation_sigma_rad, position_sigma_m;
   };
+  // A line known to be vertical or horizontal (line_terms.h); rays in the axes of the rig.
+  struct LineTerm {
+    LocalFrame frame;
+    LocalFrame other;  // of a horizontal line; invalid: vertical
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero(), across = Eigen::Vector3d::Zero();
+    Eigen::Vector3d other_normal = Eigen::Vector3d::Zero();
+    double weight = 0;
+    LocalFrame seen_by() const { return other.valid() ? other : frame; }
+  };
   std::vector<PositionTerm> positions;
   std::vector<AttitudeTerm> attitudes;
   std::vector<RelativeTerm> relatives;
   std::vector<PointTerm> point_priors;
   std::vector<IntrinsicTerm> intrinsic_priors;
   std::vector<MountTerm> mount_priors;
+  std::vector<LineTerm> lines;
 
-  RobustLoss image_loss, position_loss, relative_loss;
+  RobustLoss image_loss, position_loss, attitude_loss, relative_loss, line_loss;
 
   std::int64_t point_count() const { return static_cast<std::int64_t>(points.size()); }
   std::int64_t observation_count() const { return static_cast<std::int64_t>(image.size()); }
@@ -132,7 +143,9 @@ struct ObservationOptions {
   double image_sigma_px = 0.5;  // a-priori sigma of a tie point measurement per axis, px
   RobustLoss image_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
+  RobustLoss attitude_loss{RobustLoss::Kind::kNone, 3.0};
   RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
+  RobustLoss line_loss{RobustLoss::Kind::kHuber, 3.0};
   bool use_position_priors = true;
   bool use_attitude_priors = true;
   void check() const;  // throws InputError

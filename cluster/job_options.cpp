@@ -63,7 +63,9 @@ void describe(Visitor& visit, ObservationOptions& o) {
   visit.number("image_sigma_px", o.image_sigma_px);
   describe_loss(visit, "image_loss", o.image_loss);
   describe_loss(visit, "position_loss", o.position_loss);
+  describe_loss(visit, "attitude_loss", o.attitude_loss);
   describe_loss(visit, "relative_loss", o.relative_loss);
+  describe_loss(visit, "line_loss", o.line_loss);
   visit.flag("use_position_priors", o.use_position_priors);
   visit.flag("use_attitude_priors", o.use_attitude_priors);
 }

@@ -52,6 +52,7 @@ void check(const Block& block) {
   check_names(block.cameras, "camera");
   check_names(block.images, "image");
   check_names(block.control_points, "control point");
+  check_names(block.lines, "line");
   for (const Camera& camera : block.cameras) {
     require(camera.width > 0 && camera.height > 0, "camera '" + camera.name + "': width and height must be positive");
     require(camera.intrinsics[kFocal] > 0, "camera '" + camera.name + "': focal length must be positive (pixels)");
@@ -97,6 +98,12 @@ void check(const Block& block) {
       require(m.pixel.allFinite() && m.sigma_px > 0, "control point '" + point.name + "': bad image measurement");
     }
   }
+  for (const KnownLine& line : block.lines)
+    for (const KnownLine::Measurement& m : line.measurements) {
+      require(block.images.contains(m.image), "line '" + line.name + "': names no image of the block");
+      require(m.first.allFinite() && m.second.allFinite() && m.first != m.second && m.sigma_px > 0,
+              "line '" + line.name + "': bad image measurement");
+    }
 }
 
 }  // namespace megablock

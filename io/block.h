@@ -104,6 +104,19 @@ struct ControlPoint {
   std::vector<ImageMeasurement> measurements;
 };
 
+// A straight line of the scene with a known direction; its ends in an image are any two of its points.
+struct KnownLine {
+  enum class Direction : std::uint8_t { kVertical, kHorizontal };
+  struct Measurement {
+    ImageIndex image;
+    Eigen::Vector2d first, second;  // pixel centres at +0.5
+    double sigma_px = 1;            // of each end, across the line
+  };
+  std::string name;
+  Direction direction = Direction::kVertical;
+  std::vector<Measurement> measurements;
+};
+
 struct Block {
   GroundFrame ground;
   IndexedVector<CameraIndex, Camera> cameras;
@@ -112,6 +125,7 @@ struct Block {
   IndexedVector<ImageIndex, Image> images;
   std::vector<RelativePose> relative_poses;
   std::vector<ControlPoint> control_points;
+  std::vector<KnownLine> lines;
 
   const Rig& rig_of(FrameIndex frame) const { return rigs[frames[frame].rig]; }
   const Mount& mount_of(ImageIndex image) const {

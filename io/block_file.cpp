@@ -311,6 +311,56 @@ std::vector<ControlPoint> get_control(const Hdf5Reader& file) {
   return points;
 }
 
+void put_lines(Hdf5Writer& file, const std::vector<KnownLine>& lines) {
+  if (lines.empty()) return;
+  std::vector<KnownLine::Measurement> measurements;
+  std::vector<double> ends;
+  for (const KnownLine& line : lines)
+    for (const KnownLine::Measurement& m : line.measurements) {
+      measurements.push_back(m);
+      ends.insert(ends.end(), {m.first.x(), m.first.y(), m.second.x(), m.second.y()});
+    }
+  file.group("lines", "straight lines of known direction");
+  file.texts("lines/name", column(lines, [](const KnownLine& l) { return l.name; }));
+  file.vector("lines/direction",
+              column(lines, [](const KnownLine& l) { return static_cast<std::uint8_t>(l.direction); }),
+              {"", "0: vertical, 1: horizontal"});
+  file.vector("lines/measurements",
+              column(lines, [](const KnownLine& l) { return static_cast<std::int32_t>(l.measurements.size()); }),
+              {"", "number of image measurements: rows of the group 'lines/measurement', in order"});
+  file.group("lines/measurement", "image measurements of the lines");
+  file.vector("lines/measurement/image",
+              column(measurements, [](const KnownLine::Measurement& m) { return m.image.value; }),
+              {"", "row in images"});
+  file.matrix("lines/measurement/ends", ends, 4, {"px", "x, y of two of its points; pixel centres at +0.5"});
+  file.vector("lines/measurement/sigma",
+              column(measurements, [](const KnownLine::Measurement& m) { return m.sigma_px; }),
+              {"px", "of each end, across the line"});
+}
+
+std::vector<KnownLine> get_lines(const Hdf5Reader& file) {
+  if (!file.has("lines")) return {};
+  const std::vector<std::string> names = file.texts("lines/name");
+  const auto count = static_cast<std::int64_t>(names.size());
+  const auto directions = file.vector<std::uint8_t>("lines/direction", count);
+  const auto images = file.vector<std::int64_t>("lines/measurement/image");
+  const auto rows = static_cast<std::int64_t>(images.size());
+  const auto ends = file.matrix<double>("lines/measurement/ends", 4, rows);
+  const auto sigmas = file.vector<double>("lines/measurement/sigma", rows);
+  const auto begin = begin_of(file, "lines/measurements", file.vector<std::int64_t>("lines/measurements", count), rows);
+  std::vector<KnownLine> lines;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (directions[i] > static_cast<std::uint8_t>(KnownLine::Direction::kHorizontal))
+      file.fail("lines/direction", "holds an unknown direction");
+    KnownLine line{names[i], static_cast<KnownLine::Direction>(directions[i]), {}};
+    for (auto m = static_cast<std::size_t>(begin[i]); m < static_cast<std::size_t>(begin[i + 1]); ++m)
+      line.measurements.push_back(
+          {ImageIndex(images[m]), {ends[4 * m], ends[4 * m + 1]}, {ends[4 * m + 2], ends[4 * m + 3]}, sigmas[m]});
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
 }  // namespace
 
 void put_block(Hdf5Writer& file, const Block& block) {
@@ -321,6 +371,7 @@ void put_block(Hdf5Writer& file, const Block& block) {
   put_images(file, block.images, block);
   put_relative_poses(file, block.relative_poses);
   put_control(file, block.control_points);
+  put_lines(file, block.lines);
 }
 
 Block get_block(const Hdf5Reader& file) {
@@ -332,6 +383,7 @@ Block get_block(const Hdf5Reader& file) {
   block.images = get_images(file);
   block.relative_poses = get_relative_poses(file);
   block.control_points = get_control(file);
+  block.lines = get_lines(file);
   return block;
 }
 

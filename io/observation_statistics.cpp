@@ -18,7 +18,8 @@ constexpr std::array<Names, kObservationKinds> kNames{{{"image, tie points", "im
                                                        {"control, horizontal", "control_horizontal"},
                                                        {"control, height", "control_height"},
                                                        {"camera, prior values", "intrinsics"},
-                                                       {"mount, prior values", "mount"}}};
+                                                       {"mount, prior values", "mount"},
+                                                       {"lines of known direction", "line"}}};
 
 }  // namespace
 

@@ -27,8 +27,9 @@ enum class ObservationKind : std::uint8_t {
   kControlHeight,
   kIntrinsics,  // prior values of cameras
   kMount,       // prior values of mounts
+  kLine,        // lines known to be vertical or horizontal
 };
-inline constexpr std::size_t kObservationKinds = 12;
+inline constexpr std::size_t kObservationKinds = 13;
 
 // "image, tie points" ...: for tables.
 const char* name_of(ObservationKind kind);

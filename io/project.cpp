@@ -9,6 +9,7 @@
 #include "io/control_file.h"
 #include "io/error.h"
 #include "io/image_scan.h"
+#include "io/lines.h"
 #include "io/project_sections.h"
 #include "io/settings_reader.h"
 #include "io/unit_files.h"
@@ -89,6 +90,8 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   read_attitudes(top, scanned, project);
   if (poses) set_given_poses(*poses, names_left_out(project), project.block, project.warnings);
   if (control) add_control(*control, names_left_out(project), project.block, project.warnings);
+  if (const auto lines = top.existing_file("lines"))
+    read_lines(*lines, names_left_out(project), project.block, project.warnings);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // What one tile says of the datum: the information of its priors on the similarities of each part.
 #include <algorithm>
 
+#include "adjust/line_terms.h"
 #include "adjust/linearise.h"
 #include "merge/gauge.h"
 
@@ -23,6 +24,7 @@ class PartBuilder {
     describe_frames();
     add_frame_priors();
     add_relatives();
+    add_lines();
     add_point_priors();
     add_mounts();
     return std::move(parts_);
@@ -77,6 +79,16 @@ class PartBuilder {
     for (const auto& term : problem_.attitudes) {
       GaugePart& part = part_of(term.frame);
       add(part, linearise_attitude(state_.frames[at(term.frame.value)], term.prior).by_frame * move(part, term.frame));
+    }
+  }
+
+  // Lines look at rotations alone, and a similarity turns both frames alike.
+  void add_lines() {
+    for (const auto& term : problem_.lines) {
+      GaugePart& part = part_of(term.frame);
+      const LineResidual line =
+          linearise_line(state_.frames[at(term.frame.value)], state_.frames[at(term.seen_by().value)], term);
+      add(part, (line.by_frame + line.by_other) * move(part, term.frame));
     }
   }
 

@@ -1,5 +1,7 @@
 #include "merge/tile_linearisation.h"
 
+#include "adjust/line_terms.h"
+
 namespace megablock {
 
 namespace {
@@ -31,7 +33,18 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     out.residual = r.residual;
     out.kinds.fill(ObservationKind::kAttitude);
     out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(none, pass);
+    out.weight(problem.attitude_loss, pass);
+    visit(out);
+  }
+  for (std::int64_t i : plan.lines[cell]) {
+    const auto& term = problem.lines[static_cast<std::size_t>(i)];
+    const LineResidual r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term);
+    TermResidual out;
+    out.residual = Eigen::Matrix<double, 1, 1>(r.residual);
+    out.kinds.fill(ObservationKind::kLine);
+    out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
+    if (term.other.valid()) out.add_block(plan.unknown_of_frame[term.other.value], r.by_other);
+    out.weight(problem.line_loss, pass);
     visit(out);
   }
   for (std::int64_t i : plan.relatives[cell]) {

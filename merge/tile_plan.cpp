@@ -31,6 +31,7 @@ Touched touched_rows(const TileProblem& problem) {
   }
   for (const auto& term : problem.positions) touched.frames[term.frame.value] = 1;
   for (const auto& term : problem.attitudes) touched.frames[term.frame.value] = 1;
+  for (const auto& term : problem.lines) touched.frames[term.frame.value] = touched.frames[term.seen_by().value] = 1;
   for (const auto& term : problem.relatives) touched.frames[term.from.value] = touched.frames[term.to.value] = 1;
   for (const auto& term : problem.intrinsic_priors)
     if (problem.camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
@@ -81,6 +82,9 @@ FrameGraph graph_of(const TileProblem& problem) {
   }
   for (const auto& term : problem.relatives)
     pairs.emplace_back(std::min(term.from.value, term.to.value), std::max(term.from.value, term.to.value));
+  for (const auto& term : problem.lines)
+    pairs.emplace_back(std::min(term.frame.value, term.seen_by().value),
+                       std::max(term.frame.value, term.seen_by().value));
   std::sort(pairs.begin(), pairs.end());
   FrameGraph graph;
   graph.frame_count = static_cast<std::int64_t>(problem.frames.size());
@@ -131,8 +135,8 @@ class CellPlanner {
   CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
               std::size_t cells)
       : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame) {
-    for (auto* list :
-         {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.intrinsic_priors, &plan.mount_priors})
+    for (auto* list : {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.lines,
+                       &plan.intrinsic_priors, &plan.mount_priors})
       list->resize(cells);
     touched_.assign(cells, std::vector<std::uint8_t>(plan.unknowns.size(), 0));
   }
@@ -189,6 +193,13 @@ class CellPlanner {
       plan_.relatives[cell].push_back(static_cast<std::int64_t>(i));
       touch(cell, plan_.unknown_of_frame[term.from.value]);
       touch(cell, plan_.unknown_of_frame[term.to.value]);
+    }
+    for (std::size_t i = 0; i < problem_.lines.size(); ++i) {
+      const auto& term = problem_.lines[i];
+      const std::size_t cell = cell_of(std::min(term.frame, term.seen_by()));
+      plan_.lines[cell].push_back(static_cast<std::int64_t>(i));
+      touch(cell, plan_.unknown_of_frame[term.frame.value]);
+      touch(cell, plan_.unknown_of_frame[term.seen_by().value]);
     }
     // Shared parameters' priors go where the first image of the camera or mount lies.
     std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);

@@ -41,7 +41,12 @@ void add_other_terms(Hasher& hasher, const TileProblem& p) {
     hasher.add(term.mount).add(term.rotation_sigma_rad).add(term.position_sigma_m);
     add_to_hash(hasher, term.value);
   }
-  for (const RobustLoss& loss : {p.image_loss, p.position_loss, p.relative_loss}) hasher.add(loss.kind).add(loss.scale);
+  hasher.add(p.lines.size());
+  for (const auto& term : p.lines) {
+    hasher.add(term.frame.value).add(term.other.value).add(term.weight);
+    for (const Eigen::Vector3d& v : {term.middle, term.across, term.other_normal}) add_to_hash(hasher, v);
+  }
+  for (const RobustLoss& loss : {p.image_loss, p.position_loss, p.attitude_loss, p.relative_loss, p.line_loss}) hasher.add(loss.kind).add(loss.scale);
 }
 
 }  // namespace

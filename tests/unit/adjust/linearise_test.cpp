@@ -10,6 +10,7 @@
 #include <random>
 
 #include "adjust/ceres_problem.h"
+#include "adjust/line_terms.h"
 
 namespace megablock {
 namespace {
@@ -125,6 +126,30 @@ TEST_P(Linearise, Attitude) {
   const Evaluated reference = by_ceres<3, 7>(residual::AttitudeMeasured{prior}, {block(frame)});
   expect_residual(ours.residual, reference.residual);
   expect_same(ours.by_frame, reference.jacobian);
+}
+
+// Rays to the ends of a line anywhere, seen by two frames.
+TEST_P(Linearise, Line) {
+  const Pose frame = far_pose(), other = far_pose();
+  TileProblem::LineTerm term;
+  const Eigen::Vector3d first = vector(1).normalized(), second = vector(1).normalized();
+  term.middle = (first + second).normalized();
+  term.across = (first - second).cross(term.middle) / 2;
+  term.other_normal = vector(1).normalized();
+  term.weight = uniform(100, 4000);
+  const LineResidual vertical = linearise_line(frame, frame, term);
+  const Evaluated one = by_ceres<1, 7>(residual::VerticalLine{term}, {block(frame)});
+  expect_residual(Eigen::VectorXd::Constant(1, vertical.residual), one.residual);
+  expect_same(vertical.by_frame, one.jacobian);
+  EXPECT_TRUE(vertical.by_other.isZero(0));
+
+  term.other = LocalFrame(1);
+  const LineResidual horizontal = linearise_line(frame, other, term);
+  const Evaluated two = by_ceres<1, 7, 7>(residual::HorizontalLine{term}, {block(frame), block(other)});
+  expect_residual(Eigen::VectorXd::Constant(1, horizontal.residual), two.residual);
+  Matrix jacobian(1, 12);
+  jacobian << horizontal.by_frame, horizontal.by_other;
+  expect_same(jacobian, two.jacobian);
 }
 
 TEST_P(Linearise, RelativePose) {

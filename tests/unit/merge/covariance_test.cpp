@@ -6,6 +6,7 @@
 
 #include "geometry/decompositions.h"
 #include "merge/monolithic.h"
+#include "tests/unit/adjust/known_lines.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
@@ -166,6 +167,18 @@ TEST(Gauge, AttitudesLeaveShiftAndScale) {
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
   runner.final_up();
   EXPECT_EQ(runner.gauge().defect, 4);
+}
+
+TEST(Gauge, LinesLeaveShiftScaleAndHeading) {
+  SimulationOptions options = small(SimulationOptions::Scene::kAerial, 40, 40);
+  options.gps_sigma_m = 0;
+  options.calibrate = false;
+  SimulatedBlock simulated = simulate_block(options);
+  add_known_lines(simulated, 10, 1);
+  const TiledBlock block(std::move(simulated), 12, {}, 0);
+  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  runner.final_up();
+  EXPECT_EQ(runner.gauge().defect, 5);
 }
 
 // The datum is a matter of convention: cost, decrement and the adjusted observations do not depend on it.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "merge/monolithic.h"
+#include "tests/unit/adjust/known_lines.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
@@ -14,6 +15,7 @@ struct Scene {
   SimulationOptions simulation;
   ObservationOptions observations;
   bool free_mounts = false;
+  bool lines = false;
 };
 
 SimulationOptions aerial() {
@@ -55,11 +57,13 @@ std::vector<Scene> scenes() {
   relative.gps_share = 0.2;
   list.push_back({"StreetRelative", relative, cauchy});
   list.push_back({"StreetFreeMounts", street(), {}, true});
+  list.push_back({"StreetLines", street(), cauchy, false, true});
   return list;
 }
 
 SimulatedBlock simulated(const Scene& scene) {
   SimulatedBlock block = simulate_block(scene.simulation);
+  if (scene.lines) add_known_lines(block, 20, 1);
   if (scene.free_mounts)
     for (Rig& rig : block.block.rigs)
       for (std::size_t m = 1; m < rig.mounts.size(); ++m) {

@@ -1,0 +1,92 @@
+#include "adjust/line_terms.h"
+
+#include <gtest/gtest.h>
+
+#include "known_lines.h"
+#include "single_tile.h"
+
+namespace megablock {
+namespace {
+
+SimulationOptions scene(SimulationOptions::Scene kind) {
+  SimulationOptions options;
+  options.scene = kind;
+  options.frames = 30;
+  options.points_per_frame = 100;
+  options.calibrate = false;  // lines take the given cameras
+  return options;
+}
+
+class Lines : public testing::TestWithParam<SimulationOptions::Scene> {};
+
+TEST_P(Lines, FitTheTruth) {
+  SimulatedBlock simulated = simulate_block(scene(GetParam()));
+  add_known_lines(simulated, 10, 0);
+  const SingleTile tile(std::move(simulated));
+  const TileState truth = tile.truth();
+  ASSERT_GT(tile.problem.lines.size(), 50u);
+  std::int64_t horizontal = 0;
+  for (const auto& term : tile.problem.lines) {
+    horizontal += term.other.valid();
+    const LineResidual r = linearise_line(truth.frames[term.frame.value], truth.frames[term.seen_by().value], term);
+    EXPECT_LT(std::abs(r.residual), 1e-6);
+    EXPECT_GT(r.by_frame.norm(), 0);
+    EXPECT_EQ(r.by_other.isZero(0), !term.other.valid());
+  }
+  EXPECT_GT(horizontal, 10);
+}
+
+// Positions of metres leave a small block tilted; lines do not. Their residuals are those of their noise.
+TEST_P(Lines, LevelTheBlock) {
+  SimulationOptions options = scene(GetParam());
+  options.gps_sigma_m = 3;
+  options.start_position_error_m = 2;
+  SimulatedBlock with = simulate_block(options);
+  SingleTile without(with);
+  add_known_lines(with, 10, 0.1);
+  SingleTile lines(std::move(with));
+  for (SingleTile* tile : {&without, &lines})
+    EXPECT_TRUE(adjust_tile(tile->problem, tile->state, tile->options).usable);
+  const auto tilt = [](const SingleTile& tile) {
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    double sum = 0;
+    for (std::size_t f = 0; f < tile.problem.frames.size(); ++f) {
+      const Eigen::Vector3d ours = tile.state.frames[f].rotation * up,
+                            truth = tile.simulated.truth.frames[tile.problem.frames[f]].rotation * up;
+      sum += (ours - truth).squaredNorm();
+    }
+    return std::sqrt(sum / static_cast<double>(tile.problem.frames.size())) * 180 / std::acos(-1.0);
+  };
+  EXPECT_GT(tilt(without), 0.1);  // degrees
+  EXPECT_LT(tilt(lines), 0.1 * tilt(without));
+  double squares = 0;
+  for (const auto& term : lines.problem.lines) {
+    const double r =
+        linearise_line(lines.state.frames[term.frame.value], lines.state.frames[term.seen_by().value], term).residual;
+    if (!term.other.valid()) squares += r * r;
+  }
+  const auto vertical = std::count_if(lines.problem.lines.begin(), lines.problem.lines.end(),
+                                      [](const auto& term) { return !term.other.valid(); });
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(vertical)), 1,
+              4 / std::sqrt(2.0 * static_cast<double>(vertical)));
+}
+
+TEST_P(Lines, OneWrongLineDoesNotTilt) {
+  SimulatedBlock simulated = simulate_block(scene(GetParam()));
+  add_known_lines(simulated, 10, 1.0);
+  simulated.block.lines.front().measurements.front().second +=
+      simulated.block.lines.front().direction == KnownLine::Direction::kVertical ? Eigen::Vector2d(300, 200)
+                                                                                 : Eigen::Vector2d(0, 300);
+  SingleTile tile(std::move(simulated));
+  EXPECT_TRUE(adjust_tile(tile.problem, tile.state, tile.options).usable);
+  EXPECT_LT(tile.position_rms(), 0.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Lines,
+                         testing::Values(SimulationOptions::Scene::kAerial, SimulationOptions::Scene::kStreet),
+                         [](const auto& p) {
+                           return p.param == SimulationOptions::Scene::kAerial ? "Aerial" : "Street";
+                         });
+
+}  // namespace
+}  // namespace megablock
