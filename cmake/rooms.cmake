@@ -19,6 +19,8 @@ if(MEGABLOCK_SANITIZE)
   target_compile_options(megablock_options INTERFACE -fsanitize=address,undefined
                          -fno-sanitize=null,object-size,alignment,vptr
                          -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+  # Debian's static libceres holds Eigen code compiled without sanitizers, which takes memory from malloc as it is.
+  target_compile_definitions(megablock_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
   target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)
 endif()
 
