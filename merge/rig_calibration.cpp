@@ -7,7 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "adjust/linearise.h"
 #include "geometry/line_ratio.h"
 #include "io/error.h"
 #include "merge/rig_posterior.h"
@@ -57,37 +56,6 @@ std::optional<PointFit> check_points(const Block& block, const WholeBlock& whole
   fit.mean_m /= n;
   fit.normalised = std::sqrt(ratios / (3 * n));
   return fit;
-}
-
-// Redundancy that falls to the priors: one less what each residual's own sigma is covered by the unknowns. Relative
-// poses are taken as fully redundant.
-double prior_redundancy(const WholeBlock& whole, const TileCovariance& covariance) {
-  const TileProblem& problem = whole.problem;
-  const auto uncovered = [](const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& c) {
-    return static_cast<double>(jacobian.rows()) - (jacobian * c * jacobian.transpose()).trace();
-  };
-  double sum = 6.0 * static_cast<double>(problem.relatives.size());
-  for (const auto& term : problem.point_priors) {
-    if (!problem.active(term.point.value)) continue;
-    const Eigen::Vector3d inverse = term.sigma.cwiseInverse();  // zero along an open axis
-    sum += static_cast<double>((inverse.array() > 0).count()) -
-           inverse.cwiseAbs2().dot(covariance.points[at(term.point.value)].diagonal());
-  }
-  for (const auto& term : problem.mount_priors)
-    sum += uncovered(linearise_mount(whole.state.mounts[at(term.mount)], term).by_mount,
-                     covariance.mounts[at(term.mount)]);
-  for (const auto& term : problem.positions)
-    sum += uncovered(linearise_position(whole.state.frames[at(term.frame.value)], term.prior).by_frame,
-                     covariance.frames[at(term.frame.value)]);
-  for (const auto& term : problem.attitudes)
-    sum += uncovered(linearise_attitude(whole.state.frames[at(term.frame.value)], term.prior).by_frame,
-                     covariance.frames[at(term.frame.value)]);
-  for (const auto& term : problem.intrinsic_priors)
-    for (int k = 0; k < term.value.size(); ++k) {
-      const double weight = intrinsic_prior_weight(term, k);
-      if (weight > 0) sum += 1 - weight * weight * covariance.cameras[at(term.camera.value)](k, k);
-    }
-  return sum;
 }
 
 class RigCalibrator {
@@ -204,7 +172,10 @@ class RigCalibrator {
     const std::int64_t redundancy =
         sums.residuals - sums.unknowns + std::ssize(sums.held) + sums.held_points + runner.block_gauge().defect();
     result_.residuals = 2 * sums.observations;
-    result_.redundancy = static_cast<double>(redundancy) - prior_redundancy(whole, covariances.front());
+    result_.redundancy = 0;
+    for (const ObservationKind kind :
+         {ObservationKind::kTieImage, ObservationKind::kControlImage, ObservationKind::kCheckImage})
+      result_.redundancy += covariances.front().observations[kind].redundancy;
     result_.sigma0 = redundancy > 0 ? std::sqrt(sums.weighted_squares / static_cast<double>(redundancy)) : 0;
     result_.image_sigma_px = whole.problem.image_sigma_px;
     free_datum_ = runner.block_gauge().free();
