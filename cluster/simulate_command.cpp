@@ -42,14 +42,15 @@ class SimulateOptions {
       if (option->count() > 0) options.*member = given_.*member;
     });
   }
-  void add_switch(const std::string& name, bool SimulationOptions::*member, const std::string& help) {
+  void add_switch(const std::string& name, bool SimulationOptions::*member, const std::string& help,
+                  bool value = false) {
     command_->add_flag_callback(
-        name, [this, member] { off_.push_back(member); }, help);
+        name, [this, member, value] { switched_.emplace_back(member, value); }, help);
   }
   SimulationOptions settled() const {
     SimulationOptions options = SimulationOptions::of(kScenes.at(scene), kPaths.at(path));
     for (const auto& settle : settle_) settle(options);
-    for (const auto member : off_) options.*member = false;
+    for (const auto& [member, value] : switched_) options.*member = value;
     if (options.published_camera != 0) options.use_published_camera(options.published_camera);
     return options;
   }
@@ -61,7 +62,7 @@ class SimulateOptions {
   CLI::App* command_;
   SimulationOptions given_;
   std::vector<std::function<void(SimulationOptions&)>> settle_;
-  std::vector<bool SimulationOptions::*> off_;
+  std::vector<std::pair<bool SimulationOptions::*, bool>> switched_;
 };
 
 void add_scene_options(SimulateOptions& s) {
@@ -82,6 +83,9 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--panorama-radius", &O::panorama_radius_m, "Panorama: mean distance of the points, m [10]");
   s.add("--depth-spread", &O::depth_spread, "Panorama: distances are that, times 1 +- this [0]");
   s.add("--off-centre", &O::off_centre_m, "Panorama: projection centre ahead of the point it turns about, m [0]");
+  s.add_switch("--vehicle", &O::vehicle, "Stereopolis, rendered: parts of the vehicle are in the pictures", true);
+  s.add("--repeated-facades", &O::repeated_facades,
+        "Street, stereopolis, rendered: share of houses with repeated facades, 0..1 [0]");
   s.add("--mount-position-error", &O::mount_position_error_m,
         "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]");
   s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]");

@@ -35,6 +35,9 @@ Project read_project(const std::string& path);
 // The same in the ground frame of a running job, so that images added later cannot move the origin.
 Project read_project(const std::string& path, const std::optional<GroundFrame>& ground);
 
+// Of a camera's mask in the folder `masks`: "<camera>.png", '/' in the name written '_'.
+std::string mask_file_name(const std::string& camera);
+
 // The block of a job that has grown: cameras, rigs, frames and images of `previous` keep their indices (matched by
 // name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
 // `previous` that are gone stay, so the caller sees that by the count. The ground frame stays the previous one:

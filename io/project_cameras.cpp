@@ -151,12 +151,16 @@ void read_cameras(YamlReader& cameras, Block& block) {
                        names_of(block) + " (and 'default' for all, 'grouping')");
 }
 
+std::string mask_file_name(const std::string& camera) {
+  std::string name = camera;
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name + ".png";
+}
+
 void read_masks(const std::string& folder, Project& project) {
   std::vector<std::string> used;
   for (Camera& camera : project.block.cameras) {
-    std::string name = camera.name;
-    std::replace(name.begin(), name.end(), '/', '_');
-    const std::string path = (fs::path(folder) / (name + ".png")).string();
+    const std::string path = (fs::path(folder) / mask_file_name(camera.name)).string();
     if (!fs::is_regular_file(path)) continue;
     used.push_back(path);
     if (camera.mask_path.empty()) camera.mask_path = path;

@@ -12,6 +12,7 @@ namespace megablock {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kWindow = 1.7, kStorey = 3;  // metres, from one window to the next
 
 }  // namespace
 
@@ -171,9 +172,6 @@ void City::sort_boxes() {
   }
 }
 
-namespace {
-
-// Slab test; the distance at which the ray enters the box, and through which axis' face.
 bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d& inverse, double& distance, int& axis) {
   double first = 0, last = kInfinity;
   int face = -1;
@@ -191,8 +189,6 @@ bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d&
   axis = face;
   return true;
 }
-
-}  // namespace
 
 // Walks through the cells that the ray crosses in plan (Amanatides and Woo 1987).
 std::int64_t City::nearest_box(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit,
@@ -290,23 +286,33 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
       detail = texture_.detail(p.x(), p.y(), number, footprint);
     } else {
       const int across = std::abs(hit.normal.x()) > 0.5 ? 0 : 1;
-      const double along = p[1 - across];
+      double along = p[1 - across], up = p.z();
       const std::uint32_t wall = number + static_cast<std::uint32_t>(1 + across) + (hit.normal[across] > 0 ? 7 : 0);
-      detail = texture_.detail(along, p.z(), wall, footprint);
-      // Windows of different brightness, a storey of 3 m.
-      const double u = along / 1.7 - std::floor(along / 1.7), v = p.z() / 3 - std::floor(p.z() / 3);
+      if (Texture::cell(2.5, 0.5, 1, number) < options_.repeated_facades) {
+        // The same two windows again and again, with what weather has made of each.
+        detail = 0.2f * texture_.detail(along, up, wall + 3, footprint);
+        along -= 2 * kWindow * std::floor(along / (2 * kWindow));
+        up -= kStorey * std::floor(up / kStorey);
+        detail += 0.9f * texture_.detail(along, up, wall, footprint);
+      } else {
+        detail = texture_.detail(along, up, wall, footprint);
+      }
+      // Windows of different brightness.
+      const double u = along / kWindow - std::floor(along / kWindow), v = up / kStorey - std::floor(up / kStorey);
       if (u > 0.3 && u < 0.85 && v > 0.25 && v < 0.8)
-        base *= 0.3f + 0.7f * Texture::cell(along, p.z() * 1.7 / 3, 1.7, wall);
+        base *= 0.3f + 0.7f * Texture::cell(along, up * kWindow / kStorey, kWindow, wall);
     }
   }
-  // Sunlight from the south-west, with shadows of the boxes, and skylight.
+  return light(p, hit.normal) * (base * std::max(0.1f, 1 + 0.5f * detail));
+}
+
+float City::light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
   const Eigen::Vector3d sun = Eigen::Vector3d(-0.45, -0.6, 0.8).normalized();
-  double light = std::max(0.0, hit.normal.dot(sun));
+  double sunlight = std::max(0.0, normal.dot(sun));
   double distance = 0;
   int axis = 0;
-  if (light > 0 && nearest_box(p + 1e-4 * hit.normal, sun, 500, distance, axis) >= 0) light = 0;
-  const float shade = 0.6f + 0.5f * static_cast<float>(light);
-  return shade * (base * std::max(0.1f, 1 + 0.5f * detail));
+  if (sunlight > 0 && nearest_box(point + 1e-4 * normal, sun, 500, distance, axis) >= 0) sunlight = 0;
+  return 0.6f + 0.5f * static_cast<float>(sunlight);
 }
 
 std::optional<SurfacePoint> City::sample(const Pose& frame, Random& random) const {

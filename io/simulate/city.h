@@ -11,6 +11,10 @@ struct Box {
   Eigen::Vector3d low, high;  // metres, sides parallel to the axes
 };
 
+// Whether a ray from outside enters the box (slab test), at which distance, and through which axis' face. `inverse`: of
+// the direction's components.
+bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d& inverse, double& distance, int& axis);
+
 // Heights on a square lattice, bilinear between: the terrain of a rendered scene exactly.
 class HeightGrid {
  public:
@@ -59,6 +63,8 @@ class City : public Scene {
   Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double ground_guess = 0) const;
   // Red, green, blue, 0 to 255. `pixel_angle`: of a pixel, radians.
   Eigen::Vector3f colour(const Hit& hit, const Eigen::Vector3d& direction, double pixel_angle) const;
+  // What falls on a surface: sunlight from the south-west, with shadows of the boxes, and skylight.
+  float light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
 
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override;
   bool visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const override;

@@ -28,7 +28,8 @@ RayTable::RayTable(const Camera& camera, const Intrinsics& intrinsics)
 
 namespace {
 
-constexpr float kNoise = 1.5f;  // of the sensor, grey values
+constexpr float kNoise = 1.5f;           // of the sensor, grey values
+constexpr std::int64_t kOnVehicle = -3;  // in place of an object of the city
 
 // Approximately normal: the sum of four uniform numbers.
 float sensor_noise(std::uint64_t bits) {
@@ -39,7 +40,8 @@ float sensor_noise(std::uint64_t bits) {
 
 }  // namespace
 
-cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed) {
+cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed,
+                     const SeenVehicle& vehicle) {
   cv::Mat image(rays.rows() / 2, rays.columns() / 2, CV_8UC3);
   const Eigen::Matrix3d to_ground = camera.rotation.toRotationMatrix().transpose();
 #pragma omp parallel for schedule(dynamic, 8)
@@ -51,17 +53,25 @@ cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera,
       std::array<City::Hit, 4> hit;
       bool edge = false;
       for (std::size_t k = 0; k < 4; ++k) {
-        const Eigen::Vector2f& ray = rays.at(2 * row + static_cast<int>(k / 2), 2 * column + static_cast<int>(k % 2));
+        const int r = 2 * row + static_cast<int>(k / 2), c = 2 * column + static_cast<int>(k % 2);
+        const Eigen::Vector2f& ray = rays.at(r, c);
         direction[k] =
             (to_ground * Eigen::Vector3d(static_cast<double>(ray.x()), static_cast<double>(ray.y()), 1)).normalized();
-        hit[k] = city.cast(camera.centre, direction[k], guess);
+        if (vehicle.view && vehicle.view->covers(r, c))
+          hit[k].object = kOnVehicle;
+        else
+          hit[k] = city.cast(camera.centre, direction[k], guess);
         if (hit[k].object == City::kGround) guess = hit[k].distance;
         edge = edge || hit[k].object != hit[0].object;
       }
       // Within one surface two samples on the diagonal do: the texture fades where it is finer than the pixel.
       Eigen::Vector3f mean = Eigen::Vector3f::Zero();
       const std::size_t step = edge ? 1 : 3;
-      for (std::size_t k = 0; k < 4; k += step) mean += city.colour(hit[k], direction[k], 1 / focal_px);
+      for (std::size_t k = 0; k < 4; k += step) {
+        const int r = 2 * row + static_cast<int>(k / 2), c = 2 * column + static_cast<int>(k % 2);
+        mean += hit[k].object == kOnVehicle ? vehicle.view->colour(r, c, vehicle.light)
+                                            : city.colour(hit[k], direction[k], 1 / focal_px);
+      }
       mean /= edge ? 4 : 2;
       std::uint64_t bits =
           mix_bits(seed + static_cast<std::uint64_t>(row) * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(column));

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "io/simulate/city.h"
+#include "io/simulate/vehicle_view.h"
 
 namespace megablock {
 
@@ -23,8 +24,15 @@ class RayTable {
   std::vector<Eigen::Vector2f> rays_;
 };
 
+// The vehicle in a camera's pictures, and the light on it where this one was taken.
+struct SeenVehicle {
+  const VehicleView* view = nullptr;  // none: the picture shows the scene alone
+  VehicleView::Light light{};
+};
+
 // 8-bit BGR picture; `camera` is the pose ground -> camera. Sensor noise depends on `seed` alone, and the picture not
 // on the number of threads.
-cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed);
+cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed,
+                     const SeenVehicle& vehicle = {});
 
 }  // namespace megablock

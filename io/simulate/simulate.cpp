@@ -105,6 +105,8 @@ void SimulationOptions::check() const {
   require(std::abs(off_centre_m) < 0.05 * panorama_radius_m, "off_centre_m must be below 5 % of panorama_radius_m");
   require(start_focal > 0.2 && start_focal < 5, "start_focal must lie in (0.2, 5)");
   require(published_camera == 0 || !has_vehicle(scene), "published_camera is not for scenes with the vehicle's rig");
+  require(repeated_facades >= 0 && repeated_facades <= 1, "repeated_facades must lie in [0, 1]");
+  require(!vehicle || scene == Scene::kStereopolis, "a vehicle is seen in the stereopolis scene only");
   require(points_per_frame >= 10, "points_per_frame must be at least 10");
   require(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");
   require(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");

@@ -39,6 +39,10 @@ struct SimulationOptions {
   // `held_out_zone` are (-1: of none).
   int control_zones = 0, held_out_zone = -1;
   std::uint64_t vehicle_seed = 0;  // Stereopolis, target field: seed of cameras and mounts; 0: `seed`
+  // Stereopolis, rendered: parts of the vehicle are in the pictures of the level cameras.
+  bool vehicle = false;
+  // Street, Stereopolis, rendered: share of the houses whose facades repeat every 3.4 m along and 3 m up.
+  double repeated_facades = 0;
   // Stereopolis, target field: sigmas per axis of the given mounts, which are also stated; 0: held at the truth.
   double mount_position_error_m = 0.005, mount_rotation_error_deg = 0.5;
   // Panorama: a camera turned about a point (panorama_rotations), from which the projection centre lies off_centre_m
@@ -111,7 +115,7 @@ SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink&
 //   folder/block.yaml, folder/truth.csv and truth.h5 (poses of the frames), folder/control.csv (control and check
 //   points, with roles and sigmas), folder/gcp_list.txt (the control points for other programs), folder/poses.csv (the
 //   given poses; block.yaml does not use them), folder/rig_cameras.json and rig_assignments.json (street: the rig,
-//   held)
+//   held), folder/truth_masks/<camera>.png (vehicle: where it is in the pictures; block.yaml does not use them)
 // Attitude priors and relative poses have no place in these files and are not written.
 void write_rendered_block(const SimulationOptions& options, const std::string& folder);
 // The tie-point level, streamed to the files: folder/block.yaml (with `tie_points: tie_points.h5`, `block: given.h5`),

@@ -1,15 +1,18 @@
 // A simulated block as pictures with the project files around them.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "io/control_file.h"
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/pose_csv.h"
+#include "io/project.h"
 #include "io/simulate/image_file.h"
 #include "io/simulate/render.h"
 #include "io/unit_files.h"
@@ -37,6 +40,29 @@ Pose image_pose(const Layout& layout, ImageIndex image) {
   return camera_pose(layout.truth.frames[entry.frame], layout.truth.mounts[rig][static_cast<std::size_t>(entry.mount)]);
 }
 
+// The name that the program gives to a camera by the headers of its images.
+std::string name_by_headers(const Camera& camera) {
+  std::ostringstream name;
+  name << "Megablock Simulated " << camera.name << ' ' << camera.width << 'x' << camera.height << ' ' << std::fixed
+       << std::setprecision(2) << camera.intrinsics[kFocal] * 10 / std::max(camera.width, camera.height) << "mm";
+  return name.str();
+}
+
+// The vehicle in a camera's pictures; its mount is that of the rig with this camera.
+std::optional<VehicleView> vehicle_seen(const SimulationOptions& options, const Layout& layout, CameraIndex camera,
+                                        const RayTable& rays) {
+  if (!options.vehicle) return std::nullopt;
+  const std::vector<Mount>& mounts = layout.block.rigs.front().mounts;
+  const auto mount = std::find_if(mounts.begin(), mounts.end(), [&](const Mount& m) { return m.camera == camera; });
+  return VehicleView(options, rays, layout.truth.mounts.front()[static_cast<std::size_t>(mount - mounts.begin())]);
+}
+
+void write_mask(const VehicleView& vehicle, const fs::path& folder, const Camera& camera) {
+  fs::create_directories(folder);
+  const std::string path = (folder / mask_file_name(name_by_headers(camera))).string();
+  if (!cv::imwrite(path, vehicle.mask())) throw InputError(path + ": cannot be written");
+}
+
 void write_images(const SimulationOptions& options, const Layout& layout, const Block& with_priors,
                   const fs::path& folder) {
   const auto& city = dynamic_cast<const City&>(*layout.scene);
@@ -45,12 +71,16 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
   for (std::size_t c = 0; c < layout.block.cameras.size(); ++c) {
     const CameraIndex camera(static_cast<std::int64_t>(c));
     const RayTable rays(layout.block.cameras[camera], layout.truth.cameras[camera]);
+    const std::optional<VehicleView> vehicle = vehicle_seen(options, layout, camera, rays);
+    if (vehicle) write_mask(*vehicle, folder.parent_path() / "truth_masks", layout.block.cameras[camera]);
     for (std::size_t i = 0; i < layout.block.images.size(); ++i) {
       const ImageIndex image(static_cast<std::int64_t>(i));
       if (layout.block.camera_of(image) != camera) continue;
       const std::uint64_t seed = Random(options.seed, Random::Purpose::kImage, i).next();
+      const Pose& rig = layout.truth.frames[layout.block.images[image].frame];
+      const SeenVehicle seen{vehicle ? &*vehicle : nullptr, VehicleView::light_at(city, rig)};
       const cv::Mat picture =
-          render_image(city, rays, image_pose(layout, image), layout.truth.cameras[camera][kFocal], seed);
+          render_image(city, rays, image_pose(layout, image), layout.truth.cameras[camera][kFocal], seed, seen);
       SimulatedExif exif;
       exif.model = "Simulated " + layout.block.cameras[camera].name;
       exif.focal_px = layout.block.cameras[camera].intrinsics[kFocal];
@@ -139,11 +169,8 @@ void write_cameras(const SimulationOptions& options, const Block& block, std::os
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
     const Camera& camera = block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
     const Intrinsics& k = camera.intrinsics;
-    std::ostringstream focal_mm;
-    focal_mm << std::fixed << std::setprecision(2) << k[kFocal] * 10 / std::max(camera.width, camera.height);
     if (block.cameras.size() > 1)
-      yaml << "  \"Megablock Simulated " << camera.name << ' ' << camera.width << 'x' << camera.height << ' '
-           << focal_mm.str() << "mm\":\n";
+      yaml << "  \"" << name_by_headers(camera) << "\":\n";
     else
       yaml << "  default:\n";
     if (!brown) yaml << "    model: " << options.camera_model << '\n';
