@@ -14,12 +14,14 @@
 #include "cluster/collective.h"
 #include "cluster/communicator.h"
 #include "cluster/exit_codes.h"
+#include "cluster/masks_command.h"
 #include "cluster/monolithic_comparison.h"
 #include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
 #include "cluster/register_command.h"
 #include "cluster/simulate_command.h"
 #include "cluster/status.h"
+#include "cluster/train_filter_command.h"
 #include "cluster/version.h"
 #include "io/check.h"
 #include "io/error.h"
@@ -344,6 +346,8 @@ int command_line(int argc, char** argv) {
     add_run(app, action, ranks, "adjust", "adjust", "Run as far as the adjustment of the tiles");
     add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
     add_calibrate(app, action, ranks);
+    add_masks(app, action);
+    add_train_filter(app, action);
     add_resect(app, action);
     add_register(app, action, ranks);
     add_status(app, action);

@@ -35,6 +35,15 @@ void describe(Visitor& visit, MatchOptions& o) {
   visit.number("ratio", o.ratio);
   visit.number("max_residual_px", o.max_residual_px);
   visit.integer("min_inliers", o.min_inliers);
+  visit.flag("guided", o.guided);
+  visit.number("min_distance_m", o.min_distance_m);
+  visit.number("max_distance_m", o.max_distance_m);
+  visit.flag("filter", o.filter);
+  visit.text("filter_model", o.filter_model);
+  visit.flag("use_trajectory", o.trust.use_trajectory);
+  visit.number("trajectory_seconds", o.trust.max_seconds);
+  visit.number("trajectory_position_sigma_m", o.trust.position_sigma_m);
+  visit.number("trajectory_rotation_sigma_deg", o.trust.rotation_sigma_deg);
 }
 
 template <typename Visitor>
@@ -116,6 +125,7 @@ class HashVisitor {
   void integer(const std::string& key, std::int64_t value) { hasher_.add(key).add(value); }
   void flag(const std::string& key, bool value) { hasher_.add(key).add(value); }
   void choice(const std::string& key, const std::vector<std::string>&, int value) { hasher_.add(key).add(value); }
+  void text(const std::string& key, const std::string& value) { hasher_.add(key).add(value); }
 
  private:
   Hasher& hasher_;
@@ -138,6 +148,7 @@ class TextVisitor {
   void choice(const std::string& key, const std::vector<std::string>& names, int value) {
     values_.push_back({section_, key, names[static_cast<std::size_t>(value)]});
   }
+  void text(const std::string& key, const std::string& value) { values_.push_back({section_, key, value}); }
 
  private:
   std::string section_;

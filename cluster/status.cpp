@@ -10,6 +10,7 @@
 #include "cluster/stage_record.h"
 #include "io/error.h"
 #include "io/events.h"
+#include "io/feature_statistics.h"
 #include "io/remarks.h"
 #include "io/result.h"
 #include "io/unit_files.h"
@@ -78,6 +79,22 @@ Json observation_kinds(const ObservationTable& table) {
   return kinds;
 }
 
+Json interest_points_json(const BlockResult& result) {
+  Json list = Json::array();
+  const auto statistics = feature_statistics(result);
+  for (CameraIndex c(0); statistics.contains(c); ++c.value) {
+    const FeatureStatistics& s = statistics[c];
+    if (s.images == 0) continue;
+    list.push_back({{"camera", result.block.cameras[c].name},
+                    {"images", s.images},
+                    {"least", s.least},
+                    {"most", s.most},
+                    {"mean", s.mean()},
+                    {"total", s.total}});
+  }
+  return list;
+}
+
 void add_figures(Json& json, const BlockResult& result) {
   const ReprojectionStatistics statistics = reprojection_statistics(result);
   json["images"] = result.block.images.size();
@@ -97,6 +114,7 @@ void add_figures(Json& json, const BlockResult& result) {
   json["gauge"] = result.gauge;
   json["control_points_unused"] = unused_points(result, PointRole::kControl).size();
   json["check_points_unused"] = unused_points(result, PointRole::kCheck).size();
+  json["interest_points"] = interest_points_json(result);
   json["remarks"] = remarks(result);
   json["digest"] = result.digest;
 }
@@ -111,7 +129,7 @@ Json status(const JobStore& store) {
   for (const char* key :
        {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px", "rms_reprojection_px",
         "chi2_per_dof", "observation_kinds", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
-        "control_points_unused", "check_points_unused", "remarks"})
+        "control_points_unused", "check_points_unused", "interest_points", "remarks"})
     json[key] = nullptr;
   json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
   const bool current = stages.back().state == StageState::kDone;
@@ -160,6 +178,20 @@ std::string figures_text(const Json& json) {
   return line;
 }
 
+std::string interest_points_text(const Json& list) {
+  std::string text;
+  constexpr std::size_t kShown = 20;
+  for (std::size_t i = 0; i < std::min(kShown, list.size()); ++i) {
+    char line[128];
+    std::snprintf(line, sizeof line, ": %lld to %lld interest points per image, mean %.0f, %lld in %lld images\n",
+                  list[i]["least"].get<long long>(), list[i]["most"].get<long long>(), list[i]["mean"].get<double>(),
+                  list[i]["total"].get<long long>(), list[i]["images"].get<long long>());
+    text += "  " + list[i]["camera"].get<std::string>() + line;
+  }
+  if (list.size() > kShown) text += "  ... all cameras in 'megablock status --json'\n";
+  return text;
+}
+
 }  // namespace
 
 std::string status_json(const JobStore& store) {
@@ -175,6 +207,7 @@ std::string status_text(const JobStore& store) {
   if (json["result"] == "stale")
     text += "  the result is older than what was asked of the job since: run it to the end again\n";
   text += figures_text(json);
+  text += interest_points_text(json["interest_points"]);
   for (const std::string remark : json["remarks"]) text += "  look: " + remark + "\n";
   return text;
 }

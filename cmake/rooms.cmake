@@ -60,6 +60,16 @@ function(megablock_room name)
   add_library(megablock::${name} ALIAS megablock_${name})
 endfunction()
 
+# A text file of a room as a constant: <room>/<header>.h with `extern const char* <name>`, made when building.
+function(megablock_embed room file header name)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${room}/${file})
+  file(READ ${PROJECT_SOURCE_DIR}/${room}/${file} text)
+  set(folder ${CMAKE_BINARY_DIR}/embedded)
+  file(CONFIGURE OUTPUT ${folder}/${room}/${header}.h @ONLY CONTENT
+       "// Made of ${room}/${file}.\n#pragma once\nnamespace megablock { inline constexpr const char* ${name} = R\"text(@text@)text\"; }\n")
+  target_include_directories(megablock_${room} PRIVATE ${folder})
+endfunction()
+
 # One test program from the .cpp files of a folder under tests/, all of its cases labelled.
 function(megablock_tests target folder)
   cmake_parse_arguments(TESTS "" "LABEL;TIMEOUT" "LINK" ${ARGN})

@@ -27,7 +27,8 @@ StageSettings read_stage_settings(YamlReader& top) {
     auto reader = top.mapping(section);
     if (!reader) continue;
     for (const std::string& key : reader->keys()) {
-      const auto value = reader->text(key);
+      const bool is_file = section == "matching" && key == "filter_model";
+      const auto value = is_file ? reader->existing_file(key) : reader->text(key);
       settings.entries.push_back({section, key, *value, reader->where(key)});
     }
   }

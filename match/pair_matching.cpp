@@ -8,6 +8,8 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/tracks.h"
+#include "match/guided_matching.h"
+#include "match/match_filter.h"
 #include "match/nearest.h"
 #include "match/two_view.h"
 
@@ -96,13 +98,14 @@ Matches match_descriptors(const std::vector<SiftDescriptor>& a, const std::vecto
   return matches;
 }
 
-VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
-                        const MatchOptions& options) {
-  if (!(a.image < b.image)) throw InputError("match_pair: the first image must have the lower index");
+namespace {
+
+// Verification of matches by two-view geometry; `by_chance`: see TwoViewOptions.
+VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
+                    const MatchOptions& options, const Matches& matches, double by_chance) {
   VerifiedPair pair;
   pair.a = a.image;
   pair.b = b.image;
-  const Matches matches = match_descriptors(a.descriptors, b.descriptors, options);
   pair.putative = static_cast<std::int32_t>(matches.size());
   const PositionedMatches positioned = position(matches, a, b, camera_a, camera_b);
 
@@ -110,6 +113,7 @@ VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Ca
   const double focal = 0.5 * (camera_a.intrinsics[kFocal] + camera_b.intrinsics[kFocal]);
   two_view.max_residual = options.max_residual_px / focal;
   two_view.min_inliers = options.min_inliers;
+  two_view.by_chance = by_chance;
   two_view.seed = pair_seed(a.image, b.image);
   const TwoView found = estimate_two_view(positioned.points, two_view);
   if (found.model == PairModel::kNone) return pair;
@@ -123,6 +127,55 @@ VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Ca
     pair.feature_a.push_back(positioned.matches[i].first);
     pair.feature_b.push_back(positioned.matches[i].second);
   }
+  return pair;
+}
+
+Eigen::Vector2d pixel(const ImageFeatures& image, std::int32_t row) {
+  const Keypoint& k = image.keypoints[static_cast<std::size_t>(row)];
+  return {from_fixed_pixel(k.x), from_fixed_pixel(k.y)};
+}
+
+// Drops what the filter takes for wrong; a pair that keeps too little is not verified.
+void drop_wrong(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
+                const MatchOptions& options, const TrustedPair& orientation, const MatchFilter& filter,
+                VerifiedPair& pair) {
+  std::vector<MatchSample> samples;
+  for (std::size_t i = 0; i < pair.feature_a.size(); ++i) {
+    const auto sample =
+        match_sample(orientation, camera_a, pixel(a, pair.feature_a[i]), camera_b, pixel(b, pair.feature_b[i]));
+    samples.push_back(sample.value_or(MatchSample{}));  // verified, so it has rays
+  }
+  const std::vector<std::uint8_t> right = filter.right(samples);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    if (!right[i]) continue;
+    pair.feature_a[kept] = pair.feature_a[i];
+    pair.feature_b[kept++] = pair.feature_b[i];
+  }
+  pair.feature_a.resize(kept);
+  pair.feature_b.resize(kept);
+  if (static_cast<int>(kept) >= options.min_inliers) return;
+  pair.model = PairModel::kNone;
+  pair.feature_a.clear();
+  pair.feature_b.clear();
+}
+
+}  // namespace
+
+VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
+                        const MatchOptions& options, const PairKnowledge& known) {
+  if (!(a.image < b.image)) throw InputError("match_pair: the first image must have the lower index");
+  VerifiedPair pair;
+  if (known.orientation && options.guided) {
+    const GuidedMatches guided = match_along_epipolar(a, b, camera_a, camera_b, *known.orientation, options);
+    // Wrong matches lie anywhere in the band.
+    const double by_chance = std::min(1.0, options.max_residual_px / std::max(1.0, guided.half_width_px));
+    pair = verify(a, b, camera_a, camera_b, options, guided.matches, by_chance);
+  }
+  if (pair.model == PairModel::kNone)
+    pair = verify(a, b, camera_a, camera_b, options, match_descriptors(a.descriptors, b.descriptors, options), 0);
+  if (known.orientation && known.filter && pair.model != PairModel::kNone)
+    drop_wrong(a, b, camera_a, camera_b, options, *known.orientation, *known.filter, pair);
   return pair;
 }
 

@@ -2,20 +2,32 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "io/block.h"
 #include "io/features.h"
+#include "match/trusted_pair.h"
 
 namespace megablock {
+
+class MatchFilter;
 
 struct MatchOptions {
   int k_best = 1;                // neighbours kept per feature: 1, or 3 on repeated facades (CN-12)
   double ratio = 0.85;           // a neighbour passes when its distance < ratio x distance of neighbour k + 1
   double max_residual_px = 3.0;  // of verification: epipolar (Sampson) or transfer residual
   int min_inliers = 20;          // fewer: the pair is not verified
-  void check() const;            // throws InputError
+  // Of pairs whose relative orientation is trusted (trusted_pair.h).
+  bool guided = true;           // only features near the epipolar line are compared
+  double min_distance_m = 2;    // of what is matched so, and
+  double max_distance_m = 100;  // at most
+  bool filter = true;           // matches that the filter takes for wrong are dropped
+  std::string filter_model;     // YAML of train-filter; empty: the one that comes with the program
+  TrustOptions trust;
+  void check() const;  // throws InputError
 };
 
 // Mutual matches (row in a, row in b), ascending. Exact: the same as comparing all pairs with integer arithmetic.
@@ -23,8 +35,15 @@ std::vector<std::pair<std::int32_t, std::int32_t>> match_descriptors(const std::
                                                                      const std::vector<SiftDescriptor>& b,
                                                                      const MatchOptions& options);
 
-// Matches and verifies one pair; model kNone when it does not pass. Deterministic: seeded by the two image indices.
+// What is known of a pair before it is matched.
+struct PairKnowledge {
+  std::optional<TrustedPair> orientation;
+  const MatchFilter* filter = nullptr;  // none: nothing is filtered
+};
+
+// Matches and verifies one pair; model kNone when it does not pass. Deterministic: seeded by the two image indices. A
+// pair that cannot be verified along its trusted epipolar lines is matched without them.
 VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
-                        const MatchOptions& options);
+                        const MatchOptions& options, const PairKnowledge& known = {});
 
 }  // namespace megablock

@@ -197,7 +197,7 @@ int inliers_needed(const PointPairs& points, const TwoViewOptions& options) {
   for (const auto& p : points.b) box.extend(p);
   const Eigen::Vector2d size = box.sizes().cwiseMax(options.max_residual);
   const double share = std::min(1.0, 2 * options.max_residual * size.norm() / size.prod());
-  const double by_chance = kAdaptation * share * static_cast<double>(points.size());
+  const double by_chance = std::max(options.by_chance, kAdaptation * share) * static_cast<double>(points.size());
   // Matches crowded into a corner all lie in the band: never ask for more than a half.
   return options.min_inliers + static_cast<int>(std::min(by_chance, 0.5 * static_cast<double>(points.size())));
 }

@@ -19,6 +19,7 @@ struct PointPairs {
 struct TwoViewOptions {
   double max_residual = 3e-3;  // Sampson or transfer residual, normalised units (pixels / focal length)
   int min_inliers = 20;
+  double by_chance = 0;  // share of wrong matches that fit the model by chance; 0: of matches anywhere in the image
   std::uint64_t seed = 0;
 };
 

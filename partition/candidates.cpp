@@ -10,6 +10,7 @@
 
 #include "io/error.h"
 #include "partition/cells.h"
+#include "partition/cones.h"
 #include "partition/kd_tree.h"
 #include "partition/views.h"
 
@@ -18,14 +19,24 @@ namespace megablock {
 namespace {
 
 constexpr int kSectors = 8;
-constexpr std::size_t kSearchFactor = 4;                    // candidates looked at per neighbour wanted
-constexpr double kSectorDistance = 3;                       // times the distance of the farthest nearest neighbour
+constexpr std::size_t kSearchFactor = 4;  // candidates looked at per neighbour wanted
+constexpr double kSectorDistance = 3;     // times the distance of the farthest nearest neighbour
+constexpr double kRigDistance = 30;       // metres, between images of rigs (CN-11)
+constexpr double kConeRange = 30;         // metres: how far such images see things in common, when there is no limit
+constexpr double kLeastOverlap = 0.03;    // of the cones
+constexpr std::int64_t kVisitFrames = 25;
+constexpr double kVisitSeconds = 60;
 constexpr double kConeMargin = 5 * std::numbers::pi / 180;  // of overlap two images of a frame need
 
 class PairFinder {
  public:
   PairFinder(const Block& block, const GlobalDescriptors& descriptors, const CandidateOptions& options)
-      : block_(block), descriptors_(descriptors), options_(options), views_(views_of(block)) {
+      : block_(block),
+        descriptors_(descriptors),
+        options_(options),
+        views_(views_of(block)),
+        rig_distance_m_(options.max_pair_distance_m < 0 ? kRigDistance : options.max_pair_distance_m),
+        cones_(block, rig_distance_m_ > 0 ? rig_distance_m_ : kConeRange) {
     for (std::size_t i = 0; i < block.images.size(); ++i) images_.emplace_back(static_cast<std::int64_t>(i));
     by_rank_ = images_;
     std::sort(by_rank_.begin(), by_rank_.end(),
@@ -38,6 +49,7 @@ class PairFinder {
       add_all();
     } else {
       add_nearest();
+      add_intersecting();
       add_order();
       add_similar();
     }
@@ -58,6 +70,65 @@ class PairFinder {
     for (ImageIndex a : images_)
       for (ImageIndex b(a.value + 1); b < block_.images.next_index(); ++b.value)
         if (!same_frame(a, b)) add(a, b);
+  }
+
+  // Its cone is known, and its place not doubtful.
+  bool coned(ImageIndex image) const { return cones_.has(image) && !view(image).doubtful; }
+
+  // A visit: frames of one pass that follow one another.
+  bool same_visit(ImageIndex a, ImageIndex b) const {
+    const FrameIndex fa = block_.images[a].frame, fb = block_.images[b].frame;
+    const Frame &x = block_.frames[fa], &y = block_.frames[fb];
+    return x.pass == y.pass && std::abs(fa.value - fb.value) <= kVisitFrames &&
+           !(std::abs(x.time_s - y.time_s) > kVisitSeconds);
+  }
+
+  void add_intersecting() {
+    std::vector<ImageIndex> coned_images;
+    std::vector<Eigen::Vector2d> centres;
+    for (ImageIndex image : by_rank_) {
+      if (!coned(image)) continue;
+      coned_images.push_back(image);
+      centres.push_back(cones_.centre(image).head<2>());
+    }
+    const KdTree tree(centres);
+    const double radius = rig_distance_m_ > 0 ? rig_distance_m_ : kConeRange;
+    for (std::size_t i = 0; i < coned_images.size(); ++i) {
+      const ImageIndex image = coned_images[i];
+      const auto admits = [&](std::int64_t other) {
+        return !same_frame(image, coned_images[static_cast<std::size_t>(other)]);
+      };
+      std::vector<std::vector<Overlap>> visits;
+      for (const KdTree::Neighbour& n : tree.nearest(centres[i], coned_images.size(), radius, admits)) {
+        const ImageIndex other = coned_images[static_cast<std::size_t>(n.point)];
+        if ((cones_.centre(image) - cones_.centre(other)).norm() > radius) continue;
+        const double overlap = cones_.overlap(image, other);
+        if (overlap < kLeastOverlap) continue;
+        const auto visit = std::find_if(visits.begin(), visits.end(),
+                                        [&](const auto& v) { return same_visit(v.front().image, other); });
+        (visit == visits.end() ? visits.emplace_back() : *visit).push_back({overlap, view(other).rank, other});
+      }
+      for (const ImageIndex other : best_of_each(std::move(visits))) add(image, other);
+    }
+  }
+
+  struct Overlap {
+    double share;
+    std::int64_t rank;
+    ImageIndex image;
+    bool operator<(const Overlap& o) const { return share != o.share ? share > o.share : rank < o.rank; }
+  };
+  // As many as `neighbours`, the best of the visits in turn; the visit with the best one begins.
+  std::vector<ImageIndex> best_of_each(std::vector<std::vector<Overlap>> visits) const {
+    for (auto& visit : visits) std::sort(visit.begin(), visit.end());
+    std::sort(visits.begin(), visits.end(), [](const auto& a, const auto& b) { return a.front() < b.front(); });
+    std::vector<ImageIndex> best;
+    for (std::size_t round = 0, before = 1; best.size() != before; ++round) {
+      before = best.size();
+      for (const auto& visit : visits)
+        if (round < visit.size() && std::ssize(best) < options_.neighbours) best.push_back(visit[round].image);
+    }
+    return best;
   }
 
   // Both look about the same way, as far as known.
@@ -87,7 +158,7 @@ class PairFinder {
     const auto link = [&](ImageIndex image, const Eigen::Vector2d& place) {
       const auto admits = [&](std::int64_t other) {
         const ImageIndex b = located[static_cast<std::size_t>(other)];
-        return !same_frame(image, b) && views_agree(image, b) && near_enough(image, b);
+        return !same_frame(image, b) && views_agree(image, b) && near_enough(image, b) && !(coned(image) && coned(b));
       };
       const auto wanted = static_cast<std::size_t>(options_.neighbours);
       const auto found = tree.nearest(place, kSearchFactor * wanted, radius, admits);
@@ -130,7 +201,7 @@ class PairFinder {
     for (const std::vector<ImageIndex>& pass : views_.passes)
       for (std::size_t i = 0; i < pass.size(); ++i)
         for (std::size_t j = i + 1; j < pass.size() && j <= i + span; ++j)
-          if (!same_frame(pass[i], pass[j])) add(pass[i], pass[j]);
+          if (!same_frame(pass[i], pass[j]) && !(coned(pass[i]) && coned(pass[j]))) add(pass[i], pass[j]);
   }
 
   // Images without position, or with a doubtful one, against the images that look most alike. Descriptors are compared
@@ -202,6 +273,8 @@ class PairFinder {
   const GlobalDescriptors& descriptors_;
   const CandidateOptions& options_;
   Views views_;
+  double rig_distance_m_;
+  ViewingCones cones_;
   std::vector<ImageIndex> images_, by_rank_;
   std::vector<ImagePair> pairs_;
 };
@@ -247,7 +320,8 @@ void CandidateOptions::check() const {
     if (!ok) throw InputError(message);
   };
   require(neighbours >= 1, "neighbours must be at least 1");
-  require(max_pair_distance_m >= 0, "max_pair_distance_m must not be negative (metres; 0 = no limit)");
+  require(max_pair_distance_m >= 0 || max_pair_distance_m == -1,
+          "max_pair_distance_m must not be negative (metres; 0 = no limit, -1 = 30 for rigs with poses)");
   require(max_view_angle_deg > 0 && max_view_angle_deg <= 180, "max_view_angle_deg must be within 0 and 180 degrees");
   require(order_neighbours >= 0, "order_neighbours must not be negative");
   require(descriptor_neighbours >= 0, "descriptor_neighbours must not be negative");

@@ -10,14 +10,15 @@
 namespace megablock {
 
 struct CandidateOptions {
-  int neighbours = 14;             // nearest images by ground distance (footprint centres where known) per image
-  double max_pair_distance_m = 0;  // farther images are no candidates; 0 = no limit. CN-11: 30
-  double max_view_angle_deg = 75;  // between viewing directions, where known; 180 = no limit
-  int order_neighbours = 2;        // neighbours before and after in the order of acquisition (time, else name)
-  int descriptor_neighbours = 20;  // for images without position
-  int exhaustive_below = 300;      // blocks without any position: all pairs when there are fewer images
-  int cell_pairs = 100;            // pairs per cell, the unit of matching (about 10 s of work)
-  void check() const;              // throws InputError
+  int neighbours = 14;              // nearest images by ground distance (footprint centres where known) per image
+  double max_pair_distance_m = -1;  // farther images are no candidates; 0 = no limit, -1 = 30 for rigs whose poses are
+                                    // known (CN-11), else no limit
+  double max_view_angle_deg = 75;   // between viewing directions, where known; 180 = no limit
+  int order_neighbours = 2;         // neighbours before and after in the order of acquisition (time, else name)
+  int descriptor_neighbours = 20;   // for images without position
+  int exhaustive_below = 300;       // blocks without any position: all pairs when there are fewer images
+  int cell_pairs = 100;             // pairs per cell, the unit of matching (about 10 s of work)
+  void check() const;               // throws InputError
 };
 
 // One unit vector per image (zero: none), or empty: no descriptors.
@@ -26,6 +27,10 @@ using GlobalDescriptors = IndexedVector<ImageIndex, std::array<float, 128>>;
 // GPS outliers do not tear the graph: order of acquisition always links, and an image whose position is far off its
 // acquisition neighbours is also linked by descriptors and as if it stood between those neighbours. Images of one frame
 // (a rig) are paired by overlap of their viewing cones, never by distance.
+//
+// Images of rigs of several cameras with known poses are paired camera by camera (CN-11): with those within
+// max_pair_distance_m whose viewing cones intersect, `neighbours` of them, the most overlapping of each visit to the
+// place in turn. Neither the order of acquisition nor max_view_angle_deg plays a part among them.
 //
 // max_pair_distance_m limits the horizontal distance of projection centres of pairs found by position; pairs from the
 // order of acquisition and from descriptors are kept, since they are there for positions that are wrong or missing.

@@ -4,6 +4,7 @@
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
+#include "match/match_filter.h"
 #include "match/pair_matching.h"
 
 namespace megablock {
@@ -22,10 +23,33 @@ void add_camera(Hasher& hasher, const Camera& camera) {
   add_to_hash(hasher, camera.intrinsics);
 }
 
-std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs) {
+// What the trajectory says of pairs before they are matched.
+struct Knowledge {
+  explicit Knowledge(const Job& job)
+      : trajectory(job.block, job.settings.matching.trust),
+        filter(job.settings.matching.filter_model.empty() ? MatchFilter::shipped()
+                                                          : MatchFilter::load(job.settings.matching.filter_model)),
+        filtered(job.settings.matching.filter) {}
+  PairKnowledge of(const ImagePair& pair) const {
+    return {trajectory.relate(pair.a, pair.b), filtered ? &filter : nullptr};
+  }
+  TrustedPairs trajectory;
+  MatchFilter filter;
+  bool filtered;
+};
+
+std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs,
+                               const Knowledge& knowledge) {
   Hasher hasher;
   hasher.add(algorithm::kMatching);
   add_to_hash(hasher, job.settings.matching);
+  for (const ImagePair& pair : pairs)
+    if (const auto known = knowledge.trajectory.relate(pair.a, pair.b)) {
+      add_to_hash(hasher, known->a);
+      add_to_hash(hasher, known->b);
+      hasher.add(known->rotation_sigma_rad).add(known->position_sigma_m);
+      if (knowledge.filtered) hasher.add(knowledge.filter.hash());
+    }
   for (const ImagePair& pair : pairs) {
     for (const ImageIndex image : {pair.a, pair.b}) {
       hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
@@ -35,7 +59,8 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
   return hasher.value();
 }
 
-std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const std::vector<ImagePair>& pairs) {
+std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const Knowledge& knowledge,
+                                     const std::vector<ImagePair>& pairs) {
   std::vector<ImageIndex> images;
   for (const ImagePair& pair : pairs) images.insert(images.end(), {pair.a, pair.b});
   cache.load(images);
@@ -49,7 +74,7 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i)
     verified[i] = match_pair(*a[i], *b[i], block.cameras[block.camera_of(pairs[i].a)],
-                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching);
+                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching, knowledge.of(pairs[i]));
   std::erase_if(verified, [](const VerifiedPair& pair) { return pair.model == PairModel::kNone; });
   return verified;
 }
@@ -59,15 +84,18 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
 std::vector<std::string> run_matching(Job& job, const FeatureStage& features, const CandidateGraph& graph) {
   constexpr std::size_t kResidentShards = 16;
   FeatureCache cache(job.store, kResidentShards);
+  const Knowledge knowledge(job);
   std::vector<Unit> units;
   std::vector<std::string> names;
   for (std::size_t cell = 0; cell + 1 < graph.cell_begin.size(); ++cell) {
     const std::vector<ImagePair> pairs = cell_pairs(graph, cell);
     Unit unit;
     unit.name = unit_name("matches", static_cast<std::int64_t>(cell));
-    unit.fingerprint = cell_fingerprint(job, features, pairs);
+    unit.fingerprint = cell_fingerprint(job, features, pairs, knowledge);
     unit.cost = static_cast<double>(pairs.size());
-    unit.write = [&job, &cache, pairs](const std::string& path) { write_matches(path, match_cell(job, cache, pairs)); };
+    unit.write = [&job, &cache, &knowledge, pairs](const std::string& path) {
+      write_matches(path, match_cell(job, cache, knowledge, pairs));
+    };
     names.push_back(unit.name);
     units.push_back(std::move(unit));
   }

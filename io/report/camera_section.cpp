@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "io/feature_statistics.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
 
@@ -113,6 +114,18 @@ std::string mounts_table(const BlockResult& result, RigIndex index) {
   return table.html();
 }
 
+std::string interest_points_table(const BlockResult& result) {
+  Table table({"interest points of", "images", "least", "most", "mean", "total"});
+  const auto statistics = feature_statistics(result);
+  for (CameraIndex c(0); statistics.contains(c); ++c.value) {
+    const FeatureStatistics& s = statistics[c];
+    if (s.images > 0)
+      table.add({escape(result.block.cameras[c].name), count(s.images), count(s.least), count(s.most),
+                 count(std::llround(s.mean())), count(s.total)});
+  }
+  return table.empty() ? "" : "<h3>Interest points</h3>" + table.html();
+}
+
 }  // namespace
 
 std::string cameras_section(const BlockResult& result, const Figures& f) {
@@ -140,7 +153,7 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
       "÷ sigma: distance from no distortion, of the principal point from the image's centre; parameters within " +
           fixed(kSignificant, 0) + " sigma are not significant and shown faint.",
       "muted");
-  return section("cameras", "Cameras", note + body + mounts);
+  return section("cameras", "Cameras", note + body + mounts + interest_points_table(result));
 }
 
 }  // namespace megablock::report

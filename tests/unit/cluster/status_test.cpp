@@ -60,6 +60,23 @@ TEST_F(StatusTest, SaysWhenTheDatumIsFree) {
   EXPECT_EQ(json()["remarks"].size(), 1u);
 }
 
+// CN-09: by camera, of the images whose features are known.
+TEST_F(StatusTest, TellsInterestPointsByCamera) {
+  result_.image_records.assign(result_.block.images.size(), {});
+  result_.image_records[ImageIndex(0)].features = 40;
+  result_.image_records[ImageIndex(1)].features = 10;
+  result_.image_records[ImageIndex(5)].features = 100;
+  write();
+  const auto list = json()["interest_points"];
+  ASSERT_EQ(list.size(), 1u);
+  EXPECT_EQ(list[0]["images"], 3);
+  EXPECT_EQ(list[0]["least"], 10);
+  EXPECT_EQ(list[0]["most"], 100);
+  EXPECT_EQ(list[0]["mean"], 50);
+  EXPECT_EQ(list[0]["total"], 150);
+  EXPECT_THAT(status_text(store_), HasSubstr("10 to 100 interest points per image, mean 50, 150 in 3 images"));
+}
+
 TEST_F(StatusTest, KeysAreThereBeforeAResult) {
   EXPECT_TRUE(json()["control_points_unused"].is_null());
   EXPECT_EQ(json()["result"], "none");

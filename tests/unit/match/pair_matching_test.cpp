@@ -127,6 +127,74 @@ TEST(MatchPair, ImagesWithoutFeaturesAreNotVerified) {
   EXPECT_EQ(match_pair(scene.a, empty, make_camera(), make_camera(), {}).model, PairModel::kNone);
 }
 
+// A facade 10 m away whose windows are all alike: every feature has a twin in each of the others, 3.4 m along and more.
+Scene make_facade(TrustedPair& pair) {
+  std::mt19937_64 generator(5);
+  std::uniform_real_distribution<double> unit(0, 1);
+  Scene scene;
+  scene.a.image = ImageIndex(1);
+  scene.b.image = ImageIndex(2);
+  pair.b.centre = {1.2, 0.05, 0.1};
+  pair.b.rotation = rotation_exp<double>(Eigen::Vector3d(0.01, -0.02, 0.005));
+  pair.position_sigma_m = 0.02;
+  pair.rotation_sigma_rad = 5e-4;
+  const Camera camera = make_camera();
+  const auto add = [](ImageFeatures& f, const Eigen::Vector2d& pixel, const SiftDescriptor& d) {
+    f.keypoints.push_back({to_fixed_pixel(pixel.x()), to_fixed_pixel(pixel.y()), 4, 0});
+    f.descriptors.push_back(d);
+  };
+  const auto worn = [&](SiftDescriptor d) {
+    for (auto& v : d) v = static_cast<std::uint8_t>(v + generator() % 9);
+    return d;
+  };
+  for (int i = 0; i < 80; ++i) {
+    const SiftDescriptor d = random_descriptor(generator);
+    const Eigen::Vector3d place(3.4 * unit(generator), 3 * unit(generator) - 1.5, 10 + 0.4 * unit(generator));
+    for (int window = -1; window < 2; ++window) {
+      const Eigen::Vector3d x = place + Eigen::Vector3d(3.4 * window - 1.7, 0, 0);
+      const Eigen::Vector2d in_a = project(camera.intrinsics, x),
+                            in_b = project(camera.intrinsics, to_inside(pair.b, x));
+      if (in_a.x() < 0 || in_a.x() > 2000 || in_b.x() < 0 || in_b.x() > 2000) continue;
+      scene.true_matches.emplace_back(std::ssize(scene.a.keypoints), std::ssize(scene.b.keypoints));
+      add(scene.a, in_a, worn(d));
+      add(scene.b, in_b, worn(d));
+    }
+  }
+  return scene;
+}
+
+TEST(MatchPair, TrustedOrientationTellsRepeatedWindowsApart) {
+  TrustedPair pair;
+  const Scene scene = make_facade(pair);
+  const auto right = [&](const VerifiedPair& found) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < found.feature_a.size(); ++i)
+      count += std::find(scene.true_matches.begin(), scene.true_matches.end(),
+                         std::pair(found.feature_a[i], found.feature_b[i])) != scene.true_matches.end();
+    return count;
+  };
+  ASSERT_GT(scene.true_matches.size(), 150u);
+  MatchOptions options;
+  options.min_distance_m = 4;
+  const VerifiedPair guided = match_pair(scene.a, scene.b, make_camera(), make_camera(), options, {pair, nullptr});
+  EXPECT_GE(right(guided), scene.true_matches.size() * 95 / 100);
+  EXPECT_LE(guided.feature_a.size() - right(guided), guided.feature_a.size() / 50);
+  options.guided = false;
+  const VerifiedPair blind = match_pair(scene.a, scene.b, make_camera(), make_camera(), options, {pair, nullptr});
+  EXPECT_LT(right(blind), right(guided) / 2);
+}
+
+// Where the trust is misplaced, the pair is matched as if there were none.
+TEST(MatchPair, AWrongTrustIsNoHarm) {
+  const Scene scene = make_scene();
+  TrustedPair wrong;
+  wrong.b = {rotation_exp<double>(Eigen::Vector3d(0.3, 0.2, -0.5)), {-1, 2, 0.5}};
+  wrong.rotation_sigma_rad = 1e-3;
+  const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {}, {wrong, nullptr});
+  EXPECT_EQ(pair.feature_a, match_pair(scene.a, scene.b, make_camera(), make_camera(), {}).feature_a);
+  EXPECT_FALSE(pair.feature_a.empty());
+}
+
 TEST(MatchPair, BadInputIsRefused) {
   const Scene scene = make_scene();
   EXPECT_THROW(match_pair(scene.b, scene.a, make_camera(), make_camera(), {}), InputError);
