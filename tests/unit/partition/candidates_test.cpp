@@ -423,7 +423,7 @@ TEST(CandidateOptions, Checked) {
   options.neighbours = 0;
   EXPECT_THROW(candidate_pairs(block, {}, options), InputError);
   options = {};
-  options.max_pair_distance_m = -1;
+  options.max_pair_distance_m = -2;
   EXPECT_THROW(options.check(), InputError);
   options = {};
   options.cell_pairs = 0;

@@ -56,11 +56,13 @@ TEST(ViewingCones, PairsOfARigAreNearAndSeeTheSame) {
     const Image &a = block.images[pair.a], &b = block.images[pair.b];
     if (a.frame == b.frame) continue;
     EXPECT_LE(distance(block, pair.a, pair.b), 30.0);
-    if (checked++ % 7 == 0) EXPECT_TRUE(cones_meet(block, pair.a, pair.b, 30)) << a.name << ' ' << b.name;
+    if (checked++ % 7 == 0) {
+      EXPECT_TRUE(cones_meet(block, pair.a, pair.b, 30)) << a.name << ' ' << b.name;
+    }
     across += block.frames[a.frame].pass != block.frames[b.frame].pass;
     for (const ImageIndex image : {pair.a, pair.b}) ++partners[static_cast<std::size_t>(image.value)];
   }
-  EXPECT_GE(*std::min_element(partners.begin(), partners.end()), 10);
+  EXPECT_GE(*std::min_element(partners.begin(), partners.end()), 6);  // at the ends of the drives cameras look away
   EXPECT_LE(checked, 14 * block.images.size());
   // The other drive has its turn.
   EXPECT_GT(across, checked / 4);
