@@ -10,8 +10,9 @@ import tempfile
 
 from program import megablock, status
 
-SMALL = ["--frames", 20, "--rig-cameras", 4, "--width", 480, "--image-height", 270, "--focal", 350]
-FULL = ["--frames", 40, "--width", 640, "--image-height", 360, "--focal", 467]
+SMALL = ["--frames", 24, "--rig-cameras", 4, "--width", 480, "--image-height", 270, "--focal", 350, "--control-points", 24]
+FULL = ["--frames", 40, "--width", 640, "--image-height", 360, "--focal", 467, "--control-zones", 2, "--control-points", 24,
+        "--check-points", 12]
 LIMITS = {"small": (0.02, 0.02), "full": (0.01, 0.01)}  # metres, degrees
 
 
@@ -19,8 +20,8 @@ def main():
     full = "--full" in sys.argv
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(sys.argv[-1] if full else scratch)
-        megablock("simulate", "--scene", "stereopolis", "--rendered", "--vehicle", "--street-spacing", 40, "--control-zones",
-                  3 if full else 2, *(FULL if full else SMALL), "-o", folder)
+        megablock("simulate", "--scene", "stereopolis", "--rendered", "--vehicle", "--street-spacing", 60,
+                  *(FULL if full else SMALL), "-o", folder)
         megablock("masks", folder / "block.yaml", "-o", folder / "masks")
         found, true = {p.name for p in (folder / "masks").glob("*.png")}, {p.name for p in (folder / "truth_masks").iterdir()}
         assert found and found <= true, (found, true)
