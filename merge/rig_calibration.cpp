@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "adjust/linearise.h"
 #include "geometry/line_ratio.h"
 #include "io/error.h"
 #include "merge/rig_posterior.h"
