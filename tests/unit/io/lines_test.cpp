@@ -12,9 +12,9 @@
 namespace megablock {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class LinesFile : public testing::Test {
+class LinesFile : public ::testing::Test {
  protected:
   std::string message(const std::string& rows) {
     try {
@@ -25,7 +25,7 @@ class LinesFile : public testing::Test {
     return "";
   }
   Block read(const std::string& rows) {
-    write_file(scratch_.path("lines.csv"),
+    testing::write_file(scratch_.path("lines.csv"),
                "name,direction,image,column1_px,row1_px,column2_px,row2_px,sigma_px\n" + rows);
     Block block = block_;
     read_lines(scratch_.path("lines.csv"), {"gone.jpg"}, block, warnings_);
