@@ -21,10 +21,10 @@ struct MatchOptions {
   double max_residual_px = 3.0;  // of verification: epipolar (Sampson) or transfer residual
   int min_inliers = 20;          // fewer: the pair is not verified
   // Of pairs whose relative orientation is trusted (trusted_pair.h).
-  bool guided = true;           // only features near the epipolar line are compared
+  bool guided = false;          // only features near the epipolar line are compared
   double min_distance_m = 2;    // of what is matched so, and
   double max_distance_m = 100;  // at most
-  bool filter = true;           // matches that the filter takes for wrong are dropped
+  bool filter = false;          // matches that the filter takes for wrong are dropped
   std::string filter_model;     // YAML of train-filter; empty: the one that comes with the program
   TrustOptions trust;
   void check() const;  // throws InputError

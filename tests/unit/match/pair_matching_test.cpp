@@ -175,6 +175,7 @@ TEST(MatchPair, TrustedOrientationTellsRepeatedWindowsApart) {
   };
   ASSERT_GT(scene.true_matches.size(), 150u);
   MatchOptions options;
+  options.guided = true;
   options.min_distance_m = 4;
   const VerifiedPair guided = match_pair(scene.a, scene.b, make_camera(), make_camera(), options, {pair, nullptr});
   EXPECT_GE(right(guided), scene.true_matches.size() * 95 / 100);
@@ -190,7 +191,9 @@ TEST(MatchPair, AWrongTrustIsNoHarm) {
   TrustedPair wrong;
   wrong.b = {rotation_exp<double>(Eigen::Vector3d(0.3, 0.2, -0.5)), {-1, 2, 0.5}};
   wrong.rotation_sigma_rad = 1e-3;
-  const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {}, {wrong, nullptr});
+  MatchOptions options;
+  options.guided = true;
+  const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), options, {wrong, nullptr});
   EXPECT_EQ(pair.feature_a, match_pair(scene.a, scene.b, make_camera(), make_camera(), {}).feature_a);
   EXPECT_FALSE(pair.feature_a.empty());
 }
