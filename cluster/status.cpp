@@ -105,6 +105,7 @@ void add_figures(Json& json, const BlockResult& result) {
   json["mean_reprojection_px"] = statistics.mean_px;
   json["rms_reprojection_px"] = statistics.rms_px;
   json["chi2_per_dof"] = result.variance_factor;
+  json["degrees_of_freedom"] = result.degrees_of_freedom;
   json["image_sigma_px"] = result.image_sigma_px;
   json["observation_kinds"] = observation_kinds(result.observation_table);
   json["tiles"] = result.tiles.tile_count;
@@ -126,10 +127,10 @@ Json status(const JobStore& store) {
   std::optional<BlockResult> result;
   if (store.seal(kResult)) result = read_result(store.verified_path(kResult));
   Json json{{"job", store.directory()}, {"stages", stages_json(store, stages)}};
-  for (const char* key :
-       {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px", "rms_reprojection_px",
-        "chi2_per_dof", "observation_kinds", "tiles", "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
-        "control_points_unused", "check_points_unused", "interest_points", "remarks"})
+  for (const char* key : {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px",
+                          "rms_reprojection_px", "chi2_per_dof", "degrees_of_freedom", "observation_kinds", "tiles",
+                          "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
+                          "control_points_unused", "check_points_unused", "interest_points", "remarks"})
     json[key] = nullptr;
   json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
   const bool current = stages.back().state == StageState::kDone;

@@ -356,8 +356,10 @@ MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {
   const BlockGauge& gauge = adjusted.posterior.gauge;
   outcome.gauge = judge_gauge(sums, gauge, names_of(block)).text;
   for (const BlockComponent& part : gauge.components)
-    if (part.defect > 0)
+    if (part.defect > 0) {
       outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
+      outcome.degrees_of_freedom += part.defect;  // what only the datum fixes takes nothing of the observations
+    }
   outcome.seams = seam_checks(adjusted.posterior);
   outcome.observations = adjusted.posterior.observations;
   for (std::size_t k = 0; k < kObservationKinds; ++k)

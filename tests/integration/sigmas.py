@@ -53,6 +53,15 @@ def main():
             assert twice[key] == once[key], key
         assert once["normalised_error_rotation"] > 2 * plain["normalised_error_rotation"]
 
+    # Redundancy numbers add up to the degrees of freedom, whatever the datum.
+    with tempfile.TemporaryDirectory() as folder:
+        for gps in 0.05, 0:
+            megablock("simulate", "--frames", 16, "--gps-sigma", gps, "-o", os.path.join(folder, str(gps)))
+            status, _, _ = run(os.path.join(folder, str(gps)), "job", "")
+            assert ("free" in status["gauge"]) == (gps == 0), status["gauge"]
+            near(sum(kind["redundancy"] for kind in status["observation_kinds"].values()),
+                 status["degrees_of_freedom"], 1e-3)
+
     # A trajectory whose satellites are masked states 2 cm where it drifts by decimetres: its residuals tell.
     with tempfile.TemporaryDirectory() as folder:
         megablock("simulate", "--scene", "stereopolis", "--frames", 60, "--drift-per-frame", 0.2, "-o", folder)
