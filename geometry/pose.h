@@ -37,6 +37,11 @@ inline Eigen::Vector3d to_inside(const Pose& pose, const Eigen::Vector3d& point)
   return to_inside<double>(pose.rotation, pose.centre, point);
 }
 
+// Pose of `inner` in the axes of `outer` (outer -> inner), both given from the ground.
+inline Pose relative_to(const Pose& outer, const Pose& inner) {
+  return {(inner.rotation * outer.rotation.conjugate()).normalized(), to_inside(outer, inner.centre)};
+}
+
 // Ground point to camera coordinates through frame and mount.
 inline Eigen::Vector3d to_camera(const Pose& frame, const Pose& mount, const Eigen::Vector3d& point) {
   return to_inside(mount, to_inside(frame, point));

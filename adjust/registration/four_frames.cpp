@@ -36,10 +36,6 @@ std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const 
 
 }  // namespace
 
-Pose relative_to(const Pose& outer, const Pose& inner) {
-  return {(inner.rotation * outer.rotation.conjugate()).normalized(), to_inside(outer, inner.centre)};
-}
-
 FourFrames::FourFrames(const std::array<Pose, 4>& frames, const std::vector<FourFrameTrack>& tracks,
                        const PairRegistrationOptions& options)
     : tracks_(tracks),

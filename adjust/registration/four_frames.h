@@ -7,9 +7,6 @@
 
 namespace megablock {
 
-// Pose of `inner` in the axes of `outer` (outer -> inner), both given from the ground.
-Pose relative_to(const Pose& outer, const Pose& inner);
-
 class FourFrames {
  public:
   using Matrix6 = Eigen::Matrix<double, 6, 6>;

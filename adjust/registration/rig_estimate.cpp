@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "adjust/linearise.h"
-#include "adjust/registration/four_frames.h"
 #include "geometry/median.h"
 #include "io/error.h"
 

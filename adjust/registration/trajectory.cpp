@@ -7,7 +7,7 @@
 #include <numbers>
 #include <optional>
 
-#include "adjust/registration/four_frames.h"
+#include "geometry/pose.h"
 #include "geometry/triangulation.h"
 #include "io/error.h"
 

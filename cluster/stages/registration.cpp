@@ -9,7 +9,6 @@
 #include <memory>
 #include <set>
 
-#include "adjust/registration/four_frames.h"
 #include "adjust/registration/frame_resection.h"
 #include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
