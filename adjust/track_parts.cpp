@@ -25,6 +25,8 @@ class PartFinder {
   }
 
   void find(std::int64_t p, TrackParts& parts) {
+    if (std::count(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0) < 2)
+      return;  // most points
     split(p);
     for (std::uint8_t part = 1; part <= kMostParts && rest_.size() >= 2; ++part) {
       const auto found = find_consistent_rays(rest_, threshold_, static_cast<std::uint64_t>(problem_.points[p].index));

@@ -145,7 +145,12 @@ MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& 
                           const std::string& tracks, const std::string& adjusted) {
   MergeTile merge;
   merge.tile = tile;
-  merge.tracks = read_split_tracks(job, tracks, adjusted);
+  merge.tracks = read_tracks(job.store.verified_path(tracks));
+  TileAdjustment adjustment;
+  if (!adjusted.empty()) {
+    adjustment = read_adjustment(job.store.verified_path(adjusted));
+    merge.tracks = split_tracks(merge.tracks, adjustment.parts);
+  }
   const AdjustOptions& options = job.settings.adjustment;
   merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations);
   const std::size_t points = merge.problem.points.size();
@@ -155,7 +160,6 @@ MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& 
     std::fill(merge.problem.kept.begin(), merge.problem.kept.end(), std::uint8_t{0});
     return merge;
   }
-  const TileAdjustment adjustment = read_adjustment(job.store.verified_path(adjusted));
   for (std::size_t o = 0; o < merge.problem.kept.size(); ++o) merge.problem.kept[o] &= adjustment.kept[o];
   merge.state.points = adjustment.points;
   triangulate_points(merge.problem, merge.state, options);
