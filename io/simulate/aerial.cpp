@@ -60,12 +60,7 @@ Eigen::Quaterniond nadir_rotation(double right) {
 
 Layout make_aerial_layout(const SimulationOptions& options) {
   Layout layout;
-  const CameraIndex camera = add_simulated_camera(options, layout);
-  Rig rig;
-  rig.name = "rig0";
-  rig.mounts.push_back({camera, Pose(), 0, 0});
-  layout.block.rigs.push_back(rig);
-  layout.truth.mounts.push_back({Pose()});
+  const CameraIndex camera = add_single_camera_rig(options, layout);
 
   const double base = (1 - options.forward_overlap) * options.height_m * options.image_height / options.focal_px;
   const double spacing = (1 - options.side_overlap) * options.height_m * options.image_width / options.focal_px;

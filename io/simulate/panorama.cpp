@@ -107,12 +107,7 @@ class PanoramaScene : public Scene {
 
 Layout make_panorama_layout(const SimulationOptions& options) {
   Layout layout;
-  const CameraIndex camera = add_simulated_camera(options, layout);
-  Rig rig;
-  rig.name = "rig0";
-  rig.mounts.push_back({camera, Pose(), 0, 0});
-  layout.block.rigs.push_back(rig);
-  layout.truth.mounts.push_back({Pose()});
+  const CameraIndex camera = add_single_camera_rig(options, layout);
   const double across = 2 * std::atan(0.5 * options.image_width / options.focal_px),
                up = 2 * std::atan(0.5 * options.image_height / options.focal_px);
   double time_s = 0;

@@ -67,6 +67,8 @@ Layout make_panorama_layout(const SimulationOptions& options);
 
 // Adds a camera: nominal in the block, true in the state (SimulationOptions::distortion, calibrate).
 CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layout);
+// Makes the only rig of the block, of one such camera, which it returns.
+CameraIndex add_single_camera_rig(const SimulationOptions& options, Layout& layout);
 // Adds a frame with one image per mount of the (only) rig.
 void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, double time_s);
 

@@ -123,6 +123,16 @@ void SimulationOptions::check() const {
   require(focal_px >= 0.3 * std::max(image_width, image_height), "focal_px must be at least 0.3 of the larger side");
 }
 
+CameraIndex add_single_camera_rig(const SimulationOptions& options, Layout& layout) {
+  const CameraIndex camera = add_simulated_camera(options, layout);
+  Rig rig;
+  rig.name = "rig0";
+  rig.mounts.push_back({camera, Pose(), 0, 0});
+  layout.block.rigs.push_back(rig);
+  layout.truth.mounts.push_back({Pose()});
+  return camera;
+}
+
 CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layout) {
   const CameraIndex index = layout.block.cameras.next_index();
   Random random(options.seed, Random::Purpose::kCamera, static_cast<std::uint64_t>(index.value));

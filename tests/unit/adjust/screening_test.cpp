@@ -12,21 +12,7 @@ namespace {
 // Exact observations of a small aerial block at its true poses.
 class Screening : public testing::Test {
  protected:
-  static SimulationOptions exact() {
-    SimulationOptions options;
-    options.frames = 20;
-    options.points_per_frame = 80;
-    options.image_noise_px = 0;
-    return options;
-  }
-  Screening() : tile_(exact()) { tile_.state = tile_.truth(); }
-
-  // The first tie point with at least `count` observations.
-  std::int64_t long_track(std::int64_t count) const {
-    for (std::int64_t p = 0; p < tile_.problem.point_count(); ++p)
-      if (tile_.problem.begin[p + 1] - tile_.problem.begin[p] >= count) return p;
-    throw ComputeError("no such track");
-  }
+  std::int64_t long_track(std::int64_t count) const { return tile_.long_track(count); }
   std::vector<std::uint8_t> kept(std::int64_t p) const {
     return {tile_.problem.kept.begin() + tile_.problem.begin[p],
             tile_.problem.kept.begin() + tile_.problem.begin[p + 1]};
@@ -34,18 +20,10 @@ class Screening : public testing::Test {
   std::int64_t screen(double threshold = 4) {
     return screen_observations(tile_.problem, tile_.state, threshold, tile_.options);
   }
-  // Moves an observation to where another ground point would be seen.
-  void redirect(std::int64_t row, const Eigen::Vector3d& point) {
-    const TileImage& image = tile_.problem.images[tile_.problem.image[row].value];
-    const Eigen::Vector2d pixel =
-        project(tile_.state.cameras[image.camera.value],
-                to_camera(tile_.state.frames[image.frame.value], tile_.state.mounts[image.mount], point));
-    tile_.problem.x[row] = pixel.x();
-    tile_.problem.y[row] = pixel.y();
-  }
+  void redirect(std::int64_t row, const Eigen::Vector3d& point) { tile_.redirect(row, point); }
   std::int64_t rejected() const { return std::count(tile_.problem.kept.begin(), tile_.problem.kept.end(), 0); }
 
-  SingleTile tile_;
+  ExactTile tile_;
 };
 
 TEST_F(Screening, IntersectsEveryPointAtItsPlace) {

@@ -5,6 +5,7 @@
 
 #include "adjust/linearise.h"
 #include "adjust/tile_adjustment.h"
+#include "io/error.h"
 #include "io/simulate/simulate.h"
 
 namespace megablock {
@@ -48,6 +49,32 @@ struct SingleTile {
     for (std::size_t f = 0; f < problem.frames.size(); ++f)
       sum += std::pow(rotation_angle(state.frames[f].rotation, simulated.truth.frames[problem.frames[f]].rotation), 2);
     return std::sqrt(sum / static_cast<double>(problem.frames.size()));
+  }
+};
+
+// Exact observations of a small aerial block at its true poses.
+struct ExactTile : SingleTile {
+  ExactTile() : SingleTile(exact()) { state = truth(); }
+  static SimulationOptions exact() {
+    SimulationOptions options;
+    options.frames = 20;
+    options.points_per_frame = 80;
+    options.image_noise_px = 0;
+    return options;
+  }
+  // The first tie point with at least `count` observations.
+  std::int64_t long_track(std::int64_t count) const {
+    for (std::int64_t p = 0; p < problem.point_count(); ++p)
+      if (problem.begin[p + 1] - problem.begin[p] >= count) return p;
+    throw ComputeError("no such track");
+  }
+  // Moves an observation to where another ground point would be seen.
+  void redirect(std::int64_t row, const Eigen::Vector3d& point) {
+    const TileImage& image = problem.images[problem.image[row].value];
+    const Eigen::Vector2d pixel = project(state.cameras[image.camera.value],
+                                          to_camera(state.frames[image.frame.value], state.mounts[image.mount], point));
+    problem.x[row] = pixel.x();
+    problem.y[row] = pixel.y();
   }
 };
 

@@ -16,27 +16,9 @@ constexpr double kThreshold = 4;  // sigmas
 // Tracks that see parts of other points, at the true poses.
 class TrackPartsOf : public testing::Test {
  protected:
-  static SimulationOptions exact() {
-    SimulationOptions options;
-    options.frames = 20;
-    options.points_per_frame = 80;
-    options.image_noise_px = 0;
-    return options;
-  }
-  TrackPartsOf() : tile_(exact()) { tile_.state = tile_.truth(); }
-
-  std::int64_t long_track(std::int64_t count) const {
-    for (std::int64_t p = 0; p < tile_.problem.point_count(); ++p)
-      if (tile_.problem.begin[p + 1] - tile_.problem.begin[p] >= count) return p;
-    throw ComputeError("no such track");
-  }
+  std::int64_t long_track(std::int64_t count) const { return tile_.long_track(count); }
   void see(std::int64_t row, const Eigen::Vector3d& point) {
-    const TileImage& image = tile_.problem.images[tile_.problem.image[row].value];
-    const Eigen::Vector2d pixel =
-        project(tile_.state.cameras[image.camera.value],
-                to_camera(tile_.state.frames[image.frame.value], tile_.state.mounts[image.mount], point));
-    tile_.problem.x[row] = pixel.x();
-    tile_.problem.y[row] = pixel.y();
+    tile_.redirect(row, point);
     tile_.problem.kept[row] = 0;
   }
   TrackParts parts() const { return find_track_parts(tile_.problem, tile_.state, kThreshold, tile_.options); }
@@ -45,7 +27,7 @@ class TrackPartsOf : public testing::Test {
     return {all.begin() + tile_.problem.begin[p], all.begin() + tile_.problem.begin[p + 1]};
   }
 
-  SingleTile tile_;
+  ExactTile tile_;
 };
 
 TEST_F(TrackPartsOf, ObservationsThatAgreeBecomeTracks) {

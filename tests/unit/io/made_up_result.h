@@ -10,6 +10,15 @@
 
 namespace megablock {
 
+inline SimulationOptions small_block() {
+  SimulationOptions options;
+  options.frames = 60;
+  options.control_points = 4;
+  options.check_points = 5;
+  options.attitude_sigma_deg = 1;
+  return options;
+}
+
 inline void add_made_up_observations(BlockResult& result, std::mt19937& random) {
   std::normal_distribution<float> noise(0, 0.4f);
   const std::size_t rows = result.tracks.image.size();

@@ -13,15 +13,6 @@ namespace {
 
 using testing::HasSubstr;
 
-SimulationOptions small_block() {
-  SimulationOptions options;
-  options.frames = 60;
-  options.control_points = 4;
-  options.check_points = 5;
-  options.attitude_sigma_deg = 1;
-  return options;
-}
-
 // One part whose positions leave `defect` parameters free.
 BlockResult free_result(std::int32_t defect, std::size_t positions, bool attitudes) {
   BlockResult result = made_up_result(small_block());

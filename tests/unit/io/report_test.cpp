@@ -18,15 +18,6 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-SimulationOptions small_block() {
-  SimulationOptions options;
-  options.frames = 60;
-  options.control_points = 4;
-  options.check_points = 5;
-  options.attitude_sigma_deg = 1;
-  return options;
-}
-
 nlohmann::json figures_in(const std::string& page) {
   const std::string open = "id=\"figures\">";
   const std::size_t begin = page.find(open) + open.size();
