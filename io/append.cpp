@@ -111,6 +111,9 @@ Block append_to(const Block& previous, const Block& now) {
   merged.control_points = moved.control_points;
   for (ControlPoint& point : merged.control_points)
     for (ImageMeasurement& measurement : point.measurements) measurement.image = images[measurement.image];
+  merged.lines = moved.lines;
+  for (KnownLine& line : merged.lines)
+    for (KnownLine::Measurement& measurement : line.measurements) measurement.image = images[measurement.image];
   return merged;
 }
 

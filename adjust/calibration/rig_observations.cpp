@@ -20,6 +20,7 @@ const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(std::numeric_limits<d
 void remove_datum(Block& block) {
   block.control_points.clear();
   block.relative_poses.clear();
+  block.lines.clear();
   for (Frame& frame : block.frames) frame.position_prior.reset(), frame.attitude_prior.reset();
 }
 

@@ -17,6 +17,7 @@ Block first_images(const Block& block, std::int64_t n) {
   part.cameras.resize(static_cast<std::size_t>(cameras));
   part.relative_poses.clear();
   part.control_points.clear();
+  part.lines.clear();
   return part;
 }
 

@@ -4,6 +4,7 @@
 
 #include "cluster/stages/problem_hash.h"
 #include "io/simulate/simulate.h"
+#include "tests/unit/adjust/known_lines.h"
 
 namespace megablock {
 namespace {
@@ -34,6 +35,7 @@ TEST(Growth, FirstImagesAreABlockOfTheirOwn) {
   block.frames.push_back(frame);
   check(block);
 
+  block.lines.push_back({"edge", KnownLine::Direction::kVertical, {{ImageIndex(7), {1, 2}, {3, 90}, 1}}});
   const Block part = first_images(block, 6);
   EXPECT_NO_THROW(check(part));
   EXPECT_EQ(part.images.size(), 6u);
@@ -58,6 +60,7 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
   options.relative_position_sigma_m = 0.05;
   options.control_points = 8;
   SimulatedBlock simulated = simulate_block(options);
+  add_known_lines(simulated, 10, 1);
   for (Mount& mount : simulated.block.rigs[RigIndex(0)].mounts) mount.rotation_sigma_rad = 0.01;
   simulated.block.rigs[RigIndex(0)].mounts[0].rotation_sigma_rad = 0;
   for (Camera& camera : simulated.block.cameras) camera.prior_sigma[kFocal] = 20;
@@ -70,7 +73,7 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
       make_tile_state(problem, start, std::vector<Eigen::Vector3d>(problem.points.size(), Eigen::Vector3d::Zero()));
   for (const std::size_t terms :
        {problem.positions.size(), problem.attitudes.size(), problem.relatives.size(), problem.point_priors.size(),
-        problem.intrinsic_priors.size(), problem.mount_priors.size()})
+        problem.intrinsic_priors.size(), problem.mount_priors.size(), problem.lines.size()})
     ASSERT_GT(terms, 0u) << "the block must have every kind of term";
   const std::uint64_t reference = hash_of(problem, state);
   EXPECT_EQ(hash_of(problem, state), reference);
@@ -90,6 +93,9 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
   EXPECT_TRUE(differs([](auto& p, auto&) { p.point_priors.at(0).position.z() += 1; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.intrinsic_priors.at(0).sigma[0] *= 2; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.mount_priors.at(0).rotation_sigma_rad *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.lines.at(0).weight *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.line_loss.scale *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.attitude_loss.scale *= 2; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.camera_free.at(0) ^= 1; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.image_loss.scale *= 2; }));
   EXPECT_TRUE(differs([](auto&, auto& s) { s.frames[0].centre.x() += 1e-9; }));

@@ -38,6 +38,10 @@ Block block_of(const std::vector<std::string>& names, const GroundFrame& ground)
   point.position = {5, 6, 7};
   point.measurements.push_back({ImageIndex(static_cast<std::int64_t>(names.size()) - 1), {1, 2}, 0.5});
   block.control_points.push_back(point);
+  KnownLine line;
+  line.name = "edge";
+  line.measurements.push_back({point.measurements.front().image, {1, 2}, {3, 90}, 1});
+  block.lines.push_back(line);
   return block;
 }
 
@@ -62,6 +66,14 @@ TEST(AppendTo, OldIndicesStayNewImagesFollow) {
   }
   EXPECT_EQ(merged.cameras[CameraIndex(2)].name, "a");
   EXPECT_EQ(merged.images[merged.control_points[0].measurements[0].image].name, "c1");
+}
+
+TEST(AppendTo, MeasurementsFollowTheirImages) {
+  const Block now = block_of({"a1", "b1", "b15", "b2"}, kHere);
+  const Block merged = append_to(block_of({"b1", "b2", "c1"}, kHere), now);
+  ASSERT_EQ(merged.lines.size(), 1u);
+  EXPECT_EQ(merged.images[merged.lines.front().measurements.front().image].name, "b2");
+  EXPECT_EQ(merged.images[merged.control_points.front().measurements.front().image].name, "b2");
 }
 
 TEST(AppendTo, ContentsAreTheNewOnes) {
