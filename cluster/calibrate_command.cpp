@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cluster/camera_modes.h"
+#include "cluster/collective.h"
 #include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
 
@@ -70,7 +71,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   command->callback([=, &action, &ranks] {
     action = [options, settings, modes, &ranks] {
       for (const CalibrateMode& mode : *modes)
-        if (mode.chosen()) return mode.run(*options);
+        if (mode.chosen()) return exit_code_on_first_rank(ranks, [&] { return mode.run(*options); });
       return calibrate_job(*options, *settings, ranks);
     };
   });

@@ -29,6 +29,11 @@ std::string on_first_rank(Communicator& ranks, const std::function<std::string()
   return message.substr(1);
 }
 
+int exit_code_on_first_rank(Communicator& ranks, const std::function<int()>& work) {
+  if (ranks.size() == 1) return work();
+  return std::stoi(on_first_rank(ranks, [&] { return std::to_string(work()); }));
+}
+
 void share_error(Communicator& ranks, char kind, const std::string& text) {
   if (!ranks.any(!text.empty())) return;
   for (const std::string& message : ranks.gather_all(text.empty() ? std::string() : kind + text))

@@ -24,6 +24,9 @@ class AgreedError : public Kind, public Agreed {
 // Runs `work` on rank 0 and returns its text on every rank; an error of the project's family is rethrown everywhere.
 std::string on_first_rank(Communicator& ranks, const std::function<std::string()>& work);
 
+// The exit code of work that knows nothing of ranks: rank 0 does it, the others wait.
+int exit_code_on_first_rank(Communicator& ranks, const std::function<int()>& work);
+
 // Collective: throws on every rank when any rank has an error; the lowest rank's is taken. `kind` is 'i' for
 // InputError, 'c' for any other; empty text: none here.
 void share_error(Communicator& ranks, char kind, const std::string& text);

@@ -337,8 +337,9 @@ int command_line(int argc, char** argv) {
     pin_arithmetic(argv);
     limit_libraries_to_one_thread();
     Communicator ranks(&argc, &argv);
-    Action action;
-    add_init(app, action);
+    Action action;  // of all ranks together
+    Action by_one;  // of a command that knows nothing of ranks: the first one's
+    add_init(app, by_one);
     add_run(app, action, ranks, "run", "", "Run all stages; the same command again resumes");
     add_run(app, action, ranks, "partition", "partition", "Run as far as the candidate pairs and cells");
     add_run(app, action, ranks, "match", "match", "Run as far as matches, tiles and tracks");
@@ -346,17 +347,17 @@ int command_line(int argc, char** argv) {
     add_run(app, action, ranks, "adjust", "adjust", "Run as far as the adjustment of the tiles");
     add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
     add_calibrate(app, action, ranks);
-    add_masks(app, action);
-    add_train_filter(app, action);
-    add_resect(app, action);
+    add_masks(app, by_one);
+    add_train_filter(app, by_one);
+    add_resect(app, by_one);
     add_register(app, action, ranks);
-    add_status(app, action);
-    add_report(app, action);
-    add_export(app, action);
-    add_import(app, action);
-    add_evaluate(app, action);
-    add_simulate(app, action);
-    add_check(app, action);
+    add_status(app, by_one);
+    add_report(app, by_one);
+    add_export(app, by_one);
+    add_import(app, by_one);
+    add_evaluate(app, by_one);
+    add_simulate(app, by_one);
+    add_check(app, by_one);
     if (const std::optional<int> code = answer_without_command(app, argc, argv, ranks.rank() == 0)) return *code;
     try {
       app.parse(argc, argv);
@@ -364,6 +365,7 @@ int command_line(int argc, char** argv) {
       const int code = ranks.rank() == 0 ? app.exit(error) : error.get_exit_code();
       return code == 0 ? kExitDone : kExitBadInput;
     }
+    if (by_one) action = [&] { return exit_code_on_first_rank(ranks, by_one); };
     return run_action(action, ranks);
   } catch (const std::exception& error) {  // before there are ranks
     std::fprintf(stderr, "megablock: %s\n", error.what());

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -124,6 +125,11 @@ std::string preview(const Judged& judged) {
   return {bytes.begin(), bytes.end()};
 }
 
+bool holds(const fs::path& file, const std::string& bytes) {
+  std::ifstream stream(file, std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(stream), {}) == bytes;
+}
+
 Proposal propose(const Block& block, const Camera& camera, const std::vector<ImageIndex>& images,
                  const MasksOptions& options) {
   Proposal proposal;
@@ -141,13 +147,15 @@ Proposal propose(const Block& block, const Camera& camera, const std::vector<Ima
     return proposal;
   }
   const fs::path file = fs::path(options.output) / mask_file_name(camera.name);
-  if (fs::exists(file)) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", judged.mask, bytes);
+  const std::string png(bytes.begin(), bytes.end());
+  if (!fs::exists(file)) {
+    JobStore(options.output).write_text(file.filename().string(), png);
+  } else if (!holds(file, png)) {  // else it is this proposal, of an earlier run
     proposal.note = file.string() + " is there already and stays as it is";
     return proposal;
   }
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", judged.mask, bytes);
-  JobStore(options.output).write_text(file.filename().string(), {bytes.begin(), bytes.end()});
   proposal.file = file.string();
   if (!camera.mask_path.empty()) proposal.note = "the project has " + camera.mask_path + ", which stays as it is";
   return proposal;

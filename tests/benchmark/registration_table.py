@@ -2,10 +2,12 @@
 """The table of CN-30 on a simulated Stereopolis block: errors of the trajectory by method, one control zone left out in turn.
 
 Absolute: rms distance of the frames within 40 m of the held-out zone's points from their true positions. Relative: rms
-error of the vector between the frames of registered places (true ones). `control` holds the other zones' points.
+error of the vector between the frames of all places (true ones). `resection alone`: of the frames near a zone that are
+resected from its points, with the rig that `register` estimated, and of those whose stated sigma is at most 1 cm. Seconds
+are of processor time, means over the zones.
 
     megablock simulate --scene stereopolis --frames 45000 --drives 4 --control-zones 7 -o town
-    tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 7] [--only all ...]
+    tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 0 1 4] [--only all ...]
 
 Places are registered once; rows differ by the joint adjustment alone.
 """
@@ -13,11 +15,11 @@ import argparse
 import csv
 import math
 import pathlib
+import resource
 import subprocess
 import time
 
 METHODS = [  # name, options of `register`
-    ("initial", None),
     ("resections + chain", ["--no-registrations", "--resections", "--no-control", "--no-positions"]),
     ("+ 2x2", ["--resections", "--no-control", "--no-positions"]),
     ("chain + 2x2", ["--no-control", "--no-positions"]),
@@ -65,21 +67,27 @@ def main():
     parser.add_argument("megablock")
     parser.add_argument("block", type=pathlib.Path, help="folder of simulate")
     parser.add_argument("job", type=pathlib.Path)
-    parser.add_argument("--zones", type=int, default=7)
+    parser.add_argument("--zones", type=int, nargs="+", default=range(7), help="zones to leave out")
     parser.add_argument("--only", nargs="+", help="methods whose names begin so")
     arguments = parser.parse_args()
     truth = read_poses(arguments.block / "truth.csv")
 
-    def register(options):
-        begun = time.time()
-        done = subprocess.run([arguments.megablock, "register", arguments.block / "block.yaml", "-j", arguments.job, "-q",
-                               *options], capture_output=True, text=True)
+    def megablock(*command):
+        """What it printed, its processor time."""
+        done = subprocess.run([arguments.megablock, *command], capture_output=True, text=True)
         if done.returncode:
             raise SystemExit(done.stderr)
-        return done.stdout, time.time() - begun
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        total, megablock.used = used.ru_utime + used.ru_stime, getattr(megablock, "used", 0)
+        seconds, megablock.used = total - megablock.used, total
+        return done.stdout, seconds
 
+    def register(options):
+        return megablock("register", arguments.block / "block.yaml", "-j", arguments.job, "-q", *options)
+
+    begun = time.time()
     text, seconds = register([])
-    print(text, f"first run {seconds:.0f} s\n", sep="")
+    print(text, f"first run {time.time() - begun:.0f} s, {seconds:.0f} s of processor time\n", sep="")
     with open(arguments.job / "register/registrations.csv") as file:
         rows = list(csv.DictReader(file))
     places = [(r["a"], r["c"]) for r in rows]
@@ -88,25 +96,44 @@ def main():
     with h5py.File(arguments.block / "given.h5") as given:
         control = {n.decode(): tuple(p) for n, p in
                    zip(given["control/name"][:], given["control/position"][:])}
-    zones = []
-    for z in range(arguments.zones):
+    zones = {}  # frames near them
+    for z in arguments.zones:
         points = [p for n, p in control.items() if n.startswith(f"zone{z}_")]
         if points:
-            zones.append((z, [n for n, (_, c) in truth.items() if min(norm(minus(c, p)) for p in points) < 40]))
+            zones[z] = [n for n, (_, c) in truth.items() if min(norm(minus(c, p)) for p in points) < 40]
+
+    def wanted(name):
+        return not arguments.only or any(name.startswith(begin) for begin in arguments.only)
+
+    def off(poses, frames):
+        return rms([norm(minus(poses[n][1], truth[n][1])) for n in frames])
+
+    def print_row(name, errors, relative, seconds):
+        each = " ".join(f"{e:.3f}" for e in errors)  # nan: no such frame
+        errors = [e for e in errors if e == e]
+        between = f"{rms(relative):.4f}" if relative else "-"
+        print(f"{name:44s} {rms(errors):.3f} ({each})   {between}   {seconds / len(zones):.0f}", flush=True)
+
     print(f"{'method':44s} absolute, m: mean over zones (each)    relative, m    s")
+    if wanted("initial"):
+        print_row("initial", [off(start, near) for near in zones.values()], [relative_error(start, truth, places)], 0)
     for name, options in METHODS:
-        if arguments.only and not any(name.startswith(begin) for begin in arguments.only):
+        if not wanted(name):
             continue
         errors, relative, seconds = [], [], 0
-        for z, near in zones:
-            poses = start
-            if options is not None:
-                seconds += register([*options, "--check-prefix", f"zone{z}_"])[1]
-                poses = read_poses(arguments.job / "register/poses.csv")
-            errors.append(rms([norm(minus(poses[n][1], truth[n][1])) for n in near]))
+        for z, near in zones.items():
+            seconds += register([*options, "--check-prefix", f"zone{z}_"])[1]
+            poses = read_poses(arguments.job / "register/poses.csv")
+            errors.append(off(poses, near))
             relative.append(relative_error(poses, truth, places))
-        print(f"{name:44s} {rms(errors):.3f} ({' '.join(f'{e:.3f}' for e in errors)})   {rms(relative):.4f}   "
-              f"{seconds / max(1, len(zones)):.0f}", flush=True)
+        print_row(name, errors, relative, seconds)
+    for name, bound in (("resection alone", []), ("resection alone, stated within 1 cm", ["--max-sigma", "0.01"])):
+        if not wanted(name):
+            continue
+        table = arguments.job / "resected.csv"
+        seconds = megablock("resect", arguments.job / "register/block.yaml", "-o", table, *bound)[1]
+        poses = read_poses(table)
+        print_row(name, [off(poses, [n for n in near if n in poses]) for near in zones.values()], [], seconds * len(zones))
 
 
 if __name__ == "__main__":

@@ -8,17 +8,16 @@ so that a unit with two events was computed again although it was there; a kill 
 just sealed, one a rank.
 """
 import argparse
-import contextlib
 import json
-import os
 import pathlib
 import random
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
 import time
+
+from sessions import kill_after, kill_all, processes_of, start
 
 LONGEST_RUN_S = 300  # a run that takes longer hangs: its stacks are printed
 
@@ -34,26 +33,6 @@ options = parser.parse_args()
 COMMAND = ["register", "--places-per-unit", "4"] if options.register else ["run"]
 
 
-def processes_of(session):
-    """Living processes of a session: mpirun gives its ranks process groups of their own, but keeps its session."""
-    found = []
-    for entry in pathlib.Path("/proc").iterdir():
-        try:
-            state, _, _, its_session = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
-        except (OSError, ValueError):
-            continue  # not a process, or gone
-        if int(its_session) == session and state not in "ZX":
-            found.append(int(entry.name))
-    return found
-
-
-def kill_all(session):
-    while processes := processes_of(session):
-        for process in processes:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
-
-
 def print_stacks(session):
     if not shutil.which("gdb"):
         return
@@ -61,16 +40,12 @@ def print_stacks(session):
         subprocess.run(["gdb", "-p", str(process), "-batch", "-ex", "thread apply all bt 12"], stderr=subprocess.STDOUT)
 
 
-def start(project, job, log):
-    command = ["mpirun", "--bind-to", "none", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1",
-               "-n", str(options.ranks), options.megablock, *COMMAND, str(project), "-j", str(job), "--quiet"]
-    environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
-    return subprocess.Popen(command, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL,
-                            start_new_session=True)
+def command(project, job):
+    return [options.megablock, *COMMAND, project, "-j", job, "--quiet"]
 
 
 def run(project, job, log):
-    process = start(project, job, log)
+    process = start(command(project, job), options.ranks, log)
     try:
         status = process.wait(timeout=LONGEST_RUN_S)
     except subprocess.TimeoutExpired:
@@ -79,16 +54,6 @@ def run(project, job, log):
         sys.exit(f"a run of {job} did not end in {LONGEST_RUN_S} s")
     if status != 0:
         sys.exit(f"a run of {job} ended with {status}: {pathlib.Path(log.name).read_text()[-2000:]}")
-
-
-def kill_after(project, job, log, moment_s):
-    process = start(project, job, log)
-    try:
-        process.wait(timeout=moment_s)
-    except subprocess.TimeoutExpired:
-        pass
-    kill_all(process.pid)
-    process.wait()
 
 
 def events(job):
@@ -104,7 +69,7 @@ def events(job):
 
 def digest(project, job):
     if options.register:  # said by a run that finds everything there
-        text = subprocess.check_output([options.megablock, *COMMAND, str(project), "-j", str(job), "--quiet"], text=True)
+        text = subprocess.check_output(list(map(str, command(project, job))), text=True)
         return next(line.split()[1] for line in text.splitlines() if line.startswith("digest"))
     return subprocess.check_output([options.megablock, "status", str(job), "--digest"], text=True).strip()
 
@@ -129,7 +94,7 @@ with tempfile.TemporaryDirectory() as folder:
         length_s = time.monotonic() - before
         moments = random.Random(options.seed)
         for _ in range(options.kills):
-            kill_after(project, work / "job", log, length_s * moments.random())
+            kill_after(command(project, work / "job"), options.ranks, log, length_s * moments.random())
         run(project, work / "job", log)
     wanted = {event["unit"] for event in events(work / "reference")}
     done = [event["unit"] for event in events(work / "job")]
