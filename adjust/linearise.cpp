@@ -1,7 +1,5 @@
-// Derivatives by the right perturbation R Exp(w) (geometry/rotation.h), C + d:
+// Derivatives of what is no image observation (those are in the header):
 //
-//   X_rig = R (X - C):          by w: -R [X - C]x,   by d: -R,          by X: R
-//   X_cam = R_m (X_rig - C_m):  by w_m: -R_m [X_rig - C_m]x,  by d_m: -R_m,  by X_rig: R_m
 //   C + R' l:                   by w: [R' l]x (as Exp(-w) R' l),  by d: I
 //   Log(R Exp(w) R_0') = Log(E Exp(R_0 w)),  E = R R_0':  by w: J_r^-1(Log E) R_0
 //   E = R_to R_from' R_m':      by w_to: J_r^-1(Log E) R_m R_from,  by w_from: the negative of it
@@ -29,25 +27,26 @@ RotationDifference rotation_difference(const Eigen::Quaterniond& rotation, const
 
 }  // namespace
 
+std::vector<ImageView> image_views(const TileProblem& problem, const TileState& state) {
+  std::vector<ImageView> views;
+  views.reserve(problem.images.size());
+  for (const TileImage& image : problem.images)
+    views.emplace_back(state.frames[image.frame.value], state.mounts[image.mount], state.cameras[image.camera.value]);
+  return views;
+}
+
 ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrinsics& intrinsics,
                               const Eigen::Vector3d& point, const Eigen::Vector2d& measured, double inverse_sigma) {
+  const ImageView view(frame, mount, intrinsics);
+  CameraResidual r;
   ImageResidual result;
-  const Eigen::Matrix3d frame_rotation = frame.rotation.toRotationMatrix();
-  const Eigen::Matrix3d mount_rotation = mount.rotation.toRotationMatrix();
-  const Eigen::Vector3d from_frame = point - frame.centre;
-  const Eigen::Vector3d from_mount = frame_rotation * from_frame - mount.centre;
-  const Eigen::Vector3d in_camera = mount_rotation * from_mount;
-  const ProjectionJacobian projection = project_with_jacobian(intrinsics, in_camera);
-  result.in_front = projection.valid;
+  result.in_front = linearise_in_camera(view, point, measured, inverse_sigma, true, r);
   if (!result.in_front) return result;
-
-  const Eigen::Matrix<double, 2, 3> by_rig = inverse_sigma * projection.by_point * mount_rotation;
-  const Eigen::Matrix<double, 2, 3> by_point = by_rig * frame_rotation;
-  result.residual = inverse_sigma * pixel_difference(intrinsics, projection.pixel, measured);
-  result.by_point = by_point;
-  result.by_frame << -by_point * skew3(from_frame), -by_point;
-  result.by_mount << -by_rig * skew3(from_mount), -by_rig;
-  result.by_intrinsics = inverse_sigma * projection.by_intrinsics;
+  result.residual = r.residual;
+  result.by_point = r.by_camera * view.rotation;
+  result.by_frame = by_pose(result.by_point, r.from_frame);
+  result.by_mount = by_mount(view, r);
+  result.by_intrinsics = r.by_intrinsics;
   return result;
 }
 
@@ -111,12 +110,14 @@ Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState&
 namespace {
 
 double image_cost(const TileProblem& problem, const TileState& state) {
+  const std::vector<ImageView> views = image_views(problem, state);
   double sum = 0;
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
     if (!problem.active(p)) continue;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      const Eigen::Vector2d difference = image_difference_px(problem, state, p, row);
+      const Eigen::Vector2d difference =
+          views[problem.image[row].value].difference_px(state.points[p], {problem.x[row], problem.y[row]});
       if (!difference.allFinite()) return std::numeric_limits<double>::infinity();
       sum += problem.image_loss.evaluate((problem.inverse_sigma[row] * difference).squaredNorm())[0];
     }

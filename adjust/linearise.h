@@ -1,10 +1,72 @@
 // Analytic linearisation of single residuals: what merge/ condenses and what the tests hold against automatic
 // differentiation. All residuals and Jacobians are already divided by sigma; robust weighting is the caller's.
+//
+// Derivatives by the right perturbation R Exp(w) (geometry/rotation.h), C + d:
+//
+//   X_rig = R (X - C):          by w: -R [X - C]x,   by d: -R,          by X: R
+//   X_cam = R_m (X_rig - C_m):  by w_m: -R_m [X_rig - C_m]x,  by d_m: -R_m,  by X_rig: R_m
+//
+// so that a residual's derivative by X_cam gives all those by poses and point.
 #pragma once
 
 #include "adjust/tile_problem.h"
+#include "geometry/brown.h"
 
 namespace megablock {
+
+// What the observations of an image share: X_cam = R (X - C) - t with R = R_m R_f, t = R_m C_m.
+struct ImageView {
+  Eigen::Matrix3d rotation;        // ground -> camera
+  Eigen::Matrix3d mount_rotation;  // rig -> camera
+  Eigen::Vector3d centre;          // of the frame
+  Eigen::Vector3d shift;           // t
+  const Intrinsics* intrinsics;    // outlives the view
+  ImageView(const Pose& frame, const Pose& mount, const Intrinsics& camera)
+      : mount_rotation(mount.rotation.toRotationMatrix()), centre(frame.centre), intrinsics(&camera) {
+    rotation = mount_rotation * frame.rotation.toRotationMatrix();
+    shift = mount_rotation * mount.centre;
+  }
+  Eigen::Vector3d in_camera(const Eigen::Vector3d& from_frame) const { return rotation * from_frame - shift; }
+  // Adjusted minus measured position, pixels; NaN where the camera cannot project the point.
+  Eigen::Vector2d difference_px(const Eigen::Vector3d& point, const Eigen::Vector2d& measured) const {
+    return reprojection(*intrinsics, in_camera(point - centre), measured);
+  }
+};
+std::vector<ImageView> image_views(const TileProblem& problem, const TileState& state);  // [images]
+
+// Residual of an image observation with the derivatives that the others are made of.
+struct CameraResidual {
+  Eigen::Vector3d from_frame, in_camera;  // X - C, X_cam
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 3> by_camera;  // by X_cam
+  IntrinsicJacobian by_intrinsics;        // where asked for
+};
+// False where the camera cannot project the point; then the result is undefined.
+inline bool linearise_in_camera(const ImageView& view, const Eigen::Vector3d& point, const Eigen::Vector2d& measured,
+                                double inverse_sigma, bool with_intrinsics, CameraResidual& result) {
+  const Intrinsics& k = *view.intrinsics;
+  result.from_frame = point - view.centre;
+  result.in_camera = view.in_camera(result.from_frame);
+  ProjectionJacobian projection;
+  if (k.model().kind == CameraModelKind::kBrown)
+    projection.valid = project_brown(k, result.in_camera, with_intrinsics, projection);
+  else
+    projection = project_with_jacobian(k, result.in_camera);
+  if (!projection.valid) return false;
+  result.residual = inverse_sigma * pixel_difference(k, projection.pixel, measured);
+  result.by_camera = inverse_sigma * projection.by_point;
+  if (with_intrinsics) result.by_intrinsics = inverse_sigma * projection.by_intrinsics;
+  return true;
+}
+// Derivative by a pose (rotation, centre) from that by X, at u = X - C: -J [u]x = (u x rows of J), -J.
+inline Eigen::Matrix<double, 2, 6> by_pose(const Eigen::Matrix<double, 2, 3>& by_point, const Eigen::Vector3d& u) {
+  Eigen::Matrix<double, 2, 6> result;
+  for (int i = 0; i < 2; ++i) result.row(i) << u.cross(by_point.row(i).transpose()).transpose(), -by_point.row(i);
+  return result;
+}
+inline Eigen::Matrix<double, 2, 6> by_mount(const ImageView& view, const CameraResidual& r) {
+  return by_pose(r.by_camera * view.mount_rotation, view.mount_rotation.transpose() * r.in_camera);
+}
 
 struct ImageResidual {
   Eigen::Vector2d residual;

@@ -5,49 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/brown.h"
+
 namespace megablock {
 
 namespace {
 
 using Kind = CameraModelKind;
-
-// Brown's distorted normalised coordinates with their derivatives by (x, y).
-struct Distortion {
-  Eigen::Vector2d point;
-  Eigen::Matrix2d jacobian;
-};
-
-Distortion distort(const Intrinsics& k, double x, double y) {
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k[kRadial1] + r2 * (k[kRadial2] + r2 * k[kRadial3]));
-  const double slope = k[kRadial1] + r2 * (2 * k[kRadial2] + 3 * r2 * k[kRadial3]);  // d radial / d r2
-  const double p1 = k[kDecentring1], p2 = k[kDecentring2];
-  Distortion d;
-  d.point = {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
-  const double cross = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y;
-  d.jacobian << radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x, cross,  //
-      cross, radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x;
-  return d;
-}
-
-bool brown_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, ProjectionJacobian& result) {
-  if (!(point.z() > 0)) return false;
-  const double inverse_z = 1 / point.z();
-  const double x = point.x() * inverse_z, y = point.y() * inverse_z;
-  const Distortion d = distort(k, x, y);
-  const double f = k[kFocal];
-  result.pixel = {k[kPrincipalX] + f * d.point.x(), k[kPrincipalY] + f * d.point.y()};
-
-  Eigen::Matrix<double, 2, 3> normalised;
-  normalised << inverse_z, 0, -x * inverse_z, 0, inverse_z, -y * inverse_z;
-  result.by_point.noalias() = f * d.jacobian * normalised;
-
-  const double r2 = x * x + y * y, r4 = r2 * r2, r6 = r4 * r2;
-  result.by_intrinsics.resize(2, k.size());
-  result.by_intrinsics << d.point.x(), 1, 0, f * x * r2, f * x * r4, f * x * r6, f * 2 * x * y, f * (r2 + 2 * x * x),
-      d.point.y(), 0, 1, f * y * r2, f * y * r4, f * y * r6, f * (r2 + 2 * y * y), f * 2 * x * y;
-  return true;
-}
 
 // Without distortion; the columns of further parameters are zero.
 bool pinhole_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, ProjectionJacobian& result) {
@@ -134,7 +98,7 @@ std::optional<Eigen::Vector2d> unproject_brown(const Intrinsics& k, const Eigen:
   Eigen::Vector2d p = target;
   constexpr int kMaxIterations = 50;
   for (int i = 0; i < kMaxIterations; ++i) {
-    const Distortion d = distort(k, p.x(), p.y());
+    const BrownDistortion d = distort_brown(k, p.x(), p.y());
     if (!(d.jacobian.determinant() > 0) || !(d.jacobian.trace() > 0)) return std::nullopt;
     const Eigen::Vector2d step = d.jacobian.inverse() * (target - d.point);
     p += step;
@@ -195,7 +159,7 @@ namespace {
 bool linearise(const Intrinsics& k, const Eigen::Vector3d& point, ProjectionJacobian& result) {
   switch (k.model().kind) {
     case Kind::kBrown:
-      return brown_jacobian(k, point, result);
+      return project_brown(k, point, true, result);
     case Kind::kPinhole:
       return pinhole_jacobian(k, point, result);
     case Kind::kFisheye:

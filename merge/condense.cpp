@@ -3,7 +3,8 @@
 #include <algorithm>
 
 #include "geometry/decompositions.h"
-#include "merge/tile_linearisation.h"
+#include "merge/cell_assembler.h"
+#include "merge/point_equations.h"
 
 namespace megablock {
 
@@ -11,115 +12,18 @@ namespace {
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// Scalar rows of TilePlan::unknowns in a front (first row of each, -1: not in it).
-std::vector<std::int64_t> front_rows(const TilePlan& plan, const Front& front) {
-  std::vector<std::int64_t> rows;
-  rows.reserve(plan.unknowns.size());
-  for (const Unknown& u : plan.unknowns) rows.push_back(front.row_of(u.id));
-  return rows;
-}
-
-// Adds A'B (sign * ) at (row, column) of the lower triangle, transposed when it would lie above.
-template <typename Product>
-void add_product(double* matrix, std::int64_t n, std::int64_t row, std::int64_t column, const Product& product,
-                 double sign) {
-  const auto rows = product.rows(), columns = product.cols();
-  if (row >= column) {
-    for (Eigen::Index j = 0; j < columns; ++j)
-      for (Eigen::Index i = 0; i < rows; ++i) matrix[row + i + (column + j) * n] += sign * product(i, j);
-  } else {
-    for (Eigen::Index i = 0; i < rows; ++i)
-      for (Eigen::Index j = 0; j < columns; ++j) matrix[column + j + (row + i) * n] += sign * product(i, j);
-  }
-}
-
-// Fills the front of a cell with its points (eliminated on the way) and its other observations.
-class CellAssembler {
- public:
-  CellAssembler(const TilePlan& plan, Front& front) : front_(front), rows_(front_rows(plan, front)) {}
-
-  void add_point(const PointEquations& point) {
-    const std::int64_t n = front_.dimension();
-    for (const auto& observation : point.observations())
-      add_residual(observation.blocks.data(), observation.block_count, observation.residual);
-    const auto& blocks = point.blocks();
-    double* matrix = front_.matrix();
-    double* rhs = front_.rhs();
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      const std::int64_t row = rows_[at(blocks[i].unknown)];
-      for (std::size_t j = 0; j <= i; ++j)
-        subtract_outer(matrix, n, row, rows_[at(blocks[j].unknown)], blocks[i], blocks[j]);
-      const auto reduced = (blocks[i].w * point.z()).eval();
-      for (Eigen::Index k = 0; k < reduced.size(); ++k) rhs[row + k] -= reduced[k];
-    }
-    SubtreeSums& sums = front_.sums();
-    sums.cost += 0.5 * point.rho();
-    sums.weighted_squares += point.weighted_squares();
-    sums.decrement_squared += point.z().squaredNorm();
-    sums.residuals += point.residual_count();
-    sums.observations += point.observation_count();
-    sums.points += 1;
-    sums.unknowns += 3;
-    sums.held_points += point.held();
-  }
-
-  void add_term(const TermResidual& term) {
-    add_residual(term.blocks.data(), term.block_count, term.residual);
-    SubtreeSums& sums = front_.sums();
-    sums.cost += 0.5 * term.rho;
-    sums.weighted_squares += term.weighted_squares;
-    sums.residuals += term.residual.size();
-  }
-
- private:
-  using Product =
-      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxIntrinsics, kMaxIntrinsics>;
-
-  template <typename Jacobian, typename Residual>
-  void add_residual(const JacobianBlock<Jacobian>* blocks, int count, const Residual& residual) {
-    const std::int64_t n = front_.dimension();
-    for (int a = 0; a < count; ++a) {
-      const auto& jacobian = blocks[a].jacobian;
-      const std::int64_t row = rows_[at(blocks[a].unknown)];
-      const Eigen::Index dimension = jacobian.cols();
-      double* rhs = front_.rhs();
-      double* diagonal = front_.diagonal();
-      for (Eigen::Index k = 0; k < dimension; ++k) {
-        rhs[row + k] -= jacobian.col(k).dot(residual);
-        diagonal[row + k] += jacobian.col(k).squaredNorm();
-      }
-      for (int b = 0; b <= a; ++b) {
-        const Product product = jacobian.transpose().lazyProduct(blocks[b].jacobian);
-        add_product(front_.matrix(), n, row, rows_[at(blocks[b].unknown)], product, 1);
-      }
-    }
-  }
-
-  static void subtract_outer(double* matrix, std::int64_t n, std::int64_t row, std::int64_t column,
-                             const PointEquations::Block& a, const PointEquations::Block& b) {
-    if (a.dimension == 6 && b.dimension == 6) {
-      const Eigen::Matrix<double, 6, 3> left = a.w, right = b.w;
-      const Eigen::Matrix<double, 6, 6> product = left * right.transpose();
-      add_product(matrix, n, row, column, product, -1);
-    } else {
-      const Product product = a.w.lazyProduct(b.w.transpose());
-      add_product(matrix, n, row, column, product, -1);
-    }
-  }
-
-  Front& front_;
-  std::vector<std::int64_t> rows_;
-};
-
 Front fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                const PlanNode& node, PointEquations& equations, std::int64_t right_hand_sides) {
+                const PlanNode& node, PointEquations& equations, std::int64_t right_hand_sides,
+                std::vector<double>& diagonal) {
   Front front(node.eliminated, node.passed, right_hand_sides);
   CellAssembler assembler(plan, front);
   for (std::int64_t point : plan.points[at(node.leaf)]) {
     equations.linearise(point, pass);
+    equations.reduce();
     assembler.add_point(equations);
   }
   visit_terms(problem, plan, state, pass, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
+  assembler.finish(diagonal);
   return front;
 }
 
@@ -139,45 +43,24 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
       const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
       const Eigen::MatrixXd basis = orthonormal_basis(scaled);
       const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();
-      add_product(front.matrix(), front.dimension(), row, row, weight, 1);
+      add_block(front.matrix(), front.dimension(), row, row, weight);
     }
   }
 }
-
-// Squared steps times the diagonal of J'J, over the residuals of a tile.
-class DampingNorm {
- public:
-  explicit DampingNorm(const TilePlan& plan) : offsets_(row_offsets(plan.unknowns)) {
-    diagonal_.assign(at(offsets_.back()), 0);
-  }
-  template <typename Jacobian>
-  void add(const JacobianBlock<Jacobian>& block) {
-    double* target = diagonal_.data() + offsets_[at(block.unknown)];
-    for (Eigen::Index k = 0; k < block.jacobian.cols(); ++k) target[k] += block.jacobian.col(k).squaredNorm();
-  }
-  double norm(const Step& step) const {
-    double sum = 0;
-    for (std::size_t i = 0; i < diagonal_.size(); ++i) sum += diagonal_[i] * step.values[i] * step.values[i];
-    return sum;
-  }
-
- private:
-  std::vector<std::int64_t> offsets_;
-  std::vector<double> diagonal_;
-};
 
 }  // namespace
 
 std::int64_t TileFactor::byte_count() const {
   std::int64_t sum = 0;
   for (const FrontFactor& node : nodes) sum += node.byte_count();
-  return sum;
+  return sum + static_cast<std::int64_t>(diagonal.size() * sizeof(double));
 }
 
 Bytes TileFactor::to_bytes() const {
   ByteWriter out;
   out.value<std::uint64_t>(nodes.size());
   for (const FrontFactor& node : nodes) node.write(out);
+  out.values(diagonal);
   return out.take();
 }
 
@@ -186,6 +69,7 @@ TileFactor TileFactor::from_bytes(const Bytes& bytes) {
   TileFactor factor;
   const auto count = in.value<std::uint64_t>();
   for (std::uint64_t i = 0; i < count; ++i) factor.nodes.push_back(FrontFactor::read(in));
+  factor.diagonal = in.values<double>();
   if (!in.at_end()) throw StoreError("merge: a tile's factor has the wrong size");
   return factor;
 }
@@ -198,10 +82,12 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
   std::vector<UpdateMatrix> updates(nodes.size());
   TileCondensation result;
   result.factor.nodes.resize(nodes.size());
+  result.factor.diagonal.assign(at(total_dimension(plan.unknowns)), 0);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const PlanNode& node = nodes[i];
-    Front front = node.leaf >= 0 ? fill_cell(problem, plan, state, pass, node, equations, right_hand_sides)
-                                 : Front(node.eliminated, node.passed, right_hand_sides);
+    Front front = node.leaf >= 0
+                      ? fill_cell(problem, plan, state, pass, node, equations, right_hand_sides, result.factor.diagonal)
+                      : Front(node.eliminated, node.passed, right_hand_sides);
     for (std::int64_t child : {node.left, node.right}) {
       if (child < 0) continue;
       front.add(updates[at(child)]);
@@ -250,25 +136,15 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
 
   const double* x = result.unknowns.values.data();
   PointEquations equations(problem, plan, state);
-  DampingNorm damping(plan);
   for (const auto& cell : plan.points) {
     for (std::int64_t point : cell) {
       equations.linearise(point, pass);
-      Eigen::Vector3d y = equations.z();
-      for (const auto& block : equations.blocks())
-        y -= block.w.transpose() * Eigen::Map<const Eigen::VectorXd>(x + offsets[at(block.unknown)], block.dimension);
-      const Eigen::Vector3d step = equations.inverse_factor().transpose() * y;
+      const Eigen::Vector3d step = equations.step(x, offsets);
       result.points[at(point)] = step;
       result.damping_norm += equations.diagonal().dot(step.cwiseAbs2());
-      for (const auto& observation : equations.observations())
-        for (int b = 0; b < observation.block_count; ++b) damping.add(observation.blocks[at(b)]);
     }
   }
-  for (std::size_t cell = 0; cell < plan.points.size(); ++cell)
-    visit_terms(problem, plan, state, pass, cell, [&](const TermResidual& term) {
-      for (int b = 0; b < term.block_count; ++b) damping.add(term.blocks[at(b)]);
-    });
-  result.damping_norm += damping.norm(result.unknowns);
+  for (std::size_t i = 0; i < factor.diagonal.size(); ++i) result.damping_norm += factor.diagonal[i] * x[i] * x[i];
   return result;
 }
 

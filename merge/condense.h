@@ -44,6 +44,7 @@ TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::i
 // Factors of a tile's cells, by node of TilePlan::cells. Empty: recompute.
 struct TileFactor {
   std::vector<FrontFactor> nodes;
+  std::vector<double> diagonal;  // of J'J over the scalar unknowns of the plan: the tile's own residuals
   bool empty() const { return nodes.empty(); }
   std::int64_t byte_count() const;
   Bytes to_bytes() const;

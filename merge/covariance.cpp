@@ -1,7 +1,7 @@
 // Covariances of a tile: down through the cells' fronts, then per point; with them the redundancy numbers of all
 // observations (io/observation_statistics.h), which are the same whatever holds a free datum.
 #include "merge/condense.h"
-#include "merge/tile_linearisation.h"
+#include "merge/point_equations.h"
 
 namespace megablock {
 
@@ -100,6 +100,7 @@ class TileCovarianceBuilder {
       row_of_unknown_[at(find_unknown(plan_.unknowns, covariance.unknowns[i].id))] = offsets[i];
     for (std::int64_t point : plan_.points[cell]) {
       equations_.linearise(point, 0);
+      equations_.reduce();
       add_point(point);
       if (columns_.columns > 1) add_point_columns(point);
     }
@@ -124,8 +125,8 @@ class TileCovarianceBuilder {
       auto& sum = with_point_[a];
       sum.setZero(blocks[a].dimension, 3);
       for (const auto& b : blocks)
-        sum.noalias() += covariance_of(blocks[a].unknown, blocks[a].dimension, b.unknown, b.dimension) * b.w;
-      inner.noalias() += blocks[a].w.transpose() * sum;
+        sum.noalias() += covariance_of(blocks[a].unknown, blocks[a].dimension, b.unknown, b.dimension) * b.matrix();
+      inner.noalias() += blocks[a].matrix().transpose() * sum;
       sum = (-sum * inverse).eval();
     }
     const Eigen::Matrix3d covariance = inverse.transpose() * inner * inverse;
@@ -138,13 +139,14 @@ class TileCovarianceBuilder {
     ObservationStatistics& sums = result_.observations[image_kind(problem_.points[at(point)].role)];
     for (const auto& observation : equations_.observations()) {
       const auto& by_point = observation.by_point;
+      const int count = equations_.jacobians(observation, jacobians_);
       Eigen::Vector2d variance = (by_point * covariance).cwiseProduct(by_point).rowwise().sum();
-      for (int i = 0; i < observation.block_count; ++i) {
-        const auto& a = observation.blocks[at(i)];
+      for (int i = 0; i < count; ++i) {
+        const auto& a = jacobians_[at(i)];
         const auto& with_point = with_point_[at(equations_.slot(a.unknown))];
         variance += 2 * (a.jacobian * with_point).cwiseProduct(by_point).rowwise().sum();
-        for (int j = 0; j < observation.block_count; ++j) {
-          const auto& b = observation.blocks[at(j)];
+        for (int j = 0; j < count; ++j) {
+          const auto& b = jacobians_[at(j)];
           variance += (a.jacobian * covariance_of(a.unknown, a.jacobian.cols(), b.unknown, b.jacobian.cols()))
                           .cwiseProduct(b.jacobian)
                           .rowwise()
@@ -191,7 +193,7 @@ class TileCovarianceBuilder {
       const double* first = columns_.values.data() + offsets_[at(block.unknown)] + n;
       const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> x(first, block.dimension, columns_.columns - 1,
                                                                          Eigen::OuterStride<>(n));
-      sum -= block.w.transpose() * x;
+      sum -= block.matrix().transpose() * x;
     }
     result_.point_columns[at(point)] = equations_.inverse_factor().transpose() * sum;
   }
@@ -208,6 +210,7 @@ class TileCovarianceBuilder {
   const double* cell_ = nullptr;
   std::int64_t cell_rows_ = 0;
   std::vector<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMaxIntrinsics, 3>> with_point_;  // C_ap
+  std::array<JacobianBlock<IntrinsicJacobian>, 3> jacobians_;  // of one observation
   TileCovariance result_;
 };
 

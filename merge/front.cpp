@@ -14,6 +14,7 @@ namespace {
 constexpr std::int64_t kPanel = 64;  // columns per step of the blocked factorisation
 
 int blas(std::int64_t n) { return static_cast<int>(n); }
+std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // First row of every unknown of `wanted` in `list` laid out as row_offsets(list).
 std::vector<std::int64_t> rows_in(const UnknownList& list, const UnknownList& wanted, const char* what) {
@@ -311,26 +312,43 @@ std::int64_t Front::row_of(const UnknownId& id) const {
 }
 
 void Front::add(const UpdateMatrix& child) {
-  std::vector<std::int64_t> first_rows;
+  // Stretches of the child's rows that lie one behind the other here too.
+  struct Run {
+    std::int64_t row, first, count;  // here, in the child
+  };
+  std::vector<Run> runs;
+  std::int64_t n = 0;
   for (const Unknown& u : child.unknowns) {
-    first_rows.push_back(row_of(u.id));
-    if (first_rows.back() < 0) throw ComputeError("merge: a front lacks " + describe(u.id) + " of its child");
+    const std::int64_t row = row_of(u.id);
+    if (row < 0) throw ComputeError("merge: a front lacks " + describe(u.id) + " of its child");
+    if (!runs.empty() && runs.back().row + runs.back().count == row)
+      runs.back().count += u.dimension;
+    else
+      runs.push_back({row, n, u.dimension});
+    n += u.dimension;
   }
-  const std::vector<std::int64_t> rows = scalar_rows(child.unknowns, first_rows);
-  const auto n = static_cast<std::int64_t>(rows.size());
   const double* source = child.matrix.data();
-  for (std::int64_t j = 0; j < n; ++j) {
-    const std::int64_t column = rows[static_cast<std::size_t>(j)];
-    for (std::int64_t i = j; i < n; ++i) {
-      const std::int64_t row = rows[static_cast<std::size_t>(i)];
-      matrix_[static_cast<std::size_t>(std::max(row, column) + std::min(row, column) * dimension_)] += *source++;
+  for (auto across = runs.begin(); across != runs.end(); ++across) {
+    for (std::int64_t k = 0; k < across->count; ++k) {
+      const std::int64_t column = across->row + k;
+      for (auto down = across; down != runs.end(); ++down) {
+        const std::int64_t skipped = down == across ? k : 0, count = down->count - skipped;
+        const std::int64_t row = down->row + skipped;
+        const bool below = row >= column;  // else transposed
+        double* target = matrix_.data() + (below ? row + column * dimension_ : column + row * dimension_);
+        if (below)
+          for (std::int64_t i = 0; i < count; ++i) target[i] += source[i];
+        else
+          for (std::int64_t i = 0; i < count; ++i) target[i * dimension_] += source[i];
+        source += count;
+      }
     }
-    diagonal_[static_cast<std::size_t>(column)] += child.diagonal[static_cast<std::size_t>(j)];
+    for (std::int64_t k = 0; k < across->count; ++k) {
+      diagonal_[at(across->row + k)] += child.diagonal[at(across->first + k)];
+      for (std::int64_t c = 0; c < std::min(child.right_hand_sides, right_hand_sides_); ++c)
+        rhs_[at(across->row + k + c * dimension_)] += child.rhs[at(across->first + k + c * n)];
+    }
   }
-  for (std::int64_t c = 0; c < std::min(child.right_hand_sides, right_hand_sides_); ++c)
-    for (std::int64_t i = 0; i < n; ++i)
-      rhs_[static_cast<std::size_t>(rows[static_cast<std::size_t>(i)] + c * dimension_)] +=
-          child.rhs[static_cast<std::size_t>(i + c * n)];
   sums_.add(child.sums);
 }
 

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <limits>
 
-#include "merge/tile_linearisation.h"
+#include "merge/point_equations.h"
 
 namespace megablock {
 
@@ -16,12 +16,13 @@ constexpr double kMaxDamping = 1e6;
 class PointRefiner {
  public:
   PointRefiner(const TileProblem& problem, TileState& state)
-      : problem_(problem), state_(state), prior_(prior_rows(problem)) {}
+      : problem_(problem), state_(state), views_(image_views(problem, state)), prior_(prior_rows(problem)) {}
 
   void refine(std::int64_t point) {
+    if (!in_tail(point)) return;
     Eigen::Vector3d& position = state_.points[static_cast<std::size_t>(point)];
     Equations now = equations(point, position);
-    if (!std::isfinite(now.cost) || now.tail == 0) return;
+    if (!std::isfinite(now.cost)) return;
     double damping = 1e-4;
     bool raised = false;
     for (int step = 0; step < kMaxSteps && now.decrement_squared() > kSettled; ++step) {
@@ -43,7 +44,6 @@ class PointRefiner {
  private:
   struct Equations {
     double cost = 0;
-    int tail = 0;                                          // observations beyond the corner
     Eigen::Matrix3d reweighted = Eigen::Matrix3d::Zero();  // rho' alone
     Eigen::Matrix3d curved = Eigen::Matrix3d::Zero();      // with the loss's curvature
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -54,28 +54,38 @@ class PointRefiner {
     }
   };
 
+  // Whether an observation lies beyond the corner; most points are settled by this.
+  bool in_tail(std::int64_t point) const {
+    for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
+      if (!problem_.kept[row]) continue;
+      const Eigen::Vector2d difference =
+          views_[problem_.image[row].value].difference_px(state_.points[point], {problem_.x[row], problem_.y[row]});
+      if (problem_.image_loss.evaluate((problem_.inverse_sigma[row] * difference).squaredNorm())[2] < 0) return true;
+    }
+    return false;
+  }
+
   Equations equations(std::int64_t point, const Eigen::Vector3d& position) const {
     Equations e;
     for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
       if (!problem_.kept[row]) continue;
-      const TileImage& image = problem_.images[problem_.image[row].value];
-      const ImageResidual r = linearise_image(state_.frames[image.frame.value], state_.mounts[image.mount],
-                                              state_.cameras[image.camera.value], position,
-                                              {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row]);
-      if (!r.in_front) {
+      const ImageView& view = views_[problem_.image[row].value];
+      CameraResidual r;
+      if (!linearise_in_camera(view, position, {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row], false,
+                               r)) {
         e.cost = std::numeric_limits<double>::infinity();
         return e;
       }
+      const Eigen::Matrix<double, 2, 3> by_point = r.by_camera * view.rotation;
       const double squares = r.residual.squaredNorm();
       const auto rho = problem_.image_loss.evaluate(squares);
-      const Eigen::Vector3d along = r.by_point.transpose() * r.residual;
-      const Eigen::Matrix3d whole = rho[1] * (r.by_point.transpose() * r.by_point);
+      const Eigen::Vector3d along = by_point.transpose() * r.residual;
+      const Eigen::Matrix3d whole = rho[1] * (by_point.transpose() * by_point);
       e.cost += 0.5 * rho[0];
       e.b -= rho[1] * along;
       e.reweighted += whole;
       e.curved += whole;
       if (rho[2] < 0) {
-        ++e.tail;
         e.curved += std::max(2 * rho[2], -rho[1] / squares) * (along * along.transpose());
       }
     }
@@ -91,6 +101,7 @@ class PointRefiner {
 
   const TileProblem& problem_;
   TileState& state_;
+  std::vector<ImageView> views_;
   std::vector<std::int64_t> prior_;
 };
 

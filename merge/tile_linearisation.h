@@ -1,5 +1,5 @@
-// Linearised residuals of one cell, point by point and term by term: shared by condensation, back-substitution and
-// covariances, which all recompute them (cheaper than keeping them).
+// Weights of the robust losses, and linearised residuals without a point of one cell: shared by condensation and
+// covariances (point_equations.h has those with one).
 //
 // Losses. The second derivative of 1/2 rho(|r|^2) by r is rho' (I + 2 rho''/rho' r r'): rho' across the residual, and
 // rho' (1 + 2 s rho''/rho') along it, s = |r|^2: nothing for Huber beyond its corner, less than nothing for Cauchy
@@ -85,67 +85,5 @@ struct TermResidual {
 // Calls visit for every observation without a point of a cell.
 void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                  std::size_t cell, const std::function<void(const TermResidual&)>& visit);
-
-// Row of the point's prior in TileProblem::point_priors, -1: none. [points]
-std::vector<std::int64_t> prior_rows(const TileProblem& problem);
-
-// One point's part of the normal equations.
-class PointEquations {
- public:
-  // Unknown that sees the point: W = J_i'J_p, later Y = W C^-T, and its own diagonal of J_i'J_i.
-  struct Block {
-    std::int64_t unknown = -1;
-    int dimension = 0;
-    Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMaxIntrinsics, 3> w;
-    Block() {}  // not defaulted: the vectors below must not fill its storage with zeros
-  };
-  struct Observation {
-    Eigen::Vector2d residual;
-    std::array<JacobianBlock<IntrinsicJacobian>, 3> blocks;  // 2 x dimension, weighted
-    Eigen::Matrix<double, 2, 3> by_point;                    // weighted
-    int block_count = 0;
-    Observation() {}  // as Block
-  };
-
-  PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)
-      : problem_(problem), plan_(plan), state_(state), prior_(prior_rows(problem)) {
-    slot_.assign(plan.unknowns.size(), -1);
-  }
-
-  // Linearises all kept observations of the point and factorises its own block. Throws ComputeError behind a camera.
-  void linearise(std::int64_t point, const Pass& pass);
-
-  const std::vector<Observation>& observations() const { return observations_; }
-  const std::vector<Block>& blocks() const { return blocks_; }        // holding Y after linearise()
-  const Eigen::Matrix3d& inverse_factor() const { return inverse_; }  // C^-1, zero rows where held
-  const Eigen::Vector3d& z() const { return z_; }                     // C^-1 b_p
-  const Eigen::Vector3d& diagonal() const { return diagonal_; }       // of J_p'J_p
-  double rho() const { return rho_; }
-  double weighted_squares() const { return weighted_squares_; }
-  std::int64_t residual_count() const { return residual_count_; }
-  std::int64_t observation_count() const { return static_cast<std::int64_t>(observations_.size()); }
-  int held() const { return held_; }
-  // Place of an unknown that sees the point in blocks(), and of the point's prior in TileProblem::point_priors (-1).
-  std::int64_t slot(std::int64_t unknown) const { return slot_[static_cast<std::size_t>(unknown)]; }
-  std::int64_t prior_row(std::int64_t point) const { return prior_[static_cast<std::size_t>(point)]; }
-
- private:
-  Block& block_of(std::int64_t unknown, int dimension);
-  void add_observation(std::int64_t point, std::int64_t row, bool curvature);
-  void factorise(double lambda);
-
-  const TileProblem& problem_;
-  const TilePlan& plan_;
-  const TileState& state_;
-  std::vector<std::int64_t> prior_;
-  std::vector<std::int32_t> slot_;
-  std::vector<Observation> observations_;
-  std::vector<Block> blocks_;
-  Eigen::Matrix3d v_, inverse_;
-  Eigen::Vector3d b_, z_, diagonal_;
-  double rho_ = 0, weighted_squares_ = 0;
-  std::int64_t residual_count_ = 0;
-  int held_ = 0;
-};
 
 }  // namespace megablock

@@ -1,0 +1,50 @@
+// Fills the front of a cell with its points, which are eliminated on the way, and its other observations.
+//
+// Per point (point_equations.h) K_ij -= Y_i Y_j' goes to the front at once. What only concerns one frame or the shared
+// unknowns of one camera in one mount, J'J and -J'r, is summed apart and added to the front once per cell.
+#pragma once
+
+#include <vector>
+
+#include "merge/front.h"
+#include "merge/point_equations.h"
+
+namespace megablock {
+
+// Adds `block` at (row, column) of the lower triangle of an n x n matrix, transposed when it would lie above; of a
+// diagonal block (row = column) the lower triangle alone counts.
+void add_block(double* matrix, std::int64_t n, std::int64_t row, std::int64_t column,
+               const Eigen::Ref<const Eigen::MatrixXd>& block);
+
+class CellAssembler {
+ public:
+  CellAssembler(const TilePlan& plan, Front& front);
+  void add_point(const PointEquations& point);  // after reduce()
+  void add_term(const TermResidual& term);
+  // Adds what was summed apart; the front is complete then. `diagonal`: of J'J over plan.unknowns, grows by the cell's.
+  void finish(std::vector<double>& diagonal);
+
+ private:
+  struct FrameSum {
+    std::array<double, 36> normal{};  // J'J
+    Eigen::Matrix<double, 6, 1> rhs = Eigen::Matrix<double, 6, 1>::Zero();
+  };
+  struct SharedSum {
+    ImageUnknowns unknowns;
+    std::vector<double> normal;  // [width x (width + 1)]: lower triangle of J'J, then J'r
+  };
+
+  void add_frames(const PointEquations& point);
+  void add_shared(const PointEquations& point);
+  void subtract(const PointEquations::Block& a, const PointEquations::Block& b);
+  // An unknown's own J'J (lower triangle), with its diagonal.
+  void add_normal(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& normal);
+
+  const TilePlan& plan_;
+  Front& front_;
+  std::vector<std::int64_t> rows_;  // of TilePlan::unknowns in the front (first row of each, -1: not in it)
+  std::vector<FrameSum> frames_;    // [plan.unknowns]
+  std::vector<SharedSum> shared_;   // by ImageUnknowns::calibration
+};
+
+}  // namespace megablock
