@@ -102,7 +102,7 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
     if (!gradients[k].empty()) finder.add(std::move(gradients[k]), sizes[k]);
   judged.images = finder.images();
   if (judged.images < options.min_images) {
-    judged.failure = fmt::format("{} images apart from one another, {} are needed", judged.images, options.min_images);
+    judged.failure = fmt::format("{} images {} m apart are needed", options.min_images, options.min_distance_m);
     return judged;
   }
   judged.mask = finder.mask();
@@ -173,20 +173,28 @@ std::string base64(const std::string& bytes) {
   return text;
 }
 
+// What is said of a camera: "16 images, 3.5 % masked; ...".
+std::string finding(const Proposal& p) {
+  std::string text = fmt::format("{} images", p.images);
+  if (p.masked > 0) text += fmt::format(", {:.1f} % masked", 100 * p.masked);
+  return p.note.empty() ? text : text + "; " + p.note;
+}
+
 std::string page(const std::vector<Proposal>& proposals) {
   std::string html =
       "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>Proposed masks</title>\n"
-      "<style>body{font:15px/1.5 system-ui,sans-serif;margin:20px;color:#1c2733}figure{display:inline-block;margin:0 "
-      "16px 20px 0;max-width:620px}img{width:100%;display:block}figcaption{font-size:13px}</style>\n"
+      "<style>body{font:15px/1.5 system-ui,sans-serif;margin:20px auto;padding:0 16px;max-width:1240px;color:#1c2733}"
+      "main{display:grid;grid-template-columns:repeat(auto-fill,minmax(360px,1fr));gap:20px 16px}figure{margin:0}"
+      "img{width:100%;display:block}figcaption{font-size:13px;margin-top:4px;overflow-wrap:anywhere}</style>\n"
       "<h1>Proposed masks</h1>\n<p>Red: what never changes over the images of a camera, masked in its PNG "
-      "(black = ignored). Correct a proposal in any paint program, or delete it.</p>\n";
+      "(black = ignored). Correct a proposal in any paint program, or delete it.</p>\n<main>\n";
   for (const Proposal& p : proposals) {
     html += "<figure>";
     if (!p.preview.empty()) html += "<img alt=\"\" src=\"data:image/jpeg;base64," + base64(p.preview) + "\">";
-    html += fmt::format("<figcaption><b>{}</b>, {} images, {:.1f} % masked. {}</figcaption></figure>\n",
-                        report::escape(p.camera), p.images, 100 * p.masked, report::escape(p.note));
+    html += fmt::format("<figcaption><b>{}</b>: {}</figcaption></figure>\n", report::escape(p.camera),
+                        report::escape(finding(p)));
   }
-  return html + "</html>\n";
+  return html + "</main>\n</html>\n";
 }
 
 int propose_masks(MasksOptions options) {
@@ -203,8 +211,7 @@ int propose_masks(MasksOptions options) {
   for (CameraIndex c(0); block.cameras.contains(c); ++c.value) {
     proposals.push_back(propose(block, block.cameras[c], images[c], options));
     const Proposal& p = proposals.back();
-    std::printf("%s: %d images, %.1f %% masked%s%s\n", p.camera.c_str(), p.images, 100 * p.masked,
-                p.note.empty() ? "" : "; ", p.note.c_str());
+    std::printf("%s: %s\n", p.camera.c_str(), finding(p).c_str());
     written += !p.file.empty();
   }
   JobStore(options.output).write_text("masks.html", page(proposals));

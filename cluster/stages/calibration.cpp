@@ -54,9 +54,11 @@ std::string calibrate(Job& job, const BlockState& start, const TrackSet& tracks,
   if (!settings.json) std::printf("%s\n%s\n", job.store.path(name).c_str(), job.store.path("calibration.html").c_str());
   std::fflush(stdout);
   if (calibration.refused.empty()) return "";
+  const bool only_there = calibration.verification && calibration.held_out_px < calibration.held_out_before_px;
   return "the calibration is refused, it is no better than the start: " + calibration.refused +
          ". The rig stays as it was; what was found is in " + job.store.path(name) +
-         ". Measure more, better spread over the pictures, or hold what is weak (--hold-intrinsics)";
+         (only_there ? ". Was the site recorded with this rig? Else measure" : ". Measure") +
+         " more, better spread over the pictures, or hold what is weak (--hold-intrinsics)";
 }
 
 }  // namespace

@@ -45,12 +45,18 @@ std::string mounts_table(const RigCalibration& c) {
   return table.html();
 }
 
-std::string point_text(const std::optional<PointFit>& fit) {
-  if (!fit) return kMissing;
-  std::string text = fmt::format("{} points, rms {} mm, largest {} mm", count(fit->points), fixed(1e3 * fit->rms_m, 1),
-                                 fixed(1e3 * fit->largest_m, 1));
-  if (fit->normalised > 0) text += ", rms ÷ σ " + fixed(fit->normalised, 2);
-  return text + (fit->aligned ? ", after a similarity" : "");
+// Rows of one comparison: rms, largest, over sigma.
+void add_points(Table& table, const std::string& what, const std::optional<PointFit>& before,
+                const std::optional<PointFit>& after) {
+  if (!before && !after) return;
+  const auto cell = [](const std::optional<PointFit>& fit, const auto& text) { return fit ? text(*fit) : kMissing; };
+  const auto row = [&](const std::string& name, const auto& text) {
+    table.add({what + name, cell(before, text), cell(after, text)});
+  };
+  row(", number", [](const PointFit& fit) { return count(fit.points) + (fit.aligned ? ", after a similarity" : ""); });
+  row(", rms", [](const PointFit& fit) { return fixed(1e3 * fit.rms_m, 1) + " mm"; });
+  row(", largest", [](const PointFit& fit) { return fixed(1e3 * fit.largest_m, 1) + " mm"; });
+  row(", rms ÷ σ", [](const PointFit& fit) { return fit.normalised > 0 ? fixed(fit.normalised, 2) : kMissing; });
 }
 
 std::string comparison_table(const RigCalibration& c) {
@@ -62,13 +68,11 @@ std::string comparison_table(const RigCalibration& c) {
   if (c.held_out > 0)
     table.add(
         {count(c.held_out) + " points held out, from the median", pixels(c.held_out_before_px), pixels(c.held_out_px)});
-  if (c.before.check_points || c.after.check_points)
-    table.add({"check points", point_text(c.before.check_points), point_text(c.after.check_points)});
+  add_points(table, "check points", c.before.check_points, c.after.check_points);
   if (c.verification && c.verification_before) {
     table.add({"verification site, rms per axis", pixels(c.verification_before->images.rms_px()),
                pixels(c.verification->images.rms_px())});
-    table.add({"verification site, check points", point_text(c.verification_before->check_points),
-               point_text(c.verification->check_points)});
+    add_points(table, "its check points", c.verification_before->check_points, c.verification->check_points);
   }
   return table.html();
 }

@@ -27,6 +27,7 @@ code{font:13px ui-monospace,Menlo,Consolas,monospace}
 .card span{font-size:13px}
 .card small{color:var(--muted);font-size:12px}
 .assessment{list-style:none;background:var(--paper);border:1px solid var(--line);border-radius:8px;margin:0;padding:10px 18px}
+main>.assessment:first-child{margin-top:16px}
 .assessment li{padding:2px 0 2px 20px;position:relative}
 .assessment li::before{content:"";position:absolute;left:0;top:9px;width:10px;height:10px;border-radius:5px;background:#9aa7b3}
 .assessment .good::before{background:var(--good)}
