@@ -18,13 +18,23 @@ const std::map<std::string, CalibrationMode> kModes = {
     {"all", CalibrationMode::kAll}, {"off-line", CalibrationMode::kOffLine}, {"on-line", CalibrationMode::kOnLine}};
 const std::map<std::string, MountFreedom> kMounts = {{"stated", MountFreedom::kStated}, {"free", MountFreedom::kFree}};
 
+// An option with named values.
+template <typename Value>
+void add_choice(CLI::App& command, const std::string& name, Value& value, const std::map<std::string, Value>& values,
+                const std::string& usual, const std::string& help) {
+  command
+      .add_option_function<std::string>(
+          name, [&](const std::string& chosen) { value = values.at(chosen); }, help)
+      ->check(CLI::IsMember(values))
+      ->default_str(usual);
+}
+
 void add_rig_options(CLI::App& command, CalibrationSettings& settings) {
   RigCalibrationOptions& rig = settings.rig;
-  command.add_option("--mode", rig.mode, "all: what the project has | off-line: control points | on-line: tie points")
-      ->transform(CLI::CheckedTransformer(kModes).description("{all,off-line,on-line} [all]"));
-  command
-      .add_option("--mounts", rig.mounts, "stated: sigmas of the project are priors | free: all but the first, without")
-      ->transform(CLI::CheckedTransformer(kMounts).description("{stated,free} [stated]"));
+  add_choice(command, "--mode", rig.mode, kModes, "all",
+             "all: what the project has | off-line: control points | on-line: tie points");
+  add_choice(command, "--mounts", rig.mounts, kMounts, "stated",
+             "stated: sigmas of the project are priors | free: all but the first, without");
   command.add_flag_callback(
       "--hold-intrinsics", [&rig] { rig.estimate_intrinsics = false; },
       "Cameras are held; else estimated as the project says");

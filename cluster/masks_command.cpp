@@ -201,6 +201,8 @@ int propose_masks(MasksOptions options) {
   options.regions.check();
   const Project project = read_project(options.project);
   const Block& block = project.block;
+  if (std::none_of(block.images.begin(), block.images.end(), [](const Image& i) { return fs::exists(i.path); }))
+    throw InputError(options.project + ": the project has no pictures; masks are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "mask_proposals").string();
   std::error_code error;
   fs::create_directories(options.output, error);

@@ -18,4 +18,15 @@ inline CLI::Validator not_negative() {
       "NUMBER", "not negative");
 }
 
+// A number above 0.
+inline CLI::Validator positive() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value > 0;
+        return number ? std::string() : "'" + text + "' is not a number above 0";
+      },
+      "NUMBER", "positive");
+}
+
 }  // namespace megablock

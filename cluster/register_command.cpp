@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -35,6 +36,10 @@ int resect(const ResectOptions& options) {
   options.resection.check();
   const Project project = read_project(options.project);
   const Block& block = project.block;
+  if (std::none_of(block.control_points.begin(), block.control_points.end(), [](const ControlPoint& point) {
+        return point.role == PointRole::kControl && !point.measurements.empty();
+      }))
+    throw InputError(options.project + ": no measured control points; give 'control' in the project file");
   const std::vector<Pose> start = options.without_trajectory ? std::vector<Pose>() : starts_of(block, {});
   std::string csv = "name,qw,qx,qy,qz,x,y,z,position_sigma_m,rotation_sigma_deg,points,seen,angle_deg,rms_px,note\n";
   int resected = 0, refused = 0, warned = 0;
@@ -103,12 +108,17 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
   command->add_flag_callback(
       "--hold-rig", [options] { options->settings.estimate_rig = false; },
       "Cameras and mounts as given; else free ones are estimated first");
-  command->add_option("--alpha", s.places.alpha_m, "Radius of the alpha shape, m")->capture_default_str();
-  command->add_option("--z-stretch", s.places.z_stretch, "Stretch of heights in it")->capture_default_str();
+  command->add_option("--alpha", s.places.alpha_m, "Radius of the alpha shape, m")
+      ->check(positive())
+      ->capture_default_str();
+  command->add_option("--z-stretch", s.places.z_stretch, "Stretch of heights in it")
+      ->check(positive())
+      ->capture_default_str();
   command->add_option("--d-cons", s.places.registration_spacing, "Frames between two registrations of a pass pair")
+      ->check(positive())
       ->capture_default_str();
   command->add_option("--places-per-unit", s.units_places, "2x2: places that a rank registers at a time")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_option("--iterations", s.pairs.iterations, "2x2: iterations")->capture_default_str();
   command->add_option("--first-threshold", s.pairs.first_threshold_px, "2x2: threshold of the published start, px")

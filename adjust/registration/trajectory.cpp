@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -126,6 +127,9 @@ std::vector<Ray> rays_of(const PathPoint& point, const std::vector<Pose>& start)
 }
 
 void add_points(const Block& block, const TrajectoryOptions& options, Trajectory& trajectory) {
+  const auto named = [&](const ControlPoint& point) { return point.name.starts_with(options.check_prefix); };
+  if (!options.check_prefix.empty() && std::none_of(block.control_points.begin(), block.control_points.end(), named))
+    throw InputError("no control point's name begins with '" + options.check_prefix + "'");
   for (std::size_t i = 0; i < block.control_points.size(); ++i) {
     const ControlPoint& control = block.control_points[i];
     const bool held_out = !options.check_prefix.empty() && control.name.starts_with(options.check_prefix);

@@ -300,17 +300,32 @@ RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, cons
 
 // A reason without its numbers.
 std::string kind_of(const std::string& reason) {
+  constexpr const char* kNumber = "…";
   std::string kind;
-  for (const char c : reason)
-    if (!std::isdigit(static_cast<unsigned char>(c)) && c != '.')
-      kind += c;
-    else if (kind.empty() || kind.back() != '#')
-      kind += '#';
+  bool number = false;
+  for (const char c : reason) {
+    const bool digit = std::isdigit(static_cast<unsigned char>(c)) || (number && c == '.');
+    if (!digit) kind += c;
+    if (digit && !number) kind += kNumber;
+    number = digit;
+  }
   return kind;
 }
 
+// The datum may hang on nothing: then the trajectory stays about where it was.
+void note_free_position(const JointInput& input, const RegisteredTrajectory& registered,
+                        const RegistrationSettings& settings, std::vector<std::string>& notes) {
+  const bool control =
+      std::any_of(input.points.begin(), input.points.end(), [](const PathPoint& p) { return p.known; });
+  const bool positions =
+      settings.joint.use_positions && std::find(input.located.begin(), input.located.end(), 1) != input.located.end();
+  if (!control && !positions && registered.resections == 0)
+    notes.push_back(
+        "neither positions nor control take part: the block as a whole lies about where the trajectory had it");
+}
+
 RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, const std::vector<RegisteredPlace>& rows,
-                              const RegisteredTrajectory& registered) {
+                              const RegisteredTrajectory& registered, const RegistrationSettings& settings) {
   RegistrationSummary s;
   s.frames = std::ssize(registered.frames);
   s.chain = std::ssize(trajectory.input.chain);
@@ -344,6 +359,7 @@ RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, cons
   }
   if (!s.check_points.empty()) s.check_rms_m = std::sqrt(squares / static_cast<double>(s.check_points.size()));
   s.notes = trajectory.notes;
+  note_free_position(trajectory.input, registered, settings, s.notes);
   s.digest = job.store.seal(kTrajectory)->content_hash;
   return s;
 }
@@ -372,7 +388,7 @@ RegistrationSummary run_registration(Job& job, const TrackSource& source, const 
     write_registration_outputs(job, trajectory.input.start, rows, registered, settings.joint, source.file);
     return std::string();
   });
-  RegistrationSummary summary = summarise(job, trajectory, rows, registered);
+  RegistrationSummary summary = summarise(job, trajectory, rows, registered, settings);
   summary.rig = rig;
   return summary;
 }

@@ -10,7 +10,7 @@ import pathlib
 import sys
 import tempfile
 
-from program import megablock, status
+from program import BAD_INPUT, megablock, one_line, status
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "benchmark"))
 from registration_table import minus, norm, read_poses, relative_error, rms  # noqa: E402
@@ -61,3 +61,14 @@ with tempfile.TemporaryDirectory() as folder:
     assert judged["check_rms_m"] < 0.05, judged
     assert judged["normalised_error_position"] < 1.4, "the sigmas are true or cautious"
     assert (work / "run/result/report.html").exists()
+
+    # What is asked of something that is not there is refused in one line.
+    def refused(*arguments):
+        return one_line(megablock(*arguments, expect=BAD_INPUT))
+
+    assert "no control point's name begins with 'zone9_'" in refused(
+        "register", project, "-j", work / "job", "-q", "--check-prefix", "zone9_")
+    assert "--d-cons: '0' is not a number above 0" in refused("register", project, "-j", work / "job", "--d-cons", 0)
+    megablock("simulate", "--scene", "street", "--frames", 6, "--rig-cameras", 2, "-o", work / "bare")
+    assert "no measured control points" in refused("resect", work / "bare/block.yaml", "-o", work / "resected.csv")
+    assert "no pictures" in refused("masks", work / "bare/block.yaml", "-o", work / "masks")
