@@ -143,9 +143,13 @@ std::vector<Geodetic> ApproximatePoses::positions() const {
 
 ApproximatePoses read_approximate_poses(const std::string& path) {
   const CsvTable csv(path);
-  if (csv.has("qw")) return read_quaternions(path);
+  if (csv.has("qw") || csv.has("qx") || csv.has("qy") || csv.has("qz")) return read_quaternions(path);
   const std::string name_column = csv.has("image") ? "image" : "name";
   csv.require({name_column});
+  if (!csv.has("latitude_deg") && !csv.has("x_m"))
+    throw InputError(path +
+                     ": no columns of poses: latitude_deg,longitude_deg,height_m or x_m,y_m,z_m with angles, or "
+                     "qw,qx,qy,qz,x,y,z");
   return read_angles(csv, name_column);
 }
 

@@ -46,6 +46,7 @@ std::string calibrate(Job& job, const BlockState& start, const TrackSet& tracks,
   CalibratedRig rig = calibrate_rig(job.block, start, tracks, settings.rig, site);
   RigCalibration& calibration = rig.calibration;
   calibration.project = std::filesystem::path(job.options.project).filename().string();
+  calibration.warnings.insert(calibration.warnings.end(), job.notes.begin(), job.notes.end());
   warn_of_lost_frames(job.block, start, calibration);
   const std::string name = calibration.refused.empty() ? "calibration.yaml" : "calibration-refused.yaml";
   job.store.write_text(name, calibration_yaml(calibration, kProgram));

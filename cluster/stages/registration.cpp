@@ -358,7 +358,8 @@ RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, cons
     s.check_points.push_back(fmt::format("{} {:.4f} {:.4f} {:.4f} m", control.name, off.x(), off.y(), off.z()));
   }
   if (!s.check_points.empty()) s.check_rms_m = std::sqrt(squares / static_cast<double>(s.check_points.size()));
-  s.notes = trajectory.notes;
+  s.notes = job.notes;
+  s.notes.insert(s.notes.end(), trajectory.notes.begin(), trajectory.notes.end());
   note_free_position(trajectory.input, registered, settings, s.notes);
   s.digest = job.store.seal(kTrajectory)->content_hash;
   return s;
