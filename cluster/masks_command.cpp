@@ -217,8 +217,9 @@ int propose_masks(MasksOptions options) {
     written += !p.file.empty();
   }
   JobStore(options.output).write_text("masks.html", page(proposals));
-  std::printf("%d masks in %s; look at masks.html there, then add 'masks: %s' to the project file\n", written,
-              options.output.c_str(), options.output.c_str());
+  const bool any = std::any_of(proposals.begin(), proposals.end(), [](const Proposal& p) { return p.masked > 0; });
+  std::printf("%d masks in %s; look at masks.html there%s\n", written, options.output.c_str(),
+              any ? (", then add 'masks: " + options.output + "' to the project file").c_str() : "");
   return kExitDone;
 }
 

@@ -4,7 +4,7 @@ import pathlib
 import tempfile
 
 import pictures
-from program import megablock
+from program import BAD_INPUT, megablock, one_line
 
 WIDTH, HEIGHT = 160, 90
 
@@ -36,6 +36,14 @@ def main():
         said = megablock("masks", project, "--min-images", 10, "--min-distance", 1, "-o", folder / "others")
         assert "the project has" in said and "which stays as it is" in said, said
         assert drawn.read_bytes() == by_hand and (folder / "others" / names[0]).read_bytes() == proposed[names[0]]
+
+        # The trajectory of these pictures, misspelt.
+        given = (folder / "poses.csv").read_text()
+        for header, said in ("name,qq,qx", "column 'qw' is missing"), ("name,a,b", "no columns of poses"):
+            text = given.replace("name,qw,qx", header)
+            (folder / "poses.csv").write_text(text if "qq" in header else text.replace("qy,qz", "c,d"))
+            message = one_line(megablock("register", project, "-j", folder / "job", "-q", expect=BAD_INPUT))
+            assert said in message and "poses.csv" in message, message
 
 
 main()
