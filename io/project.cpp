@@ -8,6 +8,7 @@
 #include "io/approximate_poses.h"
 #include "io/control_file.h"
 #include "io/error.h"
+#include "io/hdf5_file.h"
 #include "io/image_scan.h"
 #include "io/lines.h"
 #include "io/project_sections.h"
@@ -35,11 +36,28 @@ StageSettings read_stage_settings(YamlReader& top) {
   return settings;
 }
 
+// What is wrong with a file that the project names: nothing that running again would make anew.
+InputError refusal(YamlReader& top, const std::string& key, const StoreError& error) {
+  std::string reason = error.what();
+  if (const auto remedy = reason.find("; delete it"); remedy != std::string::npos)
+    reason.replace(remedy, std::string::npos, "; make it again");
+  return InputError(top.where(key) + ": " + key + ": " + reason);
+}
+
 void read_simulated_block(YamlReader& top, Project& project, const std::string& block_file) {
   try {
     project.block = read_block(block_file);
   } catch (const StoreError& error) {
-    throw InputError(top.where("block") + ": block: " + error.what());
+    throw refusal(top, "block", error);
+  }
+}
+
+// The tracks themselves are read when they are needed.
+void check_tie_points(YamlReader& top, const std::string& file) {
+  try {
+    Hdf5Reader(file, "tracks");
+  } catch (const StoreError& error) {
+    throw refusal(top, "tie_points", error);
   }
 }
 
@@ -62,7 +80,10 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
       throw InputError(top.where(key) + ": unknown key '" + key + "'; did you mean 'images'?");
   if (!images && !block_file)
     throw InputError(top.where() + ": key 'images' (a folder of images) is missing; add for example 'images: images'");
-  if (const auto tie_points = top.existing_file("tie_points")) project.tie_points = *tie_points;
+  if (const auto tie_points = top.existing_file("tie_points")) {
+    check_tie_points(top, *tie_points);
+    project.tie_points = *tie_points;
+  }
   if (block_file && project.tie_points.empty())
     throw InputError(top.where("block") + ": 'block' needs 'tie_points' as well: there are no images to measure in");
 

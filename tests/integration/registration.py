@@ -72,3 +72,11 @@ with tempfile.TemporaryDirectory() as folder:
     megablock("simulate", "--scene", "street", "--frames", 6, "--rig-cameras", 2, "-o", work / "bare")
     assert "no measured control points" in refused("resect", work / "bare/block.yaml", "-o", work / "resected.csv")
     assert "no pictures" in refused("masks", work / "bare/block.yaml", "-o", work / "masks")
+
+    # Tie points that are none: told at once, not as places that nobody registers.
+    bare, tie_points = work / "bare/block.yaml", work / "bare/tie_points.h5"
+    whole = tie_points.read_bytes()
+    for damaged, why in (whole[:1000], "cannot be opened"), ((work / "bare/given.h5").read_bytes(), "holds 'block'"):
+        tie_points.write_bytes(damaged)
+        said = refused("register", bare, "-j", work / "none", "-q")
+        assert "block.yaml:" in said and "tie_points: " in said and why in said and "delete" not in said, said
