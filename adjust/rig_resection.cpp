@@ -1,6 +1,6 @@
 #include "adjust/rig_resection.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

@@ -1,5 +1,5 @@
 #include <ceres/ceres.h>
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <cmath>
 

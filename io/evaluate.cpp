@@ -1,6 +1,6 @@
 #include "io/evaluate.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>

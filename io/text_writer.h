@@ -1,7 +1,7 @@
 // Buffered text and binary output with one check for every failure. Internal to io/.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cstdio>
 #include <cstring>
@@ -28,7 +28,7 @@ class TextWriter {
   // {} of a double is the shortest text that reads back to the same bits.
   template <typename... Arguments>
   void print(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-    fmt::format_to(std::back_inserter(buffer_), format, std::forward<Arguments>(arguments)...);
+    fmt::vformat_to(std::back_inserter(buffer_), format, fmt::make_format_args(arguments...));
     if (buffer_.size() > kChunk) flush();
   }
 
@@ -37,7 +37,7 @@ class TextWriter {
   requires std::is_arithmetic_v<Value>
   void bytes(Value value) {
     const char* data = reinterpret_cast<const char*>(&value);
-    buffer_.append(data, data + sizeof value);
+    buffer_.append(data, sizeof value);
     if (buffer_.size() > kChunk) flush();
   }
 
@@ -62,7 +62,7 @@ class TextWriter {
 
   std::string path_;
   std::FILE* file_;
-  fmt::memory_buffer buffer_;
+  std::string buffer_;
 };
 
 }  // namespace megablock

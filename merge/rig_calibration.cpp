@@ -1,6 +1,6 @@
 #include "merge/rig_calibration.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <chrono>

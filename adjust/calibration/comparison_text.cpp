@@ -1,5 +1,5 @@
 // What a comparison of camera models prints and draws.
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include "adjust/calibration/model_comparison.h"
 #include "io/report/drawing.h"

@@ -1,6 +1,6 @@
 #include "adjust/calibration/model_comparison.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>

@@ -1,6 +1,6 @@
 #include "adjust/registration/rig_estimate.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "cluster/stages/registration.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cctype>

@@ -1,6 +1,6 @@
 #include "cluster/stages/registration_output.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <numbers>

@@ -1,5 +1,5 @@
 // Headline and assessment: what is well and what needs a look.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

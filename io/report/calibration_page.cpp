@@ -1,5 +1,5 @@
 // The page of a rig calibration: mounts, residuals, and how the measurements cover each camera's sensor.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <numbers>

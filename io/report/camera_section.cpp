@@ -1,5 +1,5 @@
 // Cameras and mounts.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Control and check points, and their image measurements.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The table of images, for the eye and for sorting.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The maps. Parts of the block whose place is not observed are not drawn onto a common map: each has its own.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "io/report/drawing.h"
 #include "io/report/html.h"

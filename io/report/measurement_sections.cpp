@@ -1,5 +1,5 @@
 // Positions, attitudes, accuracy: what is measured in metres and radians.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

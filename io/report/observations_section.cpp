@@ -1,5 +1,5 @@
 // Are the stated sigmas true? One row per kind of observation (io/observation_statistics.h).
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

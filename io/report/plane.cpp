@@ -1,6 +1,6 @@
 #include "io/report/plane.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

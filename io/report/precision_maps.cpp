@@ -1,5 +1,5 @@
 // Maps of how well the ground is covered and how well the frames are placed.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,6 +1,6 @@
 // What failed, what it took, and where the result comes from.
 #include <fmt/chrono.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

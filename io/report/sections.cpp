@@ -1,7 +1,7 @@
 // Tie points, residuals, tiles.
 #include "io/report/sections.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
