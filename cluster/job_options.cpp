@@ -49,6 +49,7 @@ void describe(Visitor& visit, MatchOptions& o) {
 template <typename Visitor>
 void describe(Visitor& visit, TrackOptions& o) {
   visit.integer("min_track_length", o.min_length);
+  visit.flag("remove_eccentricity", o.remove_eccentricity);
 }
 
 template <typename Visitor>

@@ -10,7 +10,8 @@
 namespace megablock {
 
 struct TrackOptions {
-  int min_length = 2;  // images
+  int min_length = 2;               // images
+  bool remove_eccentricity = true;  // of keypoints (eccentricity.h); the pipeline does it, not the builder below
   void check() const;  // throws InputError
 };
 

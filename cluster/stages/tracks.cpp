@@ -11,11 +11,13 @@
 
 #include "adjust/tile_problem.h"
 #include "cluster/collective.h"
+#include "cluster/stages/block_hash.h"
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
+#include "match/eccentricity.h"
 
 namespace megablock {
 
@@ -142,6 +144,7 @@ TrackSet build_block_tracks(const Job& job, const std::vector<std::string>& matc
   }
   for (std::int64_t t = 0; t < kept.track_count(); ++t)
     kept.id[t] = TrackIndex(track_key(kept.image[kept.begin[t]], kept.feature[kept.begin[t]]));
+  if (job.settings.tracks.remove_eccentricity) remove_eccentricity(job.block, keypoints, kept);
   return kept;
 }
 
@@ -158,7 +161,9 @@ IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job) 
 
 std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& matches, const Tiles& tiles) {
   Hasher hasher;
-  hasher.add(job.settings.tracks.min_length).add(job.generations);
+  hasher.add(job.settings.tracks.min_length).add(job.generations).add(job.settings.tracks.remove_eccentricity);
+  if (job.settings.tracks.remove_eccentricity)
+    for (const Camera& camera : job.block.cameras) add_to_hash(hasher, camera.intrinsics);
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
   return run_tracks_unit(job, hasher.value(), tiles, [&] { return build_block_tracks(job, matches, tiles); });
 }

@@ -129,6 +129,7 @@ class Growth(unittest.TestCase):
                 ("adjustment", "image_sigma_px", 0.4, {"orientation", "adjustment", "merge"}, set()),
                 ("orientation", "max_rotation_error_deg", 8, {"orientation"}, {"adjustment", "merge"}),
                 ("tiles", "weak_link_tracks", 9, {"tiles"}, {"tracks", "adjustment", "merge"}),
+                ("matching", "remove_eccentricity", "false", {"tracks", "adjustment", "merge"}, {"orientation"}),
                 ("matching", "min_track_length", 3, {"tracks", "orientation", "adjustment", "merge"}, set()),
                 ("matching", "ratio", 0.8, {"matching", "tiles", "tracks", "orientation", "adjustment", "merge"}, set()),
                 ("candidates", "order_neighbours", 3, {"candidates"},
