@@ -1,0 +1,144 @@
+// One job on a simulated block of any size, from given tie points to the evaluated result:
+//
+//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--folder F] [--seed 1]
+//
+// street: grid of 100 m, every street driven twice, a frame of ten cameras each 4 m, 1 000 observations per frame, five
+// per point, 0.5 px; position priors of 0.5 m on half of the frames, relative poses of 1 cm and 0.01 degrees;
+// calibration held. aerial: 80 % and 60 % overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the
+// camera is calibrated. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as its last
+// line; seconds are those of the run on the wall clock. What --folder holds is not simulated again.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "io/error.h"
+#include "io/evaluate.h"
+#include "io/events.h"
+
+namespace {
+
+using namespace megablock;
+namespace fs = std::filesystem;
+
+struct ScaleOptions {
+  std::string scene = "street";
+  std::int64_t frames = 1000;
+  int ranks = 1, threads = 1;
+  std::uint64_t seed = 1;
+  fs::path folder;  // empty: a temporary one, removed at the end
+};
+
+void run(const std::string& command) {
+  std::fprintf(stderr, "%s\n", command.c_str());
+  if (const int status = std::system((command + " >&2").c_str()); status != 0)
+    throw ComputeError("'" + command + "' ended with " + std::to_string(status));
+}
+
+std::string scene_options(const ScaleOptions& options) {
+  if (options.scene == "street")
+    return "--scene street --rig-cameras 10 --points-per-frame 1000 --gps-sigma 0.5 --gps-share 0.5 "
+           "--relative-position-sigma 0.01 --relative-rotation-sigma 0.01 --no-calibration";
+  return "--scene aerial --points-per-frame 300 --gps-sigma 0.05 --attitude-sigma 0.02";
+}
+
+// Median over the steps of the global adjustment, of which each leaves one event on the first rank.
+double seconds_per_iteration(const fs::path& job) {
+  std::vector<double> seconds;
+  for (const UnitEvent& event : read_events(JobStore(job.string())))
+    if (event.rank == 0 && event.unit.starts_with("merge/")) seconds.push_back(event.seconds);
+  if (seconds.empty()) throw ComputeError("the job has left no events of its merge");
+  std::nth_element(seconds.begin(), seconds.begin() + std::ssize(seconds) / 2, seconds.end());
+  return seconds[seconds.size() / 2];
+}
+
+double peak_rss_mib(const BlockResult& result) {
+  double peak = 0;
+  for (const StageStatistics& stage : result.stages) peak = std::max(peak, stage.peak_rss_mib);
+  return peak;
+}
+
+// Points with kept observations in frames of several tiles.
+std::int64_t points_across_tiles(const BlockResult& result) {
+  std::int64_t count = 0;
+  for (std::int64_t t = 0; t < result.tracks.track_count(); ++t) {
+    TileIndex first;
+    bool across = false;
+    for (std::int64_t o = result.tracks.begin[t]; o < result.tracks.begin[t + 1]; ++o) {
+      if (!result.kept[o]) continue;
+      const TileIndex tile = result.tiles.tile_of_frame[result.block.images[result.tracks.image[o]].frame];
+      if (!first.valid()) first = tile;
+      across = across || tile != first;
+    }
+    count += across;
+  }
+  return count;
+}
+
+nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
+  const fs::path megablock = fs::canonical("/proc/self/exe").parent_path() / "../../megablock";
+  const std::string program = "'" + megablock.string() + "' ", block = "'" + (folder / "block.yaml").string() + "' ";
+  if (!fs::exists(folder / "block.yaml"))
+    run(program + "simulate " + scene_options(options) + " --frames " + std::to_string(options.frames) + " --seed " +
+        std::to_string(options.seed) + " -o '" + folder.string() + "'");
+  const fs::path job = folder / ("job-" + std::to_string(options.ranks) + "x" + std::to_string(options.threads));
+  fs::remove_all(job);
+  const auto start = std::chrono::steady_clock::now();
+  run("mpirun --bind-to none --oversubscribe -n " + std::to_string(options.ranks) + " " + program + "run " + block +
+      "-j '" + job.string() + "' --quiet --threads " + std::to_string(options.threads));
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const BlockResult result = read_result((job / "result/block.h5").string());
+  const Evaluation evaluation = evaluate(result, (folder / "truth.csv").string());
+  const ReprojectionStatistics statistics = reprojection_statistics(result);
+  const double per_iteration = seconds_per_iteration(job);
+  return {{"scene", options.scene},
+          {"frames", options.frames},
+          {"images", result.block.images.size()},
+          {"ranks", options.ranks},
+          {"threads", options.threads},
+          {"observations", statistics.observations},
+          {"observations_per_second_per_core",
+           static_cast<double>(statistics.observations) / per_iteration / options.ranks / options.threads},
+          {"seconds", seconds},
+          {"seconds_per_iteration", per_iteration},
+          {"global_iterations", result.global_iterations},
+          {"chi2_per_dof", result.variance_factor},
+          {"peak_rss_mib_per_rank", peak_rss_mib(result)},
+          {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), std::uint8_t{1})},
+          {"tiles", result.tiles.tile_count},
+          {"points_across_tiles", points_across_tiles(result)},
+          {"newton_decrement", result.newton_decrement},
+          {"normalised_error_position", evaluation.normalised_error_position},
+          {"normalised_error_rotation", evaluation.normalised_error_rotation},
+          {"position_rms_m", evaluation.position_rms_m}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ScaleOptions options;
+  CLI::App app("One job on a simulated block of any size; prints one JSON object");
+  app.add_option("--scene", options.scene, "street or aerial")->check(CLI::IsMember({"street", "aerial"}));
+  app.add_option("--frames", options.frames, "Frames")->check(CLI::Range(10, 10'000'000));
+  app.add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 1024));
+  app.add_option("--threads", options.threads, "Threads per rank")->check(CLI::Range(1, 1024));
+  app.add_option("--seed", options.seed, "Seed of the simulation");
+  app.add_option("--folder", options.folder, "Where block and job go and stay; by default nothing stays");
+  CLI11_PARSE(app, argc, argv);
+  const bool keep = !options.folder.empty();
+  std::string scratch = (fs::temp_directory_path() / "adjust_scale_XXXXXX").string();
+  const fs::path folder = keep ? options.folder : fs::path(mkdtemp(scratch.data()));
+  int code = 0;
+  try {
+    std::printf("%s\n", measure(options, folder).dump().c_str());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "adjust_scale: %s\n", error.what());
+    code = 1;
+  }
+  if (!keep) fs::remove_all(folder);
+  return code;
+}
