@@ -15,14 +15,15 @@
 namespace megablock {
 
 // What the observations of an image share: X_cam = R (X - C) - t with R = R_m R_f, t = R_m C_m.
-struct ImageView {
+// Aligned, so that an observation with a held mount reads two lines of the cache.
+struct alignas(64) ImageView {
   Eigen::Matrix3d rotation;        // ground -> camera
-  Eigen::Matrix3d mount_rotation;  // rig -> camera
   Eigen::Vector3d centre;          // of the frame
   Eigen::Vector3d shift;           // t
   const Intrinsics* intrinsics;    // outlives the view
+  Eigen::Matrix3d mount_rotation;  // rig -> camera
   ImageView(const Pose& frame, const Pose& mount, const Intrinsics& camera)
-      : mount_rotation(mount.rotation.toRotationMatrix()), centre(frame.centre), intrinsics(&camera) {
+      : centre(frame.centre), intrinsics(&camera), mount_rotation(mount.rotation.toRotationMatrix()) {
     rotation = mount_rotation * frame.rotation.toRotationMatrix();
     shift = mount_rotation * mount.centre;
   }
@@ -47,15 +48,20 @@ inline bool linearise_in_camera(const ImageView& view, const Eigen::Vector3d& po
   const Intrinsics& k = *view.intrinsics;
   result.from_frame = point - view.centre;
   result.in_camera = view.in_camera(result.from_frame);
-  ProjectionJacobian projection;
-  if (k.model().kind == CameraModelKind::kBrown)
-    projection.valid = project_brown(k, result.in_camera, with_intrinsics, projection);
-  else
-    projection = project_with_jacobian(k, result.in_camera);
-  if (!projection.valid) return false;
-  result.residual = inverse_sigma * pixel_difference(k, projection.pixel, measured);
-  result.by_camera = inverse_sigma * projection.by_point;
-  if (with_intrinsics) result.by_intrinsics = inverse_sigma * projection.by_intrinsics;
+  const auto take = [&](const ProjectionJacobian& projection) {
+    result.residual = inverse_sigma * pixel_difference(k, projection.pixel, measured);
+    result.by_camera = inverse_sigma * projection.by_point;
+    if (with_intrinsics) result.by_intrinsics = inverse_sigma * projection.by_intrinsics;
+  };
+  if (k.model().kind == CameraModelKind::kBrown) {
+    ProjectionJacobian projection;
+    if (!project_brown(k, result.in_camera, with_intrinsics, projection)) return false;
+    take(projection);
+  } else {
+    const ProjectionJacobian projection = project_with_jacobian(k, result.in_camera);
+    if (!projection.valid) return false;
+    take(projection);
+  }
   return true;
 }
 // Derivative by a pose (rotation, centre) from that by X, at u = X - C: -J [u]x = (u x rows of J), -J.

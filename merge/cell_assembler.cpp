@@ -6,12 +6,12 @@ namespace {
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// C -= A B' with three columns each; leading dimensions n, lda, ldb. Numbers of rows known when compiling, or 0.
+// C -= A B' with three columns each; leading dimensions n, lda, ldb. Numbers of rows are known when compiling, or 0.
 template <int kRows, int kColumns>
-void subtract_product(double* c, std::int64_t n, const double* a, std::int64_t lda, const double* b, std::int64_t ldb,
-                      std::int64_t rows = kRows, std::int64_t columns = kColumns) {
-  const double *a0 = a, *a1 = a + lda, *a2 = a1 + lda;
+void subtract(double* c, std::int64_t n, const double* a, std::int64_t lda, std::int64_t rows, const double* b,
+              std::int64_t ldb, std::int64_t columns) {
   const std::int64_t height = kRows > 0 ? kRows : rows, width = kColumns > 0 ? kColumns : columns;
+  const double *a0 = a, *a1 = a + lda, *a2 = a1 + lda;
   for (std::int64_t j = 0; j < width; ++j) {
     const double b0 = b[j], b1 = b[j + ldb], b2 = b[j + 2 * ldb];
     double* __restrict__ column = c + j * n;
@@ -22,11 +22,27 @@ void subtract_product(double* c, std::int64_t n, const double* a, std::int64_t l
 // Frames and mounts have 6 unknowns, Brown's cameras 8.
 void subtract_product(double* c, std::int64_t n, const double* a, std::int64_t lda, std::int64_t rows, const double* b,
                       std::int64_t ldb, std::int64_t columns) {
-  if (rows == 6 && columns == 6) return subtract_product<6, 6>(c, n, a, lda, b, ldb);
-  if (rows == 8 && columns == 6) return subtract_product<8, 6>(c, n, a, lda, b, ldb);
-  if (rows == 6 && columns == 8) return subtract_product<6, 8>(c, n, a, lda, b, ldb);
-  if (rows == 8 && columns == 8) return subtract_product<8, 8>(c, n, a, lda, b, ldb);
-  subtract_product<0, 0>(c, n, a, lda, b, ldb, rows, columns);
+  if (rows == 6 && columns == 6) return subtract<6, 6>(c, n, a, lda, rows, b, ldb, columns);
+  if (rows == 8 && columns == 6) return subtract<8, 6>(c, n, a, lda, rows, b, ldb, columns);
+  if (rows == 6 && columns == 8) return subtract<6, 8>(c, n, a, lda, rows, b, ldb, columns);
+  if (rows == 8 && columns == 8) return subtract<8, 8>(c, n, a, lda, rows, b, ldb, columns);
+  subtract<0, 0>(c, n, a, lda, rows, b, ldb, columns);
+}
+
+// Lower triangle of C += J'J, and J'r behind it, of two residuals; C has the width of J.
+void add_squares(double* c, std::int64_t width, const double* jacobian, const double* residual) {
+  const double *first = jacobian, *second = jacobian + width;
+  for (std::int64_t j = 0; j <= width; ++j) {
+    const double a = j < width ? first[j] : residual[0], b = j < width ? second[j] : residual[1];
+    double* __restrict__ column = c + j * width;
+    for (std::int64_t i = j < width ? j : 0; i < width; ++i) column[i] += first[i] * a + second[i] * b;
+  }
+}
+
+inline Eigen::Matrix3d crossed(const Eigen::Vector3d& u, const Eigen::Matrix3d& m) {  // [u]x m
+  Eigen::Matrix3d result;
+  for (int j = 0; j < 3; ++j) result.col(j) = u.cross(m.col(j));
+  return result;
 }
 
 }  // namespace
@@ -50,8 +66,12 @@ void CellAssembler::add_point(const PointEquations& point) {
   add_frames(point);
   add_shared(point);
   const auto blocks = point.blocks();
-  for (std::size_t i = 0; i < blocks.size(); ++i)
-    for (std::size_t j = 0; j <= i; ++j) subtract(blocks[i], blocks[j]);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const bool frame = i < point.frames().size();  // of frames Y_i Y_i' is in the sum
+    for (std::size_t j = 0; j < i + !frame; ++j)
+      subtract_outer({blocks[i].unknown, blocks[i].dimension, blocks[i].dimension, blocks[i].y},
+                     {blocks[j].unknown, blocks[j].dimension, blocks[j].dimension, blocks[j].y});
+  }
   SubtreeSums& sums = front_.sums();
   sums.cost += 0.5 * point.rho();
   sums.weighted_squares += point.weighted_squares();
@@ -64,60 +84,57 @@ void CellAssembler::add_point(const PointEquations& point) {
 }
 
 void CellAssembler::add_frames(const PointEquations& point) {
-  const auto frames = point.frames();
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    FrameSum& sum = frames_[at(frames[i].unknown)];
-    const Eigen::Matrix<double, 6, 3> w = frames[i].coupling(frames[i].v), g = -frames[i].by_frame();
-    subtract_product<6, 6>(sum.normal.data(), 6, w.data(), 6, g.data(), 6);
-    sum.rhs.noalias() -= g * frames[i].b + point.blocks()[i].matrix() * point.z();
+  const Eigen::Vector3d own_step = point.inverse_factor().transpose() * point.z();  // V^-1 b
+  for (const PointEquations::FramePart& part : point.frames()) {
+    FrameSum& sum = frames_[at(part.unknown)];
+    const Eigen::Vector3d& u = part.from_frame;
+    for (int k = 0; k < 3; ++k) {  // of G'V_f G
+      const int a = (k + 1) % 3, b = (k + 2) % 3;
+      sum.diagonal[k] += u[a] * u[a] * part.v(b, b) - 2 * u[a] * u[b] * part.v(a, b) + u[b] * u[b] * part.v(a, a);
+      sum.diagonal[k + 3] += part.v(k, k);
+    }
+    const Eigen::Matrix3d reduced = part.v - part.t.lazyProduct(part.t.transpose());
+    const Eigen::Matrix3d turned = crossed(u, reduced);
+    sum.by_centre += reduced;
+    sum.mixed += turned;
+    sum.by_rotation += crossed(u, turned.transpose());
+    const Eigen::Vector3d rest = part.b - part.v * own_step;
+    sum.rhs.head<3>() += u.cross(rest);
+    sum.rhs.tail<3>() -= rest;
   }
 }
 
 void CellAssembler::add_shared(const PointEquations& point) {
-  const std::int64_t n = front_.dimension();
   for (const PointEquations::Observation& o : point.observations()) {
-    if (o.shared == nullptr) continue;
     const ImageUnknowns& u = point.unknowns_of(o);
+    const int width = u.shared_width;
+    if (width == 0) continue;
     if (at(u.calibration) >= shared_.size()) shared_.resize(at(u.calibration + 1));
     SharedSum& sum = shared_[at(u.calibration)];
-    const int width = u.shared_width;
     if (sum.normal.empty()) {
       sum.unknowns = u;
       sum.normal.assign(at(width * (width + 1)), 0);
     }
-    const double *first = o.shared, *second = o.shared + width;
-    for (int j = 0; j <= width; ++j) {
-      const double a = j < width ? first[j] : o.residual[0], b = j < width ? second[j] : o.residual[1];
-      double* __restrict__ column = sum.normal.data() + j * width;
-      for (int i = j < width ? j & ~3 : 0; i < width; ++i) column[i] += first[i] * a + second[i] * b;
-    }
+    add_squares(sum.normal.data(), width, o.shared, o.residual.data());
     // J_s'J_f = W_sk G
-    const PointEquations::FramePart& frame = point.frames()[at(o.frame)];
-    const Eigen::Matrix<double, 6, 3> g = -frame.by_frame();
-    const std::int64_t frame_row = rows_[at(frame.unknown)];
-    const auto add = [&](std::int64_t unknown, const double* w, int dimension) {
-      const std::int64_t row = rows_[at(unknown)];
-      if (row >= frame_row)
-        subtract_product(front_.matrix() + row + frame_row * n, n, w, width, dimension, g.data(), 6, 6);
-      else
-        subtract_product(front_.matrix() + frame_row + row * n, n, g.data(), 6, 6, w, width, dimension);
-    };
-    if (u.camera >= 0) add(u.camera, o.shared_point, u.camera_width);
-    if (u.mount >= 0) add(u.mount, o.shared_point + u.camera_width, 6);
+    const PointEquations::FramePart& part = point.frames()[at(o.frame)];
+    Eigen::Matrix<double, 6, 3> minus_g;
+    minus_g << -skew<double>(part.from_frame), Eigen::Matrix3d::Identity();
+    const Factor frame{part.unknown, 6, 6, minus_g.data()};
+    if (u.camera >= 0) subtract_outer({u.camera, u.camera_width, width, o.shared_point}, frame);
+    if (u.mount >= 0) subtract_outer({u.mount, 6, width, o.shared_point + u.camera_width}, frame);
   }
   for (const auto& block : point.blocks().subspan(point.frames().size()))
     Eigen::Map<Eigen::VectorXd>(front_.rhs() + rows_[at(block.unknown)], block.dimension).noalias() -=
         block.matrix() * point.z();
 }
 
-void CellAssembler::subtract(const PointEquations::Block& a, const PointEquations::Block& b) {
+void CellAssembler::subtract_outer(const Factor& a, const Factor& b) {
   const std::int64_t n = front_.dimension(), row = rows_[at(a.unknown)], column = rows_[at(b.unknown)];
   if (row >= column)
-    subtract_product(front_.matrix() + row + column * n, n, a.y, a.dimension, a.dimension, b.y, b.dimension,
-                     b.dimension);
+    subtract_product(front_.matrix() + row + column * n, n, a.values, a.stride, a.rows, b.values, b.stride, b.rows);
   else
-    subtract_product(front_.matrix() + column + row * n, n, b.y, b.dimension, b.dimension, a.y, a.dimension,
-                     a.dimension);
+    subtract_product(front_.matrix() + column + row * n, n, b.values, b.stride, b.rows, a.values, a.stride, a.rows);
 }
 
 void CellAssembler::add_term(const TermResidual& term) {
@@ -146,8 +163,12 @@ void CellAssembler::add_normal(std::int64_t unknown, const Eigen::Ref<const Eige
 void CellAssembler::finish(std::vector<double>& diagonal) {
   for (std::size_t u = 0; u < frames_.size(); ++u) {
     if (rows_[u] < 0 || plan_.unknowns[u].id.kind != UnknownKind::kFrame) continue;
-    add_normal(static_cast<std::int64_t>(u), Eigen::Map<const Eigen::Matrix<double, 6, 6>>(frames_[u].normal.data()));
-    Eigen::Map<Eigen::Matrix<double, 6, 1>>(front_.rhs() + rows_[u]) += frames_[u].rhs;
+    const FrameSum& sum = frames_[u];
+    Eigen::Matrix<double, 6, 6> normal;
+    normal << sum.by_rotation, -sum.mixed, -sum.mixed.transpose(), sum.by_centre;
+    add_block(front_.matrix(), front_.dimension(), rows_[u], rows_[u], normal);
+    Eigen::Map<Vector6>(front_.diagonal() + rows_[u]) += sum.diagonal;
+    Eigen::Map<Vector6>(front_.rhs() + rows_[u]) += sum.rhs;
   }
   for (const SharedSum& sum : shared_) {
     if (sum.normal.empty()) continue;

@@ -25,9 +25,12 @@ class CellAssembler {
   void finish(std::vector<double>& diagonal);
 
  private:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  // Sum of G'(V_f - T T')G of a frame, T = V_f C^-T, by its blocks: with R = V_f - T T' they are [u]x R [u]x', -[u]x R
+  // and R. Further the diagonal of J'J, and G'(b_f - T z).
   struct FrameSum {
-    std::array<double, 36> normal{};  // J'J
-    Eigen::Matrix<double, 6, 1> rhs = Eigen::Matrix<double, 6, 1>::Zero();
+    Eigen::Matrix3d by_rotation = Eigen::Matrix3d::Zero(), mixed = by_rotation, by_centre = by_rotation;
+    Vector6 diagonal = Vector6::Zero(), rhs = diagonal;
   };
   struct SharedSum {
     ImageUnknowns unknowns;
@@ -36,7 +39,13 @@ class CellAssembler {
 
   void add_frames(const PointEquations& point);
   void add_shared(const PointEquations& point);
-  void subtract(const PointEquations::Block& a, const PointEquations::Block& b);
+  // Three columns over the rows of an unknown.
+  struct Factor {
+    std::int64_t unknown = -1;
+    int rows = 0, stride = 0;
+    const double* values = nullptr;
+  };
+  void subtract_outer(const Factor& a, const Factor& b);  // A B' from the front
   // An unknown's own J'J (lower triangle), with its diagonal.
   void add_normal(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& normal);
 

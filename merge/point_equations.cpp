@@ -106,17 +106,19 @@ void PointEquations::add_observation(std::int64_t point, std::int64_t row, bool 
   observation.image = image;
   observation.residual = weight.residual_scale * r.residual;
   observation.by_point.noalias() = r.by_camera * view.rotation;
-  const Eigen::Matrix3d normal = observation.by_point.transpose() * observation.by_point;
-  const Eigen::Vector3d gradient = observation.by_point.transpose() * observation.residual;
 
   std::int32_t& slot = slot_[at(unknowns.frame)];
   if (slot < 0) {
     slot = static_cast<std::int32_t>(frames_.size());
-    frames_.push_back({unknowns.frame, r.from_frame, normal, -gradient});
-  } else {
-    frames_[at(slot)].v += normal;
-    frames_[at(slot)].b -= gradient;
+    FramePart& added = frames_.emplace_back();
+    added.unknown = unknowns.frame;
+    added.from_frame = r.from_frame;
+    added.v.setZero();
+    added.b.setZero();
   }
+  FramePart& part = frames_[at(slot)];
+  part.v.noalias() += observation.by_point.transpose().lazyProduct(observation.by_point);
+  part.b.noalias() -= observation.by_point.transpose().lazyProduct(observation.residual);
   observation.frame = slot;
   if (unknowns.shared_width > 0) add_shared(unknowns, view, r, observation);
 }
@@ -191,9 +193,13 @@ void PointEquations::factorise(double lambda) {
 }
 
 void PointEquations::reduce() {
-  for (const FramePart& part : frames_) {
-    double* y = take(18);
-    Eigen::Matrix<double, 6, 3>::Map(y) = part.coupling(part.v * inverse_.transpose());
+  for (FramePart& part : frames_) {
+    part.t.noalias() = part.v.lazyProduct(inverse_.transpose());
+    double* y = take(18);  // G'T
+    for (int j = 0; j < 3; ++j) {
+      Eigen::Map<Eigen::Vector3d>(y + 6 * j) = part.from_frame.cross(part.t.col(j));
+      Eigen::Map<Eigen::Vector3d>(y + 6 * j + 3) = -part.t.col(j);
+    }
     blocks_.push_back({part.unknown, 6, y});
   }
   for (const SharedPart& part : shared_) {

@@ -44,8 +44,8 @@ class PointEquations {
     Eigen::Vector3d from_frame;  // u
     Eigen::Matrix3d v;
     Eigen::Vector3d b;
-    Eigen::Matrix<double, 6, 3> coupling(const Eigen::Matrix3d& m) const;                           // G'm
-    Eigen::Matrix<double, 6, 3> by_frame() const { return coupling(Eigen::Matrix3d::Identity()); }  // G'
+    Eigen::Matrix3d t;  // V_f C^-T, after reduce()
+    FramePart() {}      // not defaulted: the vector must not fill it with zeros
   };
   // An unknown that sees the point, after reduce().
   struct Block {
@@ -61,6 +61,7 @@ class PointEquations {
     Eigen::Matrix<double, 2, 3> by_point;  // J_p
     const double* shared = nullptr;        // J_s, [2 x shared_width] row by row
     const double* shared_point = nullptr;  // W_sk, [shared_width x 3] column by column
+    Observation() {}                       // as FramePart
   };
 
   PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state);
@@ -125,14 +126,5 @@ class PointEquations {
   std::int64_t residual_count_ = 0;
   int held_ = 0;
 };
-
-inline Eigen::Matrix<double, 6, 3> PointEquations::FramePart::coupling(const Eigen::Matrix3d& m) const {
-  Eigen::Matrix<double, 6, 3> result;
-  for (int j = 0; j < 3; ++j) {
-    result.col(j).head<3>() = from_frame.cross(m.col(j));
-    result.col(j).tail<3>() = -m.col(j);
-  }
-  return result;
-}
 
 }  // namespace megablock

@@ -33,7 +33,7 @@ struct LossWeight {
     const auto values = loss.evaluate(squared_norm);
     rho = values[0];
     first = values[1];
-    root = residual_scale = std::sqrt(first);
+    if (first != 1) root = residual_scale = std::sqrt(first);
     if (!curvature || values[2] >= 0) return;
     const double left = std::sqrt(std::max(kLeastCurvature, 1 + 2 * squared_norm * values[2] / first));
     along = (1 - left) / squared_norm;
