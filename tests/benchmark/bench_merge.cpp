@@ -1,14 +1,15 @@
-// One Levenberg-Marquardt iteration of a tile, one thread: a street of 300 frames of ten cameras, 1 000 observations
-// per frame, five per point, with its own cells and nothing passed to a merge tree. Calibration held, or the eight
-// intrinsics and the six mount unknowns of the ten cameras shared by all frames.
-//
+// One Levenberg-Marquardt iteration of a tile, one thread, with its own cells and nothing passed to a merge tree:
+//   scene 0  a street of 300 frames of ten cameras, 1 000 observations per frame, five per point; calibration held
+//   scene 1  the same; eight intrinsics and six mount unknowns of every camera shared by all frames
+//   scene 2  500 aerial images, overlaps of 80 and 60 %, 300 observations each; the camera's eight intrinsics shared
 // Parts: condense (linearise, eliminate points, factorise the cells), down (back-substitute), evaluate (points in the
 // tail of the loss, cost of the new state); iteration: all of them as the merge runs them, with the datum and the new
 // state. The counter is observations per second of processor time.
 //
-//     bench_merge --benchmark_repetitions=5 --benchmark_report_aggregates_only=false
+//     bench_merge --benchmark_repetitions=5
 #include <benchmark/benchmark.h>
 
+#include <map>
 #include <numbers>
 
 #include "adjust/linearise.h"
@@ -21,43 +22,57 @@ extern "C" void openblas_set_num_threads(int threads);
 namespace megablock {
 namespace {
 
+enum Scene { kStreetHeld, kStreetShared, kAerial };
+
+SimulatedBlock simulated(Scene scene) {
+  SimulationOptions options;
+  options.calibrate = scene != kStreetHeld;
+  if (scene == kAerial) {
+    options.frames = 500;
+    options.attitude_sigma_deg = 0.02;
+    return simulate_block(options);
+  }
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 300;
+  options.rig_cameras = 10;
+  options.points_per_frame = 1000;
+  options.gps_sigma_m = 0.5;
+  options.gps_share = 0.5;
+  options.relative_position_sigma_m = 0.01;
+  SimulatedBlock block = simulate_block(options);
+  for (Mount& mount : block.block.rigs[RigIndex(0)].mounts) {
+    mount.rotation_sigma_rad = scene == kStreetShared ? 0.1 * std::numbers::pi / 180 : 0;
+    mount.position_sigma_m = scene == kStreetShared ? 0.005 : 0;
+  }
+  return block;
+}
+
 // A tile that is the whole block, with the true values as its state.
-struct StreetTile {
+struct WholeTile {
   TileProblem problem;
   TileState state;
   TilePlan plan;
   MergeTree tree;
 
-  explicit StreetTile(bool shared) {
+  explicit WholeTile(const SimulatedBlock& block) {
     openblas_set_num_threads(1);
-    SimulationOptions options;
-    options.scene = SimulationOptions::Scene::kStreet;
-    options.frames = 300;
-    options.rig_cameras = 10;
-    options.points_per_frame = 1000;
-    options.calibrate = shared;
-    options.gps_sigma_m = 0.5;
-    options.gps_share = 0.5;
-    options.relative_position_sigma_m = 0.01;
-    SimulatedBlock simulated = simulate_block(options);
-    for (Mount& mount : simulated.block.rigs[RigIndex(0)].mounts) {
-      mount.rotation_sigma_rad = shared ? 0.1 * std::numbers::pi / 180 : 0;
-      mount.position_sigma_m = shared ? 0.005 : 0;
-    }
-    const Tiles one = single_tile(simulated.block);
-    problem = make_tile_problem(simulated.block, simulated.truth, one, TileIndex(0), simulated.tracks, {});
-    state = make_tile_state(problem, simulated.truth, simulated.points);
+    const Tiles one = single_tile(block.block);
+    problem = make_tile_problem(block.block, block.truth, one, TileIndex(0), block.tracks, {});
+    state = make_tile_state(problem, block.truth, block.points);
     tree = one.tree;
     plan = make_tile_plan(problem, make_plan(tree, {tile_unknowns(problem)}).nodes.front());
   }
 };
 
-const StreetTile& tile_of(const benchmark::State& state) {
-  static const StreetTile held(false), shared(true);
-  return state.range(0) != 0 ? shared : held;
+const WholeTile& tile_of(const benchmark::State& state) {
+  static std::map<std::int64_t, WholeTile> tiles;
+  const std::int64_t scene = state.range(0);
+  const auto made = tiles.find(scene);
+  return made != tiles.end() ? made->second
+                             : tiles.try_emplace(scene, simulated(static_cast<Scene>(scene))).first->second;
 }
 
-void count_observations(benchmark::State& state, const StreetTile& tile) {
+void count_observations(benchmark::State& state, const WholeTile& tile) {
   state.SetItemsProcessed(state.iterations() * tile.problem.observation_count());
   state.counters["observations"] = static_cast<double>(tile.problem.observation_count());
 }
@@ -65,13 +80,13 @@ void count_observations(benchmark::State& state, const StreetTile& tile) {
 constexpr double kLambda = 1e-6;
 
 void condense(benchmark::State& state) {
-  const StreetTile& tile = tile_of(state);
+  const WholeTile& tile = tile_of(state);
   for (auto _ : state) benchmark::DoNotOptimize(condense_tile(tile.problem, tile.plan, tile.state, kLambda));
   count_observations(state, tile);
 }
 
 void down(benchmark::State& state) {
-  const StreetTile& tile = tile_of(state);
+  const WholeTile& tile = tile_of(state);
   const TileCondensation condensed = condense_tile(tile.problem, tile.plan, tile.state, kLambda);
   for (auto _ : state)
     benchmark::DoNotOptimize(solve_tile_down(tile.problem, tile.plan, tile.state, kLambda, condensed.factor, {}));
@@ -79,7 +94,7 @@ void down(benchmark::State& state) {
 }
 
 void evaluate(benchmark::State& state) {
-  const StreetTile& tile = tile_of(state);
+  const WholeTile& tile = tile_of(state);
   TileState values = tile.state;
   for (auto _ : state) {
     refine_points(tile.problem, tile.plan, values);
@@ -89,7 +104,7 @@ void evaluate(benchmark::State& state) {
 }
 
 void iteration(benchmark::State& state) {
-  const StreetTile& tile = tile_of(state);
+  const WholeTile& tile = tile_of(state);
   SerialRunner runner(tile.tree, {tile.problem}, {tile.state});
   for (auto _ : state) {
     benchmark::DoNotOptimize(runner.up(kLambda));
@@ -98,13 +113,13 @@ void iteration(benchmark::State& state) {
   count_observations(state, tile);
 }
 
-void street(benchmark::internal::Benchmark* part) {
-  part->ArgName("shared")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+void scenes(benchmark::internal::Benchmark* part) {
+  part->ArgName("scene")->DenseRange(kStreetHeld, kAerial)->Unit(benchmark::kMillisecond);
 }
-BENCHMARK(condense)->Apply(street);
-BENCHMARK(down)->Apply(street);
-BENCHMARK(evaluate)->Apply(street);
-BENCHMARK(iteration)->Apply(street);
+BENCHMARK(condense)->Apply(scenes);
+BENCHMARK(down)->Apply(scenes);
+BENCHMARK(evaluate)->Apply(scenes);
+BENCHMARK(iteration)->Apply(scenes);
 
 }  // namespace
 }  // namespace megablock
