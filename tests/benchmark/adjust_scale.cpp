@@ -18,6 +18,7 @@
 #include "io/error.h"
 #include "io/evaluate.h"
 #include "io/events.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace {
 
@@ -129,16 +130,13 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Seed of the simulation");
   app.add_option("--folder", options.folder, "Where block and job go and stay; by default nothing stays");
   CLI11_PARSE(app, argc, argv);
-  const bool keep = !options.folder.empty();
-  std::string scratch = (fs::temp_directory_path() / "adjust_scale_XXXXXX").string();
-  const fs::path folder = keep ? options.folder : fs::path(mkdtemp(scratch.data()));
-  int code = 0;
   try {
+    const ScratchDirectory scratch;
+    const fs::path folder = options.folder.empty() ? fs::path(scratch.path()) : options.folder;
     std::printf("%s\n", measure(options, folder).dump().c_str());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "adjust_scale: %s\n", error.what());
-    code = 1;
+    return 1;
   }
-  if (!keep) fs::remove_all(folder);
-  return code;
+  return 0;
 }
