@@ -20,6 +20,7 @@
 #include <array>
 
 #include "geometry/camera.h"
+#include "io/tracks.h"
 
 namespace megablock {
 
@@ -61,20 +62,10 @@ Eigen::Vector2d eccentricity_px(const Intrinsics& intrinsics, const Eigen::Vecto
   return kernel_variance(diameter_px) / 3 * (traces + 2 * contractions);
 }
 
-void remove_eccentricity(const Block& block, const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints,
-                         TrackSet& tracks) {
-  const auto count = static_cast<std::int64_t>(tracks.image.size());
-#pragma omp parallel for schedule(static, 4096)
-  for (std::int64_t o = 0; o < count; ++o) {
-    const auto row = static_cast<std::size_t>(o);
-    const ImageIndex image = tracks.image[row];
-    const Keypoint& keypoint = keypoints[image][static_cast<std::size_t>(tracks.feature[row])];
-    const Eigen::Vector2d pixel(from_fixed_pixel(keypoint.x), from_fixed_pixel(keypoint.y));
-    const Eigen::Vector2d corrected =
-        pixel - eccentricity_px(block.cameras[block.camera_of(image)].intrinsics, pixel, keypoint.scale_px);
-    tracks.x[row] = to_fixed_pixel(corrected.x());
-    tracks.y[row] = to_fixed_pixel(corrected.y());
-  }
+FixedPixel without_eccentricity(const Intrinsics& intrinsics, const Keypoint& keypoint) {
+  const Eigen::Vector2d pixel(from_fixed_pixel(keypoint.x), from_fixed_pixel(keypoint.y));
+  const Eigen::Vector2d corrected = pixel - eccentricity_px(intrinsics, pixel, keypoint.scale_px);
+  return {to_fixed_pixel(corrected.x()), to_fixed_pixel(corrected.y())};
 }
 
 }  // namespace megablock

@@ -7,9 +7,10 @@
 // pictures with f = 467 px: 0.02 px of parallax, 0.09 % of scale).
 #pragma once
 
-#include "io/block.h"
+#include <Eigen/Core>
+
+#include "geometry/intrinsics.h"
 #include "io/features.h"
-#include "io/tracks.h"
 
 namespace megablock {
 
@@ -17,9 +18,10 @@ namespace megablock {
 // camera gives the pixel no ray.
 Eigen::Vector2d eccentricity_px(const Intrinsics& intrinsics, const Eigen::Vector2d& pixel, double diameter_px);
 
-// Subtracts it from all observations of the tracks, with the cameras of the block as they start. Observations refer to
-// rows of `keypoints`.
-void remove_eccentricity(const Block& block, const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints,
-                         TrackSet& tracks);
+// Position of a keypoint without it, 2^-10 px, with the camera as given.
+struct FixedPixel {
+  std::int32_t x, y;
+};
+FixedPixel without_eccentricity(const Intrinsics& intrinsics, const Keypoint& keypoint);
 
 }  // namespace megablock

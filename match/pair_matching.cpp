@@ -75,6 +75,14 @@ PositionedMatches position(const Matches& matches, const ImageFeatures& a, const
   return result;
 }
 
+// The first of the rows that SIFT gives one keypoint, one for each of its orientations; they follow one another. What
+// is at one place is one point, so only the first is named in matches.
+std::int32_t first_at_place(const std::vector<Keypoint>& keypoints, std::int32_t row) {
+  const auto at = [&](std::int32_t r) { return keypoints[static_cast<std::size_t>(r)]; };
+  while (row > 0 && at(row - 1).x == at(row).x && at(row - 1).y == at(row).y) --row;
+  return row;
+}
+
 std::uint64_t pair_seed(ImageIndex a, ImageIndex b) { return Hasher().add(a.value).add(b.value).value(); }
 
 }  // namespace
@@ -124,8 +132,8 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
   pair.median_angle_deg = found.median_angle_deg;
   for (std::size_t i = 0; i < positioned.matches.size(); ++i) {
     if (!found.inlier[i]) continue;
-    pair.feature_a.push_back(positioned.matches[i].first);
-    pair.feature_b.push_back(positioned.matches[i].second);
+    pair.feature_a.push_back(first_at_place(a.keypoints, positioned.matches[i].first));
+    pair.feature_b.push_back(first_at_place(b.keypoints, positioned.matches[i].second));
   }
   return pair;
 }

@@ -1,209 +1,163 @@
 #include "match/tracks.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <string>
-#include <utility>
 
 #include "io/error.h"
 
 namespace megablock {
 
-// Every feature is a node; nodes of one image follow one another. Sets are linked lists of nodes in ascending order,
-// which is ascending order of images.
-class FeatureSets {
+// Sets of matched features as linked lists in ascending order, which is ascending order of images; the root of a set is
+// its first feature.
+class TrackBuilder::FeatureSets {
  public:
-  explicit FeatureSets(std::vector<std::int64_t> image_begin)
-      : image_begin_(std::move(image_begin)),
-        parent_(static_cast<std::size_t>(image_begin_.back())),
-        next_(parent_.size(), -1),
-        head_(parent_.size()) {
-    std::iota(parent_.begin(), parent_.end(), std::int64_t{0});
-    std::iota(head_.begin(), head_.end(), std::int64_t{0});
+  static constexpr FeatureNumber kNone = std::numeric_limits<FeatureNumber>::max();
+
+  explicit FeatureSets(const MatchedFeatures& features)
+      : features_(features),
+        parent_(static_cast<std::size_t>(features.count())),
+        next_(static_cast<std::size_t>(features.count()), kNone) {
+    std::iota(parent_.begin(), parent_.end(), FeatureNumber{0});
   }
 
-  std::int64_t root(std::int64_t node) {
-    while (parent_[at(node)] != node) {
-      parent_[at(node)] = parent_[at(parent_[at(node)])];
-      node = parent_[at(node)];
-    }
-    return node;
+  bool is_root(FeatureNumber n) const { return parent_[n] == n; }
+  FeatureNumber next(FeatureNumber n) const { return next_[n]; }
+  bool has_length(FeatureNumber root, int length) const {
+    FeatureNumber n = root;
+    for (; length > 0 && n != kNone; --length) n = next_[n];
+    return length == 0;
   }
-  bool is_root(std::int64_t node) const { return parent_[at(node)] == node; }
 
   // Unites two sets unless the union would see an image twice.
-  void unite(std::int64_t node_a, std::int64_t node_b) {
-    const std::int64_t a = root(node_a), b = root(node_b);
+  void unite(FeatureNumber one, FeatureNumber other) {
+    const FeatureNumber a = root(one), b = root(other);
     if (a == b || share_image(a, b)) return;
-    const std::int64_t low = std::min(a, b), high = std::max(a, b);
-    head_[at(low)] = merge_lists(head_[at(a)], head_[at(b)]);
-    parent_[at(high)] = low;
+    merge_lists(a, b);
+    parent_[std::max(a, b)] = std::min(a, b);
   }
-
-  std::int64_t first(std::int64_t root_node) const { return head_[at(root_node)]; }
-  std::int64_t next(std::int64_t node) const { return next_[at(node)]; }
-  int length(std::int64_t root_node) const {
-    int length = 0;
-    for (std::int64_t n = first(root_node); n >= 0; n = next(n)) ++length;
-    return length;
-  }
-  std::size_t image_of(std::int64_t node) const {
-    const auto above = std::upper_bound(image_begin_.begin(), image_begin_.end(), node);
-    return static_cast<std::size_t>(above - image_begin_.begin()) - 1;
-  }
-  std::int64_t node(ImageIndex image, std::int32_t feature) const { return image_begin_[at(image.value)] + feature; }
-  std::int64_t row(std::int64_t n) const { return n - image_begin_[image_of(n)]; }
-  std::int64_t size() const { return static_cast<std::int64_t>(parent_.size()); }
 
  private:
-  static std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
-
-  bool share_image(std::int64_t a, std::int64_t b) const {
-    std::int64_t i = head_[at(a)], j = head_[at(b)];
-    while (i >= 0 && j >= 0) {
-      const std::size_t image_i = image_of(i), image_j = image_of(j);
-      if (image_i == image_j) return true;
-      if (image_i < image_j) {
-        i = next_[at(i)];
-      } else {
-        j = next_[at(j)];
-      }
+  FeatureNumber root(FeatureNumber n) {
+    while (parent_[n] != n) {
+      parent_[n] = parent_[parent_[n]];
+      n = parent_[n];
     }
-    return false;
+    return n;
   }
 
-  std::int64_t merge_lists(std::int64_t i, std::int64_t j) {
-    const std::int64_t head = std::min(i, j);
-    std::int64_t last = -1;
-    while (i >= 0 || j >= 0) {
-      std::int64_t& smaller = j < 0 || (i >= 0 && i < j) ? i : j;
-      const std::int64_t taken = smaller;
-      smaller = next_[at(taken)];
-      if (last >= 0) next_[at(last)] = taken;
+  bool share_image(FeatureNumber i, FeatureNumber j) const {
+    ImageIndex image_i = features_.image_of(i), image_j = features_.image_of(j);
+    while (image_i != image_j) {
+      FeatureNumber& behind = image_i < image_j ? i : j;
+      behind = next_[behind];
+      if (behind == kNone) return false;
+      (image_i < image_j ? image_i : image_j) = features_.image_of(behind);
+    }
+    return true;
+  }
+
+  void merge_lists(FeatureNumber i, FeatureNumber j) {
+    FeatureNumber last = kNone;
+    while (i != kNone || j != kNone) {  // kNone is above all numbers
+      FeatureNumber& smaller = i < j ? i : j;
+      const FeatureNumber taken = smaller;
+      smaller = next_[taken];
+      if (last != kNone) next_[last] = taken;
       last = taken;
     }
-    return head;
   }
 
-  std::vector<std::int64_t> image_begin_, parent_, next_, head_;
+  const MatchedFeatures& features_;
+  std::vector<FeatureNumber> parent_, next_;
 };
 
-namespace {
-
-// The lowest row with the same position: SIFT reports a keypoint once per dominant orientation, but it is one point.
-std::vector<std::vector<std::int32_t>> rows_by_position(
-    const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints) {
-  std::vector<std::vector<std::int32_t>> result(keypoints.size());
-  for (std::size_t image = 0; image < keypoints.size(); ++image) {
-    const std::vector<Keypoint>& points = keypoints[ImageIndex(static_cast<std::int64_t>(image))];
-    std::vector<std::int32_t> order(points.size());
-    std::iota(order.begin(), order.end(), 0);
-    const auto position = [&](std::int32_t i) {
-      const Keypoint& k = points[static_cast<std::size_t>(i)];
-      return std::pair(k.x, k.y);
-    };
-    std::sort(order.begin(), order.end(),
-              [&](std::int32_t i, std::int32_t j) { return std::pair(position(i), i) < std::pair(position(j), j); });
-    result[image].resize(points.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const bool repeats = i > 0 && position(order[i]) == position(order[i - 1]);
-      result[image][static_cast<std::size_t>(order[i])] =
-          repeats ? result[image][static_cast<std::size_t>(order[i - 1])] : order[i];
-    }
-  }
-  return result;
-}
-
-void check_pair(const VerifiedPair& pair, const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints) {
-  const auto complain = [&](const std::string& what) {
-    throw InputError("matches of images " + std::to_string(pair.a.value) + " and " + std::to_string(pair.b.value) +
-                     ": " + what);
-  };
-  if (!keypoints.contains(pair.a) || !keypoints.contains(pair.b) || pair.a == pair.b) complain("no such image pair");
-  if (pair.feature_a.size() != pair.feature_b.size()) complain("columns of different length");
-  const auto outside = [](const std::vector<std::int32_t>& rows, std::size_t count) {
-    return std::any_of(rows.begin(), rows.end(),
-                       [&](std::int32_t r) { return r < 0 || static_cast<std::size_t>(r) >= count; });
-  };
-  if (outside(pair.feature_a, keypoints[pair.a].size()) || outside(pair.feature_b, keypoints[pair.b].size())) {
-    complain("a feature does not exist");
-  }
-}
-
-// Pairs with many inliers first: their links are the surest.
-std::vector<std::size_t> order_of_pairs(const std::vector<VerifiedPair>& pairs) {
-  std::vector<std::size_t> order(pairs.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
-    const VerifiedPair &p = pairs[i], &q = pairs[j];
-    if (p.feature_a.size() != q.feature_a.size()) return p.feature_a.size() > q.feature_a.size();
-    return std::pair(p.a, p.b) < std::pair(q.a, q.b);
-  });
-  return order;
-}
-
-}  // namespace
-
-TrackBuilder::TrackBuilder(const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints)
-    : keypoints_(keypoints), canonical_(rows_by_position(keypoints)) {
-  std::vector<std::int64_t> image_begin{0};
-  for (const auto& points : keypoints)
-    image_begin.push_back(image_begin.back() + static_cast<std::int64_t>(points.size()));
-  sets_ = std::make_unique<FeatureSets>(std::move(image_begin));
-}
+TrackBuilder::TrackBuilder(std::size_t images, MatchMemory memory) : features_(images), order_(std::move(memory)) {}
 
 TrackBuilder::~TrackBuilder() = default;
 
-void TrackBuilder::add(const std::vector<VerifiedPair>& pairs) {
-  for (const std::size_t i : order_of_pairs(pairs)) {
-    const VerifiedPair& pair = pairs[i];
-    check_pair(pair, keypoints_);
-    const auto &rows_a = canonical_[static_cast<std::size_t>(pair.a.value)],
-               &rows_b = canonical_[static_cast<std::size_t>(pair.b.value)];
-    for (std::size_t m = 0; m < pair.feature_a.size(); ++m) {
-      sets_->unite(sets_->node(pair.a, rows_a[static_cast<std::size_t>(pair.feature_a[m])]),
-                   sets_->node(pair.b, rows_b[static_cast<std::size_t>(pair.feature_b[m])]));
-    }
+void TrackBuilder::add(const VerifiedPair& pair, std::int32_t generation) {
+  order_.add(pair, generation);
+  features_.mark(pair.a, pair.feature_a);
+  features_.mark(pair.b, pair.feature_b);
+}
+
+void TrackBuilder::build() {
+  features_.number();
+  sets_ = std::make_unique<FeatureSets>(features_);
+  std::int32_t current = 0;
+  order_.visit([&](const PairMatches& pair) {
+    for (; current < pair.generation; ++current) count_long_tracks(current);
+    for (std::size_t m = 0; m < pair.feature_a.size(); ++m)
+      sets_->unite(features_.number_of(pair.a, pair.feature_a[m]), features_.number_of(pair.b, pair.feature_b[m]));
+  });
+  count_long_tracks(current);
+}
+
+void TrackBuilder::fill(FeatureNumber first, Track& track) const {
+  track.first = first;
+  track.images.clear();
+  track.features.clear();
+  for (FeatureNumber n = first; n != FeatureSets::kNone; n = sets_->next(n)) {
+    track.images.push_back(features_.image_of(n));
+    track.features.push_back(features_.row_of(n));
   }
 }
 
-IndexedVector<ImageIndex, std::int64_t> TrackBuilder::long_tracks() const {
-  IndexedVector<ImageIndex, std::int64_t> count(keypoints_.size(), 0);
-  for (std::int64_t root = 0; root < sets_->size(); ++root) {
-    if (!sets_->is_root(root) || sets_->length(root) < 3) continue;
-    for (std::int64_t n = sets_->first(root); n >= 0; n = sets_->next(n))
-      ++count[ImageIndex(static_cast<std::int64_t>(sets_->image_of(n)))];
-  }
-  return count;
+Track TrackBuilder::track(FeatureNumber first) const {
+  Track track;
+  fill(first, track);
+  return track;
 }
 
-TrackSet TrackBuilder::tracks(const TrackOptions& options) const {
-  if (options.min_length < 2) throw InputError("min_length of tracks must be at least 2");
-  // A root is the lowest node of its set, so ascending roots are ordered by first image, then first feature.
-  TrackSet tracks;
-  tracks.begin.push_back(0);
-  for (std::int64_t root = 0; root < sets_->size(); ++root) {
-    if (!sets_->is_root(root) || sets_->length(root) < options.min_length) continue;
-    for (std::int64_t n = sets_->first(root); n >= 0; n = sets_->next(n)) {
-      const ImageIndex image(static_cast<std::int64_t>(sets_->image_of(n)));
-      const std::int64_t row = sets_->row(n);
-      const Keypoint& keypoint = keypoints_[image][static_cast<std::size_t>(row)];
-      tracks.image.push_back(image);
-      tracks.x.push_back(keypoint.x);
-      tracks.y.push_back(keypoint.y);
-      tracks.feature.push_back(static_cast<std::int32_t>(row));
-    }
-    tracks.id.push_back(TrackIndex(tracks.track_count()));
-    tracks.begin.push_back(static_cast<std::int64_t>(tracks.image.size()));
+void TrackBuilder::visit(int min_length, const std::function<void(const Track&)>& visit) const {
+  if (min_length < 2) throw InputError("min_length of tracks must be at least 2");
+  Track track;
+  const auto count = static_cast<FeatureNumber>(features_.count());
+  for (FeatureNumber n = 0; n < count; ++n) {
+    if (!sets_->is_root(n) || !sets_->has_length(n, min_length)) continue;
+    fill(n, track);
+    visit(track);
   }
-  return tracks;
+}
+
+void TrackBuilder::count_long_tracks(std::int32_t generation) {
+  IndexedVector<ImageIndex, std::int64_t> count(features_.image_count(), 0);
+  visit(3, [&](const Track& track) {
+    for (const ImageIndex image : track.images) ++count[image];
+  });
+  long_tracks_.resize(static_cast<std::size_t>(generation) + 1);
+  long_tracks_.back() = std::move(count);
+}
+
+const IndexedVector<ImageIndex, std::int64_t>& TrackBuilder::long_tracks(std::int32_t generation) const {
+  return long_tracks_[std::min(static_cast<std::size_t>(generation), long_tracks_.size() - 1)];
 }
 
 TrackSet build_tracks(const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints,
                       const std::vector<VerifiedPair>& pairs, const TrackOptions& options) {
-  TrackBuilder builder(keypoints);
-  builder.add(pairs);
-  return builder.tracks(options);
+  TrackBuilder builder(keypoints.size());
+  for (const VerifiedPair& pair : pairs) builder.add(pair);
+  builder.build();
+  TrackSet tracks;
+  tracks.begin.push_back(0);
+  builder.visit(options.min_length, [&](const Track& track) {
+    for (std::size_t i = 0; i < track.images.size(); ++i) {
+      const auto& own = keypoints[track.images[i]];
+      const auto row = static_cast<std::size_t>(track.features[i]);
+      if (row >= own.size())
+        throw InputError("matches of image " + std::to_string(track.images[i].value) + ": feature " +
+                         std::to_string(row) + " does not exist");
+      tracks.image.push_back(track.images[i]);
+      tracks.x.push_back(own[row].x);
+      tracks.y.push_back(own[row].y);
+      tracks.feature.push_back(track.features[i]);
+    }
+    tracks.id.push_back(TrackIndex(tracks.track_count()));
+    tracks.begin.push_back(static_cast<std::int64_t>(tracks.image.size()));
+  });
+  return tracks;
 }
 
 }  // namespace megablock

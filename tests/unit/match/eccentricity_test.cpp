@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "geometry/camera.h"
+#include "io/tracks.h"
 
 namespace megablock {
 namespace {
@@ -81,37 +82,16 @@ TEST(Eccentricity, IsWhereTheDetectorsResponseIsGreatest) {
     }
 }
 
-TEST(Eccentricity, IsTakenFromTheObservationsOfTracks) {
-  Block block;
-  Camera camera;
-  camera.intrinsics = kPerspective;
-  block.cameras.push_back(camera);
-  block.frames.push_back({});
-  Image image;
-  image.frame = FrameIndex(0);
-  block.rigs.push_back({});
-  block.rigs.front().mounts.push_back({});
-  block.rigs.front().mounts.front().camera = CameraIndex(0);
-  block.frames.front().rig = RigIndex(0);
-  block.images.push_back(image);
-  IndexedVector<ImageIndex, std::vector<Keypoint>> keypoints;
-  keypoints.push_back({Keypoint{to_fixed_pixel(300), to_fixed_pixel(200), 8, 0},
-                       Keypoint{to_fixed_pixel(450), to_fixed_pixel(200), 20, 0}});
-  TrackSet tracks;
-  for (int row : {1, 0}) {
-    tracks.id.push_back(TrackIndex(tracks.track_count()));
-    tracks.image.push_back(ImageIndex(0));
-    tracks.feature.push_back(row);
-    tracks.x.push_back(0);
-    tracks.y.push_back(0);
-  }
-  tracks.begin = {0, 1, 2};
-  remove_eccentricity(block, keypoints, tracks);
+TEST(Eccentricity, IsTakenOffTheKeypoint) {
+  const FixedPixel moved =
+      without_eccentricity(kPerspective, Keypoint{to_fixed_pixel(450), to_fixed_pixel(200), 20, 0});
   const double shift = eccentricity_px(kPerspective, {450, 200}, 20).x();
   EXPECT_GT(shift, 0.1);
-  EXPECT_NEAR(from_fixed_pixel(tracks.x[0]), 450 - shift, 1e-3);
-  EXPECT_EQ(tracks.y[0], to_fixed_pixel(200));
-  EXPECT_EQ(tracks.x[1], to_fixed_pixel(300));
+  EXPECT_NEAR(from_fixed_pixel(moved.x), 450 - shift, 1e-3);
+  EXPECT_EQ(moved.y, to_fixed_pixel(200));
+  const FixedPixel on_axis =
+      without_eccentricity(kPerspective, Keypoint{to_fixed_pixel(300), to_fixed_pixel(200), 8, 0});
+  EXPECT_EQ(on_axis.x, to_fixed_pixel(300));
 }
 
 }  // namespace

@@ -102,6 +102,19 @@ TEST(MatchPair, FindsOrientationAndInliers) {
   EXPECT_LT(wrong, 5);
 }
 
+TEST(MatchPair, NamesTheFirstOfTheRowsAtOnePlace) {
+  Scene scene = make_scene();
+  std::mt19937_64 generator(11);
+  for (ImageFeatures* f : {&scene.a, &scene.b}) {  // row 0 is row 1 with another orientation, which nothing matches
+    f->keypoints[0] = f->keypoints[1];
+    f->descriptors[0] = random_descriptor(generator);
+  }
+  const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
+  ASSERT_GT(pair.feature_a.size(), 2u);
+  EXPECT_EQ(std::pair(pair.feature_a[0], pair.feature_b[0]), std::pair(0, 0));
+  EXPECT_EQ(std::pair(pair.feature_a[1], pair.feature_b[1]), std::pair(2, 2));
+}
+
 TEST(MatchPair, IsRepeatable) {
   const Scene scene = make_scene();
   const VerifiedPair first = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});

@@ -1,11 +1,14 @@
 #include "match/tracks.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <map>
+#include <filesystem>
 #include <random>
 #include <set>
+#include <string>
+#include <tuple>
 
 #include "io/error.h"
 
@@ -50,27 +53,98 @@ std::vector<Track> to_lists(const TrackSet& set) {
   return tracks;
 }
 
-TEST(Tracks, LaterBatchesDoNotUndoEarlierOnes) {
-  const Keypoints keypoints = make_keypoints(4, 2);
-  TrackBuilder builder(keypoints);
-  builder.add({make_pair(0, 1, {{0, 0}}), make_pair(1, 2, {{0, 0}})});
-  EXPECT_EQ(builder.long_tracks(), (IndexedVector<ImageIndex, std::int64_t>({1, 1, 1, 0})));
-  // Surer pairs that would split the first track if they came with it: image 3 sees 0 and 2 at two places.
-  builder.add({make_pair(0, 3, {{0, 0}, {1, 1}}), make_pair(2, 3, {{0, 1}, {1, 0}})});
-  const std::vector<Track> tracks = to_lists(builder.tracks({}));
-  EXPECT_EQ(tracks.front(), (Track{{0, 0}, {1, 0}, {2, 0}, {3, 0}}));
-  EXPECT_EQ(builder.long_tracks()[ImageIndex(3)], 1);
+std::vector<Track> to_lists(const TrackBuilder& builder) {
+  std::vector<Track> tracks;
+  builder.visit(2, [&](const megablock::Track& found) {
+    Track track;
+    for (std::size_t i = 0; i < found.images.size(); ++i) track.emplace_back(found.images[i].value, found.features[i]);
+    tracks.push_back(track);
+    EXPECT_EQ(builder.track(found.first).images, found.images);
+    EXPECT_EQ(builder.track(found.first).features, found.features);
+  });
+  return tracks;
 }
 
-TEST(Tracks, OneBatchIsBuildTracks) {
-  const Keypoints keypoints = make_keypoints(4, 5);
-  const std::vector<VerifiedPair> pairs = {make_pair(2, 3, {{1, 1}}), make_pair(0, 2, {{4, 1}, {0, 0}}),
-                                           make_pair(0, 1, {{4, 2}})};
-  TrackBuilder one(keypoints), several(keypoints);
-  one.add(pairs);
-  for (const VerifiedPair& pair : pairs) several.add({pair});
-  EXPECT_EQ(to_lists(one.tracks({})), to_lists(build_tracks(keypoints, pairs, {})));
-  EXPECT_EQ(to_lists(several.tracks({})), to_lists(one.tracks({}))) << "nothing here depends on the order";
+TEST(Tracks, LaterBatchesDoNotUndoEarlierOnes) {
+  TrackBuilder builder(4);
+  builder.add(make_pair(0, 1, {{0, 0}}), 0);
+  builder.add(make_pair(1, 2, {{0, 0}}), 0);
+  // Surer pairs that would split the first track if they came with it: image 3 sees 0 and 2 at two places.
+  builder.add(make_pair(0, 3, {{0, 0}, {1, 1}}), 2);
+  builder.add(make_pair(2, 3, {{0, 1}, {1, 0}}), 2);
+  builder.build();
+  EXPECT_EQ(builder.long_tracks(0), (IndexedVector<ImageIndex, std::int64_t>({1, 1, 1, 0})));
+  EXPECT_EQ(builder.long_tracks(1), builder.long_tracks(0)) << "brought no pairs";
+  EXPECT_EQ(to_lists(builder).front(), (Track{{0, 0}, {1, 0}, {2, 0}, {3, 0}}));
+  EXPECT_EQ(builder.long_tracks(2)[ImageIndex(3)], 1);
+  EXPECT_EQ(builder.long_tracks(9), builder.long_tracks(2)) << "the last one that brought pairs";
+}
+
+// Independent of the builder: sets as std::set, pairs sorted as the header says, no numbers.
+std::vector<Track> tracks_by_brute_force(std::vector<std::pair<int, VerifiedPair>> pairs) {
+  std::sort(pairs.begin(), pairs.end(), [](const auto& p, const auto& q) {
+    return std::tuple(p.first, q.second.feature_a.size(), p.second.a, p.second.b) <
+           std::tuple(q.first, p.second.feature_a.size(), q.second.a, q.second.b);
+  });
+  std::vector<std::set<std::pair<std::int64_t, std::int32_t>>> sets;
+  const auto set_of = [&](const std::pair<std::int64_t, std::int32_t>& feature) {
+    auto found = std::find_if(sets.begin(), sets.end(), [&](const auto& s) { return s.contains(feature); });
+    return found != sets.end() ? found : sets.insert(sets.end(), {feature});
+  };
+  for (const auto& [generation, pair] : pairs)
+    for (std::size_t m = 0; m < pair.feature_a.size(); ++m) {
+      set_of({pair.a.value, pair.feature_a[m]});
+      const auto b = set_of({pair.b.value, pair.feature_b[m]}), a = set_of({pair.a.value, pair.feature_a[m]});
+      std::set<std::int64_t> images;
+      for (const auto& feature : *a) images.insert(feature.first);
+      for (const auto& feature : *b) images.insert(feature.first);
+      if (a == b || images.size() < a->size() + b->size()) continue;
+      a->insert(b->begin(), b->end());
+      sets.erase(b);
+    }
+  std::vector<Track> tracks;
+  for (const auto& set : sets)
+    if (set.size() >= 2) tracks.emplace_back(set.begin(), set.end());
+  std::sort(tracks.begin(), tracks.end());
+  return tracks;
+}
+
+TEST(Tracks, EqualBruteForceHoweverLittleMemorySorts) {
+  constexpr int kImages = 14, kFeatures = 700;  // rows beyond one group of words, and images without matches
+  std::mt19937_64 generator(3);
+  std::vector<std::pair<int, VerifiedPair>> pairs;
+  for (int a = 0; a < kImages; ++a) {
+    for (int b = a + 1; b < kImages; ++b) {
+      if (a == 4 || b == 4 || generator() % 3 == 0) continue;
+      std::vector<std::pair<int, int>> matches;
+      for (int i = static_cast<int>(generator() % 40); i < kFeatures; i += 23)
+        matches.emplace_back(i, generator() % 8 == 0 ? static_cast<int>(generator() % kFeatures) : i + b % 2);
+      pairs.emplace_back(b > 9 ? 1 : 0, make_pair(a, b, matches));
+    }
+  }
+  const std::vector<Track> expected = tracks_by_brute_force(pairs);
+  ASSERT_GT(expected.size(), 100u);
+  const std::string scratch =
+      (std::filesystem::temp_directory_path() / ("megablock-tracks-" + std::to_string(::getpid()))).string();
+  for (const std::int64_t bytes : {std::int64_t{1} << 30, std::int64_t{4000}, std::int64_t{1}}) {
+    std::shuffle(pairs.begin(), pairs.end(), generator);
+    TrackBuilder builder(kImages, {bytes, scratch});
+    for (const auto& [generation, pair] : pairs) builder.add(pair, generation);
+    EXPECT_EQ(std::filesystem::exists(scratch), bytes < 5000);
+    builder.build();
+    EXPECT_EQ(to_lists(builder), expected) << bytes;
+  }
+  EXPECT_FALSE(std::filesystem::exists(scratch)) << "the scratch file is removed";
+}
+
+TEST(Tracks, AScratchFileThatCannotBeMadeIsNamed) {
+  TrackBuilder builder(2, {1, "/no-such-folder/matches"});
+  try {
+    builder.add(make_pair(0, 1, {{0, 0}}));
+    FAIL();
+  } catch (const StoreError& error) {
+    EXPECT_NE(std::string(error.what()).find("/no-such-folder/matches"), std::string::npos);
+  }
 }
 
 TEST(Tracks, JoinMatchesOverImages) {
@@ -90,13 +164,6 @@ TEST(Tracks, SplitWhereAnImageWouldBeSeenTwice) {
       keypoints,
       {make_pair(0, 2, {{0, 3}}), make_pair(0, 1, {{0, 0}, {1, 1}, {2, 2}}), make_pair(1, 2, {{0, 0}, {1, 1}})}, {});
   EXPECT_EQ(to_lists(set), (std::vector<Track>{{{0, 0}, {1, 0}, {2, 0}}, {{0, 1}, {1, 1}, {2, 1}}, {{0, 2}, {1, 2}}}));
-}
-
-TEST(Tracks, TheOrientationsOfOneKeypointAreOnePoint) {
-  Keypoints keypoints = make_keypoints(3, 4);
-  keypoints[ImageIndex(1)][2] = keypoints[ImageIndex(1)][1];  // same place
-  const TrackSet set = build_tracks(keypoints, {make_pair(0, 1, {{0, 1}}), make_pair(1, 2, {{2, 3}})}, {});
-  EXPECT_EQ(to_lists(set), (std::vector<Track>{{{0, 0}, {1, 1}, {2, 3}}}));
 }
 
 TEST(Tracks, RandomMatchesGiveConsistentTracksInAnyOrder) {
