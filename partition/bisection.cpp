@@ -21,8 +21,10 @@ namespace megablock {
 namespace {
 
 constexpr idx_t kSeed = 20260;
-constexpr idx_t kImbalance = 20;                // per mille above the ideal half, per level
-constexpr double kLeafMargin = 1.05;            // leaves are planned 5 % below the limit, so that no half exceeds it
+constexpr idx_t kImbalance = 20;  // per mille above the ideal half, per level
+// Leaves are planned 5 % below the limit, and later splits get one more where they came out so large that METIS's
+// imbalance would take a leaf above it.
+constexpr double kPlanMargin = 1.05, kSplitMargin = 1.02;
 constexpr std::int64_t kWeightLimit = 1 << 30;  // METIS adds edge weights in 32 bits
 
 // Compressed rows of an undirected graph; node_weight 1 for all.
@@ -186,9 +188,11 @@ class Bisector {
   // Appends the tree over `nodes` in postorder; returns the number of its root.
   std::int64_t run(Adjacency graph, const std::vector<std::int32_t>& nodes, std::int64_t leaves) {
     const auto count = static_cast<std::int64_t>(nodes.size());
-    if (count > max_leaf_)
-      leaves = std::max(leaves, static_cast<std::int64_t>(std::ceil(kLeafMargin * static_cast<double>(count) /
-                                                                    static_cast<double>(max_leaf_))));
+    if (count > max_leaf_) {
+      const double margin = nodes.size() == result_.leaf_of_node.size() ? kPlanMargin : kSplitMargin;
+      leaves = std::max<std::int64_t>(
+          leaves, std::llround(std::ceil(margin * static_cast<double>(count) / static_cast<double>(max_leaf_))));
+    }
     leaves = std::min(leaves, count);
     if (leaves <= 1) return add_leaf(nodes);
     const std::int64_t left_leaves = (leaves + 1) / 2;
@@ -198,9 +202,10 @@ class Bisector {
     std::array<std::vector<std::int32_t>, 2> members;
     for (std::size_t v = 0; v < side.size(); ++v) members[static_cast<std::size_t>(side[v])].push_back(nodes[v]);
     graph = Adjacency();
-    // The larger half takes the larger number of leaves.
-    const bool first_larger = members[0].size() >= members[1].size();
-    const std::int64_t first = first_larger ? left_leaves : leaves - left_leaves;
+    // Leaves by the sizes that came out, so that deviations of one level do not add to those of the next.
+    const double shared =
+        static_cast<double>(leaves * static_cast<std::int64_t>(members[0].size())) / static_cast<double>(count);
+    const std::int64_t first = std::clamp<std::int64_t>(std::llround(shared), 1, leaves - 1);
     const std::int64_t left = run(std::move(parts[0]), members[0], first);
     const std::int64_t right = run(std::move(parts[1]), members[1], leaves - first);
     return join(result_.tree, left, right);

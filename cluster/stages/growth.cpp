@@ -4,12 +4,17 @@
 
 namespace megablock {
 
+std::int64_t frames_of_first_images(const Block& block, std::int64_t n) {
+  std::int64_t frames = 0;
+  for (std::int64_t i = 0; i < n; ++i) frames = std::max(frames, block.images[ImageIndex(i)].frame.value + 1);
+  return frames;
+}
+
 Block first_images(const Block& block, std::int64_t n) {
   Block part = block;
   part.images.resize(static_cast<std::size_t>(n));
-  std::int64_t frames = 0, rigs = 0, cameras = 0;
-  for (const Image& image : part.images) frames = std::max(frames, image.frame.value + 1);
-  part.frames.resize(static_cast<std::size_t>(frames));
+  std::int64_t rigs = 0, cameras = 0;
+  part.frames.resize(static_cast<std::size_t>(frames_of_first_images(block, n)));
   for (const Frame& frame : part.frames) rigs = std::max(rigs, frame.rig.value + 1);
   part.rigs.resize(static_cast<std::size_t>(rigs));
   for (const Rig& rig : part.rigs)

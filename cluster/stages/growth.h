@@ -14,6 +14,8 @@ namespace megablock {
 // control.
 Block first_images(const Block& block, std::int64_t n);
 
+std::int64_t frames_of_first_images(const Block& block, std::int64_t n);
+
 // The generation in which an image came.
 std::size_t generation_of(const std::vector<std::int64_t>& generations, ImageIndex image);
 

@@ -16,7 +16,7 @@ namespace megablock {
 
 // Algorithm number of each stage: part of its fingerprints, raised when its results change.
 namespace algorithm {
-inline constexpr int kFeatures = 1, kCandidates = 1, kMatching = 2, kTiles = 1, kTracks = 2, kOrientation = 2,
+inline constexpr int kFeatures = 1, kCandidates = 1, kMatching = 2, kTiles = 2, kTracks = 2, kOrientation = 2,
                      kAdjustment = 5, kMerge = 5, kResult = 1;
 }
 

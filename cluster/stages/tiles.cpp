@@ -1,44 +1,28 @@
 #include "partition/tiles.h"
 
 #include <algorithm>
-#include <map>
 
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
+#include "partition/link_weights.h"
 
 namespace megablock {
 
 namespace {
 
-using PairWeights = std::map<std::pair<FrameIndex, FrameIndex>, std::int64_t>;
-
-void add_link(PairWeights& weights, FrameIndex a, FrameIndex b, std::int64_t count) {
-  if (a == b) return;
-  weights[{std::min(a, b), std::max(a, b)}] += count;
-}
-
-FrameGraph graph_of(const PairWeights& weights, std::int64_t frames) {
-  FrameGraph graph;
-  graph.frame_count = frames;
-  for (const auto& [pair, weight] : weights)
-    if (pair.second.value < frames) graph.edges.push_back({pair.first, pair.second, weight});
-  return graph;
-}
-
 // Grown as the block grew, so that earlier frames keep their tiles.
-Tiles grow_tiles(const Job& job, const PairWeights& weights) {
+Tiles grow_tiles(const Job& job, LinkWeights links) {
   Tiles tiles;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
-    const Block part = first_images(job.block, job.generations[g]);
-    const FrameGraph graph = graph_of(weights, static_cast<std::int64_t>(part.frames.size()));
+    const FrameGraph graph = links.graph(frames_of_first_images(job.block, job.generations[g]));
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);
   }
   return tiles;
 }
 
-Tiles run_tiles_unit(Job& job, std::uint64_t inputs, const std::function<PairWeights()>& links) {
+Tiles run_tiles_unit(Job& job, std::uint64_t inputs, const std::function<LinkWeights()>& links) {
   Hasher hasher;
   hasher.add(algorithm::kTiles).add(inputs).add(job.generations);
   add_to_hash(hasher, job.settings.tiles);
@@ -57,18 +41,18 @@ Tiles run_tiles(Job& job, const std::vector<std::string>& matches) {
   Hasher hasher;
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
   return run_tiles_unit(job, hasher.value(), [&] {
-    PairWeights weights;
+    LinkWeights links;
     for (const std::string& name : matches)
       for (const VerifiedPair& pair : read_matches(job.store.verified_path(name)))
-        add_link(weights, job.block.images[pair.a].frame, job.block.images[pair.b].frame,
-                 static_cast<std::int64_t>(pair.feature_a.size()));
-    return weights;
+        links.add(job.block.images[pair.a].frame, job.block.images[pair.b].frame,
+                  static_cast<std::int64_t>(pair.feature_a.size()));
+    return links;
   });
 }
 
 Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points) {
   return run_tiles_unit(job, hash_file(tie_points), [&] {
-    PairWeights weights;
+    LinkWeights links;
     const TrackSet tracks = read_tracks(tie_points);
     std::vector<FrameIndex> frames;
     for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
@@ -78,9 +62,9 @@ Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points) {
       std::sort(frames.begin(), frames.end());
       frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
       for (std::size_t i = 0; i < frames.size(); ++i)
-        for (std::size_t j = i + 1; j < frames.size(); ++j) add_link(weights, frames[i], frames[j], 1);
+        for (std::size_t j = i + 1; j < frames.size(); ++j) links.add(frames[i], frames[j], 1);
     }
-    return weights;
+    return links;
   });
 }
 

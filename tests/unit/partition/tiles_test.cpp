@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <random>
 #include <set>
 
 #include "io/error.h"
+#include "partition/link_weights.h"
 
 namespace megablock {
 namespace {
@@ -204,6 +206,43 @@ TEST(MakeTiles, LimitAndInvariants) {
   EXPECT_LE(tiles.tile_count, 26);
   EXPECT_TRUE(tiles.dropped_links.empty());
   EXPECT_GE(tiles.tree.nodes.back().level, 4);
+}
+
+// Streets of single frames in a grid: fragments and chains make halves uneven.
+TEST(MakeTiles, TilesOfAStreetGridAreBalanced) {
+  constexpr std::int64_t kStreets = 40, kPerBlock = 25, kLength = kStreets * kPerBlock;
+  std::vector<FrameEdge> edges;
+  for (std::int64_t street = 0; street < 2 * kStreets; ++street)
+    for (std::int64_t i = 0; i + 1 < kLength; ++i) add(edges, street * kLength + i, street * kLength + i + 1, 300);
+  for (std::int64_t s = 0; s < kStreets; ++s)
+    for (std::int64_t t = 0; t < kStreets; ++t)
+      add(edges, s * kLength + t * kPerBlock, (kStreets + t) * kLength + s * kPerBlock, 300);
+  const Tiles tiles = make_tiles(sorted(2 * kStreets * kLength, edges), {});
+  const std::vector<std::int64_t> sizes = tile_sizes(tiles);
+  const double mean = static_cast<double>(2 * kStreets * kLength) / static_cast<double>(tiles.tile_count);
+  EXPECT_LE(static_cast<double>(*std::max_element(sizes.begin(), sizes.end())), 1.1 * mean);
+  EXPECT_LE(*std::max_element(sizes.begin(), sizes.end()), TileOptions().tile_max_frames);
+}
+
+TEST(LinkWeights, AreTheSumsOfWhatWasAdded) {
+  std::mt19937_64 generator(2);
+  std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> expected;
+  LinkWeights links;
+  constexpr std::int64_t kFrames = 700;
+  for (int i = 0; i < 3'000'000; ++i) {  // more than wait before they are summed up
+    const auto a = static_cast<std::int64_t>(generator() % kFrames),
+               b = static_cast<std::int64_t>(generator() % kFrames);
+    links.add(FrameIndex(a), FrameIndex(b), 1 + i % 3);
+    if (a != b) expected[std::minmax(a, b)] += 1 + i % 3;
+  }
+  for (const std::int64_t frames : {kFrames, std::int64_t{100}}) {
+    const FrameGraph graph = links.graph(frames);
+    EXPECT_EQ(graph.frame_count, frames);
+    std::vector<FrameEdge> edges;
+    for (const auto& [pair, weight] : expected)
+      if (pair.second < frames) edges.push_back({FrameIndex(pair.first), FrameIndex(pair.second), weight});
+    EXPECT_EQ(graph.edges, edges);
+  }
 }
 
 TEST(MakeTiles, SameTilesEveryTime) {
