@@ -42,6 +42,32 @@ class DriftingError {
   Eigen::Vector3d slow_ = Eigen::Vector3d::Zero();
 };
 
+// Given poses by integration of the relative poses (SimulationOptions::start_offset_m).
+class IntegratedChain {
+ public:
+  explicit IntegratedChain(const SimulationOptions& options) : options_(options) {}
+  // `relative`: from the frame before, nullptr at the beginning of a pass.
+  Pose next(std::int64_t frame, const Pose& truth, const RelativePose* relative) {
+    if (relative == nullptr || length_ == options_.start_chain_frames) {
+      length_ = 0;
+      Random random(options_.seed, Random::Purpose::kChain, static_cast<std::uint64_t>(frame));
+      const Eigen::Vector3d direction = random.normal3().normalized();
+      here_ = truth;
+      here_.centre += options_.start_offset_m * std::cbrt(random.uniform(0, 1)) * direction;
+    } else {
+      here_.centre += here_.rotation.conjugate() * relative->pose.centre;
+      here_.rotation = (relative->pose.rotation * here_.rotation).normalized();
+    }
+    ++length_;
+    return here_;
+  }
+
+ private:
+  const SimulationOptions& options_;
+  Pose here_;
+  int length_ = 0;
+};
+
 }  // namespace
 
 RelativePose measure_relative(const SimulationOptions& options, const BlockState& truth, FrameIndex from, FrameIndex to,
@@ -65,6 +91,7 @@ void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated
   const bool given = options.start_position_error_m >= 0 && options.start_rotation_error_deg >= 0;
   const std::vector<std::uint8_t> with_position = frames_with_position(options);
   DriftingError position_error, rotation_error;
+  IntegratedChain chain(options);
   for (std::size_t i = 0; i < block.frames.size(); ++i) {
     const FrameIndex index(static_cast<std::int64_t>(i));
     Frame& frame = block.frames[index];
@@ -96,9 +123,12 @@ void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated
       start.rotation = rotation_update(start.rotation, kDegree * options.start_rotation_error_deg * start_rotation);
       frame.given_pose = start;
     }
-    if (options.relative_position_sigma_m > 0 && !new_pass)
+    const bool linked = options.relative_position_sigma_m > 0 && !new_pass;
+    if (linked)
       block.relative_poses.push_back(
           measure_relative(options, simulated.truth, FrameIndex(index.value - 1), index, random));
+    if (options.start_offset_m > 0)
+      frame.given_pose = chain.next(index.value, pose, linked ? &block.relative_poses.back() : nullptr);
   }
 }
 

@@ -30,7 +30,8 @@ class Random {
     kPriors,
     kControl,
     kImage,
-    kTrajectory
+    kTrajectory,
+    kChain
   };
 
   Random(std::uint64_t seed, Purpose purpose, std::uint64_t item = 0)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "geometry/rotation.h"
@@ -107,6 +108,37 @@ double rms(const std::vector<Eigen::Vector3d>& normalised) {
 }
 
 constexpr double kDegree = std::numbers::pi / 180;
+
+TEST_P(SimulateTest, GivenPosesAreTheIntegratedRelativePosesWithOffsets) {
+  SimulationOptions options = GetParam();
+  options.relative_position_sigma_m = 0.02;
+  const SimulatedBlock before = simulate_block(options);
+  options.start_offset_m = 2;
+  options.start_chain_frames = 12;
+  const SimulatedBlock s = simulate_block(options);
+  const auto start = [&](FrameIndex f) { return *s.block.frames[f].given_pose; };
+  std::map<FrameIndex, const RelativePose*> relative_to;
+  for (std::size_t i = 0; i < s.block.relative_poses.size(); ++i) {
+    relative_to[s.block.relative_poses[i].to] = &s.block.relative_poses[i];
+    ASSERT_EQ(s.block.relative_poses[i].pose.centre, before.block.relative_poses[i].pose.centre)
+        << "no other quantity is disturbed";
+  }
+  int length = 0;
+  for (FrameIndex f(0); s.block.frames.contains(f); ++f.value, ++length) {
+    const auto linked = relative_to.find(f);
+    if (linked != relative_to.end() && length < 12) {
+      const Pose a = start(linked->second->from), b = start(f), &r = linked->second->pose;
+      ASSERT_LT((a.rotation * (b.centre - a.centre) - r.centre).norm(), 1e-9);
+      ASSERT_LT((a.rotation.conjugate() * r.rotation.conjugate() * b.rotation).vec().norm(), 1e-9);
+      continue;
+    }
+    length = 0;
+    const double offset = (start(f).centre - s.truth.frames[f].centre).norm();
+    EXPECT_LE(offset, 2);
+    EXPECT_GT(offset, 0);
+    EXPECT_EQ(start(f).rotation.coeffs(), s.truth.frames[f].rotation.coeffs());
+  }
+}
 
 TEST_P(SimulateTest, PriorsHaveTheStatedNoise) {
   SimulationOptions options = GetParam();
