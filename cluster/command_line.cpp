@@ -15,6 +15,7 @@
 #include "cluster/communicator.h"
 #include "cluster/exit_codes.h"
 #include "cluster/masks_command.h"
+#include "cluster/measurements_command.h"
 #include "cluster/monolithic_comparison.h"
 #include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
@@ -354,6 +355,7 @@ int command_line(int argc, char** argv) {
     add_status(app, by_one);
     add_report(app, by_one);
     add_export(app, by_one);
+    add_measurements(app, by_one);
     add_import(app, by_one);
     add_evaluate(app, by_one);
     add_simulate(app, by_one);

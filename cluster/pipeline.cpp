@@ -17,6 +17,7 @@
 #include "cluster/version.h"
 #include "io/error.h"
 #include "io/hash.h"
+#include "io/measurements.h"
 #include "io/project.h"
 #include "io/unit_files.h"
 
@@ -139,6 +140,13 @@ void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
       if (!wanted.contains(name)) job.store.remove(name);
 }
 
+void update_measurement_index(Job& job, const std::vector<std::string>& tracks) {
+  on_first_rank(job.ranks, [&] {
+    update_measurement_index(job.store, tracks);
+    return std::string();
+  });
+}
+
 void run_stages(Job& job, const std::string& tie_points) {
   const std::string& last = job.options.last_stage;
   std::vector<std::string> matches;
@@ -159,6 +167,7 @@ void run_stages(Job& job, const std::string& tie_points) {
   if (tiles.tile_count == 0)
     throw AgreedError<ComputeError>(
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
+  update_measurement_index(job, tracks);
   if (last == "match") return;
   const BlockState oriented = run_orientation(job, matches);
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
@@ -208,6 +217,7 @@ TrackSource track_source(Job& job, const std::string& tie_points) {
   const std::vector<std::string> matches = run_matching(job, features, graph);
   const Tiles tiles = run_tiles(job, matches);
   const std::vector<std::string> tracks = run_tracks(job, matches, tiles);
+  update_measurement_index(job, tracks);
   Hasher hasher;
   for (const std::string& unit : tracks) hasher.add(job.store.seal(unit)->content_hash);
   return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }, matches};

@@ -152,6 +152,13 @@ class Hdf5Writer {
   std::map<std::string, Growing> growing_;
 };
 
+// Rows [first, first + count) of a dataset.
+struct RowRange {
+  std::int64_t first = 0, count = 0;
+};
+// Ascending rows as few ranges, each with all rows between its first and its last: rows closer than `gap` join.
+std::vector<RowRange> ranges_of(const std::vector<std::int64_t>& rows, std::int64_t gap);
+
 // What a file holds: its attribute `kind`. Errors as Hdf5Reader.
 std::string file_kind(const std::string& path);
 
@@ -184,6 +191,15 @@ class Hdf5Reader {
   }
   std::vector<std::string> texts(const std::string& name, std::int64_t size = -1) const;
 
+  // Of some rows only, range behind range (row-major); reads no chunk without any of them.
+  template <typename T>
+  std::vector<T> rows(const std::string& name, const std::vector<RowRange>& ranges) const {
+    std::vector<T> values(size_of_rows(name, ranges));
+    read_rows(name, element_type<T>(), ranges, values.data());
+    return values;
+  }
+  std::vector<std::string> text_rows(const std::string& name, const std::vector<RowRange>& ranges) const;
+
   bool has_attribute(const std::string& object, const std::string& name) const;
   template <typename T>
   T attribute(const std::string& object, const std::string& name) const {
@@ -200,6 +216,9 @@ class Hdf5Reader {
   friend std::string file_kind(const std::string& path);
   explicit Hdf5Reader(const std::string& path);  // of any kind
   void read(const std::string& name, ElementType type, void* values) const;
+  std::size_t size_of_rows(const std::string& name, const std::vector<RowRange>& ranges) const;  // number of values
+  void read_rows(const std::string& name, ElementType type, const std::vector<RowRange>& ranges, void* values) const;
+  Hdf5Handle text_type(std::int64_t set, const std::string& name) const;  // of fixed-length strings, else an error
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, void* value) const;
   // Number of values of a dataset, whose shape must be as expected.
   std::size_t checked_size(const std::string& name, const std::vector<std::int64_t>& expected) const;

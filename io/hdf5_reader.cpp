@@ -12,6 +12,47 @@ Hdf5Handle open_dataset(hid_t file, const std::string& name) {
   return {H5Dopen2(file, name.c_str(), H5P_DEFAULT), &H5Dclose};
 }
 
+std::vector<hsize_t> extent_of(hid_t space) {
+  std::vector<hsize_t> extent(static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space))));
+  H5Sget_simple_extent_dims(space, extent.data(), nullptr);
+  return extent;
+}
+
+// Reads the ranges of an open dataset, each behind the one before; the chunks they share stay in its cache.
+bool read_ranges(hid_t set, hid_t memory_type, const std::vector<RowRange>& ranges, char* values) {
+  const Hdf5Handle space(H5Dget_space(set), &H5Sclose);
+  std::vector<hsize_t> extent = extent_of(space.id()), start(extent.size(), 0);
+  std::size_t row_bytes = H5Tget_size(memory_type);
+  for (std::size_t d = 1; d < extent.size(); ++d) row_bytes *= extent[d];
+  for (const RowRange& range : ranges) {
+    if (range.count == 0) continue;
+    start[0] = static_cast<hsize_t>(range.first);
+    extent[0] = static_cast<hsize_t>(range.count);
+    const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
+    if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr) < 0 ||
+        H5Dread(set, memory_type, memory.id(), space.id(), H5P_DEFAULT, values) < 0)
+      return false;
+    values += row_bytes * extent[0];
+  }
+  return true;
+}
+
+std::int64_t count_of(const std::vector<RowRange>& ranges) {
+  std::int64_t count = 0;
+  for (const RowRange& range : ranges) count += range.count;
+  return count;
+}
+
+// Fixed-length texts without their padding.
+std::vector<std::string> unpadded(const std::string& padded, std::size_t length) {
+  std::vector<std::string> values(padded.size() / length);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = padded.substr(i * length, length);
+    values[i].erase(values[i].find_last_not_of('\0') + 1);
+  }
+  return values;
+}
+
 // "[12, 3]", "[any, 3]"
 std::string shape_text(const std::vector<std::int64_t>& shape) {
   std::string text = "[";
@@ -51,11 +92,45 @@ std::vector<std::int64_t> Hdf5Reader::shape(const std::string& name) const {
   const Hdf5Handle set = open_dataset(file_.id(), name);
   checked(set.id(), name);
   const Hdf5Handle space(checked(H5Dget_space(set.id()), name), &H5Sclose);
-  const int dimensions = H5Sget_simple_extent_ndims(space.id());
-  checked(dimensions, name);
-  std::vector<hsize_t> extent(static_cast<std::size_t>(dimensions));
-  checked(H5Sget_simple_extent_dims(space.id(), extent.data(), nullptr), name);
+  const std::vector<hsize_t> extent = extent_of(space.id());
   return {extent.begin(), extent.end()};
+}
+
+std::vector<RowRange> ranges_of(const std::vector<std::int64_t>& rows, std::int64_t gap) {
+  std::vector<RowRange> ranges;
+  for (const std::int64_t row : rows)
+    if (!ranges.empty() && row < ranges.back().first + ranges.back().count + gap)
+      ranges.back().count = row + 1 - ranges.back().first;
+    else
+      ranges.push_back({row, 1});
+  return ranges;
+}
+
+std::size_t Hdf5Reader::size_of_rows(const std::string& name, const std::vector<RowRange>& ranges) const {
+  const std::vector<std::int64_t> found = shape(name);
+  for (const RowRange& range : ranges)
+    if (range.first < 0 || range.count < 0 || found.empty() || range.first + range.count > found[0])
+      fail(name, "has " + shape_text(found) + " rows, more were asked for");
+  std::int64_t size = count_of(ranges);
+  for (std::size_t d = 1; d < found.size(); ++d) size *= found[d];
+  return static_cast<std::size_t>(size);
+}
+
+void Hdf5Reader::read_rows(const std::string& name, ElementType type, const std::vector<RowRange>& ranges,
+                           void* values) const {
+  const Hdf5Handle set = open_dataset(file_.id(), name);
+  checked(set.id(), name);
+  checked(read_ranges(set.id(), memory_type(type), ranges, static_cast<char*>(values)) ? 0 : -1, name);
+}
+
+std::vector<std::string> Hdf5Reader::text_rows(const std::string& name, const std::vector<RowRange>& ranges) const {
+  size_of_rows(name, ranges);
+  const Hdf5Handle set = open_dataset(file_.id(), name);
+  const Hdf5Handle type = text_type(set.id(), name);
+  const std::size_t length = H5Tget_size(type.id());
+  std::string padded(length * static_cast<std::size_t>(count_of(ranges)), '\0');
+  checked(read_ranges(set.id(), type.id(), ranges, padded.data()) ? 0 : -1, name);
+  return unpadded(padded, length);
 }
 
 std::size_t Hdf5Reader::checked_size(const std::string& name, const std::vector<std::int64_t>& expected) const {
@@ -77,20 +152,14 @@ void Hdf5Reader::read(const std::string& name, ElementType type, void* values) c
 }
 
 std::vector<std::string> Hdf5Reader::texts(const std::string& name, std::int64_t size) const {
-  const auto rows = checked_size(name, {size});
-  const Hdf5Handle set = open_dataset(file_.id(), name);
-  const Hdf5Handle type(checked(H5Dget_type(set.id()), name), &H5Tclose);
+  return text_rows(name, {{0, static_cast<std::int64_t>(checked_size(name, {size}))}});
+}
+
+Hdf5Handle Hdf5Reader::text_type(std::int64_t set, const std::string& name) const {
+  Hdf5Handle type(checked(H5Dget_type(set), name), &H5Tclose);
   if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) > 0)
     fail(name, "does not hold fixed-length strings");
-  const std::size_t length = H5Tget_size(type.id());
-  std::string padded(length * rows, '\0');
-  checked(H5Dread(set.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()), name);
-  std::vector<std::string> values(rows);
-  for (std::size_t i = 0; i < rows; ++i) {
-    values[i] = padded.substr(i * length, length);
-    values[i].erase(values[i].find_last_not_of('\0') + 1);
-  }
-  return values;
+  return type;
 }
 
 bool Hdf5Reader::has_attribute(const std::string& object, const std::string& name) const {

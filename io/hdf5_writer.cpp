@@ -17,7 +17,7 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kCompressFrom = 16384;  // bytes; smaller datasets are stored as they are
-constexpr hsize_t kChunkBytes = 1 << 19;      // of one chunk before compression
+constexpr hsize_t kChunkBytes = 1 << 16;      // of one chunk before compression: what a query of some rows reads
 constexpr std::size_t kMemoryStep = 1 << 20;  // bytes by which the file in memory grows
 constexpr unsigned kDeflateLevel = 1;         // higher levels gain a few per cent for several times the time
 

@@ -75,6 +75,8 @@ struct BlockResult {
   // Tracks of all tiles in global track order. point NaN = not triangulated.
   TrackSet tracks;
   std::vector<Eigen::Vector3d> points;            // [tracks]
+  std::vector<TrackIndex> file_tracks;            // [tracks] or empty: their indices in the file of their tile
+  std::vector<TileIndex> file_tiles;              // [tracks] or empty: that tile
   std::vector<Eigen::Matrix3d> point_covariance;  // [tracks] or empty
   std::vector<std::uint8_t> kept;                 // [observations]
   std::vector<float> residual_x, residual_y;      // [observations] adjusted minus measured, px

@@ -7,6 +7,7 @@
 #include "io/hdf5_state.h"
 #include "io/hdf5_tables.h"
 #include "io/hdf5_tiles.h"
+#include "io/measurements.h"
 #include "io/result.h"
 
 namespace megablock {
@@ -46,6 +47,8 @@ void check_sizes(const BlockResult& result) {
   require_size(result.residual_x.size(), observations, "residuals");
   require_size(result.residual_y.size(), observations, "residuals");
   if (!result.point_covariance.empty()) require_size(result.point_covariance.size(), tracks, "point covariances");
+  require_size(result.file_tiles.size(), result.file_tracks.size(), "tiles of tracks");
+  if (!result.file_tracks.empty()) require_size(result.file_tracks.size(), tracks, "indices of tracks in their tiles");
   if (!result.control.empty())
     require_size(result.control.size(), result.block.control_points.size(), "control point results");
   for (std::size_t p = 0; p < result.control.size(); ++p) {
@@ -84,6 +87,15 @@ void put_points(Hdf5Writer& file, const BlockResult& result) {
               {"", "observations of point i are rows begin[i] to begin[i + 1] (exclusive)"});
   file.matrix("points/position", vectors3(result.points, [](const Eigen::Vector3d& p) { return p; }), 3,
               {"m", "ground frame; NaN: not triangulated"});
+  const std::vector<float> boxes = boxes_of(result.points);
+  file.matrix(
+      "points/box", boxes, 6,
+      {"m", "bounds of each 1024 successive points: lowest east, north, up, highest; NaN: none has a position"});
+  file.matrix("points/district", districts_of(boxes), 6, {"m", "the same of each 65536 successive points"});
+  if (!result.file_tracks.empty()) {
+    file.vector("points/track", plain(result.file_tracks), {"", "index of the track in the file of its tile"});
+    file.integers("points/tile", plain(result.file_tiles), {"", "that owns the track"});
+  }
   if (!result.point_covariance.empty())
     file.array("points/covariance", flattened<float>(result.point_covariance), {tracks.track_count(), 3, 3},
                {"m^2", "posterior"});
@@ -116,6 +128,10 @@ void get_points(const Hdf5Reader& file, BlockResult& result) {
   result.residual_y = file.vector<float>("observations/residual_y", observations);
   const auto positions = file.matrix<double>("points/position", 3, count);
   for (std::size_t p = 0; p < tracks.id.size(); ++p) result.points.push_back(vector3(positions, p));
+  if (file.has("points/track")) {
+    result.file_tracks = indices<TrackIndex>(file.vector<std::int64_t>("points/track", count));
+    result.file_tiles = indices<TileIndex>(file.vector<std::int64_t>("points/tile", count));
+  }
   if (file.has("points/covariance"))
     result.point_covariance = square_matrices<Eigen::Matrix3d>(file.array<float>("points/covariance", {count, 3, 3}));
 }

@@ -1,6 +1,7 @@
 // Tracks: docs/job-format.md, "Tracks".
 #include "io/error.h"
 #include "io/hdf5_tables.h"
+#include "io/track_reader.h"
 #include "io/track_writer.h"
 #include "io/unit_files.h"
 
@@ -151,16 +152,34 @@ void TrackWriter::append(const TrackSet& batch) {
 
 void TrackWriter::close() { file_->hdf5.close(); }
 
-TrackSet read_tracks(const std::string& path) {
-  const Hdf5Reader file(path, "tracks");
+namespace {
+
+// All but x, y and feature.
+TrackSet structure_of(const Hdf5Reader& file) {
   TrackSet tracks;
   tracks.id = indices<TrackIndex>(cumulate(file.vector<std::int64_t>(kIds)));
-  tracks.x = file.vector<std::int32_t>(kX);
-  const auto count = static_cast<std::int64_t>(tracks.x.size());
-  tracks.y = file.vector<std::int32_t>(kY, count);
-  tracks.feature = file.vector<std::int32_t>(kFeature, count);
-  tracks.begin = begin_of(file, kCounts, file.vector<std::int64_t>(kCounts, tracks.track_count()), count);
-  tracks.image = images_from(file.vector<std::int64_t>(kImages, count), tracks.begin);
+  const std::vector<std::int64_t> images = file.vector<std::int64_t>(kImages);
+  tracks.begin = begin_of(file, kCounts, file.vector<std::int64_t>(kCounts, tracks.track_count()),
+                          static_cast<std::int64_t>(images.size()));
+  tracks.image = images_from(images, tracks.begin);
+  return tracks;
+}
+
+}  // namespace
+
+TrackSet TrackReader::images() const { return structure_of(file_); }
+
+TrackReader::Measured TrackReader::measured(const std::vector<RowRange>& ranges) const {
+  return {file_.rows<std::int32_t>(kX, ranges), file_.rows<std::int32_t>(kY, ranges),
+          file_.rows<std::int32_t>(kFeature, ranges)};
+}
+
+TrackSet read_tracks(const std::string& path) {
+  const Hdf5Reader file(path, "tracks");
+  TrackSet tracks = structure_of(file);
+  tracks.x = file.vector<std::int32_t>(kX, tracks.observation_count());
+  tracks.y = file.vector<std::int32_t>(kY, tracks.observation_count());
+  tracks.feature = file.vector<std::int32_t>(kFeature, tracks.observation_count());
   check_order(file, tracks);
   return tracks;
 }

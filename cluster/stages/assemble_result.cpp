@@ -54,6 +54,8 @@ void append_tracks(BlockResult& result, const std::vector<TileResult>& parts) {
     const TileResult& part = parts[row.part];
     const auto t = static_cast<std::size_t>(row.row);
     result.tracks.id.push_back(TrackIndex(dense++));
+    result.file_tracks.push_back(row.key);
+    result.file_tiles.push_back(TileIndex(static_cast<std::int64_t>(row.part)));
     result.points.push_back(part.positions[t]);
     if (covariances) result.point_covariance.push_back(part.covariances[t]);
     for (std::int64_t i = part.tracks.begin[t]; i < part.tracks.begin[t + 1]; ++i) {

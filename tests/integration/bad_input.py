@@ -329,6 +329,30 @@ class BadInput(unittest.TestCase):
         self.assertEqual(done.returncode, FAILED_UNITS)
         self.assertIn("matches/000000.h5", done.stdout)
 
+    def test_questions_for_measurements(self):
+        shutil.copytree(work / "clean_job", self.job)
+
+        def asked(*question, expect=BAD_INPUT):
+            return one_line(megablock("measurements", self.job, *question, expect=expect))
+
+        self.assertIn("no image 'f7.jpg'", asked("--image", "f000001.jpg", "--image", "f7.jpg"))
+        self.assertIn("no frame 'f7'", asked("--frame", "f7"))
+        for question in ((), ("--image", "f000001.jpg", "--near", "1,2", "--radius", 3), ("--near", "1,2"),
+                         ("--image", "f000001.jpg", "--radius", 3), ("--near", "1", "--radius", 3)):
+            asked(*question)
+        megablock("measurements", self.job, "--near", "1,east", "--radius", 3, expect=BAD_INPUT)
+        self.assertIn("not a job directory", one_line(megablock("measurements", self.images, "--image", "f000001.jpg",
+                                                                expect=BAD_INPUT)))
+        tile = self.job / "tracks/000000.h5"
+        data = bytearray(tile.read_bytes())
+        data[len(data) // 2] ^= 1
+        tile.write_bytes(data)
+        self.assertIn("tracks/000000.h5: is damaged", asked("--image", "f000001.jpg", expect=FAILED_UNITS))
+        (self.job / "tracks/index.txt").unlink()
+        self.assertIn("no tracks yet", asked("--image", "f000001.jpg"))
+        (self.job / "result/block.h5").unlink()
+        self.assertIn("no result yet", asked("--near", "1,2", "--radius", 3))
+
     def test_finished_job_computes_nothing(self):
         megablock("run", self.project, "-j", self.job, "-q")
         before = len(events(self.job))

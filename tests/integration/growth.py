@@ -5,14 +5,16 @@ nothing else.
 usage: growth.py MEGABLOCK [unittest arguments]
 Works on a rendered block of four tiles; needs nothing but the program and the standard library (and mpirun, if there).
 """
+import csv
 import os
 import pathlib
 import re
 import shutil
+import subprocess
 import tempfile
 import unittest
 
-from program import events, megablock, status
+from program import MEGABLOCK, events, megablock, status
 
 work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-growth-"))
 ADDED = ["f000000.jpg", "f000005.jpg"]  # corners of the block, so that one lies far from some of the tiles
@@ -69,6 +71,11 @@ def tearDownModule():
     shutil.rmtree(work)
 
 
+def measurements(job, *question):
+    text = subprocess.check_output([MEGABLOCK, "measurements", job, *map(str, question)], text=True)
+    return list(csv.DictReader(text.splitlines()))
+
+
 class Growth(unittest.TestCase):
     def setUp(self):
         self.folder = work / self.id().split(".")[-1]
@@ -93,9 +100,33 @@ class Growth(unittest.TestCase):
             self.assertEqual(units["candidates"] + units["tiles"] + units["tracks"],
                              ["graph.h5", "tiles.h5", "tracks/index.txt"])
 
+            self.check_measurements(name)
+
             computed = {unit for stage in units.values() for unit in stage} | set(changed_tracks)
             self.assertEqual({file for file in after if after[file] != before.get(file)}, computed & set(after))
             self.assertEqual(set(before) - set(after), set())
+
+    def check_measurements(self, added):
+        """By image (the files of tracks) and by place (the result) are the same rows, the added image's among them."""
+        job = self.folder / "job"
+        images = sorted(path.name for path in (self.folder / "images").glob("*.jpg"))
+        by_image = {image: measurements(job, "--image", image) for image in images}
+        self.assertTrue(all(row["image"] == image for image, rows in by_image.items() for row in rows))
+        self.assertGreater(len(by_image[added]), 20)
+        self.assertEqual(by_image[added], measurements(job, "--frame", added))
+        by_place = measurements(job, "--near", "0,0", "--radius", 1e6)
+        self.assertEqual(sum(row["kept"] == "1" for row in by_place), status(job)["observations"])
+        keys = ("image", "track", "x_px", "y_px", "feature", "tile")
+        tracks = {tuple(row[key] for key in keys) for rows in by_image.values() for row in rows}
+        points = {tuple(row[key] for key in keys) for row in by_place}
+        self.assertEqual(len(tracks), sum(map(len, by_image.values())))
+        self.assertLessEqual(points, tracks)
+        self.assertGreater(len(points), 0.9 * len(tracks))  # the others have no position
+        self.assertEqual(measurements(job, *(word for image in images for word in ("--image", image))),
+                         [row for image in sorted(images, key=self.index_of) for row in by_image[image]])
+
+    def index_of(self, image):
+        return (image in ADDED and 1 + ADDED.index(image), image)  # later images have later indices
 
     def test_an_added_image_without_overlap_touches_nothing_of_the_others(self):
         before = unit_files(self.folder)

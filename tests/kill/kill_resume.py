@@ -103,6 +103,9 @@ with tempfile.TemporaryDirectory() as folder:
     reference, resumed = digest(project, work / "reference"), digest(project, work / "job")
     print(f"undisturbed {length_s:.1f} s, digest {reference}, {len(wanted)} units; after {options.kills} kills digest "
           f"{resumed}, {len(done)} units computed, {len(twice)} of them twice")
+    index = work / "reference/measurements.h5"
+    if index.exists() and index.read_bytes() != (work / "job/measurements.h5").read_bytes():
+        sys.exit("the index of the measurements by image differs after kills")
     if resumed != reference:
         sys.exit("digest differs after kills")
     if twice:

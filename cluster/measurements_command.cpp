@@ -1,0 +1,132 @@
+#include "cluster/measurements_command.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cluster/exit_codes.h"
+#include "cluster/option_checks.h"
+#include "cluster/status.h"
+#include "io/error.h"
+#include "io/measurements.h"
+
+namespace megablock {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MeasurementsOptions {
+  std::string job, output;
+  std::vector<std::string> images, frames;
+  std::vector<double> near;  // east, north and, perhaps, up
+  double radius_m = 0;
+  bool json = false;
+};
+
+void check(const MeasurementsOptions& options) {
+  const bool by_image = !options.images.empty() || !options.frames.empty(), by_place = !options.near.empty();
+  if (by_image == by_place)
+    throw InputError("measurements: either --image or --frame, or --near; see 'megablock measurements --help'");
+  if (by_place && options.near.size() != 2 && options.near.size() != 3)
+    throw InputError("measurements: --near takes EAST,NORTH or EAST,NORTH,UP in metres");
+  if (by_place != (options.radius_m > 0)) throw InputError("measurements: --near and --radius belong together");
+}
+
+Measurements ask(const MeasurementStore& store, const MeasurementsOptions& options) {
+  if (!options.near.empty()) {
+    const double up = options.near.size() == 3 ? options.near[2] : std::nan("");
+    Measurements found = store.near({{options.near[0], options.near[1], up}, options.radius_m});
+    for (const std::string& line : unfinished_stages(JobStore(options.job)))
+      std::fprintf(stderr, "megablock: warning: %s: places are those of an older result; %s\n", options.job.c_str(),
+                   line.c_str());
+    return found;
+  }
+  std::vector<ImageIndex> images = store.find_images(options.images);
+  const std::vector<ImageIndex> of_frames = store.images_of_frames(options.frames);
+  images.insert(images.end(), of_frames.begin(), of_frames.end());
+  return store.of_images(std::move(images));
+}
+
+std::string quoted(const std::string& name, bool json) {
+  if (json) return nlohmann::json(name).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  if (name.find_first_of(",\"\n") == std::string::npos) return name;
+  std::string text = "\"";
+  for (const char letter : name) text += letter == '"' ? "\"\"" : std::string(1, letter);
+  return text + "\"";
+}
+
+// NaN: an empty cell, null.
+std::string number(float value, bool json) {
+  return std::isfinite(value) ? fmt::format("{:.4f}", value) : json ? "null" : "";
+}
+
+std::string table(const MeasurementStore& store, const Measurements& rows, bool json) {
+  std::vector<ImageIndex> images = rows.image;
+  std::sort(images.begin(), images.end());
+  images.erase(std::unique(images.begin(), images.end()), images.end());
+  std::vector<std::string> names = store.names_of(images);
+  for (std::string& name : names) name = quoted(name, json);
+  const bool adjusted = !rows.kept.empty();
+  std::string text = json ? "[" : "image,track,x_px,y_px,feature,tile";
+  if (!json) text += adjusted ? ",kept,residual_x_px,residual_y_px\n" : "\n";
+  for (std::size_t r = 0; r < rows.image.size(); ++r) {
+    const auto image = std::lower_bound(images.begin(), images.end(), rows.image[r]) - images.begin();
+    const char* row =
+        json ? "{}\n {{\"image\": {}, \"track\": {}, \"x_px\": {}, \"y_px\": {}, \"feature\": {}, \"tile\": {}"
+             : "{}{},{},{},{},{},{}";
+    text += fmt::format(fmt::runtime(row), json && r > 0 ? "," : "", names[static_cast<std::size_t>(image)],
+                        rows.track[r].value, from_fixed_pixel(rows.x[r]), from_fixed_pixel(rows.y[r]), rows.feature[r],
+                        rows.tile[r].value);
+    if (adjusted)
+      text += fmt::format(
+          fmt::runtime(json ? ", \"kept\": {}, \"residual_x_px\": {}, \"residual_y_px\": {}" : ",{},{},{}"),
+          static_cast<int>(rows.kept[r]), number(rows.residual_x[r], json), number(rows.residual_y[r], json));
+    text += json ? "}" : "\n";
+  }
+  return json ? text + "\n]\n" : text;
+}
+
+int measurements(const MeasurementsOptions& options) {
+  check(options);
+  const MeasurementStore store(options.job);
+  const std::string text = table(store, ask(store, options), options.json);
+  if (options.output.empty()) {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+  } else {
+    const fs::path path = fs::absolute(options.output);
+    JobStore(path.parent_path().string()).write_text(path.filename().string(), text);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_measurements(CLI::App& app, std::function<int()>& action) {
+  auto options = std::make_shared<MeasurementsOptions>();
+  CLI::App* command = app.add_subcommand("measurements", "Measurements of tie points in some images, or about a place");
+  command->footer(
+      "Example: megablock measurements job --image 0001.jpg --image 0002.jpg -o rows.csv\n"
+      "         megablock measurements job --near 120,85 --radius 10");
+  command->add_option("job", options->job, "Job directory")->required();
+  command->add_option("--image", options->images, "Name of an image; may be repeated")->allow_extra_args(false);
+  command->add_option("--frame", options->frames, "Name of a frame: all its images; may be repeated")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--near", options->near, "Ground position EAST,NORTH[,UP], m; without UP distances are horizontal")
+      ->delimiter(',')
+      ->expected(1, 3)
+      ->allow_extra_args(false);
+  command->add_option("--radius", options->radius_m, "About that position, m: of the adjusted points")
+      ->check(positive());
+  command->add_option("-o,--output", options->output, "File to write instead of standard output");
+  command->add_flag("--json", options->json, "JSON instead of CSV");
+  command->callback([=, &action] { action = [options] { return measurements(*options); }; });
+}
+
+}  // namespace megablock

@@ -1,0 +1,31 @@
+// Reads parts of a file of tracks (docs/job-format.md, "Tracks"): its image column, which is its index by image, and
+// the measurements of some rows.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/hdf5_file.h"
+#include "io/tracks.h"
+
+namespace megablock {
+
+class TrackReader {
+ public:
+  // Errors of all functions: as Hdf5Reader.
+  explicit TrackReader(const std::string& path) : file_(path, "tracks") {}
+
+  // All tracks and the images of all observations; x, y and feature stay empty.
+  TrackSet images() const;
+
+  // Of some rows of the observations, range behind range.
+  struct Measured {
+    std::vector<std::int32_t> x, y, feature;  // as in TrackSet
+  };
+  Measured measured(const std::vector<RowRange>& ranges) const;
+
+ private:
+  Hdf5Reader file_;
+};
+
+}  // namespace megablock
