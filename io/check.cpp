@@ -9,6 +9,7 @@
 #include "io/error.h"
 #include "io/events.h"
 #include "io/hdf5_file.h"
+#include "io/measurements.h"
 #include "io/registration.h"
 #include "io/result.h"
 #include "io/unit_files.h"
@@ -77,6 +78,7 @@ class Check {
           {"matches", [&] { read_matches(path); }},
           {"tiles", [&] { read_tiles(path); }},
           {"tracks", [&] { read_tracks(path); }},
+          {"measurement_index", [&] { check_measurement_index(store_); }},
           {"state", [&] { read_state(path); }},
           {"orientation", [&] { read_orientation(path); }},
           {"adjustment", [&] { read_adjustment(path); }},

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "io/error.h"
@@ -59,6 +60,12 @@ void write_index(const std::string& path, const JobStore& store, const std::vect
 
 }  // namespace
 
+std::string tracks_unit(TileIndex tile) {
+  char name[40];
+  std::snprintf(name, sizeof name, "tracks/%06lld.h5", static_cast<long long>(tile.value));
+  return name;
+}
+
 std::uint64_t measurement_index_fingerprint(const UnitSeal& tracks) {
   Hasher hasher;
   return hasher.add(kAlgorithm).add(tracks.content_hash).value();
@@ -74,6 +81,16 @@ void update_measurement_index(const JobStore& store, const std::vector<std::stri
     // made again
   }
   store.write(kMeasurementIndex, fingerprint, [&](const std::string& path) { write_index(path, store, tiles); });
+}
+
+void check_measurement_index(const JobStore& store) {
+  const std::string path = store.verified_path(kMeasurementIndex);
+  const auto tracks = store.seal(kTrackList);
+  bool current = tracks && store.up_to_date(kMeasurementIndex, measurement_index_fingerprint(*tracks));
+  const auto fingerprints = Hdf5Reader(path, kMeasurementIndexKind).vector<std::uint64_t>(kTileFingerprint);
+  for (std::size_t t = 0; current && t < fingerprints.size(); ++t)
+    current = store.up_to_date(tracks_unit(TileIndex(static_cast<std::int64_t>(t))), fingerprints[t]);
+  if (!current) throw StoreError(path + ": is not of the job's tracks as they are; run the job again");
 }
 
 namespace {

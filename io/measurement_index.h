@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
+#include "io/index.h"
 #include "io/job_store.h"
 
 namespace megablock {
@@ -10,6 +12,8 @@ namespace megablock {
 inline constexpr const char *kTrackList = "tracks/index.txt", *kMeasurementIndex = "measurements.h5";
 inline constexpr const char *kMeasurementIndexKind = "measurement_index", *kTileFingerprint = "tiles/fingerprint",
                             *kImageBegin = "images/begin", *kImageTile = "images/tile";
+
+std::string tracks_unit(TileIndex tile);  // "tracks/000003.h5"
 
 // Of the index made of the files that this list of tracks names.
 std::uint64_t measurement_index_fingerprint(const UnitSeal& tracks);

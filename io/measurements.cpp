@@ -16,12 +16,6 @@ namespace {
 constexpr const char* kResult = "result/block.h5";
 constexpr std::int64_t kGap = 4096;  // rows; closer ones lie in one chunk, mostly
 
-std::string tile_file(TileIndex tile) {
-  char name[32];
-  std::snprintf(name, sizeof name, "tracks/%06lld.h5", static_cast<long long>(tile.value));
-  return name;
-}
-
 // The values of some rows of a column of which `ranges` were read.
 template <typename T>
 std::vector<T> picked(const std::vector<T>& values, const std::vector<RowRange>& ranges,
@@ -210,7 +204,7 @@ Measurements MeasurementStore::of_images(std::vector<ImageIndex> images) const {
   if (!images.empty() && !images.front().valid()) throw InputError("an image without index has no measurements");
   Measurements all;
   for (const TileIndex tile : tiles_of(images)) {
-    const std::string unit = tile_file(tile), path = store_.verified_path(unit);
+    const std::string unit = tracks_unit(tile), path = store_.verified_path(unit);
     const auto expected = index_->rows<std::uint64_t>(kTileFingerprint, {{tile.value, 1}}).front();
     if (!store_.up_to_date(unit, expected))
       throw StoreError(path + ": is newer than " + kMeasurementIndex + "; run the job again");

@@ -66,6 +66,9 @@ class MeasurementStore {
 // Brings the index by image up to date with the files of the tiles, in tile order, that tracks/index.txt lists.
 void update_measurement_index(const JobStore& store, const std::vector<std::string>& tiles);
 
+// Throws StoreError when the index by image is not that of the files of tracks as they are.
+void check_measurement_index(const JobStore& store);
+
 // The index by place of the result: bounds of the positions of each run of successive points (points/box) and of each
 // district of runs (points/district): six numbers (lowest east, north, up; highest) rounded outwards; points without
 // position count for nothing, NaN: no point at all.
