@@ -42,34 +42,16 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-// Ascending; all of `images` ascend.
-std::vector<std::int64_t> rows_of(const TrackSet& tracks, const std::vector<ImageIndex>& images) {
-  const std::int64_t first = images.front().value;
-  std::vector<std::uint8_t> wanted(static_cast<std::size_t>(images.back().value - first + 1), 0);
-  for (const ImageIndex image : images) wanted[static_cast<std::size_t>(image.value - first)] = 1;
-  std::vector<std::int64_t> rows;
-  for (std::size_t row = 0; row < tracks.image.size(); ++row) {
-    const auto offset = static_cast<std::uint64_t>(tracks.image[row].value - first);  // negative: far behind the end
-    if (offset < wanted.size() && wanted[offset]) rows.push_back(static_cast<std::int64_t>(row));
-  }
-  return rows;
-}
-
 void append_tile(Measurements& all, const std::string& path, TileIndex tile, const std::vector<ImageIndex>& images) {
   const TrackReader reader(path);
-  const TrackSet tracks = reader.images();
-  const std::vector<std::int64_t> rows = rows_of(tracks, images);
-  const std::vector<RowRange> ranges = ranges_of(rows, kGap);
+  const TrackReader::Found found = reader.find(images);
+  const std::vector<RowRange> ranges = ranges_of(found.row, kGap);
   const TrackReader::Measured measured = reader.measured(ranges);
-  append(all.x, picked(measured.x, ranges, rows));
-  append(all.y, picked(measured.y, ranges, rows));
-  append(all.feature, picked(measured.feature, ranges, rows));
-  auto next = tracks.begin.begin();  // of the track behind the row's
-  for (const std::int64_t row : rows) {
-    next = std::upper_bound(next, tracks.begin.end(), row);
-    all.track.push_back(tracks.id[static_cast<std::size_t>(next - tracks.begin.begin() - 1)]);
-    all.image.push_back(tracks.image[static_cast<std::size_t>(row)]);
-  }
+  append(all.image, found.image);
+  append(all.track, found.track);
+  append(all.x, picked(measured.x, ranges, found.row));
+  append(all.y, picked(measured.y, ranges, found.row));
+  append(all.feature, picked(measured.feature, ranges, found.row));
   all.tile.resize(all.image.size(), tile);
 }
 

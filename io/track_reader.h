@@ -18,6 +18,14 @@ class TrackReader {
   // All tracks and the images of all observations; x, y and feature stay empty.
   TrackSet images() const;
 
+  // The observations in some images (ascending), in the order of the rows. Reads and keeps less than images().
+  struct Found {
+    std::vector<std::int64_t> row;
+    std::vector<ImageIndex> image;
+    std::vector<TrackIndex> track;
+  };
+  Found find(const std::vector<ImageIndex>& images) const;
+
   // Of some rows of the observations, range behind range.
   struct Measured {
     std::vector<std::int32_t> x, y, feature;  // as in TrackSet
