@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "geometry/chi_square.h"
 
@@ -71,6 +72,39 @@ Eigen::VectorXd scale_of(const Eigen::MatrixXd& s) {
   return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
 }
 
+UnknownCheck check_unknown(const Quadratic& tile, const Eigen::MatrixXd& covariance, const Unknown& unknown,
+                           std::int64_t row, double probability, double variance_factor) {
+  UnknownCheck check;
+  check.id = unknown.id;
+  const auto rows = tile.s.middleRows(row, unknown.dimension);
+  const Eigen::MatrixXd own = rows.middleCols(row, unknown.dimension);
+  const Eigen::MatrixXd left = own - rows * covariance * rows.transpose();
+  // In units of what the tile knows; directions that it alone knows leave nothing to test.
+  constexpr double kShared = 1e-6;
+  const Eigen::VectorXd scale = scale_of(own);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * left * scale.asDiagonal());
+  const Eigen::VectorXd score =
+      eigen.eigenvectors().transpose() * scale.cwiseProduct(tile.b.segment(row, unknown.dimension));
+  for (Eigen::Index i = 0; i < score.size(); ++i) {
+    if (eigen.eigenvalues()[i] < kShared) continue;
+    ++check.degrees;
+    check.statistic += score[i] * score[i] / eigen.eigenvalues()[i] / variance_factor;
+  }
+  if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+  return check;
+}
+
+// Keeps the worst, in order.
+void insert(const UnknownCheck& check, std::array<UnknownCheck, 4>& worst) {
+  const auto badness = [](const UnknownCheck& c) { return c.degrees > 0 ? c.statistic / c.threshold : 0; };
+  for (std::size_t i = 0; i < worst.size(); ++i) {
+    if (badness(check) <= badness(worst[i])) continue;
+    std::copy_backward(worst.begin() + static_cast<std::ptrdiff_t>(i), worst.end() - 1, worst.end());
+    worst[i] = check;
+    return;
+  }
+}
+
 }  // namespace
 
 SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
@@ -116,7 +150,48 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   check.degrees = alone.rank - (n - solver.rank());
   check.statistic = std::max(0.0, alone.value + own.b.dot(moved)) / variance_factor;
   if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+
+  const std::vector<std::int64_t> rows = row_offsets(condensed.unknowns);
+  for (std::size_t u = 0; u < condensed.unknowns.size(); ++u)
+    insert(check_unknown(own, covariance, condensed.unknowns[u], rows[u],
+                         probability / static_cast<double>(condensed.unknowns.size()), variance_factor),
+           check.worst);
   return check;
+}
+
+std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& tiles, const UnknownName& name) {
+  std::vector<double> blame(tiles.size(), 0);
+  std::map<UnknownId, std::vector<std::size_t>> by_unknown;  // tiles that see it differently
+  for (std::size_t t = 0; t < tiles.size(); ++t)
+    for (const UnknownCheck& check : tiles[t].worst) {
+      if (!check.alarm()) continue;
+      blame[t] += check.excess();
+      by_unknown[check.id].push_back(t);
+    }
+  std::vector<std::pair<double, std::string>> lines;
+  for (auto& [id, who] : by_unknown) {
+    std::stable_sort(who.begin(), who.end(), [&](std::size_t a, std::size_t b) { return blame[a] > blame[b]; });
+    const auto& worst = tiles[who.front()].worst;
+    const UnknownCheck& check =
+        *std::find_if(worst.begin(), worst.end(), [&, wanted = id](const UnknownCheck& c) { return c.id == wanted; });
+    const bool either = who.size() > 1 && blame[who[1]] > 0.5 * blame[who[0]];
+    char line[240];
+    std::snprintf(line, sizeof line, "T = %.0f with %lld degrees of freedom (limit %.0f)", check.statistic,
+                  static_cast<long long>(check.degrees), check.threshold);
+    lines.emplace_back(check.excess(), (either ? "tiles " + std::to_string(tiles[who[0]].tile) + " and " +
+                                                     std::to_string(tiles[who[1]].tile) + " see " + name(id) +
+                                                     " differently, one of them wrongly: "
+                                               : "tile " + std::to_string(tiles[who[0]].tile) + " sees " + name(id) +
+                                                     " differently from the rest of the block: ") +
+                                           line);
+  }
+  std::stable_sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  constexpr std::size_t kLines = 3;
+  std::vector<std::string> result;
+  for (std::size_t i = 0; i < std::min(kLines, lines.size()); ++i) result.push_back(std::move(lines[i].second));
+  if (lines.size() > kLines)
+    result.push_back(std::to_string(lines.size() - kLines) + " more unknowns that tiles see differently");
+  return result;
 }
 
 std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles) {

@@ -9,10 +9,13 @@
 // (halves without a datum). Unknowns that only one half has are minimised over first.
 #pragma once
 
+#include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "merge/front.h"
+#include "merge/gauge.h"
 
 namespace megablock {
 
@@ -30,6 +33,22 @@ struct SeamReport {
 SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
                       double variance_factor = 1);
 
+// T asks all common unknowns at once, and a single frame that a tile sees differently drowns in hundreds of degrees of
+// freedom. So each boundary or shared unknown u of a tile is tested by itself: were it free to differ by v between the
+// tile and the rest, the block's optimum would have the score g = b_u of the tile alone for v, and
+//
+//     T_u = g' A^+ g,   A = S_uu - S_u C S_u'   (v's normal equations after elimination of the block)
+//
+// is chi-square distributed with rank A degrees of freedom. S_u: rows of the tile's condensed normal equations.
+struct UnknownCheck {
+  UnknownId id;
+  double statistic = 0;      // T_u
+  std::int64_t degrees = 0;  // of freedom; 0: no check
+  double threshold = 0;      // of T_u at the alarm probability
+  bool alarm() const { return degrees > 0 && statistic > threshold; }
+  double excess() const { return degrees > 0 ? statistic - threshold : 0; }
+};
+
 // A tile's own consistency and its agreement with the rest of the block, used to name the tile behind an alarm.
 struct TileCheck {
   std::int64_t tile = -1;
@@ -38,11 +57,18 @@ struct TileCheck {
   double statistic = 0;  // T of the tile against the rest
   std::int64_t degrees = 0;
   double threshold = 0;
+  std::array<UnknownCheck, 4> worst;  // by T_u over its limit, the worst first
 };
 // From the tile's condensed normal equations and the block's covariance of its boundary unknowns (lambda = 0, at the
 // optimum, where the rest's gradient is minus the tile's).
 TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
                      double probability, double variance_factor = 1);
+
+// One line per unknown that a tile sees differently, the three worst: the unknown, the figures, and the tile. Of the
+// tiles that say so of one unknown, it is the one with most such disagreements; two that disagree about as much are
+// both named: either may be wrong.
+std::vector<std::string> describe_disagreements(
+    const std::vector<TileCheck>& tiles, const UnknownName& name = [](const UnknownId& id) { return describe(id); });
 
 // One line per alarm: the seam, its figures, and the tile under it that disagrees most with the rest.
 std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles);

@@ -387,6 +387,8 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
     job.notes.push_back("the global adjustment did not converge: " + describe(adjusted.position.global));
   for (const SeamCheck& seam : outcome.seams)
     if (!seam.note.empty()) job.notes.push_back(seam.note);
+  for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
+    job.notes.push_back(line);
   BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
   result.stages = statistics_of(job, event);
   std::filesystem::create_directories(job.store.path("result"));
