@@ -2,6 +2,7 @@
 // the measurements of some rows.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,14 @@ class TrackReader {
 
   // All tracks and the images of all observations; x, y and feature stay empty.
   TrackSet images() const;
+
+  // All tracks in order, in batches of whole tracks with about so many observations; a batch's x, y and feature are
+  // read where `wanted` (of its first track's row and number of tracks) says so, else they stay empty.
+  using Wanted = std::function<bool(std::int64_t, std::int64_t)>;
+  void visit(
+      const std::function<void(const TrackSet&)>& take,
+      const Wanted& wanted = [](std::int64_t, std::int64_t) { return true; },
+      std::int64_t batch_observations = std::int64_t{1} << 20) const;
 
   // The observations in some images (ascending), in the order of the rows. Reads and keeps less than images().
   struct Found {

@@ -1,4 +1,6 @@
 // Tracks: docs/job-format.md, "Tracks".
+#include <algorithm>
+
 #include "io/error.h"
 #include "io/hdf5_tables.h"
 #include "io/track_reader.h"
@@ -67,9 +69,10 @@ void make_groups(Hdf5Writer& file) {
   file.group(kObservations, "one row per observation, in the order of the tracks");
 }
 
-std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, const std::vector<std::int64_t>& begin) {
+// previous_first: first image of the track before these; then that of the last one.
+std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, const std::vector<std::int64_t>& begin,
+                                    std::int64_t& previous_first) {
   std::vector<ImageIndex> images(values.size());
-  std::int64_t previous_first = 0;
   for (std::size_t t = 0; t + 1 < begin.size(); ++t) {
     std::int64_t previous = previous_first;
     for (std::int64_t o = begin[t]; o < begin[t + 1]; ++o) {
@@ -82,9 +85,9 @@ std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, con
   return images;
 }
 
-void check_order(const Hdf5Reader& file, const TrackSet& tracks) {
+void check_order(const Hdf5Reader& file, const TrackSet& tracks, TrackIndex before = {}) {
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
-    if (tracks.id[t].value < 0 || (t > 0 && tracks.id[t] <= tracks.id[t - 1])) file.fail(kIds, "indices do not ascend");
+    if (tracks.id[t] <= (t > 0 ? tracks.id[t - 1] : before)) file.fail(kIds, "indices do not ascend");
     ImageIndex previous;  // -1
     for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o) {
       const ImageIndex image = tracks.image[static_cast<std::size_t>(o)];
@@ -161,13 +164,49 @@ TrackSet structure_of(const Hdf5Reader& file) {
   const std::vector<std::int64_t> images = file.vector<std::int64_t>(kImages);
   tracks.begin = begin_of(file, kCounts, file.vector<std::int64_t>(kCounts, tracks.track_count()),
                           static_cast<std::int64_t>(images.size()));
-  tracks.image = images_from(images, tracks.begin);
+  std::int64_t previous_first = 0;
+  tracks.image = images_from(images, tracks.begin, previous_first);
   return tracks;
 }
 
 }  // namespace
 
 TrackSet TrackReader::images() const { return structure_of(file_); }
+
+void TrackReader::visit(const std::function<void(const TrackSet&)>& take, const Wanted& wanted,
+                        std::int64_t batch_observations) const {
+  const std::int64_t tracks = file_.shape(kIds).at(0), observations = file_.shape(kImages).at(0);
+  std::int64_t row = 0, id = 0, previous_first = 0;
+  TrackIndex last;
+  for (std::int64_t first = 0; first < tracks;) {
+    const std::int64_t most = std::min(tracks - first, std::max<std::int64_t>(1, batch_observations / 2));
+    std::vector<std::int64_t> counts = file_.rows<std::int64_t>(kCounts, {{first, most}});
+    std::size_t taken = 0;
+    std::int64_t sum = 0;
+    for (; taken < counts.size() && (taken == 0 || sum + counts[taken] <= batch_observations); ++taken)
+      sum += counts[taken];
+    counts.resize(taken);
+    if (sum < 0 || row + sum > observations) file_.fail(kCounts, "does not add up to the number of observations");
+    TrackSet batch;
+    batch.begin = begin_of(file_, kCounts, counts);
+    const auto batch_tracks = static_cast<std::int64_t>(taken);
+    for (const std::int64_t difference : file_.rows<std::int64_t>(kIds, {{first, batch_tracks}}))
+      batch.id.push_back(TrackIndex(id += difference));
+    batch.image = images_from(file_.rows<std::int64_t>(kImages, {{row, sum}}), batch.begin, previous_first);
+    check_order(file_, batch, last);
+    if (wanted(first, batch_tracks)) {
+      Measured values = measured({{row, sum}});
+      batch.x = std::move(values.x);
+      batch.y = std::move(values.y);
+      batch.feature = std::move(values.feature);
+    }
+    take(batch);
+    last = batch.id.back();
+    first += batch_tracks;
+    row += sum;
+  }
+  if (row != observations) file_.fail(kCounts, "does not add up to the number of observations");
+}
 
 // Numbers of images fit into 32 bits (as for TrackWriter): half the memory, whose fetching costs more than the search.
 TrackReader::Found TrackReader::find(const std::vector<ImageIndex>& images) const {

@@ -46,7 +46,8 @@ void add_other_terms(Hasher& hasher, const TileProblem& p) {
     hasher.add(term.frame.value).add(term.other.value).add(term.weight);
     for (const Eigen::Vector3d& v : {term.middle, term.across, term.other_normal}) add_to_hash(hasher, v);
   }
-  for (const RobustLoss& loss : {p.image_loss, p.position_loss, p.attitude_loss, p.relative_loss, p.line_loss}) hasher.add(loss.kind).add(loss.scale);
+  for (const RobustLoss& loss : {p.image_loss, p.position_loss, p.attitude_loss, p.relative_loss, p.line_loss})
+    hasher.add(loss.kind).add(loss.scale);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
+#include "io/track_reader.h"
 #include "io/unit_files.h"
 #include "partition/link_weights.h"
 
@@ -53,17 +54,19 @@ Tiles run_tiles(Job& job, const std::vector<std::string>& matches) {
 Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points) {
   return run_tiles_unit(job, hash_file(tie_points), [&] {
     LinkWeights links;
-    const TrackSet tracks = read_tracks(tie_points);
     std::vector<FrameIndex> frames;
-    for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
-      frames.clear();
-      for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o)
-        frames.push_back(job.block.images[tracks.image[o]].frame);
-      std::sort(frames.begin(), frames.end());
-      frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-      for (std::size_t i = 0; i < frames.size(); ++i)
-        for (std::size_t j = i + 1; j < frames.size(); ++j) links.add(frames[i], frames[j], 1);
-    }
+    const auto add_tracks = [&](const TrackSet& tracks) {
+      for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
+        frames.clear();
+        for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o)
+          frames.push_back(job.block.images[tracks.image[o]].frame);
+        std::sort(frames.begin(), frames.end());
+        frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+        for (std::size_t i = 0; i < frames.size(); ++i)
+          for (std::size_t j = i + 1; j < frames.size(); ++j) links.add(frames[i], frames[j], 1);
+      }
+    };
+    TrackReader(tie_points).visit(add_tracks, [](std::int64_t, std::int64_t) { return false; });
     return links;
   });
 }

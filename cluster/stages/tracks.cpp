@@ -14,6 +14,7 @@
 #include "adjust/tile_problem.h"
 #include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
+#include "cluster/stages/given_tracks.h"
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
@@ -150,17 +151,6 @@ void append_track(const Track& track, TrackSet& tracks) {
   tracks.begin.push_back(static_cast<std::int64_t>(tracks.image.size()));
 }
 
-void append_track(const TrackSet& from, std::int64_t t, TrackSet& tracks) {
-  tracks.id.push_back(from.id[t]);
-  for (std::int64_t o = from.begin[t]; o < from.begin[t + 1]; ++o) {
-    tracks.image.push_back(from.image[o]);
-    tracks.x.push_back(from.x[o]);
-    tracks.y.push_back(from.y[o]);
-    tracks.feature.push_back(from.feature[o]);
-  }
-  tracks.begin.push_back(static_cast<std::int64_t>(tracks.image.size()));
-}
-
 std::vector<ImageFeatures> shard_keypoints(const Job& job, std::int64_t shard) {
   return read_keypoints(job.store.verified_path(unit_name("features", shard)));
 }
@@ -229,22 +219,6 @@ void build_tracks_by_tile(const Job& job, const std::vector<std::string>& matche
   }
 }
 
-void deal_given_tracks(const Job& job, const TrackSet& given, const Tiles& tiles,
-                       const std::function<void(const TrackSet&)>& take) {
-  std::vector<std::vector<std::int64_t>> owned(static_cast<std::size_t>(tiles.tile_count));
-  for (std::int64_t t = 0; t < given.track_count(); ++t) {
-    const ImageIndex* images = given.image.data();
-    const TileIndex owner = owner_tile(job.block, tiles, images + given.begin[t], images + given.begin[t + 1]);
-    if (owner.valid()) owned[static_cast<std::size_t>(owner.value)].push_back(t);
-  }
-  for (const std::vector<std::int64_t>& rows : owned) {
-    TrackSet tracks;
-    tracks.begin.push_back(0);
-    for (const std::int64_t t : rows) append_track(given, t, tracks);
-    take(tracks);
-  }
-}
-
 }  // namespace
 
 IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job) {
@@ -267,7 +241,7 @@ std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& ma
 
 std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles) {
   return run_tracks_unit(job, hash_file(tie_points), tiles,
-                         [&](const auto& take) { deal_given_tracks(job, read_tracks(tie_points), tiles, take); });
+                         [&](const auto& take) { deal_given_tracks(tie_points, job.block, tiles, take); });
 }
 
 }  // namespace megablock

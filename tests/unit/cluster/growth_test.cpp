@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "adjust/tile_problem.h"
+#include "cluster/stages/given_tracks.h"
 #include "cluster/stages/problem_hash.h"
 #include "io/simulate/simulate.h"
+#include "io/unit_files.h"
 #include "tests/unit/adjust/known_lines.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -102,6 +106,48 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
   EXPECT_TRUE(differs([](auto&, auto& s) { s.cameras[0][kRadial1] += 1e-9; }));
   EXPECT_TRUE(differs([](auto&, auto& s) { s.mounts[0].centre.x() += 1e-9; }));
   EXPECT_FALSE(differs([](auto& p, auto&) { p.points.back().index += 1; })) << "only the place in the block";
+}
+
+TEST(GivenTracks, GoToTheirOwnersHoweverFewAreHeld) {
+  SimulationOptions options;
+  options.frames = 60;
+  options.points_per_frame = 40;
+  const SimulatedBlock simulated = simulate_block(options);
+  const TrackSet& all = simulated.tracks;
+  Tiles tiles = single_tile(simulated.block);
+  tiles.tile_count = 7;  // the sixth stays empty
+  for (std::int64_t f = 0; f < options.frames; ++f)
+    tiles.tile_of_frame[FrameIndex(f)] = f % 11 == 0 ? TileIndex() : TileIndex(f / 12 == 4 ? 6 : f / 12);
+  const ScratchDirectory scratch;
+  write_tracks(scratch.path("tie_points.h5"), all);
+  for (const std::int64_t held : {std::int64_t{1} << 24, std::int64_t{300}, std::int64_t{1}}) {
+    std::int64_t tile = 0, dealt = 0;
+    deal_given_tracks(
+        scratch.path("tie_points.h5"), simulated.block, tiles,
+        [&](const TrackSet& own) {
+          std::int64_t row = 0;
+          for (std::int64_t t = 0; t < all.track_count(); ++t) {
+            const ImageIndex* images = all.image.data();
+            if (owner_tile(simulated.block, tiles, images + all.begin[t], images + all.begin[t + 1]).value != tile)
+              continue;
+            ASSERT_LT(row, own.track_count());
+            ASSERT_EQ(own.id[row], all.id[t]);
+            ASSERT_EQ(own.begin[row + 1] - own.begin[row], all.begin[t + 1] - all.begin[t]);
+            for (std::int64_t o = 0; o < all.begin[t + 1] - all.begin[t]; ++o) {
+              const std::int64_t a = own.begin[row] + o, b = all.begin[t] + o;
+              ASSERT_EQ(std::tuple(own.image[a], own.x[a], own.y[a], own.feature[a]),
+                        std::tuple(all.image[b], all.x[b], all.y[b], all.feature[b]));
+            }
+            ++row;
+          }
+          EXPECT_EQ(row, own.track_count());
+          dealt += row;
+          ++tile;
+        },
+        held);
+    EXPECT_EQ(tile, 7);
+    EXPECT_GT(dealt, 300);
+  }
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "io/error.h"
 #include "io/result.h"
+#include "io/track_reader.h"
 #include "io/unit_files.h"
 #include "tests/unit/io/scratch_directory.h"
 
@@ -310,6 +311,35 @@ TEST_F(MeasurementsByPlace, NeedAResult) {
                 MeasurementStore(scratch_.path()).near({{0, 0, 0}, 1});
               }),
               HasSubstr("the job has no result yet"));
+}
+
+TEST(TrackReader, BatchesAreTheWholeFile) {
+  const ScratchDirectory scratch;
+  const std::string path = scratch.path("tracks.h5");
+  const TrackSet all = street()[1];
+  write_tracks(path, all);
+  for (const std::int64_t batch : {std::int64_t{1}, std::int64_t{100}, std::int64_t{1} << 20}) {
+    std::int64_t t = 0, row = 0;
+    TrackReader(path).visit(
+        [&](const TrackSet& part) {
+          const bool measured = part.x.size() == part.image.size();
+          EXPECT_EQ(measured, t % 3 == 0);
+          EXPECT_TRUE(measured || (part.x.empty() && part.y.empty() && part.feature.empty()));
+          for (std::int64_t p = 0; p < part.track_count(); ++p, ++t) {
+            ASSERT_EQ(part.id[p], all.id[t]);
+            ASSERT_EQ(part.begin[p + 1] - part.begin[p], all.begin[t + 1] - all.begin[t]);
+          }
+          for (std::int64_t o = 0; o < part.observation_count(); ++o, ++row) {
+            ASSERT_EQ(part.image[o], all.image[row]);
+            if (!measured) continue;
+            ASSERT_EQ(std::tuple(part.x[o], part.y[o], part.feature[o]),
+                      std::tuple(all.x[row], all.y[row], all.feature[row]));
+          }
+        },
+        [](std::int64_t first, std::int64_t) { return first % 3 == 0; }, batch);
+    EXPECT_EQ(t, all.track_count());
+    EXPECT_EQ(row, all.observation_count());
+  }
 }
 
 }  // namespace

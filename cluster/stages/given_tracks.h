@@ -1,0 +1,20 @@
+// Deals tie points that are given with a job to the tiles that own them.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "io/block.h"
+#include "io/image_graph.h"
+#include "io/tracks.h"
+
+namespace megablock {
+
+// Calls `take` with the tracks of tile 0, 1, ... in turn. The file is read once to find the owners (4 bytes per track
+// are kept), then once for every run of tiles that hold up to `observations_at_a_time` together, which bounds the
+// memory (24 bytes each); the result does not depend on it.
+void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
+                       const std::function<void(const TrackSet&)>& take,
+                       std::int64_t observations_at_a_time = std::int64_t{1} << 23);
+
+}  // namespace megablock
