@@ -22,12 +22,15 @@ struct ResidualSum {
 };
 
 void add_images(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
+  const std::vector<ImageView> views = image_views(problem, state);
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
     if (!problem.active(p)) continue;
     ++sum.points;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      sum.squares += (problem.inverse_sigma[row] * image_difference_px(problem, state, p, row)).squaredNorm();
+      const Eigen::Vector2d difference =
+          views[problem.image[row].value].difference_px(state.points[p], {problem.x[row], problem.y[row]});
+      sum.squares += (problem.inverse_sigma[row] * difference).squaredNorm();
       ++sum.observations;
     }
   }
@@ -46,8 +49,7 @@ void add_priors(const TileProblem& problem, const TileState& state, ResidualSum&
     add(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
         problem.attitude_loss);
   for (const auto& term : problem.lines) {
-    const double r =
-        linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
+    const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
     add(r * r, 1, problem.line_loss);
   }
   for (const auto& term : problem.relatives)
@@ -89,6 +91,20 @@ ceres::Solver::Options solver_options(CeresTile& tile, std::size_t frames, const
 
 }  // namespace
 
+void describe_solution(const TileProblem& problem, const TileState& state, std::int64_t unknowns,
+                       std::int64_t datum_defect, AdjustSummary& summary) {
+  ResidualSum sum;
+  add_images(problem, state, sum);
+  add_priors(problem, state, sum);
+  const std::int64_t freedom = sum.residuals - unknowns + datum_defect;
+  summary.observations = sum.observations;
+  summary.points = sum.points;
+  summary.degrees_of_freedom = freedom;
+  summary.sigma0 = freedom > 0 ? std::sqrt(sum.squares / static_cast<double>(freedom)) : 0;
+  summary.text = fmt::format("{} images, {} points, {} observations: sigma0 {:.3f}, {} iterations",
+                             problem.images.size(), sum.points, sum.observations, summary.sigma0, summary.iterations);
+}
+
 AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, const SolveOptions& options) {
   AdjustSummary result;
   CeresTile tile(problem, state, {CeresOptions::Derivatives::kAnalytic, options.camera_free});
@@ -104,18 +120,10 @@ AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, con
   result.iterations = static_cast<int>(summary.iterations.size());
   if (result.usable) tile.store(state);
 
-  ResidualSum sum;
-  add_images(problem, state, sum);
-  add_priors(problem, state, sum);
-  std::int64_t freedom = sum.residuals;
-  for (const double* block : tile.unknown_blocks()) freedom -= tile.problem().ParameterBlockTangentSize(block);
-  for (const DatumDefect& defect : defects) freedom += defect.dimension;
-  result.observations = sum.observations;
-  result.points = sum.points;
-  result.degrees_of_freedom = freedom;
-  result.sigma0 = freedom > 0 ? std::sqrt(sum.squares / static_cast<double>(freedom)) : 0;
-  result.text = fmt::format("{} images, {} points, {} observations: sigma0 {:.3f}, {} iterations",
-                            problem.images.size(), sum.points, sum.observations, result.sigma0, result.iterations);
+  std::int64_t unknowns = 0, defect = 0;
+  for (const double* block : tile.unknown_blocks()) unknowns += tile.problem().ParameterBlockTangentSize(block);
+  for (const DatumDefect& d : defects) defect += d.dimension;
+  describe_solution(problem, state, unknowns, defect, result);
   if (!result.usable) result.text += ", failed: " + summary.message;
   return result;
 }

@@ -62,8 +62,8 @@ double threshold_factor(const TileProblem& problem, const TileState& state) {
 
 class TileAdjuster {
  public:
-  TileAdjuster(TileProblem& problem, TileState& state, const AdjustOptions& options)
-      : problem_(problem), state_(state), options_(options), images_(problem.cameras.size(), 0) {
+  TileAdjuster(TileProblem& problem, TileState& state, const AdjustOptions& options, const TileSolver& solver)
+      : problem_(problem), state_(state), options_(options), solver_(solver), images_(problem.cameras.size(), 0) {
     for (const TileImage& image : problem.images) ++images_[image.camera.value];
   }
 
@@ -125,20 +125,27 @@ class TileAdjuster {
     }
   }
 
-  // Enough tracks for each image, the longest first.
+  // Enough tracks for each frame, the longest first, shared out among its images.
   void select_long_tracks() {
-    constexpr int kEnough = 200;
-    if (problem_.observation_count() < 2 * kEnough * static_cast<std::int64_t>(problem_.images.size())) return;
+    constexpr std::int64_t kEnough = 200, kFewest = 20;  // of a frame, of an image
+    std::vector<std::int64_t> images(problem_.frames.size(), 0);
+    for (const TileImage& image : problem_.images) ++images[image.frame.value];
+    std::vector<std::int64_t> enough;  // [images]
+    for (const TileImage& image : problem_.images)
+      enough.push_back(std::max(kFewest, kEnough / images[image.frame.value]));
+    if (problem_.observation_count() < 2 * std::accumulate(enough.begin(), enough.end(), std::int64_t{0})) return;
     std::vector<std::int64_t> order(problem_.points.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
       return problem_.begin[a + 1] - problem_.begin[a] > problem_.begin[b + 1] - problem_.begin[b];
     });
-    std::vector<int> covered(problem_.images.size(), 0);
+    std::vector<std::int64_t> covered(problem_.images.size(), 0);
     for (std::int64_t p : order) {
       bool needed = problem_.points[p].role == PointRole::kControl;
-      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row)
-        needed = needed || (problem_.kept[row] && covered[problem_.image[row].value] < kEnough);
+      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
+        const std::int32_t image = problem_.image[row].value;
+        needed = needed || (problem_.kept[row] && covered[image] < enough[image]);
+      }
       for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
         if (!needed)
           problem_.kept[row] = 0;
@@ -187,7 +194,7 @@ class TileAdjuster {
   }
 
   AdjustSummary solve(const SolveOptions& solve_options) {
-    const AdjustSummary summary = solve_with_ceres(problem_, state_, solve_options);
+    const AdjustSummary summary = solver_(problem_, state_, solve_options);
     if (!summary.usable) throw ComputeError("the tile's adjustment does not converge: " + summary.text);
     return summary;
   }
@@ -225,6 +232,7 @@ class TileAdjuster {
   TileProblem& problem_;
   TileState& state_;
   const AdjustOptions& options_;
+  const TileSolver& solver_;
   std::vector<std::int64_t> images_;  // of each camera
   std::int64_t restored_ = 0;
 };
@@ -235,9 +243,16 @@ double screening_threshold(const TileProblem& problem, const TileState& state, c
   return options.max_residual_sigmas * threshold_factor(problem, state);
 }
 
-AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options) {
+AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options,
+                          const TileSolver& solver) {
   options.check();
-  return TileAdjuster(problem, state, options).run();
+  return TileAdjuster(problem, state, options, solver).run();
+}
+
+AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options) {
+  return adjust_tile(problem, state, options, [](const TileProblem& p, TileState& s, const SolveOptions& o) {
+    return solve_with_ceres(p, s, o);
+  });
 }
 
 }  // namespace megablock

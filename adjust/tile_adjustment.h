@@ -1,6 +1,7 @@
-// Bundle adjustment of one tile with Ceres: triangulation, screening that re-tests and restores, self-calibration.
+// Bundle adjustment of one tile: triangulation, screening that re-tests and restores, self-calibration.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ struct AdjustOptions {
   bool estimate_image_sigma = true;  // of tie points, from their residuals (image_sigma.h); image_sigma_px is the start
   double max_residual_sigmas = 4.0;  // screening threshold at the end; starts at 8 x and falls
   int screening_rounds = 3;          // re-tests every observation against the current solution, both ways
-  int max_iterations = 50;           // of Ceres per round
+  int max_iterations = 50;           // of the solver per round
   // Images a camera needs in the tile before the tile's own adjustment estimates parameters without a prior sigma:
   // focal length and k1; principal point, k2 and decentring; k3. Below, they stay at their values here and are left to
   // the adjustment of the whole block (TileProblem::camera_free is never changed).
@@ -47,25 +48,37 @@ struct AdjustSummary {
   int iterations = 0;
   std::int64_t observations = 0, points = 0;
   std::int64_t degrees_of_freedom = 0;  // residuals - unknowns + datum defect
-  std::int64_t rejected = 0;  // observations that take no part in the end (points held out included)
-  std::int64_t restored = 0;  // observations that came back in a later round
+  std::int64_t rejected = 0;            // observations that take no part in the end (points held out included)
+  std::int64_t restored = 0;            // observations that came back in a later round
   bool usable = false;
   std::string text;  // one line
 };
 
 struct SolveOptions {
   int max_iterations = 50;
-  double function_tolerance = 1e-6;
+  double function_tolerance = 1e-6;        // ends with a step that lowers the cost by less, relatively
   std::vector<ParameterMask> camera_free;  // estimated intrinsics per camera; empty = problem.camera_free
 };
 
-// One Ceres solve of the problem as it stands (one thread, deterministic). A datum that the observations leave free is
-// fixed by minimal constraints at the start values (datum.h). Every active point must be in front of its cameras.
+// Adjusts a tile's problem as it stands, from the state at hand. A datum that the observations leave free is fixed by
+// minimal constraints at the start values. Every active point must be in front of its cameras, otherwise the summary is
+// not `usable` and the state stays. Throws ComputeError when there is nothing to adjust.
+using TileSolver = std::function<AdjustSummary(const TileProblem&, TileState&, const SolveOptions&)>;
+
+// What a solver says of its solution besides costs and iterations. `unknowns`: scalar ones, points included;
+// `datum_defect`: of the observations.
+void describe_solution(const TileProblem& problem, const TileState& state, std::int64_t unknowns,
+                       std::int64_t datum_defect, AdjustSummary& summary);
+
+// The reference, and the solver of the callers within this room: Ceres, one thread, deterministic. merge/ has a faster
+// one (tile_solver.h).
 AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, const SolveOptions& options);
 AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, int max_iterations,
                                double function_tolerance = 1e-6);
 
 // The whole tile adjustment: triangulate, solve, screen, solve ... Throws ComputeError when nothing can be adjusted.
-AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options);
+AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options,
+                          const TileSolver& solver);
+AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options);  // with Ceres
 
 }  // namespace megablock

@@ -64,11 +64,11 @@ class Mover {
   Eigen::Quaterniond turn_;
 };
 
-void move_shared_parameters(const TileProblem& problem, const TileStep& step, TileState& next) {
+void move_shared_parameters(const TileProblem& problem, const TilePlan& plan, const TileStep& step, TileState& next) {
   for (std::size_t row = 0; row < problem.cameras.size(); ++row) {
     const double* x = step.unknowns.find({UnknownKind::kCamera, 0, problem.cameras[row].value});
     for (int k = 0; x != nullptr && k < next.cameras[row].size(); ++k)
-      if (contains(problem.camera_free[row], k)) next.cameras[row][static_cast<std::size_t>(k)] += *x++;
+      if (contains(plan.camera_free[row], k)) next.cameras[row][static_cast<std::size_t>(k)] += *x++;
   }
   for (std::size_t row = 0; row < problem.mounts.size(); ++row) {
     const MountId& id = problem.mounts[row];
@@ -141,7 +141,7 @@ TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& mo
       const Mover& mover = movers[at(plan.part_of_frame[at(frame_of_point(problem, p))])];
       next.points[at(p)] = mover.position(state.points[at(p)], step.points[at(p)]);
     }
-  move_shared_parameters(problem, step, next);
+  move_shared_parameters(problem, plan, step, next);
   return next;
 }
 

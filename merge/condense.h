@@ -20,6 +20,8 @@ namespace megablock {
 
 // Every unknown that a kept residual of the tile touches, ascending. What make_plan needs of each tile.
 UnknownList tile_unknowns(const TileProblem& problem);
+// With other intrinsics estimated than those of the problem, one mask per camera.
+UnknownList tile_unknowns(const TileProblem& problem, const std::vector<ParameterMask>& camera_free);
 
 // Symbolic work of a tile, done once per verdict on observations.
 struct TilePlan {
@@ -35,11 +37,14 @@ struct TilePlan {
   std::int64_t part_count = 0;
   // Position in `unknowns`, -1: held or untouched.
   std::vector<std::int64_t> unknown_of_frame, unknown_of_camera, unknown_of_mount;
+  std::vector<ParameterMask> camera_free;  // [cameras] estimated intrinsics
 };
-// `node` is the tile's leaf in the plan of the merge tree.
 // Frame row of an active point's first kept observation.
 std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);
+// `node` is the tile's leaf in the plan of the merge tree.
 TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 32);
+// Of a tile that is a block of its own: nothing is passed on.
+TilePlan make_lone_tile_plan(const TileProblem& problem, const std::vector<ParameterMask>& camera_free);
 
 // Factors of a tile's cells, by node of TilePlan::cells. Empty: recompute.
 struct TileFactor {

@@ -86,7 +86,7 @@ class TileCovarianceBuilder {
   void take_camera(std::size_t camera, std::int64_t dimension, const std::vector<double>& block) {
     std::vector<int> parameters;
     for (int k = 0; k < result_.cameras[camera].cols(); ++k)
-      if (contains(problem_.camera_free[camera], k)) parameters.push_back(k);
+      if (contains(plan_.camera_free[camera], k)) parameters.push_back(k);
     for (std::size_t i = 0; i < parameters.size(); ++i)
       for (std::size_t j = 0; j < parameters.size(); ++j)
         result_.cameras[camera](parameters[i], parameters[j]) = block[i + j * at(dimension)];

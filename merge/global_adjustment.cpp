@@ -15,6 +15,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kUnresolvable = 1e3 * kEpsilon;  // of the cost
 constexpr double kMaxLambda = 1e12;
 constexpr double kTrustworthy = 0.75;  // gain ratio
+constexpr double kHardlyDamped = 1e-2;
 
 void stop(GlobalState& state, GlobalOutcome outcome) {
   state.outcome = outcome;
@@ -39,11 +40,18 @@ void reject(GlobalState& state) {
   state.next = GlobalAction::kReject;
 }
 
+// Whether a change of the cost is too small to go on for its sake; where damping holds the steps down it says nothing.
+bool negligible(const GlobalState& state, const GlobalOptions& options, double change) {
+  return options.function_tolerance > 0 && state.pass_lambda <= kHardlyDamped &&
+         std::abs(change) <= options.function_tolerance * state.cost;
+}
+
 // After a step was accepted or rejected: the next pass, unless the budget of steps is spent.
 void start_pass(GlobalState& state, const GlobalOptions& options) {
   state.pass_lambda = state.lambda;
   state.pass_curvature = state.curvature;
   state.next = GlobalAction::kUp;
+  if (negligible(state, options, state.cost - state.trial_cost)) stop(state, GlobalOutcome::kConverged);
   if (state.lambda > kMaxLambda) stop(state, GlobalOutcome::kFailed);
   if (state.iterations >= options.max_iterations) stop(state, GlobalOutcome::kIterationLimit);
 }
@@ -68,6 +76,7 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
   state.decrement_squared = report.sums.decrement_squared;
   if (state.initial_cost < 0) state.initial_cost = state.cost;
   if (!std::isfinite(state.cost) || !std::isfinite(state.decrement_squared)) return stop(state, GlobalOutcome::kFailed);
+  if (negligible(state, options, 0.5 * state.decrement_squared)) return stop(state, GlobalOutcome::kConverged);
   const double decrement = std::sqrt(state.decrement_squared);
   const bool small = decrement <= options.max_decrement;
   const bool at_floor = state.floor_decrement >= 0 && decrement >= state.floor_decrement;

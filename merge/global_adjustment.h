@@ -26,7 +26,10 @@ struct GlobalOptions {
   double initial_lambda = 1e-10;
   double max_decrement = 1e-4;  // posterior sigmas; exactness tests use 1e-7
   int max_iterations = 50;      // accepted and rejected steps
-  void check() const;           // throws InputError
+  // Above 0: also stops when a step that is hardly damped changes the cost by less than this share of it, or promises
+  // to. Of tiles on their own, which only start the block: not every weak mode is at its optimum then.
+  double function_tolerance = 0;
+  void check() const;  // throws InputError
 };
 
 // Result of an upward pass: sums at the root.

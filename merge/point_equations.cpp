@@ -19,7 +19,7 @@ std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const Tile
     u.frame = plan.unknown_of_frame[at(image.frame.value)];
     u.camera = plan.unknown_of_camera[at(image.camera.value)];
     u.mount = plan.unknown_of_mount[at(image.mount)];
-    if (u.camera >= 0) u.free = problem.camera_free[at(image.camera.value)];
+    if (u.camera >= 0) u.free = plan.camera_free[at(image.camera.value)];
     u.camera_width = count_of(u.free);
     u.shared_width = u.camera_width + (u.mount >= 0 ? 6 : 0);
     if (u.shared_width > 0)

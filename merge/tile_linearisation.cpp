@@ -61,10 +61,10 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
   for (std::int64_t i : plan.intrinsic_priors[cell]) {
     const auto& term = problem.intrinsic_priors[static_cast<std::size_t>(i)];
     const auto camera = static_cast<std::size_t>(term.camera.value);
-    const int free_count = count_of(problem.camera_free[camera]);
+    const int free_count = count_of(plan.camera_free[camera]);
     int column = 0;
     for (int k = 0; k < term.value.size(); ++k) {
-      const bool free = contains(problem.camera_free[camera], k);
+      const bool free = contains(plan.camera_free[camera], k);
       const double weight = intrinsic_prior_weight(term, k);
       if (weight != 0) {
         TermResidual out;

@@ -15,7 +15,7 @@ struct Touched {
   std::vector<std::uint8_t> frames, cameras, mounts;
 };
 
-Touched touched_rows(const TileProblem& problem) {
+Touched touched_rows(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
   Touched touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
                   std::vector<std::uint8_t>(problem.cameras.size(), 0),
                   std::vector<std::uint8_t>(problem.mounts.size(), 0)};
@@ -25,7 +25,7 @@ Touched touched_rows(const TileProblem& problem) {
       if (!problem.kept[row]) continue;
       const TileImage& image = problem.images[problem.image[row].value];
       touched.frames[image.frame.value] = 1;
-      touched.cameras[image.camera.value] = problem.camera_free[image.camera.value] != 0;
+      touched.cameras[image.camera.value] = camera_free[image.camera.value] != 0;
       touched.mounts[image.mount] = problem.mount_free[image.mount] != 0;
     }
   }
@@ -34,7 +34,7 @@ Touched touched_rows(const TileProblem& problem) {
   for (const auto& term : problem.lines) touched.frames[term.frame.value] = touched.frames[term.seen_by().value] = 1;
   for (const auto& term : problem.relatives) touched.frames[term.from.value] = touched.frames[term.to.value] = 1;
   for (const auto& term : problem.intrinsic_priors)
-    if (problem.camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
+    if (camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
   for (const auto& term : problem.mount_priors)
     if (problem.mount_free[term.mount]) touched.mounts[term.mount] = 1;
   return touched;
@@ -43,19 +43,19 @@ Touched touched_rows(const TileProblem& problem) {
 Unknown frame_unknown(const TileProblem& problem, std::size_t row) {
   return {{UnknownKind::kFrame, 0, problem.frames[row].value}, 6};
 }
-Unknown camera_unknown(const TileProblem& problem, std::size_t row) {
-  return {{UnknownKind::kCamera, 0, problem.cameras[row].value}, count_of(problem.camera_free[row])};
+Unknown camera_unknown(const TileProblem& problem, std::size_t row, ParameterMask free) {
+  return {{UnknownKind::kCamera, 0, problem.cameras[row].value}, count_of(free)};
 }
 Unknown mount_unknown(const TileProblem& problem, std::size_t row) {
   return {{UnknownKind::kMount, problem.mounts[row].mount, problem.mounts[row].rig.value}, 6};
 }
 
-UnknownList listed(const TileProblem& problem, const Touched& touched) {
+UnknownList listed(const TileProblem& problem, const Touched& touched, const std::vector<ParameterMask>& camera_free) {
   UnknownList unknowns;
   for (std::size_t row = 0; row < touched.frames.size(); ++row)
     if (touched.frames[row]) unknowns.push_back(frame_unknown(problem, row));
   for (std::size_t row = 0; row < touched.cameras.size(); ++row)
-    if (touched.cameras[row]) unknowns.push_back(camera_unknown(problem, row));
+    if (touched.cameras[row]) unknowns.push_back(camera_unknown(problem, row, camera_free[row]));
   for (std::size_t row = 0; row < touched.mounts.size(); ++row)
     if (touched.mounts[row]) unknowns.push_back(mount_unknown(problem, row));
   return unknowns;
@@ -225,8 +225,10 @@ class CellPlanner {
 
 }  // namespace
 
-UnknownList tile_unknowns(const TileProblem& problem) {
-  UnknownList unknowns = listed(problem, touched_rows(problem));
+UnknownList tile_unknowns(const TileProblem& problem) { return tile_unknowns(problem, problem.camera_free); }
+
+UnknownList tile_unknowns(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
+  UnknownList unknowns = listed(problem, touched_rows(problem, camera_free), camera_free);
   std::sort(unknowns.begin(), unknowns.end());
   return unknowns;
 }
@@ -237,16 +239,20 @@ std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point) {
   return -1;
 }
 
-TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames) {
+namespace {
+
+TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const UnknownList& unknowns,
+                 const std::vector<ParameterMask>& camera_free, std::int64_t cell_max_frames) {
   TilePlan plan;
-  plan.unknowns = tile_unknowns(problem);
+  plan.unknowns = unknowns;
+  plan.camera_free = camera_free;
   plan.boundary = node.passed;
   plan.owned = node.owned;
   const auto position = [&](const Unknown& u) { return find_unknown(plan.unknowns, u.id); };
   for (std::size_t row = 0; row < problem.frames.size(); ++row)
     plan.unknown_of_frame.push_back(position(frame_unknown(problem, row)));
   for (std::size_t row = 0; row < problem.cameras.size(); ++row)
-    plan.unknown_of_camera.push_back(position(camera_unknown(problem, row)));
+    plan.unknown_of_camera.push_back(position(camera_unknown(problem, row, camera_free[row])));
   for (std::size_t row = 0; row < problem.mounts.size(); ++row)
     plan.unknown_of_mount.push_back(position(mount_unknown(problem, row)));
 
@@ -262,6 +268,20 @@ TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::i
   const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, cell_count).run();
   plan.cells = make_plan(cells.tree, lists, plan.boundary);
   return plan;
+}
+
+}  // namespace
+
+TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames) {
+  return plan_of(problem, node, tile_unknowns(problem), problem.camera_free, cell_max_frames);
+}
+
+TilePlan make_lone_tile_plan(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
+  constexpr std::int64_t kCellMaxFrames = 32;
+  PlanNode node;
+  node.leaf = 0;
+  node.eliminated = node.owned = tile_unknowns(problem, camera_free);
+  return plan_of(problem, node, node.owned, camera_free, kCellMaxFrames);
 }
 
 }  // namespace megablock

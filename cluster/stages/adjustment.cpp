@@ -11,6 +11,7 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
+#include "merge/tile_solver.h"
 
 namespace megablock {
 
@@ -60,7 +61,7 @@ TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tile
   const AdjustOptions& options = job.settings.adjustment;
   const auto start = [&](TrackSet tracks) { return make_start(job, oriented, tiles, tile, std::move(tracks)); };
   TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)));
-  const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options);
+  const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
                                       screening_threshold(adjusted.problem, adjusted.state, options), options);
   const auto restored = parts.size() - static_cast<std::size_t>(std::count(parts.begin(), parts.end(), 0));
