@@ -51,18 +51,23 @@ class PointSettler {
     const Eigen::Vector3d before = state_.points[p];
     const auto kept = std::count(kept_.begin(), kept_.end(), 1);
     const bool enough = kept >= (prior_[p] ? 1 : 2);
-    if (enough && before.allFinite() && passes_all_kept(before, threshold)) {
-      for (std::size_t i = 0; i < views_.size(); ++i) kept_[i] = residual(i, before) <= threshold;
+    double longest = 0;  // of the kept rays, before
+    residuals_.clear();
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      residuals_.push_back(residual(i, before));
+      if (kept_[i]) longest = std::max(longest, residuals_[i]);
+    }
+    if (enough && longest <= threshold) {
+      for (std::size_t i = 0; i < views_.size(); ++i) kept_[i] = residuals_[i] <= threshold;
     } else if (!settle_by_parts(p, threshold)) {
       if (prior_[p] && before.allFinite() && views_.size() == 1)
-        kept_[0] = residual(0, before) <= threshold;
+        kept_[0] = residuals_[0] <= threshold;
       else
         std::fill(kept_.begin(), kept_.end(), 0);
     }
     hold_out_narrow(p);
     // The same verdicts at a point a little aside (without the robust weights): it stays where the adjustment put it.
-    if (before.allFinite() && same_verdicts() && passes_all_kept(before, kGenerous * threshold))
-      state_.points[p] = before;
+    if (before.allFinite() && same_verdicts() && longest <= kGenerous * threshold) state_.points[p] = before;
     store_kept();
   }
 
@@ -137,6 +142,7 @@ class PointSettler {
   std::vector<std::int64_t> rows_;
   std::vector<PointView> views_;
   std::vector<std::uint8_t> kept_;
+  std::vector<double> residuals_;  // sigmas
 };
 
 }  // namespace

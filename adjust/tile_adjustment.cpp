@@ -28,12 +28,15 @@ namespace {
 // Sigma of the kept image residuals from their median (1.1774 is the median of a Rayleigh distribution), in a-priori
 // sigmas: untouched by outliers.
 double robust_sigma(const TileProblem& problem, const TileState& state) {
+  const std::vector<ImageView> views = image_views(problem, state);
   std::vector<double> lengths;
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
     if (!problem.active(p)) continue;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
-      const double length = problem.inverse_sigma[row] * image_difference_px(problem, state, p, row).norm();
+      const Eigen::Vector2d difference =
+          views[problem.image[row].value].difference_px(state.points[p], {problem.x[row], problem.y[row]});
+      const double length = problem.inverse_sigma[row] * difference.norm();
       lengths.push_back(std::isfinite(length) ? length : std::numeric_limits<double>::max());
     }
   }
