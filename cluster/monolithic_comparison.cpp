@@ -28,14 +28,6 @@ struct SingleTile {
   TileState state;
 };
 
-ObservationOptions observation_options(const JobStore& store) {
-  std::ifstream in(store.path("job.json"));
-  const Json json = Json::parse(in);
-  StageSettings settings;
-  for (const Json& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
-  return read_options(settings).adjustment.observations;
-}
-
 SingleTile single_tile(const BlockResult& result, const ObservationOptions& options) {
   Tiles one = result.tiles;
   one.tile_count = 1;
@@ -121,6 +113,14 @@ OwnRun adjust_single_tile(const BlockResult& result, const SingleTile& tile) {
 }
 
 }  // namespace
+
+ObservationOptions observation_options(const JobStore& store) {
+  std::ifstream in(store.path("job.json"));
+  const Json json = Json::parse(in);
+  StageSettings settings;
+  for (const Json& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
+  return read_options(settings).adjustment.observations;
+}
 
 std::string compare_with_monolithic(const JobStore& store) {
   constexpr const char* kResult = "result/block.h5";

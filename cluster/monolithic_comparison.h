@@ -16,6 +16,7 @@
 
 #include <string>
 
+#include "adjust/tile_problem.h"
 #include "io/job_store.h"
 
 namespace megablock {
@@ -23,5 +24,8 @@ namespace megablock {
 // One line of JSON: the figures above, counts of images, tiles, points and observations, the Newton decrement and the
 // dimension of a free datum. InputError when the job has no result.
 std::string compare_with_monolithic(const JobStore& store);
+
+// Of the tie points and priors of a job, as its project gives them.
+ObservationOptions observation_options(const JobStore& store);
 
 }  // namespace megablock

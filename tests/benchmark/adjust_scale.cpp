@@ -2,23 +2,19 @@
 //
 //   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--folder F] [--seed 1]
 //
-// street: grid of 100 m, every street driven twice, a frame of ten cameras each 4 m, 1 000 observations per frame, five
-// per point, 0.5 px; position priors of 0.5 m on half of the frames, relative poses of 1 cm and 0.01 degrees;
-// calibration held; start = these integrated over stretches of 1 km, each off by up to 2 m. aerial: 80 % and 60 %
-// overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated. Runs 'megablock
-// simulate' and 'mpirun megablock run' and prints one JSON object as its last line; seconds are those of the run on the
-// wall clock. What --folder holds is not simulated again.
+// Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
+// its last line; seconds are those of the run on the wall clock. What --folder holds is not simulated again.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "io/error.h"
 #include "io/evaluate.h"
 #include "io/events.h"
+#include "tests/benchmark/scenes.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace {
@@ -27,25 +23,9 @@ using namespace megablock;
 namespace fs = std::filesystem;
 
 struct ScaleOptions {
-  std::string scene = "street";
-  std::int64_t frames = 1000;
+  SceneOptions scene;
   int ranks = 1, threads = 1;
-  std::uint64_t seed = 1;
-  fs::path folder;  // empty: a temporary one, removed at the end
 };
-
-void run(const std::string& command) {
-  std::fprintf(stderr, "%s\n", command.c_str());
-  if (const int status = std::system((command + " >&2").c_str()); status != 0)
-    throw ComputeError("'" + command + "' ended with " + std::to_string(status));
-}
-
-std::string scene_options(const ScaleOptions& options) {
-  if (options.scene == "street")
-    return "--scene street --rig-cameras 10 --points-per-frame 1000 --gps-sigma 0.5 --gps-share 0.5 "
-           "--relative-position-sigma 0.01 --relative-rotation-sigma 0.01 --start-offset 2 --no-calibration";
-  return "--scene aerial --points-per-frame 300 --gps-sigma 0.05 --attitude-sigma 0.02";
-}
 
 // Median over the steps of the global adjustment, of which each leaves one event on the first rank.
 double seconds_per_iteration(const fs::path& job) {
@@ -81,24 +61,18 @@ std::int64_t points_across_tiles(const BlockResult& result) {
 }
 
 nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
-  const fs::path megablock = fs::canonical("/proc/self/exe").parent_path() / "../../megablock";
-  const std::string program = "'" + megablock.string() + "' ", block = "'" + (folder / "block.yaml").string() + "' ";
-  if (!fs::exists(folder / "block.yaml"))
-    run(program + "simulate " + scene_options(options) + " --frames " + std::to_string(options.frames) + " --seed " +
-        std::to_string(options.seed) + " -o '" + folder.string() + "'");
   const fs::path job = folder / ("job-" + std::to_string(options.ranks) + "x" + std::to_string(options.threads));
-  fs::remove_all(job);
+  simulate_scene(options.scene, folder);
   const auto start = std::chrono::steady_clock::now();
-  run("mpirun --bind-to none --oversubscribe -n " + std::to_string(options.ranks) + " " + program + "run " + block +
-      "-j '" + job.string() + "' --quiet --threads " + std::to_string(options.threads));
+  run_scene(folder, job, options.ranks, options.threads);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   const BlockResult result = read_result((job / "result/block.h5").string());
   const Evaluation evaluation = evaluate(result, (folder / "truth.csv").string());
   const ReprojectionStatistics statistics = reprojection_statistics(result);
   const double per_iteration = seconds_per_iteration(job);
-  return {{"scene", options.scene},
-          {"frames", options.frames},
+  return {{"scene", options.scene.scene},
+          {"frames", options.scene.frames},
           {"images", result.block.images.size()},
           {"ranks", options.ranks},
           {"threads", options.threads},
@@ -124,16 +98,13 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
 int main(int argc, char** argv) {
   ScaleOptions options;
   CLI::App app("One job on a simulated block of any size; prints one JSON object");
-  app.add_option("--scene", options.scene, "street or aerial")->check(CLI::IsMember({"street", "aerial"}));
-  app.add_option("--frames", options.frames, "Frames")->check(CLI::Range(10, 10'000'000));
+  add_scene_options(app, options.scene);
   app.add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 1024));
   app.add_option("--threads", options.threads, "Threads per rank")->check(CLI::Range(1, 1024));
-  app.add_option("--seed", options.seed, "Seed of the simulation");
-  app.add_option("--folder", options.folder, "Where block and job go and stay; by default nothing stays");
   CLI11_PARSE(app, argc, argv);
   try {
     const ScratchDirectory scratch;
-    const fs::path folder = options.folder.empty() ? fs::path(scratch.path()) : options.folder;
+    const fs::path folder = options.scene.folder.empty() ? fs::path(scratch.path()) : options.scene.folder;
     std::printf("%s\n", measure(options, folder).dump().c_str());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "adjust_scale: %s\n", error.what());

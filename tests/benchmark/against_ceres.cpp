@@ -1,0 +1,431 @@
+// The merge of a block in tiles against Ceres, which holds it as one problem:
+//
+//   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
+//
+// Scenes: tests/benchmark/scenes.h. A job of the block gives the tiles, the observations it kept and its solution;
+// every component of every pose is moved off it by a normal deviate of its sigma. From there, with the same
+// observations, points and sigmas, run, each in processes of their own, the merge on two ranks and Ceres on two
+// threads: SPARSE_SCHUR with automatic and with analytic derivatives, ITERATIVE_SCHUR (Schur-Jacobi, three steps) with
+// analytic ones. Of these the one with the fastest iterations is the best.
+//
+// Prints one JSON object as its last line: relative_cost_difference ((ours - Ceres') / Ceres', of the best
+// SPARSE_SCHUR) and max_pose_difference_sigmas of what they end with, seconds_per_iteration_ratio and peak_memory_ratio
+// (Ceres' / ours) against the best setting, and the figures of all runs. seconds_per_iteration: median of the steps on
+// the wall clock, without reading and ordering; processor_seconds_per_iteration: of all threads or ranks; peak_rss_mib:
+// largest resident memory of the process, ours the sum of both.
+#include <ceres/ceres.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "adjust/ceres_problem.h"
+#include "adjust/image_sigma.h"
+#include "adjust/linearise.h"
+#include "adjust/sigma_scales.h"
+#include "cluster/arithmetic.h"
+#include "cluster/communicator.h"
+#include "cluster/monolithic_comparison.h"
+#include "cluster/process_memory.h"
+#include "cluster/rank_runner.h"
+#include "io/hdf5_file.h"
+#include "io/result.h"
+#include "io/unit_files.h"
+#include "tests/benchmark/scenes.h"
+#include "tests/unit/io/scratch_directory.h"
+
+namespace {
+
+using namespace megablock;
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr int kRanks = 2, kThreads = 2;
+
+double median(std::vector<double> values) {
+  if (values.empty()) throw ComputeError("no iteration was made");
+  std::nth_element(values.begin(), values.begin() + std::ssize(values) / 2, values.end());
+  return values[values.size() / 2];
+}
+
+// Wall clock and processor time between successive steps.
+class Steps {
+ public:
+  void add() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::clock_t processor = std::clock();
+    wall_.push_back(std::chrono::duration<double>(now - last_).count());
+    processor_.push_back(static_cast<double>(processor - last_processor_) / CLOCKS_PER_SEC);
+    last_ = now;
+    last_processor_ = processor;
+  }
+  void put(Json& figures) const {
+    figures["seconds_per_iteration"] = median(wall_);
+    figures["processor_seconds_per_iteration"] = median(processor_);
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  std::clock_t last_processor_ = std::clock();
+  std::vector<double> wall_, processor_;
+};
+
+struct Options {
+  SceneOptions scene;
+  std::string role;  // of a process that this program starts: "ours" or the name of Ceres' linear solver
+  bool analytic = false;
+  int tile_frames = 0;  // 0: as the program chooses
+  Options() { scene.frames = 2000; }
+};
+
+// What both sides start from, as files in one folder.
+struct Start {
+  fs::path folder;  // of the block
+  fs::path job() const { return folder / "job"; }
+  std::string file(const std::string& name) const { return (folder / "start" / name).string(); }
+  std::string tracks(std::int64_t tile) const { return file("tracks-" + std::to_string(tile) + ".h5"); }
+  std::string points(std::int64_t tile) const { return file("points-" + std::to_string(tile) + ".h5"); }
+};
+
+void write_points(const std::string& path, const std::vector<double>& coordinates) {
+  Hdf5Writer file(path, "points");
+  file.matrix("position", coordinates, 3);
+  file.close();
+}
+
+std::vector<Eigen::Vector3d> read_points(const std::string& path) {
+  const std::vector<double> values = Hdf5Reader(path, "points").matrix<double>("position", 3);
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t i = 0; i < values.size(); i += 3) points.emplace_back(values[i], values[i + 1], values[i + 2]);
+  return points;
+}
+
+// Tracks with two or more kept observations, without the others, and their points.
+void write_tile(const Start& start, const BlockResult& result, std::int64_t tile) {
+  TrackSet tracks;
+  tracks.begin = {0};
+  std::vector<double> points;
+  for (std::size_t t = 0; t < result.points.size(); ++t) {
+    const auto first = static_cast<std::size_t>(result.tracks.begin[t]),
+               last = static_cast<std::size_t>(result.tracks.begin[t + 1]);
+    if (result.file_tiles[t] != TileIndex(tile) || !result.points[t].allFinite() ||
+        std::count(result.kept.begin() + static_cast<std::ptrdiff_t>(first),
+                   result.kept.begin() + static_cast<std::ptrdiff_t>(last), 1) < 2)
+      continue;
+    for (std::size_t o = first; o < last; ++o) {
+      if (!result.kept[o]) continue;
+      tracks.image.push_back(result.tracks.image[o]);
+      tracks.x.push_back(result.tracks.x[o]);
+      tracks.y.push_back(result.tracks.y[o]);
+      tracks.feature.push_back(result.tracks.feature[o]);
+    }
+    tracks.id.push_back(result.tracks.id[t]);
+    tracks.begin.push_back(tracks.observation_count());
+    points.insert(points.end(), result.points[t].data(), result.points[t].data() + 3);
+  }
+  write_tracks(start.tracks(tile), tracks);
+  write_points(start.points(tile), points);
+}
+
+BlockState moved(const BlockResult& result, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> gauss;
+  BlockState state = result.state;
+  for (FrameIndex f(0); state.frames.contains(f); ++f.value) {
+    PoseIncrement d;
+    for (int k = 0; k < 6; ++k) d[k] = gauss(random) * std::sqrt(result.frame_covariance[f](k, k));
+    if (state.oriented[f]) state.frames[f] = pose_update(state.frames[f], d);
+  }
+  return state;
+}
+
+void write_start(const Start& start, const BlockResult& result, std::uint64_t seed) {
+  fs::create_directories(start.folder / "start");
+  for (std::int64_t t = 0; t < result.tiles.tile_count; ++t) write_tile(start, result, t);
+  write_state(start.file("state.h5"), moved(result, seed));
+  write_tiles(start.file("tiles.h5"), result.tiles);
+  Json sigmas{{"image_sigma_px", result.image_sigma_px}};
+  for (std::size_t k = 0; k < kObservationKinds; ++k)
+    sigmas["scales"].push_back(result.observation_table.kinds[k].scale);
+  std::ofstream(start.file("sigmas.json")) << sigmas;
+}
+
+// Everything but the tracks.
+struct Inputs {
+  explicit Inputs(const Start& start)
+      : block(read_block((start.job() / "block.h5").string())),
+        state(read_state(start.file("state.h5"))),
+        tiles(read_tiles(start.file("tiles.h5"))),
+        options(observation_options(JobStore(start.job().string()))) {
+    std::ifstream in(start.file("sigmas.json"));
+    const Json sigmas = Json::parse(in);
+    image_sigma_px = sigmas["image_sigma_px"];
+    for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] = sigmas["scales"][k];
+  }
+  RankTile tile(const Tiles& partition, TileIndex number, const TrackSet& tracks,
+                std::vector<Eigen::Vector3d> points) const {
+    RankTile made{number.value, make_tile_problem(block, state, partition, number, tracks, options), {}};
+    set_image_sigma(made.problem, image_sigma_px);
+    scale_sigmas(made.problem, scales);
+    points.resize(made.problem.points.size(), Eigen::Vector3d::Constant(std::nan("")));
+    made.state = make_tile_state(made.problem, state, std::move(points));
+    return made;
+  }
+
+  Block block;
+  BlockState state;
+  Tiles tiles;
+  ObservationOptions options;
+  double image_sigma_px = 0;
+  SigmaScales scales;
+};
+
+std::int64_t kept_observations(const TileProblem& problem) {
+  return std::count(problem.kept.begin(), problem.kept.end(), std::uint8_t{1});
+}
+
+// The poses that a process has at the end: its frames count as oriented.
+void write_end(const std::string& path, BlockState state, const std::vector<RankTile>& tiles) {
+  std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
+  for (const RankTile& tile : tiles)
+    for (std::size_t f = 0; f < tile.problem.frames.size(); ++f) {
+      state.frames[tile.problem.frames[f]] = tile.state.frames[f];
+      state.oriented[tile.problem.frames[f]] = 1;
+    }
+  write_state(path, state);
+}
+
+// Our side, on as many ranks as it was started on; each leaves its figures.
+void run_ours(const Start& start, Communicator& ranks) {
+  const Inputs inputs(start);
+  std::vector<std::int64_t> observations;
+  for (std::int64_t t = 0; t < inputs.tiles.tile_count; ++t)
+    observations.push_back(static_cast<std::int64_t>(fs::file_size(start.tracks(t))));
+  const std::vector<int> rank_of_tile = distribute_tiles(inputs.tiles.tree, observations, ranks.size());
+  std::vector<RankTile> tiles;
+  std::int64_t own = 0;
+  for (std::int64_t t = 0; t < inputs.tiles.tile_count; ++t)
+    if (rank_of_tile[static_cast<std::size_t>(t)] == ranks.rank()) {
+      tiles.push_back(
+          inputs.tile(inputs.tiles, TileIndex(t), read_tracks(start.tracks(t)), read_points(start.points(t))));
+      own += kept_observations(tiles.back().problem);
+    }
+  RankRunner runner(ranks, inputs.tiles.tree, rank_of_tile, std::move(tiles), MemoryOptions());
+  GlobalOptions options;
+  options.max_decrement = 1e-6;
+  GlobalState state = start_global(options);
+  Steps steps;
+  std::int32_t seen = 0;
+  adjust_globally(runner, options, state, [&](const GlobalState& now) {
+    if (now.iterations > seen) steps.add();  // else the end
+    seen = now.iterations;
+  });
+  write_end(start.file("end-" + std::to_string(ranks.rank()) + ".h5"), inputs.state, runner.tiles());
+  Json figures{{"cost", state.cost},
+               {"start_cost", state.initial_cost},
+               {"iterations", state.iterations},
+               {"observations", own},
+               {"peak_rss_mib", peak_rss_mib()}};
+  steps.put(figures);
+  std::ofstream(start.file("ours-" + std::to_string(ranks.rank()) + ".json")) << figures;
+}
+
+// All tiles' tracks as one, ascending.
+RankTile whole_block(const Start& start, const Inputs& inputs) {
+  TrackSet all;
+  all.begin = {0};
+  std::vector<Eigen::Vector3d> points;
+  {
+    std::vector<TrackSet> parts;
+    std::vector<std::vector<Eigen::Vector3d>> positions;
+    std::vector<std::tuple<TrackIndex, std::size_t, std::size_t>> order;
+    for (std::int64_t t = 0; t < inputs.tiles.tile_count; ++t) {
+      parts.push_back(read_tracks(start.tracks(t)));
+      positions.push_back(read_points(start.points(t)));
+      for (std::size_t row = 0; row < parts.back().id.size(); ++row)
+        order.emplace_back(parts.back().id[row], parts.size() - 1, row);
+    }
+    std::sort(order.begin(), order.end());
+    for (const auto& [id, part, row] : order) {
+      const TrackSet& from = parts[part];
+      for (auto o = static_cast<std::size_t>(from.begin[row]); o < static_cast<std::size_t>(from.begin[row + 1]); ++o) {
+        all.image.push_back(from.image[o]);
+        all.x.push_back(from.x[o]);
+        all.y.push_back(from.y[o]);
+        all.feature.push_back(from.feature[o]);
+      }
+      all.id.push_back(id);
+      all.begin.push_back(all.observation_count());
+      points.push_back(positions[part][row]);
+    }
+  }
+  return inputs.tile(single_tile(inputs.block), TileIndex(0), all, std::move(points));
+}
+
+// Called behind every step, and first behind the evaluation of the start.
+class StepWatch : public ceres::IterationCallback {
+ public:
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    if (summary.iteration == 0) steps = Steps();
+    if (summary.iteration > 0) steps.add();
+    return ceres::SOLVER_CONTINUE;
+  }
+  Steps steps;
+};
+
+void run_ceres(const Start& start, const Options& options) {
+  const Inputs inputs(start);
+  RankTile tile = whole_block(start, inputs);
+  CeresTile problem(
+      tile.problem, tile.state,
+      {options.analytic ? CeresOptions::Derivatives::kAnalytic : CeresOptions::Derivatives::kAutomatic, {}});
+  ceres::Solver::Options solver;
+  if (!ceres::StringToLinearSolverType(options.role, &solver.linear_solver_type))
+    throw InputError(options.role + ": no such solver");
+  if (solver.linear_solver_type == ceres::ITERATIVE_SCHUR) solver.preconditioner_type = ceres::SCHUR_JACOBI;
+  solver.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<double*> blocks;
+  problem.problem().GetParameterBlocks(&blocks);
+  for (double* block : blocks) solver.linear_solver_ordering->AddElementToGroup(block, problem.is_point(block) ? 0 : 1);
+  solver.function_tolerance = solver.gradient_tolerance = solver.parameter_tolerance = 1e-16;
+  const bool direct = solver.linear_solver_type == ceres::SPARSE_SCHUR;
+  solver.max_num_iterations = direct ? 12 : 3;  // of the other only the speed is asked
+  StepWatch watch;
+  solver.callbacks = {&watch};
+  solver.num_threads = kThreads;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem.problem(), &summary);
+  if (!summary.IsSolutionUsable()) throw ComputeError("Ceres: " + summary.message);
+  const double peak = peak_rss_mib();
+  problem.store(tile.state);
+  const std::string name = options.role + (options.analytic ? "-analytic" : "-automatic");
+  Json figures{{"solver", options.role},
+               {"derivatives", options.analytic ? "analytic" : "automatic"},
+               {"cost", summary.final_cost},
+               {"start_cost", summary.initial_cost},
+               {"iterations", summary.iterations.size() - 1},
+               {"observations", kept_observations(tile.problem)},
+               {"peak_rss_mib", peak}};
+  watch.steps.put(figures);
+  std::ofstream(start.file(name + ".json")) << figures;
+  std::vector<RankTile> tiles;
+  tiles.push_back(std::move(tile));
+  write_end(start.file("end-" + name + ".h5"), inputs.state, tiles);
+}
+
+Json json_of(const std::string& path) {
+  std::ifstream in(path);
+  return Json::parse(in);
+}
+
+Json figures_of_ours(const Start& start) {
+  Json ours = json_of(start.file("ours-0.json"));
+  for (int r = 1; r < kRanks; ++r) {
+    const Json other = json_of(start.file("ours-" + std::to_string(r) + ".json"));
+    ours["observations"] = ours["observations"].get<std::int64_t>() + other["observations"].get<std::int64_t>();
+    for (const char* figure : {"peak_rss_mib", "processor_seconds_per_iteration"})
+      ours[figure] = ours[figure].get<double>() + other[figure].get<double>();
+  }
+  ours["solver"] = "megablock, " + std::to_string(kRanks) + " ranks";
+  return ours;
+}
+
+double pose_difference_sigmas(const Start& start, const BlockResult& result, const std::string& ceres_end) {
+  const BlockState ceres = read_state(ceres_end);
+  double largest = 0;
+  for (int r = 0; r < kRanks; ++r) {
+    const BlockState ours = read_state(start.file("end-" + std::to_string(r) + ".h5"));
+    for (FrameIndex f(0); ours.frames.contains(f); ++f.value) {
+      if (!ours.oriented[f]) continue;
+      const Pose &a = ceres.frames[f], &b = ours.frames[f];
+      PoseIncrement d;
+      d << rotation_log<double>(a.rotation.conjugate() * b.rotation), b.centre - a.centre;
+      for (int k = 0; k < 6; ++k)
+        largest = std::max(largest, std::abs(d[k]) / std::sqrt(result.frame_covariance[f](k, k)));
+    }
+  }
+  return largest;
+}
+
+Json compare(const Options& options, const fs::path& folder) {
+  const Start start{folder};
+  const bool made = !fs::exists(folder / "block.yaml");
+  simulate_scene(options.scene, folder);
+  if (made && options.tile_frames > 0)
+    std::ofstream(folder / "block.yaml", std::ios::app) << "tiles: {tile_max_frames: " << options.tile_frames << "}\n";
+  if (!fs::exists(start.job() / "result/block.h5")) run_scene(folder, start.job(), kRanks, 1);
+  const BlockResult result = read_result((start.job() / "result/block.h5").string());
+  write_start(start, result, options.scene.seed);
+
+  const std::string self =
+      "'" + fs::canonical("/proc/self/exe").string() + "' --folder '" + folder.string() + "' --role ";
+  run_command(on_ranks(kRanks) + self + "ours");
+  const Json ours = figures_of_ours(start);
+  std::vector<Json> runs;
+  for (const std::string run : {"SPARSE_SCHUR", "SPARSE_SCHUR --analytic", "ITERATIVE_SCHUR --analytic"}) {
+    run_command(self + run);
+    const bool analytic = run.ends_with("--analytic");
+    runs.push_back(
+        json_of(start.file(run.substr(0, run.find(' ')) + (analytic ? "-analytic" : "-automatic") + ".json")));
+  }
+  const auto faster = [](const Json& a, const Json& b) {
+    return a["seconds_per_iteration"].get<double>() < b["seconds_per_iteration"].get<double>();
+  };
+  const Json best = *std::min_element(runs.begin(), runs.end(), faster);
+  const Json direct = *std::min_element(runs.begin(), runs.begin() + 2, faster);
+  const auto ratio = [&](const char* figure) { return best[figure].get<double>() / ours[figure].get<double>(); };
+  const double ceres_cost = direct["cost"];
+  return {{"scene", options.scene.scene},
+          {"frames", options.scene.frames},
+          {"images", result.block.images.size()},
+          {"tiles", result.tiles.tile_count},
+          {"relative_cost_difference", (ours["cost"].get<double>() - ceres_cost) / ceres_cost},
+          {"max_pose_difference_sigmas",
+           pose_difference_sigmas(start, result,
+                                  start.file("end-SPARSE_SCHUR-" + direct["derivatives"].get<std::string>() + ".h5"))},
+          {"seconds_per_iteration_ratio", ratio("seconds_per_iteration")},
+          {"processor_seconds_per_iteration_ratio", ratio("processor_seconds_per_iteration")},
+          {"peak_memory_ratio", ratio("peak_rss_mib")},
+          {"ours", ours},
+          {"ceres", best},
+          {"ceres_runs", runs}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("The merge against Ceres on one simulated block; prints one JSON object");
+  add_scene_options(app, options.scene);
+  app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most, of a block that is not there yet");
+  app.add_option("--role", options.role)->group("");
+  app.add_flag("--analytic", options.analytic)->group("");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const Start start{options.scene.folder};
+    if (options.role == "ours") {
+      pin_arithmetic(argv);
+      limit_libraries_to_one_thread();
+      Communicator ranks(&argc, &argv);
+      run_ours(start, ranks);
+    } else if (!options.role.empty()) {
+      run_ceres(start, options);
+    } else {
+      const ScratchDirectory scratch;
+      const fs::path folder = options.scene.folder.empty() ? fs::path(scratch.path()) : options.scene.folder;
+      std::printf("%s\n", compare(options, folder).dump().c_str());
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "against_ceres: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
