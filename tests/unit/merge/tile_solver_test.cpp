@@ -231,6 +231,7 @@ TEST(TileSolver, WholeAdjustmentFromAPoorStart) {
     simulation.start_position_error_m = 3;
     simulation.start_rotation_error_deg = 3;
     simulation.outlier_share = 0.1;
+    simulation.points_per_frame = 500;  // more than the first approach takes
     SingleTile tile(simulation), again(simulation);
     const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
     EXPECT_NEAR(summary.sigma0, 1, 0.05);
