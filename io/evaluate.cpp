@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -125,6 +126,7 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
                      double variance_factor, Evaluation& evaluation) {
   RootMeanSquare position, rotation, relative;
   NormalisedError normalised_position, normalised_rotation;
+  std::array<NormalisedError, 2> position_by_place, rotation_by_place;  // interior, boundary
   double largest = 0;
   const Eigen::Matrix3d turn = similarity.rotation.toRotationMatrix();
   const Eigen::Matrix3d stretch = similarity.scale * turn;
@@ -145,8 +147,14 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     previous_error = error;
     if (result.frame_covariance.empty()) continue;
     const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
-    normalised_rotation.add(angle, turn * covariance.topLeftCorner<3, 3>() * turn.transpose());
-    normalised_position.add(error, stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose());
+    const Eigen::Matrix3d rotation_covariance = turn * covariance.topLeftCorner<3, 3>() * turn.transpose(),
+                          position_covariance = stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose();
+    normalised_rotation.add(angle, rotation_covariance);
+    normalised_position.add(error, position_covariance);
+    if (result.boundary.empty()) continue;
+    const std::size_t place = result.boundary[m.frame] != 0;
+    rotation_by_place[place].add(angle, rotation_covariance);
+    position_by_place[place].add(error, position_covariance);
   }
   evaluation.frames = position.count();
   evaluation.position_rms_m = position.value();
@@ -155,6 +163,10 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   evaluation.relative_position_rms_m = relative.value();
   evaluation.normalised_error_position = normalised_position.value();
   evaluation.normalised_error_rotation = normalised_rotation.value();
+  evaluation.normalised_error_position_interior = position_by_place[0].value();
+  evaluation.normalised_error_rotation_interior = rotation_by_place[0].value();
+  evaluation.normalised_error_position_boundary = position_by_place[1].value();
+  evaluation.normalised_error_rotation_boundary = rotation_by_place[1].value();
 }
 
 void evaluate_control(const BlockResult& result, double variance_factor, Evaluation& evaluation) {
@@ -243,6 +255,10 @@ std::string to_json(const Evaluation& e) {
   json["relative_position_rms_m"] = e.relative_position_rms_m;
   json["normalised_error_position"] = e.normalised_error_position;
   json["normalised_error_rotation"] = e.normalised_error_rotation;
+  json["normalised_error_position_interior"] = e.normalised_error_position_interior;
+  json["normalised_error_rotation_interior"] = e.normalised_error_rotation_interior;
+  json["normalised_error_position_boundary"] = e.normalised_error_position_boundary;
+  json["normalised_error_rotation_boundary"] = e.normalised_error_rotation_boundary;
   json["check_points"] = e.check_points;
   json["check_rms_m"] = e.check_rms_m;
   json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;

@@ -31,7 +31,11 @@ struct Evaluation {
   double position_max_m = kNone;
   double rotation_rms_deg = kNone;         // root mean square rotation angle
   double relative_position_rms_m = kNone;  // errors of the vectors between successive frames of a pass
-  double normalised_error_position = kNone, normalised_error_rotation = kNone;  // none without covariances
+  // sqrt of the mean of e'C^-1 e / 3 over the frames, and over those touched by one tile and by several; none without
+  // covariances.
+  double normalised_error_position = kNone, normalised_error_rotation = kNone;
+  double normalised_error_position_interior = kNone, normalised_error_rotation_interior = kNone;
+  double normalised_error_position_boundary = kNone, normalised_error_rotation_boundary = kNone;
   std::int64_t check_points = 0, control_points = 0;                            // with an adjusted position
   double check_rms_m = kNone, check_rms_horizontal_m = kNone, check_rms_vertical_m = kNone;
   double control_rms_m = kNone;

@@ -85,6 +85,21 @@ TEST_F(EvaluateTest, StatedSigmasAreTrue) {
   EXPECT_NEAR(e.relative_position_rms_m, std::sqrt(2 * sum), 0.1 * e.position_rms_m);  // independent errors
 }
 
+TEST_F(EvaluateTest, BoundaryFramesApart) {
+  EXPECT_FALSE(std::isfinite(evaluate(result_, simulated_.truth).normalised_error_position_boundary));
+  result_.boundary.assign(result_.block.frames.size(), 0);
+  for (std::size_t f = 0; f < result_.boundary.size(); f += 2) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    result_.boundary[frame] = 1;
+    result_.frame_covariance[frame] /= 9;
+  }
+  const Evaluation e = evaluate(result_, simulated_.truth);
+  EXPECT_NEAR(e.normalised_error_position_interior, 1, 0.06);
+  EXPECT_NEAR(e.normalised_error_rotation_interior, 1, 0.06);
+  EXPECT_NEAR(e.normalised_error_position_boundary, 3, 0.18);
+  EXPECT_NEAR(e.normalised_error_rotation_boundary, 3, 0.18);
+}
+
 TEST_F(EvaluateTest, SigmasTooSmallShow) {
   for (auto& covariance : result_.frame_covariance) covariance /= 4;
   const Evaluation e = evaluate(result_, simulated_.truth);
