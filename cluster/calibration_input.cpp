@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "cluster/job_options.h"
+#include "cluster/stages/given_tracks.h"
 #include "io/error.h"
 #include "io/job_store.h"
 #include "io/project.h"
@@ -40,8 +41,8 @@ CalibrationInput of_project(const std::string& path) {
   if (project.tie_points.empty())
     throw InputError(path + ": the project has no 'tie_points'; run 'megablock run " + path +
                      " -j JOB' and give JOB instead");
-  CalibrationInput input{
-      std::move(project.block), {}, read_tracks(project.tie_points), read_options(project.settings).adjustment};
+  TrackSet tracks = read_given_tracks(project.tie_points, project.block);
+  CalibrationInput input{std::move(project.block), {}, std::move(tracks), read_options(project.settings).adjustment};
   input.state = initial_state(input.block);
   return input;
 }

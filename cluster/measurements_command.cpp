@@ -35,16 +35,19 @@ void check(const MeasurementsOptions& options) {
     throw InputError("measurements: either --image or --frame, or --near; see 'megablock measurements --help'");
   if (by_place && options.near.size() != 2 && options.near.size() != 3)
     throw InputError("measurements: --near takes EAST,NORTH or EAST,NORTH,UP in metres");
-  if (by_place != (options.radius_m > 0)) throw InputError("measurements: --near and --radius belong together");
+  if (by_place && !(options.radius_m > 0)) throw InputError("measurements: --near needs --radius METRES");
+  if (!by_place && options.radius_m > 0) throw InputError("measurements: --radius is for --near EAST,NORTH[,UP]");
+  for (const double coordinate : options.near)
+    if (!std::isfinite(coordinate)) throw InputError("measurements: --near takes finite numbers, in metres");
 }
 
 Measurements ask(const MeasurementStore& store, const MeasurementsOptions& options) {
   if (!options.near.empty()) {
     const double up = options.near.size() == 3 ? options.near[2] : std::nan("");
     Measurements found = store.near({{options.near[0], options.near[1], up}, options.radius_m});
-    for (const std::string& line : unfinished_stages(JobStore(options.job)))
+    if (const std::vector<std::string> stale = unfinished_stages(JobStore(options.job)); !stale.empty())
       std::fprintf(stderr, "megablock: warning: %s: places are those of an older result; %s\n", options.job.c_str(),
-                   line.c_str());
+                   stale.front().c_str());
     return found;
   }
   std::vector<ImageIndex> images = store.find_images(options.images);
@@ -66,13 +69,13 @@ std::string number(float value, bool json) {
   return std::isfinite(value) ? fmt::format("{:.4f}", value) : json ? "null" : "";
 }
 
-std::string table(const MeasurementStore& store, const Measurements& rows, bool json) {
+// adjusted: with what the result says of the rows.
+std::string table(const MeasurementStore& store, const Measurements& rows, bool adjusted, bool json) {
   std::vector<ImageIndex> images = rows.image;
   std::sort(images.begin(), images.end());
   images.erase(std::unique(images.begin(), images.end()), images.end());
   std::vector<std::string> names = store.names_of(images);
   for (std::string& name : names) name = quoted(name, json);
-  const bool adjusted = !rows.kept.empty();
   std::string text = json ? "[" : "image,track,x_px,y_px,feature,tile";
   if (!json) text += adjusted ? ",kept,residual_x_px,residual_y_px\n" : "\n";
   for (std::size_t r = 0; r < rows.image.size(); ++r) {
@@ -95,7 +98,7 @@ std::string table(const MeasurementStore& store, const Measurements& rows, bool 
 int measurements(const MeasurementsOptions& options) {
   check(options);
   const MeasurementStore store(options.job);
-  const std::string text = table(store, ask(store, options), options.json);
+  const std::string text = table(store, ask(store, options), !options.near.empty(), options.json);
   if (options.output.empty()) {
     std::fwrite(text.data(), 1, text.size(), stdout);
   } else {
@@ -120,6 +123,7 @@ void add_measurements(CLI::App& app, std::function<int()>& action) {
   command
       ->add_option("--near", options->near, "Ground position EAST,NORTH[,UP], m; without UP distances are horizontal")
       ->delimiter(',')
+      ->type_name("EAST,NORTH[,UP]")
       ->expected(1, 3)
       ->allow_extra_args(false);
   command->add_option("--radius", options->radius_m, "About that position, m: of the adjusted points")

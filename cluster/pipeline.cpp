@@ -13,6 +13,7 @@
 #include "cluster/collective.h"
 #include "cluster/exit_codes.h"
 #include "cluster/process_memory.h"
+#include "cluster/stages/given_tracks.h"
 #include "cluster/stages/stages.h"
 #include "cluster/version.h"
 #include "io/error.h"
@@ -208,7 +209,7 @@ TrackSet read_all_tracks(const Job& job, const std::vector<std::string>& units) 
 
 TrackSource track_source(Job& job, const std::string& tie_points) {
   if (!tie_points.empty()) {
-    TrackSource source{tie_points, 0, [tie_points] { return read_tracks(tie_points); }, {}};
+    TrackSource source{tie_points, 0, [&job, tie_points] { return read_given_tracks(tie_points, job.block); }, {}};
     source.fingerprint = std::stoull(on_first_rank(job.ranks, [&] { return std::to_string(hash_file(tie_points)); }));
     return source;
   }

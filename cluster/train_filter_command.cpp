@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "cluster/exit_codes.h"
+#include "cluster/stages/given_tracks.h"
 #include "io/error.h"
 #include "io/job_store.h"
 #include "io/project.h"
@@ -64,7 +65,7 @@ int train(const TrainFilterOptions& options) {
       !options.labels.empty() ? options.labels : (fs::path(project.file).parent_path() / "truth_tracks.h5").string();
   if (!fs::exists(labels))
     throw InputError(labels + ": no such file; --labels names a file that says which observations are wrong");
-  const TrackSet tracks = read_tracks(project.tie_points);
+  const TrackSet tracks = read_given_tracks(project.tie_points, project.block);
   const std::vector<LabelledMatch> matches =
       labelled_matches(project.block, tracks, read_truth_tracks(labels).outlier, {}, options.seed);
   const auto right = std::count_if(matches.begin(), matches.end(), [](const LabelledMatch& m) { return m.right; });

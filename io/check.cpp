@@ -9,6 +9,7 @@
 #include "io/error.h"
 #include "io/events.h"
 #include "io/hdf5_file.h"
+#include "io/measurement_index.h"
 #include "io/measurements.h"
 #include "io/registration.h"
 #include "io/result.h"
@@ -101,6 +102,8 @@ class Check {
   void check_tile_files() {
     if (!store_.seal("tiles.h5")) return;
     const std::int64_t tiles = read_tiles(store_.verified_path("tiles.h5")).tile_count;
+    if (store_.seal(kTrackList) && !std::filesystem::exists(store_.path(kMeasurementIndex)))
+      problems_.push_back(store_.path(kMeasurementIndex) + ": is missing; run the job again to make it");
     for (const char* folder : {"tracks", "adjust"}) {
       const std::vector<std::string> names = store_.list(folder);
       std::int64_t found = 0;

@@ -160,6 +160,8 @@ std::vector<TileIndex> MeasurementStore::tiles_of(const std::vector<ImageIndex>&
   if (!index_) {
     const auto tracks = store_.seal(kTrackList);
     if (!tracks) throw InputError(store_.directory() + ": the job has no tracks yet; run it as far as 'match'");
+    if (!std::filesystem::exists(store_.path(kMeasurementIndex)))
+      throw StoreError(store_.path(kMeasurementIndex) + ": is missing; run the job again to make it");
     const std::string path = store_.verified_path(kMeasurementIndex);
     if (!store_.up_to_date(kMeasurementIndex, measurement_index_fingerprint(*tracks)))
       throw StoreError(path + ": is older than the job's tracks; run the job again");

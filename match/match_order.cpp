@@ -26,7 +26,7 @@ MatchOrder::~MatchOrder() {
 
 void MatchOrder::fail(const char* what) const {
   throw StoreError(memory_.scratch_file + ": matches could not be " + what + " (" + std::strerror(errno) +
-                   "); free space in the job's folder");
+                   "); the job's folder must be writable, with free space");
 }
 
 void MatchOrder::add(const VerifiedPair& pair, std::int32_t generation) {
@@ -43,6 +43,8 @@ void MatchOrder::add(const VerifiedPair& pair, std::int32_t generation) {
 
 void MatchOrder::write_run() {
   if (!file_) {
+    std::error_code ignored;  // what matters is whether the file can be made
+    std::filesystem::create_directories(std::filesystem::path(memory_.scratch_file).parent_path(), ignored);
     file_.reset(std::fopen(memory_.scratch_file.c_str(), "w+b"));
     if (!file_) fail("sorted");
     run_begin_.push_back(0);

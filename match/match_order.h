@@ -1,7 +1,8 @@
 // The matches of a block in the order in which tracks are made of them, which does not depend on the cells they came
 // from: by generation; then pairs with many matches first, as their links are the surest; then by image.
 //
-// More than memory holds are sorted in runs of `memory_bytes` that wait in a scratch file and are merged while read.
+// More than memory holds are sorted in runs of MatchMemory::bytes that wait in a scratch file and are merged while
+// read.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +48,6 @@ class MatchOrder {
     bool operator<(const Header& other) const;
   };
   class Run;
-  void sort();
   void write_run();
   void visit_memory(const std::function<void(const PairMatches&)>& visit);
   void visit_runs(const std::function<void(const PairMatches&)>& visit);

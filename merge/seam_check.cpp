@@ -72,13 +72,14 @@ Eigen::VectorXd scale_of(const Eigen::MatrixXd& s) {
   return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
 }
 
-UnknownCheck check_unknown(const Quadratic& tile, const Eigen::MatrixXd& covariance, const Unknown& unknown,
+// product: covariance times tile.s.
+UnknownCheck check_unknown(const Quadratic& tile, const Eigen::MatrixXd& product, const Unknown& unknown,
                            std::int64_t row, double probability, double variance_factor) {
   UnknownCheck check;
   check.id = unknown.id;
   const auto rows = tile.s.middleRows(row, unknown.dimension);
   const Eigen::MatrixXd own = rows.middleCols(row, unknown.dimension);
-  const Eigen::MatrixXd left = own - rows * covariance * rows.transpose();
+  const Eigen::MatrixXd left = own - rows * product.middleCols(row, unknown.dimension);
   // In units of what the tile knows; directions that it alone knows leave nothing to test.
   constexpr double kShared = 1e-6;
   const Eigen::VectorXd scale = scale_of(own);
@@ -142,7 +143,8 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   const Eigen::Index n = own.b.size();
   if (n == 0) return check;
   const Eigen::Map<const Eigen::MatrixXd> covariance(c.matrix.data(), n, n);
-  const Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n) - covariance * own.s;
+  const Eigen::MatrixXd product = covariance * own.s;
+  const Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n) - product;
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
   solver.setThreshold(kRankTolerance);
   solver.compute(system);
@@ -153,7 +155,7 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
 
   const std::vector<std::int64_t> rows = row_offsets(condensed.unknowns);
   for (std::size_t u = 0; u < condensed.unknowns.size(); ++u)
-    insert(check_unknown(own, covariance, condensed.unknowns[u], rows[u],
+    insert(check_unknown(own, product, condensed.unknowns[u], rows[u],
                          probability / static_cast<double>(condensed.unknowns.size()), variance_factor),
            check.worst);
   return check;

@@ -190,8 +190,8 @@ class Bisector {
     const auto count = static_cast<std::int64_t>(nodes.size());
     if (count > max_leaf_) {
       const double margin = nodes.size() == result_.leaf_of_node.size() ? kPlanMargin : kSplitMargin;
-      leaves = std::max<std::int64_t>(
-          leaves, std::llround(std::ceil(margin * static_cast<double>(count) / static_cast<double>(max_leaf_))));
+      leaves = std::max<std::int64_t>(leaves, static_cast<std::int64_t>(std::ceil(margin * static_cast<double>(count) /
+                                                                                  static_cast<double>(max_leaf_))));
     }
     leaves = std::min(leaves, count);
     if (leaves <= 1) return add_leaf(nodes);

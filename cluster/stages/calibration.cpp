@@ -6,6 +6,7 @@
 
 #include "adjust/registration/frame_resection.h"
 #include "cluster/collective.h"
+#include "cluster/stages/given_tracks.h"
 #include "cluster/version.h"
 #include "io/calibration_report.h"
 #include "io/project.h"
@@ -28,7 +29,8 @@ VerificationSite read_site(const std::string& file) {
   resect_missing(project.block, state);
   for (FrameIndex f(0); project.block.frames.contains(f); ++f.value)
     if (state.oriented[f]) project.block.frames[f].given_pose = state.frames[f];
-  return {std::move(project.block), read_tracks(project.tie_points)};
+  TrackSet tracks = read_given_tracks(project.tie_points, project.block);
+  return {std::move(project.block), std::move(tracks)};
 }
 
 // What is left without a pose takes no part.

@@ -7,6 +7,7 @@
 #include "adjust/tile_problem.h"
 #include "io/error.h"
 #include "io/track_reader.h"
+#include "io/unit_files.h"
 
 namespace megablock {
 
@@ -19,11 +20,12 @@ struct Owners {
   std::vector<std::int64_t> observations;  // [tiles]
 };
 
-Owners find_owners(const TrackReader& file, const Block& block, const Tiles& tiles) {
+Owners find_owners(const std::string& path, const TrackReader& file, const Block& block, const Tiles& tiles) {
   if (tiles.tile_count > std::numeric_limits<TileNumber>::max()) throw ComputeError("more than 2^31 tiles");
   Owners owners;
   owners.observations.resize(static_cast<std::size_t>(tiles.tile_count), 0);
   const auto add = [&](const TrackSet& batch) {
+    check_images(path, batch, block);
     for (std::int64_t t = 0; t < batch.track_count(); ++t) {
       const ImageIndex* images = batch.image.data();
       const TileIndex owner = owner_tile(block, tiles, images + batch.begin[t], images + batch.begin[t + 1]);
@@ -69,10 +71,25 @@ std::vector<TrackSet> read_tiles(const TrackReader& file, const Owners& owners, 
 
 }  // namespace
 
+void check_images(const std::string& tie_points, const TrackSet& tracks, const Block& block) {
+  for (const ImageIndex image : tracks.image)
+    if (!block.images.contains(image))
+      throw InputError(tie_points + ": names image " + std::to_string(image.value) + ", but the block has " +
+                       std::to_string(block.images.size()) +
+                       " images, counted from 0; 'tie_points' and 'block' of the "
+                       "project do not belong together");
+}
+
+TrackSet read_given_tracks(const std::string& tie_points, const Block& block) {
+  TrackSet tracks = read_tracks(tie_points);
+  check_images(tie_points, tracks, block);
+  return tracks;
+}
+
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
                        const std::function<void(const TrackSet&)>& take, std::int64_t observations_at_a_time) {
   const TrackReader file(tie_points);
-  const Owners owners = find_owners(file, block, tiles);
+  const Owners owners = find_owners(tie_points, file, block, tiles);
   const auto count = static_cast<TileNumber>(tiles.tile_count);
   for (TileNumber first = 0, last; first < count; first = last) {
     std::int64_t held = 0;

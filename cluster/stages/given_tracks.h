@@ -1,4 +1,4 @@
-// Deals tie points that are given with a job to the tiles that own them.
+// Tie points that are given with a job: read against its block, and dealt to the tiles that own them.
 #pragma once
 
 #include <functional>
@@ -10,9 +10,14 @@
 
 namespace megablock {
 
+// InputError when a track names an image that the block does not have.
+void check_images(const std::string& tie_points, const TrackSet& tracks, const Block& block);
+// The whole file, checked so.
+TrackSet read_given_tracks(const std::string& tie_points, const Block& block);
+
 // Calls `take` with the tracks of tile 0, 1, ... in turn. The file is read once to find the owners (4 bytes per track
 // are kept), then once for every run of tiles that hold up to `observations_at_a_time` together, which bounds the
-// memory (24 bytes each); the result does not depend on it.
+// memory (24 bytes each); the result does not depend on it. Errors as check_images.
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
                        const std::function<void(const TrackSet&)>& take,
                        std::int64_t observations_at_a_time = std::int64_t{1} << 23);

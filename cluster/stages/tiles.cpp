@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "cluster/stages/given_tracks.h"
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
 #include "io/hash.h"
@@ -56,6 +57,7 @@ Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points) {
     LinkWeights links;
     std::vector<FrameIndex> frames;
     const auto add_tracks = [&](const TrackSet& tracks) {
+      check_images(tie_points, tracks, job.block);
       for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
         frames.clear();
         for (std::int64_t o = tracks.begin[t]; o < tracks.begin[t + 1]; ++o)

@@ -5,7 +5,6 @@
 #include "match/tracks.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <set>
@@ -204,7 +203,6 @@ void build_tracks_by_tile(const Job& job, const std::vector<std::string>& matche
                           const std::function<void(const TrackSet&)>& take) {
   MatchMemory memory;
   memory.scratch_file = job.store.path("scratch/matches");
-  std::filesystem::create_directories(job.store.path("scratch"));
   TrackBuilder builder(job.block.images.size(), memory);
   add_pairs(job, matches, tiles, builder);
   builder.build();

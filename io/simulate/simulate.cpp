@@ -115,10 +115,12 @@ void SimulationOptions::check() const {
   require(std::isfinite(gps_sigma_m) && std::isfinite(attitude_sigma_deg), "sigmas of priors must be finite");
   require(relative_position_sigma_m <= 0 || relative_rotation_sigma_deg > 0,
           "relative_rotation_sigma_deg must be positive with relative_position_sigma_m");
-  require(start_offset_m >= 0 && std::isfinite(start_offset_m), "start_offset_m must not be negative");
-  require(start_offset_m == 0 || (relative_position_sigma_m > 0 && scene != Scene::kStereopolis),
-          "start_offset_m needs relative poses to integrate, and another scene than stereopolis");
-  require(start_chain_frames >= 2, "start_chain_frames must be at least 2");
+  require(start_offset_m >= 0 && std::isfinite(start_offset_m), "start_offset_m (--start-offset) must not be negative");
+  require(
+      start_offset_m == 0 || (relative_position_sigma_m > 0 && scene != Scene::kStereopolis),
+      "start_offset_m (--start-offset) needs relative poses to integrate (--relative-position-sigma) and another scene "
+      "than stereopolis");
+  require(start_chain_frames >= 2, "start_chain_frames (--start-chain) must be at least 2");
   require(control_points >= 0 && check_points >= 0, "control_points and check_points must not be negative");
   require(control_sigma_m > 0, "control_sigma_m must be positive");
   require(image_width >= 64 && image_height >= 64, "images must have at least 64 x 64 pixels");

@@ -6,6 +6,8 @@
 // overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated.
 #pragma once
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -37,7 +39,8 @@ inline void run_command(const std::string& command) {
 }
 
 inline std::string on_ranks(int ranks) {
-  return "mpirun --bind-to none --oversubscribe -n " + std::to_string(ranks) + " ";
+  const std::string as_root = "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 ";
+  return (::geteuid() == 0 ? as_root : "") + "mpirun --bind-to none --oversubscribe -n " + std::to_string(ranks) + " ";
 }
 
 inline std::string program() {

@@ -352,6 +352,31 @@ class BadInput(unittest.TestCase):
         self.assertIn("no tracks yet", asked("--image", "f000001.jpg"))
         (self.job / "result/block.h5").unlink()
         self.assertIn("no result yet", asked("--near", "1,2", "--radius", 3))
+        self.assertIn("finite", asked("--near", "1,nan", "--radius", 3))
+
+    def test_measurements_about_an_empty_place_have_all_columns(self):
+        header = "image,track,x_px,y_px,feature,tile,kept,residual_x_px,residual_y_px"
+        for place in ("0,0", "90000,0"):
+            rows = megablock("measurements", work / "clean_job", "--near", place, "--radius", 30).splitlines()
+            self.assertEqual(rows[0], header)
+            self.assertEqual(len(rows) > 1, place == "0,0")
+
+    def test_measurements_without_their_index(self):
+        shutil.copytree(work / "clean_job", self.job)
+        (self.job / "measurements.h5").unlink()
+        said = one_line(megablock("measurements", self.job, "--image", "f000001.jpg", expect=FAILED_UNITS))
+        self.assertIn("measurements.h5: is missing; run the job again", said)
+        checked = subprocess.run([MEGABLOCK, "check", self.job], capture_output=True, text=True)
+        self.assertEqual(checked.returncode, FAILED_UNITS)
+        self.assertIn("measurements.h5: is missing", checked.stdout)
+
+    def test_tie_points_of_another_block(self):
+        for name, frames in (("small", 6), ("large", 12)):
+            megablock("simulate", "--frames", frames, "-o", self.folder / name)
+        project = self.folder / "mixed.yaml"
+        project.write_text("block: small/given.h5\ntie_points: large/tie_points.h5\n")
+        said = one_line(megablock("match", project, "-j", self.job, "-q", expect=BAD_INPUT))
+        self.assertRegex(said, r"large/tie_points.h5: names image \d+, but the block has 6 images")
 
     def test_finished_job_computes_nothing(self):
         megablock("run", self.project, "-j", self.job, "-q")
