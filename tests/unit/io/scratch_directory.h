@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 
 namespace megablock {
@@ -12,7 +13,8 @@ class ScratchDirectory {
   ScratchDirectory() {
     // mkdtemp wants six X at the end and puts letters of its own in their place.
     std::string name = (std::filesystem::temp_directory_path() / "megablock-test-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(name + ": no scratch directory can be made here");
+    path_ = name;
   }
   ~ScratchDirectory() {
     std::error_code ignored;
