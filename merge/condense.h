@@ -102,6 +102,9 @@ struct TileCovariance {
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
   std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part
   ObservationTable observations;                    // of everything the tile observes
+  // Redundancy numbers of the image observations, along the image's x and y (no unit, 0 to 1; io/reliability.h), of the
+  // residual as its loss weights it: 1 - diag(J C J') / sigma^2. NaN for observations that take no part. [observations]
+  std::vector<float> redundancy_x, redundancy_y;
   // [points] of the further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

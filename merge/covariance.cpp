@@ -1,5 +1,7 @@
 // Covariances of a tile: down through the cells' fronts, then per point; with them the redundancy numbers of all
 // observations (io/observation_statistics.h), which are the same whatever holds a free datum.
+#include <limits>
+
 #include "merge/condense.h"
 #include "merge/point_equations.h"
 
@@ -33,6 +35,8 @@ class TileCovarianceBuilder {
       result_.cameras.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
     result_.mounts.assign(problem.mounts.size(), Eigen::Matrix<double, 6, 6>::Zero());
     result_.points.assign(problem.points.size(), Eigen::Matrix3d::Zero());
+    result_.redundancy_x.assign(problem.kept.size(), std::numeric_limits<float>::quiet_NaN());
+    result_.redundancy_y = result_.redundancy_x;
     row_of_unknown_.assign(plan.unknowns.size(), -1);
     invert(plan.unknown_of_frame, frame_of_);
     invert(plan.unknown_of_camera, camera_of_);
@@ -137,6 +141,7 @@ class TileCovarianceBuilder {
 
   void add_image_redundancy(std::int64_t point, const Eigen::Matrix3d& covariance) {
     ObservationStatistics& sums = result_.observations[image_kind(problem_.points[at(point)].role)];
+    std::int64_t row = problem_.begin[at(point)];  // the equations hold the kept ones in their order
     for (const auto& observation : equations_.observations()) {
       const auto& by_point = observation.by_point;
       const int count = equations_.jacobians(observation, jacobians_);
@@ -154,6 +159,9 @@ class TileCovarianceBuilder {
         }
       }
       for (int k = 0; k < 2; ++k) sums.add(observation.residual[k] * observation.residual[k], 1 - variance[k]);
+      while (!problem_.kept[at(row)]) ++row;
+      result_.redundancy_x[at(row)] = static_cast<float>(1 - variance[0]);
+      result_.redundancy_y[at(row++)] = static_cast<float>(1 - variance[1]);
     }
   }
 

@@ -1,8 +1,9 @@
-// Redundancy numbers equal the diagonal of I - J (J'J)^-1 J' of the whole system, kind by kind; and the sigmas that
-// residuals show are those of the noise, not those that were stated.
+// Redundancy numbers equal the diagonal of I - J (J'J)^-1 J' of the whole system, kind by kind and observation by
+// observation; and the sigmas that residuals show are those of the noise, not those that were stated.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <utility>
 
 #include "geometry/decompositions.h"
 #include "merge/monolithic.h"
@@ -29,19 +30,23 @@ ObservationTable table_of(const std::vector<TileCovariance>& tiles) {
   return sum;
 }
 
+Eigen::VectorXd redundancy_numbers(const MonolithicSystem& system, Eigen::Index defect) {
+  const Eigen::VectorXd scale = system.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = Eigen::MatrixXd(system.jacobian) * scale.asDiagonal();
+  const SymmetricEigen eigen = symmetric_eigen(scaled.transpose() * scaled);
+  Eigen::VectorXd inverse = eigen.values.cwiseInverse();
+  inverse.head(defect).setZero();
+  return Eigen::VectorXd::Ones(scaled.rows()) - (scaled * eigen.vectors).cwiseAbs2() * inverse;
+}
+
 // Of rows that see points and frames, points alone, one frame alone, others: from the columns alone.
 struct Expected {
   double image = 0, control = 0, frame = 0, other = 0;
   Expected(const MonolithicSystem& system, Eigen::Index defect) {
     const Eigen::MatrixXd j = system.jacobian;
-    const Eigen::VectorXd scale = system.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd scaled = j * scale.asDiagonal();
-    const SymmetricEigen eigen = symmetric_eigen(scaled.transpose() * scaled);
-    Eigen::VectorXd inverse = eigen.values.cwiseInverse();
-    inverse.head(defect).setZero();
-    const Eigen::MatrixXd across = scaled * eigen.vectors;
+    const Eigen::VectorXd numbers = redundancy_numbers(system, defect);
     for (Eigen::Index row = 0; row < j.rows(); ++row) {
-      const double redundancy = 1 - across.row(row).cwiseAbs2().dot(inverse);
+      const double redundancy = numbers[row];
       const bool point = (j.row(row).tail(j.cols() - system.reduced_dimension).array() != 0).any();
       const bool pose = (j.row(row).head(system.reduced_dimension).array() != 0).any();
       bool frames = false;
@@ -97,6 +102,64 @@ TEST_P(Redundancy, DoesNotDependOnTheDatum) {
   const ObservationTable table = table_of(runner.covariances());
   const Expected expected(monolithic_system(block.whole, block.whole_state), runner.gauge().defect);
   EXPECT_NEAR(table[kTieImage].redundancy, expected.image, 1e-5);
+}
+
+// Calibration held or shared by all tiles, datum fixed or free, some observations rejected.
+TEST_P(Redundancy, OfEveryImageObservationEqualsTheDenseSystem) {
+  for (const bool calibrate : {false, true}) {
+    for (const bool free : {false, true}) {
+      SimulationOptions options = small(GetParam(), 16, 20);
+      options.calibrate = calibrate;
+      if (free) options.gps_sigma_m = options.control_points = 0;
+      TiledBlock block(simulate_block(options), 6, {}, free ? 0 : 0.02);
+      ASSERT_GE(block.tiles.tile_count, 2);
+      for (std::size_t t = 0; t < block.problems.size(); ++t) {
+        TileProblem& problem = block.problems[t];
+        for (std::size_t p = 0; p < problem.points.size(); p += 5) {
+          problem.kept[static_cast<std::size_t>(problem.begin[p])] = 0;
+          block.whole.kept[static_cast<std::size_t>(block.whole.begin[block.point_row(problem.points[p])])] = 0;
+        }
+      }
+      SerialRunner runner(block.tiles.tree, block.problems, block.states);
+      runner.final_up();
+      ASSERT_EQ(runner.gauge().defect > 0, free);
+      const std::vector<TileCovariance> tiles = runner.covariances();
+
+      // The system's first rows are those of kept image observations of active points, as they come.
+      const Eigen::VectorXd numbers =
+          redundancy_numbers(monolithic_system(block.whole, block.whole_state), runner.gauge().defect);
+      std::vector<Eigen::Index> row_of(block.whole.kept.size(), -1);
+      Eigen::Index next = 0;
+      for (std::int64_t p = 0; p < block.whole.point_count(); ++p)
+        for (std::int64_t o = block.whole.begin[static_cast<std::size_t>(p)];
+             block.whole.active(p) && o < block.whole.begin[static_cast<std::size_t>(p + 1)]; ++o)
+          if (block.whole.kept[static_cast<std::size_t>(o)])
+            row_of[static_cast<std::size_t>(o)] = std::exchange(next, next + 2);
+
+      std::int64_t compared = 0;
+      for (std::size_t t = 0; t < tiles.size(); ++t) {
+        const TileProblem& problem = block.problems[t];
+        ASSERT_EQ(tiles[t].redundancy_x.size(), problem.kept.size());
+        ASSERT_EQ(tiles[t].redundancy_y.size(), problem.kept.size());
+        for (std::size_t p = 0; p < problem.points.size(); ++p) {
+          const auto first = static_cast<std::size_t>(problem.begin[p]);
+          const auto whole = static_cast<std::size_t>(block.whole.begin[block.point_row(problem.points[p])]);
+          for (std::size_t o = first; o < static_cast<std::size_t>(problem.begin[p + 1]); ++o) {
+            const Eigen::Index row = row_of[whole + o - first];
+            if (row < 0) {
+              EXPECT_TRUE(std::isnan(tiles[t].redundancy_x[o]) && std::isnan(tiles[t].redundancy_y[o]));
+              continue;
+            }
+            EXPECT_NEAR(tiles[t].redundancy_x[o], numbers[row], 1e-6);
+            EXPECT_NEAR(tiles[t].redundancy_y[o], numbers[row + 1], 1e-6);
+            ++compared;
+          }
+        }
+      }
+      EXPECT_EQ(2 * compared, next);
+      EXPECT_GT(compared, 200);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Redundancy,
