@@ -1,18 +1,26 @@
 // The merge of a block in tiles against Ceres, which holds it as one problem:
 //
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
+//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--exactness]
 //
-// Scenes: tests/benchmark/scenes.h. A job of the block gives the tiles, the observations it kept and its solution;
-// every component of every pose is moved off it by a normal deviate of its sigma. From there, with the same
-// observations, points and sigmas, run, each in processes of their own, the merge on two ranks and Ceres on two
-// threads: SPARSE_SCHUR with automatic and with analytic derivatives, ITERATIVE_SCHUR (Schur-Jacobi, three steps) with
-// analytic ones. Of these the one with the fastest iterations is the best.
+// Scenes: tests/benchmark/scenes.h. A job of the block on two ranks, merged to a decrement of 1e-7, gives the tiles,
+// the observations it kept and its solution. How exact this is (cluster/monolithic_comparison.h):
+// max_pose_difference_sigmas, the largest component of the undamped Newton step of one Ceres problem with automatic
+// derivatives at the solution over its posterior sigma; relative_cost_difference, how far Ceres lowers the cost from
+// there with all tolerances 1e-16. With --exactness these alone.
 //
-// Prints one JSON object as its last line: relative_cost_difference ((ours - Ceres') / Ceres', of the best
-// SPARSE_SCHUR) and max_pose_difference_sigmas of what they end with, seconds_per_iteration_ratio and peak_memory_ratio
-// (Ceres' / ours) against the best setting, and the figures of all runs. seconds_per_iteration: median of the steps on
-// the wall clock, without reading and ordering; processor_seconds_per_iteration: of all threads or ranks; peak_rss_mib:
-// largest resident memory of the process, ours the sum of both.
+// How fast: from the same job's observations, points and sigmas, with
+// every component of every pose moved off it by a normal deviate of its sigma, run, each in processes of their own, the
+// merge on two ranks and Ceres on two threads: SPARSE_SCHUR with automatic and with analytic derivatives,
+// ITERATIVE_SCHUR (Schur-Jacobi, three steps) with analytic ones. Of these the one with the fastest iterations is the
+// best.
+//
+// Prints one JSON object as its last line: the two figures above; of the second runs' ends
+// relative_cost_difference_of_runs ((ours - Ceres') / Ceres', of the best SPARSE_SCHUR) and
+// max_pose_difference_sigmas_of_runs (Ceres stops a little before its optimum); seconds_per_iteration_ratio and
+// peak_memory_ratio (Ceres' / ours) against the best setting; and the figures of all runs. seconds_per_iteration:
+// median of the steps on the wall clock, without reading and ordering; processor_seconds_per_iteration: of all threads
+// or ranks; peak_rss_mib: largest resident memory of the process, ours the sum of both.
 #include <ceres/ceres.h>
 
 #include <CLI/CLI.hpp>
@@ -79,9 +87,11 @@ class Steps {
 
 struct Options {
   SceneOptions scene;
-  std::string role;  // of a process that this program starts: "ours" or the name of Ceres' linear solver
+  std::string role;  // of a process that this program starts: "exactness", "ours" or the name of Ceres' linear solver
   bool analytic = false;
+  bool exactness = false;
   int tile_frames = 0;  // 0: as the program chooses
+  std::string loss = "huber";
   Options() { scene.frames = 2000; }
 };
 
@@ -147,7 +157,6 @@ BlockState moved(const BlockResult& result, std::uint64_t seed) {
 }
 
 void write_start(const Start& start, const BlockResult& result, std::uint64_t seed) {
-  fs::create_directories(start.folder / "start");
   for (std::int64_t t = 0; t < result.tiles.tile_count; ++t) write_tile(start, result, t);
   write_state(start.file("state.h5"), moved(result, seed));
   write_tiles(start.file("tiles.h5"), result.tiles);
@@ -355,18 +364,29 @@ double pose_difference_sigmas(const Start& start, const BlockResult& result, con
   return largest;
 }
 
-Json compare(const Options& options, const fs::path& folder) {
-  const Start start{folder};
-  const bool made = !fs::exists(folder / "block.yaml");
-  simulate_scene(options.scene, folder);
-  if (made && options.tile_frames > 0)
-    std::ofstream(folder / "block.yaml", std::ios::app) << "tiles: {tile_max_frames: " << options.tile_frames << "}\n";
-  if (!fs::exists(start.job() / "result/block.h5")) run_scene(folder, start.job(), kRanks, 1);
+void run_job(const Options& options, const Start& start) {
+  const bool made = !fs::exists(start.folder / "block.yaml");
+  simulate_scene(options.scene, start.folder);
+  if (made) {
+    std::ofstream project(start.folder / "block.yaml", std::ios::app);
+    project << "adjustment: {image_loss: " << options.loss << ", position_loss: " << options.loss << "}\n"
+            << "merge: {decrement: 1e-7}\n";
+    if (options.tile_frames > 0) project << "tiles: {tile_max_frames: " << options.tile_frames << "}\n";
+  }
+  if (!fs::exists(start.job() / "result/block.h5")) run_scene(start.folder, start.job(), kRanks, 1);
+}
+
+Json exactness(const Options& options, const Start& start, const std::string& self) {
+  run_command(self + "exactness");
+  Json figures = json_of(start.file("exactness.json"));
+  figures["scene"] = options.scene.scene;
+  figures["frames"] = options.scene.frames;
+  return figures;
+}
+
+Json speed(const Options& options, const Start& start, const std::string& self) {
   const BlockResult result = read_result((start.job() / "result/block.h5").string());
   write_start(start, result, options.scene.seed);
-
-  const std::string self =
-      "'" + fs::canonical("/proc/self/exe").string() + "' --folder '" + folder.string() + "' --role ";
   run_command(on_ranks(kRanks) + self + "ours");
   const Json ours = figures_of_ours(start);
   std::vector<Json> runs;
@@ -383,12 +403,8 @@ Json compare(const Options& options, const fs::path& folder) {
   const Json direct = *std::min_element(runs.begin(), runs.begin() + 2, faster);
   const auto ratio = [&](const char* figure) { return best[figure].get<double>() / ours[figure].get<double>(); };
   const double ceres_cost = direct["cost"];
-  return {{"scene", options.scene.scene},
-          {"frames", options.scene.frames},
-          {"images", result.block.images.size()},
-          {"tiles", result.tiles.tile_count},
-          {"relative_cost_difference", (ours["cost"].get<double>() - ceres_cost) / ceres_cost},
-          {"max_pose_difference_sigmas",
+  return {{"relative_cost_difference_of_runs", (ours["cost"].get<double>() - ceres_cost) / ceres_cost},
+          {"max_pose_difference_sigmas_of_runs",
            pose_difference_sigmas(start, result,
                                   start.file("end-SPARSE_SCHUR-" + direct["derivatives"].get<std::string>() + ".h5"))},
           {"seconds_per_iteration_ratio", ratio("seconds_per_iteration")},
@@ -399,6 +415,17 @@ Json compare(const Options& options, const fs::path& folder) {
           {"ceres_runs", runs}};
 }
 
+Json compare(const Options& options, const fs::path& folder) {
+  const Start start{folder};
+  run_job(options, start);
+  fs::create_directories(folder / "start");
+  const std::string self =
+      "'" + fs::canonical("/proc/self/exe").string() + "' --folder '" + folder.string() + "' --role ";
+  Json figures = exactness(options, start, self);
+  if (!options.exactness) figures.update(speed(options, start, self));
+  return figures;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -406,6 +433,12 @@ int main(int argc, char** argv) {
   CLI::App app("The merge against Ceres on one simulated block; prints one JSON object");
   add_scene_options(app, options.scene);
   app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most, of a block that is not there yet");
+  app.add_option("--calibration", options.scene.calibration, "Calibration held, or shared by all frames and adjusted")
+      ->check(CLI::IsMember({"held", "shared"}));
+  app.add_option("--loss", options.loss, "Robust loss of image measurements and positions")
+      ->check(CLI::IsMember({"none", "huber", "cauchy"}));
+  app.add_flag("--free", options.scene.free, "Without positions and attitudes");
+  app.add_flag("--exactness", options.exactness, "Only how exact the solution is, not how fast it is found");
   app.add_option("--role", options.role)->group("");
   app.add_flag("--analytic", options.analytic)->group("");
   CLI11_PARSE(app, argc, argv);
@@ -416,6 +449,10 @@ int main(int argc, char** argv) {
       limit_libraries_to_one_thread();
       Communicator ranks(&argc, &argv);
       run_ours(start, ranks);
+    } else if (options.role == "exactness") {
+      pin_arithmetic(argv);
+      limit_libraries_to_one_thread();
+      std::ofstream(start.file("exactness.json")) << compare_with_monolithic(JobStore(start.job().string()));
     } else if (!options.role.empty()) {
       run_ceres(start, options);
     } else {

@@ -4,6 +4,10 @@
 // per point, 0.5 px; position priors of 0.5 m on half of the frames, relative poses of 1 cm and 0.01 degrees;
 // calibration held; start = these integrated over stretches of 1 km, each off by up to 2 m. aerial: 80 % and 60 %
 // overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated.
+//
+// Of a street with shared calibration seven intrinsics of every camera are free, and of all mounts but the first six
+// unknowns with weak prior values (1 degree, 0.1 m). A free block has no positions and attitudes; the relative poses of
+// a street stay.
 #pragma once
 
 #include <unistd.h>
@@ -12,9 +16,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <numbers>
 #include <string>
 
 #include "io/error.h"
+#include "io/unit_files.h"
 
 namespace megablock {
 
@@ -23,6 +29,8 @@ struct SceneOptions {
   std::int64_t frames = 1000;
   std::uint64_t seed = 1;
   std::filesystem::path folder;  // empty: a temporary one, removed at the end
+  std::string calibration;       // "held", "shared"; empty: as the scene says
+  bool free = false;
 };
 
 inline void add_scene_options(CLI::App& app, SceneOptions& options) {
@@ -52,16 +60,32 @@ inline std::string block_of(const std::filesystem::path& folder) {
   return "'" + (folder / "block.yaml").string() + "' ";
 }
 
+inline void free_mounts(const std::filesystem::path& given) {
+  Block block = read_block(given.string());
+  for (Rig& rig : block.rigs)
+    for (std::size_t m = 1; m < rig.mounts.size(); ++m) {
+      rig.mounts[m].rotation_sigma_rad = std::numbers::pi / 180;
+      rig.mounts[m].position_sigma_m = 0.1;
+    }
+  write_block(given.string(), block);
+}
+
 // Unless the folder holds a block.
 inline void simulate_scene(const SceneOptions& options, const std::filesystem::path& folder) {
   if (std::filesystem::exists(folder / "block.yaml")) return;
-  const std::string scene =
-      options.scene == "street"
-          ? "--scene street --rig-cameras 10 --points-per-frame 1000 --gps-sigma 0.5 --gps-share 0.5 "
-            "--relative-position-sigma 0.01 --relative-rotation-sigma 0.01 --start-offset 2 --no-calibration"
-          : "--scene aerial --points-per-frame 300 --gps-sigma 0.05 --attitude-sigma 0.02";
+  const bool street = options.scene == "street";
+  std::string scene = street ? "--scene street --rig-cameras 10 --points-per-frame 1000 --relative-position-sigma 0.01 "
+                               "--relative-rotation-sigma 0.01 --start-offset 2"
+                             : "--scene aerial --points-per-frame 300";
+  if (options.free)
+    scene += " --gps-sigma 0";
+  else
+    scene += street ? " --gps-sigma 0.5 --gps-share 0.5" : " --gps-sigma 0.05 --attitude-sigma 0.02";
+  const bool held = options.calibration.empty() ? street : options.calibration == "held";
+  if (held) scene += " --no-calibration";
   run_command(program() + "simulate " + scene + " --frames " + std::to_string(options.frames) + " --seed " +
               std::to_string(options.seed) + " -o '" + folder.string() + "'");
+  if (street && !held) free_mounts(folder / "given.h5");
 }
 
 // Its job, from the beginning.
