@@ -1,6 +1,7 @@
 #include "merge/condense.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/decompositions.h"
 #include "merge/cell_assembler.h"
@@ -38,8 +39,11 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
     }
     for (const TileDatum::Hold& hold : datum.holds) {
       if (hold.frame != u.id) continue;
+      // Any weight holds what nothing observes.
       const Eigen::Matrix<double, 6, 1> root =
-          Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).cwiseSqrt();
+          Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).unaryExpr([](double d) {
+            return d > 0 ? std::sqrt(d) : 1;
+          });
       const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
       const Eigen::MatrixXd basis = orthonormal_basis(scaled);
       const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();

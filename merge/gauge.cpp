@@ -14,6 +14,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kNullDirection = 1e-11;  // of the largest eigenvalue; the matrix itself carries errors of 1e-15
 constexpr double kHeldDirection = 1e-6;   // of the largest singular value: what a frame can hold
+constexpr double kOnePlace = 1e-9;        // of the coordinates: extent of frames that are all at one place
+constexpr double kNoScale = 1e6;          // weight of a scale that moves nothing
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
@@ -79,12 +81,14 @@ BlockComponent component_of(const PartGroup& group) {
   double extent = 0;
   for (const GaugePart* part : group.parts)
     extent = std::max(extent, (part->extreme_centres.colwise() - c.centre).colwise().norm().maxCoeff());
-  if (extent > 0) c.extent = extent;
+  const bool one_place = extent <= kOnePlace * (1 + c.centre.norm());
+  if (!one_place) c.extent = extent;
   Matrix77 normal = Matrix77::Zero();
   for (const GaugePart* part : group.parts) {
     const Matrix77 change = change_of_reference(*part, c);
     normal += change.transpose() * part->normal * change;
   }
+  if (one_place) normal(6, 6) += kNoScale;  // a frame alone, say, known by its position only
   const Eigen::MatrixXd free = free_directions(normal);
   c.defect = free.cols();
   c.directions.leftCols(c.defect) = free;

@@ -35,7 +35,7 @@ Eigen::SparseMatrix<double> normal_matrix(const MonolithicSystem& system, const 
 
 // Rows that hold the frames of the constraints along their directions, as heavy as what observes them.
 DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem, const BlockGauge& gauge) {
-  const Eigen::VectorXd root = system.diagonal().cwiseSqrt();
+  const Eigen::VectorXd root = system.diagonal().unaryExpr([](double d) { return d > 0 ? std::sqrt(d) : 1; });
   std::vector<Eigen::Triplet<double>> entries;
   int rows = 0;
   for (const GaugeConstraint& c : gauge.constraints) {

@@ -1,5 +1,6 @@
 #include "merge/point_equations.h"
 
+#include <cmath>
 #include <map>
 
 namespace megablock {
@@ -93,6 +94,9 @@ void PointEquations::add_observation(std::int64_t point, std::int64_t row, bool 
     throw ComputeError("a kept observation of point " + std::to_string(problem_.points[at(point)].index) +
                        " lies behind image " + std::to_string(problem_.images[at(image)].image.value));
   const double squares = r.residual.squaredNorm();
+  if (!std::isfinite(squares))  // as a pivot it would pass for a direction that nothing observes
+    throw ComputeError("the observation of point " + std::to_string(problem_.points[at(point)].index) + " in image " +
+                       std::to_string(problem_.images[at(image)].image.value) + " or its sigma is not a finite number");
   const LossWeight weight(problem_.image_loss, squares, curvature);
   rho_ += weight.rho;
   weighted_squares_ += weight.first * squares;
