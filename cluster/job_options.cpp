@@ -191,10 +191,10 @@ JobOptions read_options(const StageSettings& settings) {
     (describe(reader, parts), ...);
     reader.finish();
   });
-  options.orientation.observations = options.adjustment.observations;  // one description for all stages
   for_each_section(options, [&](const std::string& section, const auto&... parts) {
     (check_section(settings, section, parts), ...);
   });
+  options.orientation.observations = options.adjustment.observations;  // one description for all stages
   return options;
 }
 

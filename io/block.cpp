@@ -1,5 +1,6 @@
 #include "io/block.h"
 
+#include <algorithm>
 #include <cmath>
 #include <unordered_set>
 
@@ -56,6 +57,8 @@ void check(const Block& block) {
   for (const Camera& camera : block.cameras) {
     require(camera.width > 0 && camera.height > 0, "camera '" + camera.name + "': width and height must be positive");
     require(camera.intrinsics[kFocal] > 0, "camera '" + camera.name + "': focal length must be positive (pixels)");
+    require(std::all_of(camera.intrinsics.begin(), camera.intrinsics.end(), [](double v) { return std::isfinite(v); }),
+            "camera '" + camera.name + "': a parameter is not a finite number");
     for (double sigma : camera.prior_sigma)
       require(sigma >= 0, "camera '" + camera.name + "': a prior sigma is negative or not a number");
   }
@@ -65,12 +68,15 @@ void check(const Block& block) {
     for (const Mount& mount : rig.mounts) {
       require(block.cameras.contains(mount.camera), "rig '" + rig.name + "': a mount names no camera of the block");
       check_unit(mount.pose, "rig '" + rig.name + "'");
+      require(mount.held() || (mount.rotation_sigma_rad > 0 && mount.position_sigma_m > 0),
+              "rig '" + rig.name + "': the sigmas of a mount must be both positive, or both 0 to hold it");
     }
   }
   for (const Frame& frame : block.frames) {
     require(block.rigs.contains(frame.rig), "frame '" + frame.name + "': names no rig of the block");
     if (frame.position_prior)
-      require(frame.position_prior->position.allFinite() && positive(frame.position_prior->sigma),
+      require(frame.position_prior->position.allFinite() && frame.position_prior->lever_arm.allFinite() &&
+                  positive(frame.position_prior->sigma),
               "frame '" + frame.name + "': position prior must be finite with positive sigmas (metres)");
     if (frame.attitude_prior)
       require(positive(frame.attitude_prior->sigma_rad) &&
@@ -93,6 +99,8 @@ void check(const Block& block) {
   }
   for (const ControlPoint& point : block.control_points) {
     require(positive(point.sigma), "control point '" + point.name + "': sigmas must be positive (metres)");
+    require(point.position.head<2>().allFinite() && !std::isinf(point.position.z()),
+            "control point '" + point.name + "': position must be finite (metres; height may be unknown)");
     for (const ImageMeasurement& m : point.measurements) {
       require(block.images.contains(m.image), "control point '" + point.name + "': names no image of the block");
       require(m.pixel.allFinite() && m.sigma_px > 0, "control point '" + point.name + "': bad image measurement");

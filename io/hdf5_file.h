@@ -218,6 +218,8 @@ class Hdf5Reader {
   void read(const std::string& name, ElementType type, void* values) const;
   std::size_t size_of_rows(const std::string& name, const std::vector<RowRange>& ranges) const;  // number of values
   void read_rows(const std::string& name, ElementType type, const std::vector<RowRange>& ranges, void* values) const;
+  // An error where integers are wanted of numbers that are none.
+  void check_class(std::int64_t set, const std::string& name, ElementType type) const;
   Hdf5Handle text_type(std::int64_t set, const std::string& name) const;  // of fixed-length strings, else an error
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, void* value) const;
   // Number of values of a dataset, whose shape must be as expected.

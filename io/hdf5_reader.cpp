@@ -116,10 +116,19 @@ std::size_t Hdf5Reader::size_of_rows(const std::string& name, const std::vector<
   return static_cast<std::size_t>(size);
 }
 
+void Hdf5Reader::check_class(std::int64_t set, const std::string& name, ElementType type) const {
+  const bool wants_integers = type != ElementType::kFloat && type != ElementType::kDouble;
+  const Hdf5Handle found(checked(H5Dget_type(set), name), &H5Tclose);
+  const H5T_class_t kind = H5Tget_class(found.id());
+  if (wants_integers && kind == H5T_FLOAT)
+    fail(name, "holds floating-point numbers, not integers: HDF5 would make something of NaN, too");
+}
+
 void Hdf5Reader::read_rows(const std::string& name, ElementType type, const std::vector<RowRange>& ranges,
                            void* values) const {
   const Hdf5Handle set = open_dataset(file_.id(), name);
   checked(set.id(), name);
+  check_class(set.id(), name, type);
   checked(read_ranges(set.id(), memory_type(type), ranges, static_cast<char*>(values)) ? 0 : -1, name);
 }
 
@@ -148,6 +157,7 @@ std::size_t Hdf5Reader::checked_size(const std::string& name, const std::vector<
 void Hdf5Reader::read(const std::string& name, ElementType type, void* values) const {
   const Hdf5Handle set = open_dataset(file_.id(), name);
   checked(set.id(), name);
+  check_class(set.id(), name, type);
   checked(H5Dread(set.id(), memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
 }
 

@@ -8,12 +8,10 @@
 #include <numeric>
 
 #include "cluster/exit_codes.h"
-#include "cluster/pipeline.h"
 #include "io/error.h"
 #include "io/pose_csv.h"
 #include "io/simulate/simulate.h"
-#include "io/unit_files.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "tests/integration/block_folder.h"
 
 namespace megablock {
 namespace {
@@ -110,21 +108,12 @@ class RegistrationInput : public testing::Test {
  protected:
   // What `register` prints; throws what it throws.
   std::string register_block(const SimulatedBlock& s, const RegistrationSettings& settings = {}) {
-    write_block(folder_.path("given.h5"), s.block);
-    write_tracks(folder_.path("tie_points.h5"), s.tracks);
-    std::ofstream(folder_.path("block.yaml")) << "block: given.h5\ntie_points: tie_points.h5\n";
-    RunOptions run;
-    run.project = folder_.path("block.yaml");
-    run.directory = folder_.path("job");
-    run.threads = 1;
-    run.quiet = true;
-    int argc = 0;
-    char** argv = nullptr;
-    Communicator ranks(&argc, &argv);
+    folder_.write(s);
     testing::internal::CaptureStdout();
     int code = -1;
     try {
-      code = register_job(run, settings, ranks);
+      code =
+          folder_.run([&](const RunOptions& run, Communicator& ranks) { return register_job(run, settings, ranks); });
     } catch (...) {
       testing::internal::GetCapturedStdout();
       throw;
@@ -144,7 +133,7 @@ class RegistrationInput : public testing::Test {
   }
   // rms distance of the registered frames from their true positions.
   double error_m(const SimulatedBlock& s) const {
-    const PoseTable table = read_pose_csv(folder_.path("job/register/poses.csv"));
+    const PoseTable table = read_pose_csv(folder_.job("register/poses.csv"));
     EXPECT_EQ(table.poses.size(), s.block.frames.size());
     double sum = 0;
     for (std::size_t f = 0; f < table.poses.size(); ++f)
@@ -152,7 +141,7 @@ class RegistrationInput : public testing::Test {
     return std::sqrt(sum / static_cast<double>(table.poses.size()));
   }
 
-  ScratchDirectory folder_;
+  BlockFolder folder_;
 };
 
 // The block itself, for comparison with what follows.
@@ -285,7 +274,7 @@ TEST_F(RegistrationInput, CamerasThatShareNoView) {
   ASSERT_EQ(s.block.rigs.front().mounts.size(), 2u);
   const std::string said = register_block(s);
   EXPECT_THAT(said, HasSubstr("rig                   estimated from"));
-  const Block registered = read_block(folder_.path("job/register/block.h5"));
+  const Block registered = read_block(folder_.job("register/block.h5"));
   const auto off = [&](const Block& block) {
     return rotation_angle(block.rigs.front().mounts[1].pose.rotation, s.truth.mounts.front()[1].rotation);
   };
