@@ -171,10 +171,14 @@ MemoryOptions memory_options(const Job& job) {
   return memory;
 }
 
-// Before a run (a killed one may have left files) and after it.
+// Before a run (a killed one may have left files) and after it. The folder itself stays where another disk is mounted.
 void clear_scratch(Job& job) {
   on_first_rank(job.ranks, [&] {
-    std::filesystem::remove_all(job.store.path("scratch"));
+    const std::filesystem::path folder(job.store.path("scratch"));
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
+      std::filesystem::remove_all(entry.path());
+    std::filesystem::remove(folder, ignored);
     return std::string();
   });
 }

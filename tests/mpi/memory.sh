@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Factors of the merge in memory, in scratch or computed again: the same bits, on one rank and on three, and each way is
-# really gone (the run says how many). usage: memory.sh MEGABLOCK
+# really gone (the run says how many). Last, the disk of the scratch fills on the way. usage: memory.sh MEGABLOCK
 set -euo pipefail
 megablock=$1
-work=$(mktemp -d); trap 'rm -rf "$work"' EXIT
+work=$(mktemp -d); trap 'umount "$work/full/scratch" 2>/dev/null || true; rm -rf "$work"' EXIT
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 "$megablock" simulate --scene aerial --frames 160 --outliers 0.01 -o "$work/block" >/dev/null
 printf 'tiles:\n  tile_max_frames: 20\n' >> "$work/block/block.yaml"
@@ -29,3 +29,10 @@ run spilled_3 3 ' [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
 run recomputed_1 1 ' 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
 run recomputed_3 3 ' 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
 run both_2 2 ' [1-9][0-9]* spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 1
+"$megablock" adjust "$work/block/block.yaml" -j "$work/full" --quiet >/dev/null
+mkdir -p "$work/full/scratch"
+if mount -t tmpfs -o size=300k tmpfs "$work/full/scratch" 2>/dev/null; then
+  run full 2 ' [1-9][0-9]* spilled .* [1-9][0-9]* subtrees' --memory 0.2
+else
+  echo "full: skipped, needs the right to mount a tmpfs"
+fi
