@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Same bits for any number of ranks and threads: runs one simulated block on 1, 2, 3 and 4 ranks, and on 1 rank with 1 and
-# 3 threads, and compares the digests. usage: digests.sh MEGABLOCK aerial|street|rendered|registration FRAMES
+# Same bits for any number of ranks and threads: runs one simulated block on 1, 2, 3 and 4 ranks (aerial also on 8), and
+# on 1 rank with 1 and 3 threads, and compares the digests.
+# usage: digests.sh MEGABLOCK aerial|street|rendered|registration FRAMES
 # `rendered` makes pictures, so that features, matches and the initial orientation are compared too. `registration`
 # registers a trajectory of that many frames.
 set -euo pipefail
@@ -37,7 +38,7 @@ compare() {  # NAME COMMAND...: runs the command on a job of its own
   rm -rf "${work:?}/$name"
 }
 compare ranks-1 "$megablock"
-for ranks in 2 3 4; do
+for ranks in 2 3 4 $([ "$scene" = aerial ] && echo 8); do
   compare ranks-$ranks mpirun --bind-to none --oversubscribe --mca mpi_yield_when_idle 1 -n $ranks "$megablock"
 done
 for threads in 1 3; do
