@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "adjust/linearise.h"
+#include "io/error.h"
 #include "merge/bytes.h"
 #include "merge/cell_assembler.h"
 #include "merge/condense.h"
@@ -84,6 +85,11 @@ TEST(IndexRanges, FrontOfMoreThan2To31Entries) {
   const Step step = back_substitute(result.factor, zero);
   EXPECT_EQ(step.find({UnknownKind::kFrame, 0, kFrames - 1})[5], 0);
   EXPECT_NEAR(step.find({UnknownKind::kFrame, 0, 0})[0], 2, 0.5);  // 8 / 4, but for the small off-diagonals
+}
+
+// More than BLAS is given in one call are refused.
+TEST(IndexRanges, FrontsOfMoreThan100000UnknownsAreRefused) {
+  EXPECT_THROW(Front(frames(0, 10000), frames(10000, 17000)), ComputeError);
 }
 
 // What update matrices travel as.
