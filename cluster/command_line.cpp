@@ -40,14 +40,15 @@ namespace {
 
 constexpr const char* kResult = "result/block.h5";
 
-BlockResult finished_result(const std::string& job) {
+// Path of a finished job's result; warns of one that is older than what was asked since.
+std::string finished_result(const std::string& job) {
   const JobStore store(job);
   if (!std::filesystem::exists(store.path("job.json")))
     throw InputError(job + ": is not a job directory (no job.json); name the folder given to 'run -j'");
   if (!store.seal(kResult)) throw InputError(job + ": the job has no result yet; run it to the end first");
   for (const std::string& line : unfinished_stages(store))
     std::fprintf(stderr, "megablock: warning: %s: this is an older result; %s\n", job.c_str(), line.c_str());
-  return read_result(store.verified_path(kResult));
+  return store.verified_path(kResult);
 }
 
 void add_init(CLI::App& app, Action& action) {
@@ -88,11 +89,11 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
       ->check(not_negative());
   command
       ->add_option("--memory", options->memory_mib,
-                   "Memory per rank for factors of the merge, MiB; beyond it they go to the job's scratch")
+                   "Memory per rank for tiles and factors of the merge, MiB; beyond it they go to the job's scratch")
       ->check(not_negative());
   command
       ->add_option("--scratch", options->scratch_mib,
-                   "Scratch per rank for such factors, MiB; beyond it (0: at once) they are computed again")
+                   "Scratch per rank for these, MiB; beyond it (0: at once) tiles stay in memory, factors are computed again")
       ->check(not_negative());
   command->add_flag("--strict", options->strict, "End at the first failed unit");
   command->add_flag("-q,--quiet", options->quiet, "No progress");
@@ -181,7 +182,7 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("-o,--output", options->output, "File or folder to write")->required();
   command->callback([=, &action] {
     action = [options] {
-      export_result(finished_result(options->job), options->format, options->output);
+      export_result(read_result(finished_result(options->job)), options->format, options->output);
       return kExitDone;
     };
   });
@@ -224,11 +225,12 @@ void add_report(CLI::App& app, Action& action) {
   command->callback([=, &action] {
     action = [options] {
       const JobStore store(options->job);
-      const BlockResult result = finished_result(options->job);
+      const std::string result = finished_result(options->job);
       const auto written =
           std::filesystem::file_time_type::clock::to_sys(std::filesystem::last_write_time(store.path(kResult)));
       const std::string page =
-          report_html(result, {options->job, std::chrono::duration<double>(written.time_since_epoch()).count()});
+          report_html(read_result_without_tracks(result), StoredTracks(result),
+                      {options->job, std::chrono::duration<double>(written.time_since_epoch()).count()});
       if (options->output.empty()) {
         store.write_text("result/report.html", page);
       } else {
@@ -257,7 +259,8 @@ void add_evaluate(CLI::App& app, Action& action) {
   command->add_flag("--json", options->json, "Figures as JSON");
   command->callback([=, &action] {
     action = [options] {
-      const Evaluation evaluation = evaluate(finished_result(options->job), options->truth, options->evaluation);
+      const Evaluation evaluation =
+          evaluate(read_result_without_tracks(finished_result(options->job)), options->truth, options->evaluation);
       std::printf("%s\n", (options->json ? to_json(evaluation) : to_text(evaluation)).c_str());
       return kExitDone;
     };

@@ -13,6 +13,7 @@
 #include "io/feature_statistics.h"
 #include "io/remarks.h"
 #include "io/result.h"
+#include "io/track_batches.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -95,8 +96,8 @@ Json interest_points_json(const BlockResult& result) {
   return list;
 }
 
-void add_figures(Json& json, const BlockResult& result) {
-  const ReprojectionStatistics statistics = reprojection_statistics(result);
+void add_figures(Json& json, const BlockResult& result, const TrackBatches& tracks) {
+  const ReprojectionStatistics statistics = reprojection_statistics(result, tracks);
   json["images"] = result.block.images.size();
   json["oriented"] = statistics.oriented_images;
   json["points"] = statistics.points;
@@ -116,7 +117,7 @@ void add_figures(Json& json, const BlockResult& result) {
   json["control_points_unused"] = unused_points(result, PointRole::kControl).size();
   json["check_points_unused"] = unused_points(result, PointRole::kCheck).size();
   json["interest_points"] = interest_points_json(result);
-  json["remarks"] = remarks(result);
+  json["remarks"] = remarks(result, tracks);
   json["digest"] = result.digest;
 }
 
@@ -125,7 +126,7 @@ Json status(const JobStore& store) {
   const Json job = job_json(store);
   const std::vector<StageStatus> stages = stages_of(store, job);
   std::optional<BlockResult> result;
-  if (store.seal(kResult)) result = read_result(store.verified_path(kResult));
+  if (store.seal(kResult)) result = read_result_without_tracks(store.verified_path(kResult));
   Json json{{"job", store.directory()}, {"stages", stages_json(store, stages)}};
   for (const char* key : {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px",
                           "rms_reprojection_px", "chi2_per_dof", "degrees_of_freedom", "observation_kinds", "tiles",
@@ -135,7 +136,7 @@ Json status(const JobStore& store) {
   json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
   const bool current = stages.back().state == StageState::kDone;
   json["result"] = !result ? "none" : current ? "current" : "stale";
-  if (result) add_figures(json, *result);
+  if (result) add_figures(json, *result, StoredTracks(store.path(kResult)));
   json["failures"] = failures_json(job, stages, current ? result : std::nullopt);
   json["failed"] = json["failures"].size();
   return json;
@@ -234,7 +235,7 @@ std::string status_digest(const JobStore& store) {
   job_json(store);
   if (!store.seal(kResult))
     throw InputError(store.directory() + ": the job has no result yet; run it to the end first");
-  return read_result(store.verified_path(kResult)).digest;
+  return read_result_without_tracks(store.verified_path(kResult)).digest;
 }
 
 }  // namespace megablock

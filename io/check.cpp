@@ -13,6 +13,8 @@
 #include "io/measurements.h"
 #include "io/registration.h"
 #include "io/result.h"
+#include "io/result_digest.h"
+#include "io/track_batches.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -91,8 +93,11 @@ class Check {
   }
 
   void check_result(const std::string& path) {
-    const BlockResult result = read_result(path);
-    const std::string digest = result_digest(result);
+    const BlockResult result = read_result_without_tracks(path);
+    const StoredTracks tracks(path);
+    ResultDigest contents(result.state, tracks.track_count());
+    tracks.visit([&](const TrackResults& batch) { contents.add(batch); });
+    const std::string digest = contents.text();
     if (digest != result.digest)
       throw StoreError(path + ": says its digest is " + result.digest + ", its contents have " + digest +
                        "; delete it and run again");

@@ -108,10 +108,10 @@ class Hdf5Writer {
   void dataset(const std::string& name, ElementType type, const void* values, const std::vector<std::int64_t>& shape,
                const DatasetNote& note);
 
-  // A dataset that grows: no rows at first, `columns` values per row (1: one dimension), always in compressed chunks.
+  // A dataset that grows: no rows at first, each of this shape (none: one value), always in compressed chunks.
   template <typename T>
-  void growing(const std::string& name, std::int64_t columns = 1, const DatasetNote& note = {}) {
-    growing_dataset(name, element_type<T>(), columns, note);
+  void growing(const std::string& name, const std::vector<std::int64_t>& row = {}, const DatasetNote& note = {}) {
+    growing_dataset(name, element_type<T>(), row, note);
   }
   // Appends rows (row-major) to a growing dataset of this element type.
   template <typename T>
@@ -133,7 +133,8 @@ class Hdf5Writer {
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, const void* value);
   void write_dataset(const std::string& name, std::int64_t file_type, std::int64_t memory_type, const void* values,
                      const std::vector<std::int64_t>& shape, const DatasetNote& note);
-  void growing_dataset(const std::string& name, ElementType type, std::int64_t columns, const DatasetNote& note);
+  void growing_dataset(const std::string& name, ElementType type, const std::vector<std::int64_t>& row,
+                       const DatasetNote& note);
   void append_rows(const std::string& name, ElementType type, const void* values, std::int64_t count);
   void reserve_disk(std::int64_t bytes);
   std::int64_t checked(std::int64_t result, const std::string& name) const;  // throws when result < 0
@@ -142,7 +143,8 @@ class Hdf5Writer {
   struct Growing {
     Hdf5Handle set;  // kept open: the chunk that is being filled stays in its cache
     ElementType type;
-    std::int64_t columns, rows;
+    std::vector<std::int64_t> row;  // its shape
+    std::int64_t values, rows;      // values per row
   };
 
   std::string path_;

@@ -59,6 +59,13 @@ bool fits(std::int64_t lowest, std::int64_t highest) {
   return lowest >= std::numeric_limits<T>::min() && highest <= std::numeric_limits<T>::max();
 }
 
+// Rows of one shape.
+std::vector<hsize_t> shape_of(hsize_t rows, const std::vector<std::int64_t>& row) {
+  std::vector<hsize_t> shape = {rows};
+  shape.insert(shape.end(), row.begin(), row.end());
+  return shape;
+}
+
 // Gives back what is reserved beyond the end of a closed file.
 void give_back_disk(const std::string& path) {
   const Descriptor file(path, O_RDWR);
@@ -200,21 +207,21 @@ void Hdf5Writer::write_dataset(const std::string& name, std::int64_t file_type, 
   if (!note.description.empty()) attribute(name, "description", note.description);
 }
 
-void Hdf5Writer::growing_dataset(const std::string& name, ElementType type, std::int64_t columns,
+void Hdf5Writer::growing_dataset(const std::string& name, ElementType type, const std::vector<std::int64_t>& row,
                                  const DatasetNote& note) {
-  const std::vector<hsize_t> none = {0, static_cast<hsize_t>(columns)},
-                             most = {H5S_UNLIMITED, static_cast<hsize_t>(columns)};
-  const int rank = columns == 1 ? 1 : 2;
+  std::int64_t values = 1;
+  for (const std::int64_t length : row) values *= length;
+  const std::vector<hsize_t> none = shape_of(0, row), most = shape_of(H5S_UNLIMITED, row);
+  const int rank = static_cast<int>(none.size());
   const Hdf5Handle space(H5Screate_simple(rank, none.data(), most.data()), &H5Sclose);
   const Hdf5Handle creation = without_times(H5P_DATASET_CREATE);
-  const std::size_t row_bytes = H5Tget_size(file_type(type)) * static_cast<std::size_t>(columns);
-  const std::vector<hsize_t> chunk = {std::max<hsize_t>(1, kChunkBytes / row_bytes), static_cast<hsize_t>(columns)};
-  set_chunks(creation.id(), rank, chunk);
+  const std::size_t row_bytes = H5Tget_size(file_type(type)) * static_cast<std::size_t>(values);
+  set_chunks(creation.id(), rank, shape_of(std::max<hsize_t>(1, kChunkBytes / row_bytes), row));
   Hdf5Handle set(checked(H5Dcreate2(file_.id(), name.c_str(), file_type(type), space.id(), H5P_DEFAULT, creation.id(),
                                     H5P_DEFAULT),
                          name),
                  &H5Dclose);
-  growing_.insert_or_assign(name, Growing{std::move(set), type, columns, 0});
+  growing_.insert_or_assign(name, Growing{std::move(set), type, row, values, 0});
   reserve_disk(0);
   if (!note.units.empty()) attribute(name, "units", note.units);
   if (!note.description.empty()) attribute(name, "description", note.description);
@@ -222,19 +229,20 @@ void Hdf5Writer::growing_dataset(const std::string& name, ElementType type, std:
 
 void Hdf5Writer::append_rows(const std::string& name, ElementType type, const void* values, std::int64_t count) {
   const auto found = growing_.find(name);
-  if (found == growing_.end() || found->second.type != type || count % found->second.columns != 0)
+  if (found == growing_.end() || found->second.type != type || count % found->second.values != 0)
     throw StoreError(path_ + ": " + name + ": no growing dataset of this type and width");
   Growing& growing = found->second;
-  const std::int64_t rows = count / growing.columns;
+  const std::int64_t rows = count / growing.values;
   if (rows == 0) return;
   reserve_disk(count * static_cast<std::int64_t>(H5Tget_size(file_type(type))));
-  const auto columns = static_cast<hsize_t>(growing.columns);
-  const hsize_t start[] = {static_cast<hsize_t>(growing.rows), 0}, extent[] = {static_cast<hsize_t>(rows), columns},
-                total[] = {start[0] + extent[0], columns};
-  checked(H5Dset_extent(growing.set.id(), total), name);
-  const Hdf5Handle memory(H5Screate_simple(growing.columns == 1 ? 1 : 2, extent, nullptr), &H5Sclose);
+  std::vector<hsize_t> start(growing.row.size() + 1, 0);
+  start[0] = static_cast<hsize_t>(growing.rows);
+  const std::vector<hsize_t> extent = shape_of(static_cast<hsize_t>(rows), growing.row),
+                             total = shape_of(static_cast<hsize_t>(growing.rows + rows), growing.row);
+  checked(H5Dset_extent(growing.set.id(), total.data()), name);
+  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
   const Hdf5Handle space(checked(H5Dget_space(growing.set.id()), name), &H5Sclose);
-  checked(H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, start, nullptr, extent, nullptr), name);
+  checked(H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr), name);
   checked(H5Dwrite(growing.set.id(), memory_type(type), memory.id(), space.id(), H5P_DEFAULT, values), name);
   growing.rows += rows;
 }

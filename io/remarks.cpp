@@ -73,6 +73,12 @@ std::string consequence(int defect, const Placing& placing) {
   return "coordinates are not usable as they are; add positions, attitudes or control points";
 }
 
+report::Figures parts_of(const BlockResult& result, const TrackBatches& tracks) {
+  report::Figures figures;
+  if (result.state.oriented.size() == result.block.frames.size()) report::find_parts(result, tracks, figures);
+  return figures;
+}
+
 std::string sigma_text(const Placing& placing) {
   if (!std::isfinite(placing.rotation_deg) || placing.rotation_deg < 1) return "";
   return fmt::format(" (sigma of the rotations {:.0f} degrees)", placing.rotation_deg);
@@ -120,10 +126,12 @@ std::string unused_points_text(const BlockResult& result, PointRole role) {
 }
 
 std::vector<std::string> datum_texts(const BlockResult& result) {
+  return datum_texts(result, parts_of(result, WholeTracks(result)));
+}
+
+std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines;
   if (result.state.oriented.size() != result.block.frames.size()) return lines;  // nothing was oriented yet
-  report::Figures figures;
-  report::find_parts(result, figures);
   std::size_t free = 0;
   for (std::size_t p = 0; p < figures.parts.size(); ++p) {
     const report::BlockPart& part = figures.parts[p];
@@ -146,8 +154,10 @@ std::vector<std::string> datum_texts(const BlockResult& result) {
   return lines;
 }
 
-std::vector<std::string> remarks(const BlockResult& result) {
-  std::vector<std::string> lines = datum_texts(result);
+std::vector<std::string> remarks(const BlockResult& result) { return remarks(result, WholeTracks(result)); }
+
+std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks) {
+  std::vector<std::string> lines = datum_texts(result, parts_of(result, tracks));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
   return lines;

@@ -5,8 +5,13 @@
 #include <vector>
 
 #include "io/result.h"
+#include "io/track_batches.h"
 
 namespace megablock {
+
+namespace report {
+struct Figures;
+}
 
 // A control or check point that no measurement holds: all were rejected, or none lies in an oriented image.
 struct UnusedPoint {
@@ -24,8 +29,10 @@ std::string unused_points_text(const BlockResult& result, PointRole role);
 // its rotations are known to several degrees only: "The datum is free: nothing determines the rotation about the line
 // of the positions (sigma of the rotations 28 degrees): ... add control points or attitudes". Empty for a sound datum.
 std::vector<std::string> datum_texts(const BlockResult& result);
+std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures);  // parts are enough
 
 // All of this file, one line each.
 std::vector<std::string> remarks(const BlockResult& result);
+std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks);
 
 }  // namespace megablock

@@ -56,9 +56,10 @@ std::string name_of(const std::string& job) {
 
 }  // namespace
 
-std::string report_html(const BlockResult& result, const ReportContext& context) {
+namespace {
+
+std::string page_of(const BlockResult& result, const report::Figures& figures, const ReportContext& context) {
   using namespace report;
-  const Figures figures = figures_of(result);
   const std::string body =
       headline(result, figures) + assessment(result, figures) + map_section(result, figures) +
       coverage_section(result, figures) + tie_points_section(result, figures) + residuals_section(result, figures) +
@@ -69,6 +70,19 @@ std::string report_html(const BlockResult& result, const ReportContext& context)
   const std::string name = title_of(result, context.job);
   return page(name.empty() ? "Block report" : "Block report: " + escape(name), subtitle_of(result, figures, context),
               body, figures_json(result, figures));
+}
+
+}  // namespace
+
+std::string report_html(const BlockResult& result, const ReportContext& context) {
+  return page_of(result, report::figures_of(result), context);
+}
+
+std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context) {
+  constexpr std::int64_t kDrawn = 400000;  // at most
+  const report::Figures figures = report::figures_of(result, tracks);
+  static_cast<TrackResults&>(result) = sample_of(tracks, kDrawn);
+  return page_of(result, figures, context);
 }
 
 }  // namespace megablock

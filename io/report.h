@@ -6,6 +6,7 @@
 #include <string>
 
 #include "io/result.h"
+#include "io/track_batches.h"
 
 namespace megablock {
 
@@ -19,5 +20,7 @@ struct ReportContext {
 // is not a number is printed. The page carries its figures as JSON in <script type="application/json" id="figures">
 // (keys as `status --json` where they are the same; metres, radians as named, pixels; null where unknown).
 std::string report_html(const BlockResult& result, const ReportContext& context = {});
+// Of a result without tracks and all of these; maps draw a sample of them.
+std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context);
 
 }  // namespace megablock

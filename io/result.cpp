@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "io/hash.h"
+#include "io/result_digest.h"
+#include "io/track_batches.h"
 
 namespace megablock {
 
@@ -33,7 +35,7 @@ void add_state(Hasher& hasher, const BlockState& state) {
 }
 
 // A point, or a mark for its absence (a NaN has many bit patterns), and its kept observations.
-void add_point(Hasher& hasher, const BlockResult& result, std::size_t row) {
+void add_point(Hasher& hasher, const TrackResults& result, std::size_t row) {
   const TrackSet& tracks = result.tracks;
   const Eigen::Vector3d& point = result.points[row];
   hasher.add(tracks.id[row].value);
@@ -50,38 +52,92 @@ void add_point(Hasher& hasher, const BlockResult& result, std::size_t row) {
 
 }  // namespace
 
+void TrackResults::append(const TrackResults& from, std::size_t first, std::size_t last) {
+  if (tracks.begin.empty()) tracks.begin.push_back(0);
+  const auto copy = [](const auto& source, auto& target, std::size_t begin, std::size_t end) {
+    if (source.empty()) return;  // an optional column
+    target.insert(target.end(), source.begin() + static_cast<std::ptrdiff_t>(begin),
+                  source.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  copy(from.tracks.id, tracks.id, first, last);
+  copy(from.points, points, first, last);
+  copy(from.file_tracks, file_tracks, first, last);
+  copy(from.file_tiles, file_tiles, first, last);
+  copy(from.point_covariance, point_covariance, first, last);
+  const auto row = static_cast<std::size_t>(from.tracks.begin[first]);
+  const auto end = static_cast<std::size_t>(from.tracks.begin[last]);
+  const std::int64_t offset = tracks.observation_count() - from.tracks.begin[first];
+  copy(from.tracks.image, tracks.image, row, end);
+  copy(from.tracks.x, tracks.x, row, end);
+  copy(from.tracks.y, tracks.y, row, end);
+  copy(from.tracks.feature, tracks.feature, row, end);
+  copy(from.kept, kept, row, end);
+  copy(from.residual_x, residual_x, row, end);
+  copy(from.residual_y, residual_y, row, end);
+  for (std::size_t t = first; t < last; ++t) tracks.begin.push_back(from.tracks.begin[t + 1] + offset);
+}
+
+TrackResults sample_of(const TrackBatches& tracks, std::int64_t most) {
+  const std::int64_t step = 1 + (tracks.track_count() - 1) / most;
+  TrackResults sample;
+  std::int64_t before = 0;  // tracks of the batches before
+  tracks.visit([&](const TrackResults& batch) {
+    for (std::int64_t row = (step - before % step) % step; row < batch.tracks.track_count(); row += step)
+      sample.append(batch, static_cast<std::size_t>(row), static_cast<std::size_t>(row) + 1);
+    before += batch.tracks.track_count();
+  });
+  return sample;
+}
+
+ResultDigest::ResultDigest(const BlockState& state, std::int64_t track_count) {
+  add_state(hasher_, state);
+  hasher_.add(static_cast<std::size_t>(track_count));
+}
+
+void ResultDigest::add(const TrackResults& batch) {
+  for (std::size_t row = 0; row < batch.tracks.id.size(); ++row) add(batch, row);
+}
+
+void ResultDigest::add(const TrackResults& batch, std::size_t row) { add_point(hasher_, batch, row); }
+
+std::string ResultDigest::text() const { return hex(hasher_.value()); }
+
 std::string result_digest(const BlockResult& result) {
-  Hasher hasher;
-  add_state(hasher, result.state);
   std::vector<std::size_t> order(result.tracks.id.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return result.tracks.id[a] < result.tracks.id[b]; });
-  hasher.add(order.size());
-  for (const std::size_t row : order) add_point(hasher, result, row);
-  return hex(hasher.value());
+  ResultDigest digest(result.state, result.tracks.track_count());
+  for (const std::size_t row : order) digest.add(result, row);
+  return digest.text();
 }
 
 ReprojectionStatistics reprojection_statistics(const BlockResult& result) {
+  return reprojection_statistics(result, WholeTracks(result));
+}
+
+ReprojectionStatistics reprojection_statistics(const BlockResult& result, const TrackBatches& tracks) {
   ReprojectionStatistics statistics;
   for (const Image& image : result.block.images)
     if (result.state.oriented[image.frame]) ++statistics.oriented_images;
   double sum = 0, sum_of_squares = 0;
-  for (std::size_t p = 0; p < result.points.size(); ++p) {
-    if (!result.points[p].allFinite()) continue;
-    std::int64_t used = 0;
-    for (std::int64_t o = result.tracks.begin[p]; o < result.tracks.begin[p + 1]; ++o) {
-      const auto i = static_cast<std::size_t>(o);
-      if (!result.kept[i]) continue;
-      const double x = result.residual_x[i], y = result.residual_y[i];
-      if (std::isnan(x) || std::isnan(y)) continue;  // of an image without pose
-      sum += std::hypot(x, y);
-      sum_of_squares += x * x + y * y;
-      ++used;
+  tracks.visit([&](const TrackResults& batch) {
+    for (std::size_t p = 0; p < batch.points.size(); ++p) {
+      if (!batch.points[p].allFinite()) continue;
+      std::int64_t used = 0;
+      for (std::int64_t o = batch.tracks.begin[p]; o < batch.tracks.begin[p + 1]; ++o) {
+        const auto i = static_cast<std::size_t>(o);
+        if (!batch.kept[i]) continue;
+        const double x = batch.residual_x[i], y = batch.residual_y[i];
+        if (std::isnan(x) || std::isnan(y)) continue;  // of an image without pose
+        sum += std::hypot(x, y);
+        sum_of_squares += x * x + y * y;
+        ++used;
+      }
+      statistics.observations += used;
+      if (used > 0) ++statistics.points;
     }
-    statistics.observations += used;
-    if (used > 0) ++statistics.points;
-  }
+  });
   if (statistics.observations == 0) return statistics;
   const auto count = static_cast<double>(statistics.observations);
   statistics.mean_px = sum / count;

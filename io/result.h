@@ -13,6 +13,8 @@
 
 namespace megablock {
 
+class TrackBatches;
+
 struct FailedUnit {
   std::string stage, unit, reason;
 };
@@ -60,7 +62,22 @@ struct ImageRecord {
   std::int64_t matches = -1;         // in all of these pairs
 };
 
-struct BlockResult {
+// What is known of tracks: of all of a result, or of one batch of them (io/track_batches.h).
+struct TrackResults {
+  TrackSet tracks;                                // point NaN = not triangulated
+  std::vector<Eigen::Vector3d> points;            // [tracks]
+  std::vector<TrackIndex> file_tracks;            // [tracks] or empty: their indices in the file of their tile
+  std::vector<TileIndex> file_tiles;              // [tracks] or empty: that tile
+  std::vector<Eigen::Matrix3d> point_covariance;  // [tracks] or empty
+  std::vector<std::uint8_t> kept;                 // [observations]
+  std::vector<float> residual_x, residual_y;      // [observations] adjusted minus measured, px
+
+  // Rows [first, last) of another one's tracks.
+  void append(const TrackResults& from, std::size_t first, std::size_t last);
+};
+
+// Its own tracks are those of all tiles in global order, a sample of them, or none: as the function says that gives it.
+struct BlockResult : TrackResults {
   Block block;
   BlockState state;
   Tiles tiles;
@@ -71,15 +88,6 @@ struct BlockResult {
   IndexedVector<FrameIndex, Matrix6> frame_covariance;  // (rotation increment rad, centre m)
   // Of the model's parameters; held ones: zero.
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
-
-  // Tracks of all tiles in global track order. point NaN = not triangulated.
-  TrackSet tracks;
-  std::vector<Eigen::Vector3d> points;            // [tracks]
-  std::vector<TrackIndex> file_tracks;            // [tracks] or empty: their indices in the file of their tile
-  std::vector<TileIndex> file_tiles;              // [tracks] or empty: that tile
-  std::vector<Eigen::Matrix3d> point_covariance;  // [tracks] or empty
-  std::vector<std::uint8_t> kept;                 // [observations]
-  std::vector<float> residual_x, residual_y;      // [observations] adjusted minus measured, px
 
   struct ControlResult {
     Eigen::Vector3d adjusted;  // ground frame; NaN = not seen by two oriented images
@@ -114,7 +122,12 @@ struct BlockResult {
 };
 
 void write_result(const std::string& path, const BlockResult& result);
+// With these tracks instead of the result's own; fills in its digest.
+class TrackBatches;
+void write_result(const std::string& path, BlockResult& result, const TrackBatches& tracks);
 BlockResult read_result(const std::string& path);
+// Without tracks: these batch by batch as StoredTracks (io/track_batches.h).
+BlockResult read_result_without_tracks(const std::string& path);
 
 // Hash of the exact bits of every pose, camera, point and kept observation in global order; independent of file layout,
 // tiles' files and ranks.
@@ -126,5 +139,6 @@ struct ReprojectionStatistics {
   double mean_px = 0, rms_px = 0, mean_track_length = 0;
 };
 ReprojectionStatistics reprojection_statistics(const BlockResult& result);
+ReprojectionStatistics reprojection_statistics(const BlockResult& result, const TrackBatches& tracks);
 
 }  // namespace megablock

@@ -1,5 +1,6 @@
 // result/block.h5: docs/job-format.md, "Result".
 #include <algorithm>
+#include <utility>
 
 #include "io/error.h"
 #include "io/hdf5_block.h"
@@ -9,6 +10,8 @@
 #include "io/hdf5_tiles.h"
 #include "io/measurements.h"
 #include "io/result.h"
+#include "io/result_digest.h"
+#include "io/track_batches.h"
 
 namespace megablock {
 
@@ -38,10 +41,8 @@ void require_size(std::size_t found, std::size_t expected, const char* what) {
                        std::to_string(expected));
 }
 
-void check_sizes(const BlockResult& result) {
+void check_track_sizes(const TrackResults& result) {
   const std::size_t tracks = result.tracks.id.size(), observations = result.tracks.image.size();
-  require_size(result.state.frames.size(), result.block.frames.size(), "frame poses");
-  require_size(result.boundary.size(), result.block.frames.size(), "boundary flags");
   require_size(result.points.size(), tracks, "points");
   require_size(result.kept.size(), observations, "verdicts on observations");
   require_size(result.residual_x.size(), observations, "residuals");
@@ -49,6 +50,11 @@ void check_sizes(const BlockResult& result) {
   if (!result.point_covariance.empty()) require_size(result.point_covariance.size(), tracks, "point covariances");
   require_size(result.file_tiles.size(), result.file_tracks.size(), "tiles of tracks");
   if (!result.file_tracks.empty()) require_size(result.file_tracks.size(), tracks, "indices of tracks in their tiles");
+}
+
+void check_sizes(const BlockResult& result) {
+  require_size(result.state.frames.size(), result.block.frames.size(), "frame poses");
+  require_size(result.boundary.size(), result.block.frames.size(), "boundary flags");
   if (!result.control.empty())
     require_size(result.control.size(), result.block.control_points.size(), "control point results");
   for (std::size_t p = 0; p < result.control.size(); ++p) {
@@ -79,61 +85,150 @@ void get_precision(const Hdf5Reader& file, BlockResult& result) {
         get_covariances(file, column(result.block.cameras, [](const Camera& c) { return c.intrinsics.model(); })));
 }
 
-void put_points(Hdf5Writer& file, const BlockResult& result) {
-  const TrackSet& tracks = result.tracks;
-  file.group("points", "one row per track in global order");
-  file.vector("points/id", plain(tracks.id), {"", "global index"});
-  file.vector("points/begin", tracks.begin.empty() ? std::vector<std::int64_t>{0} : tracks.begin,
-              {"", "observations of point i are rows begin[i] to begin[i + 1] (exclusive)"});
-  file.matrix("points/position", vectors3(result.points, [](const Eigen::Vector3d& p) { return p; }), 3,
-              {"m", "ground frame; NaN: not triangulated"});
-  const std::vector<float> boxes = boxes_of(result.points);
-  file.matrix(
-      "points/box", boxes, 6,
-      {"m", "bounds of each 1024 successive points: lowest east, north, up, highest; NaN: none has a position"});
-  file.matrix("points/district", districts_of(boxes), 6, {"m", "the same of each 65536 successive points"});
-  if (!result.file_tracks.empty()) {
-    file.vector("points/track", plain(result.file_tracks), {"", "index of the track in the file of its tile"});
-    file.integers("points/tile", plain(result.file_tiles), {"", "that owns the track"});
+// Writes the tracks, batch behind batch.
+class PointWriter {
+ public:
+  explicit PointWriter(Hdf5Writer& file) : file_(file) {
+    file.group("points", "one row per track in global order");
+    file.growing<std::int64_t>("points/id", {}, {"", "global index"});
+    file.growing<std::int64_t>("points/begin", {},
+                               {"", "observations of point i are rows begin[i] to begin[i + 1] (exclusive)"});
+    file.append("points/begin", std::vector<std::int64_t>{0});
+    file.growing<double>("points/position", {3}, {"m", "ground frame; NaN: not triangulated"});
+    file.group("observations", "one row per image measurement, in the order of the points");
+    file.growing<std::int32_t>("observations/image", {}, {"", "row in images"});
+    file.growing<std::int32_t>("observations/x", {}, {"2^-10 px", "to the right, pixel centres at +0.5"});
+    file.growing<std::int32_t>("observations/y", {}, {"2^-10 px", "down, pixel centres at +0.5"});
+    file.growing<std::int32_t>("observations/feature", {}, {"", "row in the image's features, -1: none"});
+    file.growing<std::uint8_t>("observations/kept", {}, {"", "1: kept, 0: rejected"});
+    file.growing<float>("observations/residual_x", {}, {"px", "adjusted minus measured"});
+    file.growing<float>("observations/residual_y", {}, {"px", "adjusted minus measured"});
   }
-  if (!result.point_covariance.empty())
-    file.array("points/covariance", flattened<float>(result.point_covariance), {tracks.track_count(), 3, 3},
-               {"m^2", "posterior"});
-  file.group("observations", "one row per image measurement, in the order of the points");
-  file.attribute("observations", "observations_complete", std::uint8_t{1});
-  file.integers("observations/image", plain(tracks.image), {"", "row in images"});
-  file.vector("observations/x", tracks.x, {"2^-10 px", "to the right, pixel centres at +0.5"});
-  file.vector("observations/y", tracks.y, {"2^-10 px", "down, pixel centres at +0.5"});
-  file.vector("observations/feature", tracks.feature, {"", "row in the image's features, -1: none"});
-  file.vector("observations/kept", result.kept, {"", "1: kept, 0: rejected"});
-  file.vector("observations/residual_x", result.residual_x, {"px", "adjusted minus measured"});
-  file.vector("observations/residual_y", result.residual_y, {"px", "adjusted minus measured"});
-}
 
-void get_points(const Hdf5Reader& file, BlockResult& result) {
-  if (file.attribute<std::uint8_t>("observations", "observations_complete") != 1)
-    file.fail("observations", "is not complete: a file of observations was missing when it was written");
+  void append(const TrackResults& batch) {
+    check_track_sizes(batch);
+    if (batch.points.empty()) return;
+    if (first_) add_optional_columns(batch);
+    first_ = false;
+    const TrackSet& tracks = batch.tracks;
+    file_.append("points/id", plain(tracks.id));
+    std::vector<std::int64_t> begin(tracks.begin.begin() + 1, tracks.begin.end());
+    for (std::int64_t& row : begin) row += observations_;
+    observations_ += tracks.observation_count();
+    file_.append("points/begin", begin);
+    file_.append("points/position", vectors3(batch.points, [](const Eigen::Vector3d& p) { return p; }));
+    add_boxes(batch.points);
+    if (!batch.file_tracks.empty()) {
+      file_.append("points/track", plain(batch.file_tracks));
+      file_.append("points/tile", column(batch.file_tiles, narrow));
+    }
+    if (!batch.point_covariance.empty()) file_.append("points/covariance", flattened<float>(batch.point_covariance));
+    file_.append("observations/image", column(tracks.image, narrow));
+    file_.append("observations/x", tracks.x);
+    file_.append("observations/y", tracks.y);
+    file_.append("observations/feature", tracks.feature);
+    file_.append("observations/kept", batch.kept);
+    file_.append("observations/residual_x", batch.residual_x);
+    file_.append("observations/residual_y", batch.residual_y);
+  }
+
+  void finish() {
+    add_boxes({}, true);
+    file_.matrix(
+        "points/box", boxes_, 6,
+        {"m", "bounds of each 1024 successive points: lowest east, north, up, highest; NaN: none has a position"});
+    file_.matrix("points/district", districts_of(boxes_), 6, {"m", "the same of each 65536 successive points"});
+    file_.attribute("observations", "observations_complete", std::uint8_t{1});
+  }
+
+ private:
+  static constexpr auto narrow = [](auto index) { return static_cast<std::int32_t>(index.value); };
+
+  void add_optional_columns(const TrackResults& batch) {
+    if (!batch.file_tracks.empty()) {
+      file_.growing<std::int64_t>("points/track", {}, {"", "index of the track in the file of its tile"});
+      file_.growing<std::int32_t>("points/tile", {}, {"", "that owns the track"});
+    }
+    if (!batch.point_covariance.empty()) file_.growing<float>("points/covariance", {3, 3}, {"m^2", "posterior"});
+  }
+
+  // Of whole boxes; the last one may be smaller.
+  void add_boxes(const std::vector<Eigen::Vector3d>& more, bool last = false) {
+    waiting_.insert(waiting_.end(), more.begin(), more.end());
+    const std::size_t whole =
+        last ? waiting_.size() : waiting_.size() - waiting_.size() % static_cast<std::size_t>(kPointRun);
+    const std::vector<float> boxes =
+        boxes_of({waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(whole)});
+    boxes_.insert(boxes_.end(), boxes.begin(), boxes.end());
+    waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(whole));
+  }
+
+  Hdf5Writer& file_;
+  bool first_ = true;
+  std::int64_t observations_ = 0;
+  std::vector<Eigen::Vector3d> waiting_;  // points of a box that is not full
+  std::vector<float> boxes_;
+};
+
+// Some successive tracks of a result's file.
+TrackResults read_tracks(const Hdf5Reader& file, const RowRange& rows_of_points) {
+  TrackResults result;
   TrackSet& tracks = result.tracks;
-  tracks.id = indices<TrackIndex>(file.vector<std::int64_t>("points/id"));
-  const std::int64_t count = tracks.track_count();
-  tracks.begin = file.vector<std::int64_t>("points/begin", count + 1);
-  tracks.image = indices<ImageIndex>(file.vector<std::int64_t>("observations/image"));
-  const std::int64_t observations = tracks.observation_count();
-  begin_of(file, "points/begin", counts_of(tracks.begin), observations);
-  tracks.x = file.vector<std::int32_t>("observations/x", observations);
-  tracks.y = file.vector<std::int32_t>("observations/y", observations);
-  tracks.feature = file.vector<std::int32_t>("observations/feature", observations);
-  result.kept = file.vector<std::uint8_t>("observations/kept", observations);
-  result.residual_x = file.vector<float>("observations/residual_x", observations);
-  result.residual_y = file.vector<float>("observations/residual_y", observations);
-  const auto positions = file.matrix<double>("points/position", 3, count);
+  const std::int64_t count = rows_of_points.count;
+  const std::vector<RowRange> points = {rows_of_points};
+  tracks.id = indices<TrackIndex>(file.rows<std::int64_t>("points/id", points));
+  tracks.begin = file.rows<std::int64_t>("points/begin", {{rows_of_points.first, count + 1}});
+  const std::int64_t first = tracks.begin.front();
+  for (std::int64_t& row : tracks.begin) row -= first;
+  const std::int64_t total = file.shape("observations/image").front();
+  begin_of(file, "points/begin", counts_of(tracks.begin));
+  if (first < 0 || first + tracks.begin.back() > total)
+    file.fail("points/begin", "names rows that are not there: there are " + std::to_string(total) + " observations");
+  const std::vector<RowRange> observations = {{first, tracks.begin.back()}};
+  tracks.image = indices<ImageIndex>(file.rows<std::int64_t>("observations/image", observations));
+  tracks.x = file.rows<std::int32_t>("observations/x", observations);
+  tracks.y = file.rows<std::int32_t>("observations/y", observations);
+  tracks.feature = file.rows<std::int32_t>("observations/feature", observations);
+  result.kept = file.rows<std::uint8_t>("observations/kept", observations);
+  result.residual_x = file.rows<float>("observations/residual_x", observations);
+  result.residual_y = file.rows<float>("observations/residual_y", observations);
+  const auto positions = file.rows<double>("points/position", points);
   for (std::size_t p = 0; p < tracks.id.size(); ++p) result.points.push_back(vector3(positions, p));
   if (file.has("points/track")) {
-    result.file_tracks = indices<TrackIndex>(file.vector<std::int64_t>("points/track", count));
-    result.file_tiles = indices<TileIndex>(file.vector<std::int64_t>("points/tile", count));
+    result.file_tracks = indices<TrackIndex>(file.rows<std::int64_t>("points/track", points));
+    result.file_tiles = indices<TileIndex>(file.rows<std::int64_t>("points/tile", points));
   }
   if (file.has("points/covariance"))
-    result.point_covariance = square_matrices<Eigen::Matrix3d>(file.array<float>("points/covariance", {count, 3, 3}));
+    result.point_covariance = square_matrices<Eigen::Matrix3d>(file.rows<float>("points/covariance", points));
+  return result;
+}
+
+// Number of tracks; all columns must be as long as there are tracks or observations.
+std::int64_t check_columns(const Hdf5Reader& file) {
+  if (file.attribute<std::uint8_t>("observations", "observations_complete") != 1)
+    file.fail("observations", "is not complete: a file of observations was missing when it was written");
+  const auto require = [&](const std::string& name, const std::vector<std::int64_t>& shape) {
+    const std::vector<std::int64_t> found = file.shape(name);
+    if (found != shape)
+      file.fail(name, "has " + std::to_string(found.empty() ? 0 : found[0]) + " rows, expected " +
+                          std::to_string(shape[0]) + ", or rows of another width");
+  };
+  const auto rows_of = [&](const char* name) {
+    const std::vector<std::int64_t> shape = file.shape(name);
+    if (shape.size() != 1) file.fail(name, "is not a list");
+    return shape[0];
+  };
+  const std::int64_t count = rows_of("points/id"), observations = rows_of("observations/image");
+  require("points/begin", {count + 1});
+  require("points/position", {count, 3});
+  for (const char* name : {"points/track", "points/tile"})
+    if (file.has(name)) require(name, {count});
+  if (file.has("points/covariance")) require("points/covariance", {count, 3, 3});
+  for (const char* name : {"x", "y", "feature", "kept", "residual_x", "residual_y"})
+    require(std::string("observations/") + name, {observations});
+  if (file.rows<std::int64_t>("points/begin", {{count, 1}}).front() != observations)
+    file.fail("points/begin", "does not end with the number of observations, " + std::to_string(observations));
+  return count;
 }
 
 void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::ControlResult>& control) {
@@ -356,10 +451,10 @@ void get_free_parts(const Hdf5Reader& file, BlockResult& result) {
 
 }  // namespace
 
-void write_result(const std::string& path, const BlockResult& result) {
-  check_sizes(result);
-  Hdf5Writer file(path, "result");
-  put_figures(file, result);
+namespace {
+
+// What comes before the tracks, and behind them.
+void put_head(Hdf5Writer& file, const BlockResult& result) {
   put_provenance(file, result.provenance);
   put_block(file, result.block);
   put_image_records(file, result.image_records);
@@ -368,17 +463,24 @@ void write_result(const std::string& path, const BlockResult& result) {
   put_tiles(file, result.tiles);
   file.link("tiles/tile_of_frame", "frames/tile");
   put_precision(file, result);
-  put_points(file, result);
+}
+
+void put_tail(Hdf5Writer& file, const BlockResult& result) {
   put_control_results(file, result.control);
   put_free_parts(file, result.free_parts);
   put_observation_table(file, result.observation_table);
   put_seams(file, result.seams);
   put_record(file, result);
-  file.close();
+  put_figures(file, result);
 }
 
-BlockResult read_result(const std::string& path) {
-  const Hdf5Reader file(path, "result");
+// Larger files are written as they grow, not put together in memory.
+Hdf5Storage storage_for(const TrackBatches& tracks) {
+  constexpr std::int64_t kMostInMemory = 1 << 20;
+  return tracks.track_count() > kMostInMemory ? Hdf5Storage::kDisk : Hdf5Storage::kMemory;
+}
+
+BlockResult get_head_and_tail(const Hdf5Reader& file) {
   BlockResult result;
   get_figures(file, result);
   get_provenance(file, result.provenance);
@@ -389,13 +491,63 @@ BlockResult read_result(const std::string& path) {
       IndexedVector<FrameIndex, std::uint8_t>(file.vector<std::uint8_t>("frames/boundary", rows(result.block.frames)));
   result.tiles = get_tiles(file);
   get_precision(file, result);
-  get_points(file, result);
   result.control = get_control_results(file, result.block);
   get_free_parts(file, result);
   get_observation_table(file, result.observation_table);
   result.seams = get_seams(file);
   get_record(file, result);
   return result;
+}
+
+}  // namespace
+
+void write_result(const std::string& path, const BlockResult& result) {
+  check_sizes(result);
+  const WholeTracks tracks(result);
+  Hdf5Writer file(path, "result", storage_for(tracks));
+  put_head(file, result);
+  PointWriter points(file);
+  points.append(result);
+  points.finish();
+  put_tail(file, result);
+  file.close();
+}
+
+void write_result(const std::string& path, BlockResult& result, const TrackBatches& tracks) {
+  check_sizes(result);
+  Hdf5Writer file(path, "result", storage_for(tracks));
+  put_head(file, result);
+  PointWriter points(file);
+  ResultDigest digest(result.state, tracks.track_count());
+  tracks.visit([&](const TrackResults& batch) {
+    points.append(batch);
+    digest.add(batch);
+  });
+  points.finish();
+  result.digest = digest.text();
+  put_tail(file, result);
+  file.close();
+}
+
+BlockResult read_result(const std::string& path) {
+  const Hdf5Reader file(path, "result");
+  BlockResult result = get_head_and_tail(file);
+  static_cast<TrackResults&>(result) = read_tracks(file, {0, check_columns(file)});
+  return result;
+}
+
+BlockResult read_result_without_tracks(const std::string& path) {
+  return get_head_and_tail(Hdf5Reader(path, "result"));
+}
+
+StoredTracks::StoredTracks(std::string path)
+    : path_(std::move(path)), count_(check_columns(Hdf5Reader(path_, "result"))) {}
+
+void StoredTracks::visit(const Visit& visit) const {
+  constexpr std::int64_t kBatch = 1 << 16;  // tracks
+  const Hdf5Reader file(path_, "result");
+  for (std::int64_t first = 0; first < count_; first += kBatch)
+    visit(read_tracks(file, {first, std::min(kBatch, count_ - first)}));
 }
 
 }  // namespace megablock

@@ -136,9 +136,9 @@ struct TrackWriter::File {
 
 TrackWriter::TrackWriter(const std::string& path) : file_(std::make_unique<File>(path)) {
   make_groups(file_->hdf5);
-  file_->hdf5.growing<std::int64_t>(kIds, 1, note_of(kIds));
+  file_->hdf5.growing<std::int64_t>(kIds, {}, note_of(kIds));
   for (const char* name : {kCounts, kImages, kX, kY, kFeature})
-    file_->hdf5.growing<std::int32_t>(name, 1, note_of(name));
+    file_->hdf5.growing<std::int32_t>(name, {}, note_of(name));
 }
 
 TrackWriter::~TrackWriter() = default;

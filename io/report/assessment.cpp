@@ -182,7 +182,7 @@ std::string assessment(const BlockResult& result, const Figures& f) {
   std::string list = convergence_item(result) + images_item(result, f) + parts_item(f) + seams_item(result) +
                      unused_points_item(result) + residuals_item(result) + points_item(result, f, PointRole::kCheck) +
                      points_item(result, f, PointRole::kControl);
-  for (const std::string& text : datum_texts(result)) list += item("look", escape(text) + ".");
+  for (const std::string& text : datum_texts(result, f)) list += item("look", escape(text) + ".");
   if (!result.gauge.empty()) list += item("plain", "Datum: " + escape(result.gauge) + ".");
   for (const std::string& note : result.notes) list += item("look", escape(note));
   return "<ul class=assessment>\n" + list + "</ul>\n";

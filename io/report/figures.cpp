@@ -11,8 +11,15 @@ namespace megablock::report {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr std::size_t kSampleLimit = 500000;  // values a median is taken from
+constexpr std::int64_t kSampleLimit = 500000;  // values a median is taken from
 constexpr std::int64_t kRayLimit = 24;        // rays of a track compared for its intersection angle
+
+// The columns of the tracks are there for all of them.
+bool consistent(const TrackResults& tracks) {
+  const std::size_t rows = tracks.tracks.image.size();
+  return tracks.points.size() == tracks.tracks.id.size() && tracks.kept.size() == rows &&
+         tracks.residual_x.size() == rows && tracks.residual_y.size() == rows;
+}
 
 // The observations of one triangulated point that count.
 struct Track {
@@ -20,7 +27,7 @@ struct Track {
   std::int64_t all = 0;
 };
 
-Track track_of(const BlockResult& result, std::size_t row) {
+Track track_of(const TrackResults& result, std::size_t row) {
   Track track;
   for (std::int64_t o = result.tracks.begin[row]; o < result.tracks.begin[row + 1]; ++o) {
     const auto i = static_cast<std::size_t>(o);
@@ -33,15 +40,16 @@ Track track_of(const BlockResult& result, std::size_t row) {
 
 class Gatherer {
  public:
-  explicit Gatherer(const BlockResult& result) : result_(result), block_(result.block) {}
+  Gatherer(const BlockResult& result, const TrackBatches& tracks)
+      : result_(result), block_(result.block), tracks_(tracks) {}
 
   Figures run() {
     const bool sound = complete();
-    if (sound) f_.reprojection = reprojection_statistics(result_);
+    if (sound) f_.reprojection = reprojection_statistics(result_, tracks_);
     prepare();
     frames();
     if (sound) observations();
-    find_parts(result_, f_);
+    find_parts(result_, tracks_, f_);
     positions();
     points();
     accuracy();
@@ -49,14 +57,11 @@ class Gatherer {
   }
 
  private:
-  // State and observations are there for all that the block and the tracks name.
+  // The state is there for all that the block names.
   bool complete() const {
-    const std::size_t rows = result_.tracks.image.size();
     return result_.state.oriented.size() == block_.frames.size() &&
            result_.state.frames.size() == block_.frames.size() &&
-           result_.state.cameras.size() == block_.cameras.size() && result_.state.mounts.size() == block_.rigs.size() &&
-           result_.points.size() == result_.tracks.id.size() && result_.kept.size() == rows &&
-           result_.residual_x.size() == rows && result_.residual_y.size() == rows;
+           result_.state.cameras.size() == block_.cameras.size() && result_.state.mounts.size() == block_.rigs.size();
   }
   void prepare() {
     f_.track_length = {2, 1, std::vector<std::int64_t>(14, 0)};
@@ -66,7 +71,6 @@ class Gatherer {
     f_.observations.assign(block_.images.size(), 0);
     f_.measured.assign(block_.images.size(), 0);
     f_.image_squares.assign(block_.images.size(), 0);
-    for (const ImageIndex image : result_.tracks.image) ++f_.measured[image];
     f_.camera_images.assign(block_.cameras.size(), 0);
     for (const Camera& camera : block_.cameras) f_.fields.push_back(ResidualField(camera));
     const auto tiles = static_cast<std::size_t>(result_.tiles.tile_count);
@@ -105,17 +109,24 @@ class Gatherer {
   }
 
   void observations() {
-    const std::size_t step = 1 + result_.points.size() / kSampleLimit;
+    const auto step = static_cast<std::size_t>(1 + tracks_.track_count() / kSampleLimit);
     std::vector<double> resolution;
-    for (std::size_t row = 0; row < result_.points.size(); ++row) {
-      if (!result_.points[row].allFinite()) continue;
-      const Track track = track_of(result_, row);
-      f_.all_observations += track.all;
-      if (track.kept.empty()) continue;
-      f_.track_length.add(static_cast<double>(track.kept.size()));
-      for (std::size_t o : track.kept) observation(o);
-      if (row % step == 0) intersection(row, track, resolution);
-    }
+    std::size_t before = 0;  // tracks of the batches before
+    tracks_.visit([&](const TrackResults& batch) {
+      for (const ImageIndex image : batch.tracks.image) ++f_.measured[image];
+      for (std::size_t row = 0; row < batch.points.size(); ++row) {
+        if (!batch.points[row].allFinite()) continue;
+        const bool sampled = (before + row) % step == 0;
+        if (sampled) point_accuracy(batch, row);
+        const Track track = track_of(batch, row);
+        f_.all_observations += track.all;
+        if (track.kept.empty()) continue;
+        f_.track_length.add(static_cast<double>(track.kept.size()));
+        for (std::size_t o : track.kept) observation(batch, o);
+        if (sampled) intersection(batch, row, track, resolution);
+      }
+      before += batch.points.size();
+    });
     f_.ground_resolution_m = spread(std::move(resolution)).median;
     for (std::size_t t = 0; t < f_.tile_rms_px.size(); ++t)
       f_.tile_rms_px[t] = f_.tile_observations[t]
@@ -130,15 +141,15 @@ class Gatherer {
         f_.observations_per_image.add(static_cast<double>(f_.observations[image]));
   }
 
-  void observation(std::size_t o) {
-    const ImageIndex image = result_.tracks.image[o];
-    const Eigen::Vector2d residual(result_.residual_x[o], result_.residual_y[o]);
+  void observation(const TrackResults& batch, std::size_t o) {
+    const ImageIndex image = batch.tracks.image[o];
+    const Eigen::Vector2d residual(batch.residual_x[o], batch.residual_y[o]);
     ++f_.observations[image];
     f_.image_squares[image] += residual.squaredNorm();
     f_.residual_px.add(residual.x());
     f_.residual_px.add(residual.y());
     const CameraIndex camera = block_.camera_of(image);
-    const Eigen::Vector2d pixel(from_fixed_pixel(result_.tracks.x[o]), from_fixed_pixel(result_.tracks.y[o]));
+    const Eigen::Vector2d pixel(from_fixed_pixel(batch.tracks.x[o]), from_fixed_pixel(batch.tracks.y[o]));
     f_.fields[camera].add(block_.cameras[camera], pixel, residual);
     const TileIndex tile = tile_of(block_.images[image].frame);
     if (!tile.valid()) return;
@@ -146,12 +157,12 @@ class Gatherer {
     f_.tile_rms_px[static_cast<std::size_t>(tile.value)] += residual.squaredNorm();
   }
 
-  void intersection(std::size_t row, const Track& track, std::vector<double>& resolution) {
+  void intersection(const TrackResults& batch, std::size_t row, const Track& track, std::vector<double>& resolution) {
     std::vector<Eigen::Vector3d> rays;
     for (std::size_t o : track.kept) {
       if (static_cast<std::int64_t>(rays.size()) == kRayLimit) break;
-      const ImageIndex image = result_.tracks.image[o];
-      const Eigen::Vector3d ray = result_.points[row] - image_pose(result_, image).centre;
+      const ImageIndex image = batch.tracks.image[o];
+      const Eigen::Vector3d ray = batch.points[row] - image_pose(result_, image).centre;
       resolution.push_back(ray.norm() / result_.state.cameras[block_.camera_of(image)][kFocal]);
       rays.push_back(ray.normalized());
     }
@@ -232,20 +243,22 @@ class Gatherer {
     f_.sigma_north = spread(std::move(frame[1]));
     f_.sigma_up = spread(std::move(frame[2]));
     f_.sigma_rotation = spread(std::move(frame[3]));
-    std::vector<double> horizontal, up;
-    const std::size_t step = 1 + result_.point_covariance.size() / kSampleLimit;
-    for (std::size_t p = 0; p < result_.point_covariance.size(); p += step) {
-      const Eigen::Matrix3d& c = result_.point_covariance[p];
-      if (!c.allFinite() || !result_.points[p].allFinite()) continue;
-      horizontal.push_back(std::sqrt(std::max(0.0, c(0, 0) + c(1, 1))));
-      up.push_back(std::sqrt(std::max(0.0, c(2, 2))));
-    }
-    f_.point_sigma_horizontal = spread(std::move(horizontal));
-    f_.point_sigma_up = spread(std::move(up));
+    f_.point_sigma_horizontal = spread(std::move(point_horizontal_));
+    f_.point_sigma_up = spread(std::move(point_up_));
+  }
+
+  void point_accuracy(const TrackResults& batch, std::size_t row) {
+    if (batch.point_covariance.empty()) return;
+    const Eigen::Matrix3d& c = batch.point_covariance[row];
+    if (!c.allFinite()) return;
+    point_horizontal_.push_back(std::sqrt(std::max(0.0, c(0, 0) + c(1, 1))));
+    point_up_.push_back(std::sqrt(std::max(0.0, c(2, 2))));
   }
 
   const BlockResult& result_;
   const Block& block_;
+  const TrackBatches& tracks_;
+  std::vector<double> point_horizontal_, point_up_;  // sigmas of a sample of the points, m
   Figures f_;
 };
 
@@ -304,6 +317,11 @@ Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values) {
   return result;
 }
 
-Figures figures_of(const BlockResult& result) { return Gatherer(result).run(); }
+Figures figures_of(const BlockResult& result) {
+  const TrackResults none;
+  return figures_of(result, WholeTracks(consistent(result) ? result : none));
+}
+
+Figures figures_of(const BlockResult& result, const TrackBatches& tracks) { return Gatherer(result, tracks).run(); }
 
 }  // namespace megablock::report

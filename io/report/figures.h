@@ -1,4 +1,4 @@
-// The figures the report prints and draws, gathered in one pass over the result.
+// The figures the report prints and draws, gathered in a few passes over the result's tracks.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,6 +7,7 @@
 
 #include "io/residual_field.h"
 #include "io/result.h"
+#include "io/track_batches.h"
 
 namespace megablock::report {
 
@@ -91,11 +92,12 @@ struct Figures {
 };
 
 Figures figures_of(const BlockResult& result);
+Figures figures_of(const BlockResult& result, const TrackBatches& tracks);
 
 bool oriented(const BlockResult& result, FrameIndex frame);
 
 // Fills in parts and part_of_frame.
-void find_parts(const BlockResult& result, Figures& figures);
+void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
 
 double image_rms(const Figures& figures, ImageIndex image);  // px; unknown without observations
 Pose image_pose(const BlockResult& result, ImageIndex image);

@@ -32,14 +32,14 @@ std::size_t frame_at(const BlockResult& result, ImageIndex image) {
   return static_cast<std::size_t>(result.block.images[image].frame.value);
 }
 
-void join_tie_points(const BlockResult& result, FrameSets& sets) {
-  for (std::size_t t = 0; t + 1 < result.tracks.begin.size(); ++t) {
-    if (t >= result.points.size() || !result.points[t].allFinite()) continue;
+void join_tie_points(const BlockResult& result, const TrackResults& batch, FrameSets& sets) {
+  for (std::size_t t = 0; t + 1 < batch.tracks.begin.size(); ++t) {
+    if (t >= batch.points.size() || !batch.points[t].allFinite()) continue;
     std::int64_t first = -1;
-    for (std::int64_t o = result.tracks.begin[t]; o < result.tracks.begin[t + 1]; ++o) {
+    for (std::int64_t o = batch.tracks.begin[t]; o < batch.tracks.begin[t + 1]; ++o) {
       const auto i = static_cast<std::size_t>(o);
-      if (i >= result.kept.size() || !result.kept[i]) continue;
-      const auto frame = static_cast<std::int64_t>(frame_at(result, result.tracks.image[i]));
+      if (i >= batch.kept.size() || !batch.kept[i]) continue;
+      const auto frame = static_cast<std::int64_t>(frame_at(result, batch.tracks.image[i]));
       if (first >= 0) sets.join(static_cast<std::size_t>(first), static_cast<std::size_t>(frame));
       first = frame;
     }
@@ -60,10 +60,10 @@ void join_control_points(const BlockResult& result, FrameSets& sets) {
 
 }  // namespace
 
-void find_parts(const BlockResult& result, Figures& figures) {
+void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures) {
   const std::size_t frames = result.block.frames.size();
   FrameSets sets(frames);
-  join_tie_points(result, sets);
+  tracks.visit([&](const TrackResults& batch) { join_tie_points(result, batch, sets); });
   join_control_points(result, sets);
   for (const RelativePose& relative : result.block.relative_poses)
     if (oriented(result, relative.from) && oriented(result, relative.to))

@@ -34,9 +34,9 @@ void write_simulated_block(const SimulationOptions& options, const std::string& 
   TrackWriter tie_points((root / "tie_points.h5").string());
   Hdf5Writer truth_tracks((root / "truth_tracks.h5").string(), kTruth, Hdf5Storage::kDisk);
   truth_tracks.group("points", "one row per track of tie_points.h5");
-  truth_tracks.growing<double>(kPosition, 3, {"m", "true position in the ground frame"});
+  truth_tracks.growing<double>(kPosition, {3}, {"m", "true position in the ground frame"});
   truth_tracks.group("observations", "one row per observation of tie_points.h5");
-  truth_tracks.growing<std::uint8_t>(kOutlier, 1, {"", "1: a wrong match, 0: the point with the stated noise"});
+  truth_tracks.growing<std::uint8_t>(kOutlier, {}, {"", "1: a wrong match, 0: the point with the stated noise"});
   const SimulatedBlock simulated = simulate_block(
       options,
       [&](const SimulatedTracks& batch) {

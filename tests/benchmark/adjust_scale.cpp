@@ -14,6 +14,7 @@
 #include "io/error.h"
 #include "io/evaluate.h"
 #include "io/events.h"
+#include "io/track_batches.h"
 #include "tests/benchmark/scenes.h"
 #include "tests/unit/io/scratch_directory.h"
 
@@ -44,19 +45,21 @@ double peak_rss_mib(const BlockResult& result) {
 }
 
 // Points with kept observations in frames of several tiles.
-std::int64_t points_across_tiles(const BlockResult& result) {
+std::int64_t points_across_tiles(const BlockResult& result, const TrackBatches& tracks) {
   std::int64_t count = 0;
-  for (std::int64_t t = 0; t < result.tracks.track_count(); ++t) {
-    TileIndex first;
-    bool across = false;
-    for (std::int64_t o = result.tracks.begin[t]; o < result.tracks.begin[t + 1]; ++o) {
-      if (!result.kept[o]) continue;
-      const TileIndex tile = result.tiles.tile_of_frame[result.block.images[result.tracks.image[o]].frame];
-      if (!first.valid()) first = tile;
-      across = across || tile != first;
+  tracks.visit([&](const TrackResults& batch) {
+    for (std::int64_t t = 0; t < batch.tracks.track_count(); ++t) {
+      TileIndex first;
+      bool across = false;
+      for (std::int64_t o = batch.tracks.begin[t]; o < batch.tracks.begin[t + 1]; ++o) {
+        if (!batch.kept[o]) continue;
+        const TileIndex tile = result.tiles.tile_of_frame[result.block.images[batch.tracks.image[o]].frame];
+        if (!first.valid()) first = tile;
+        across = across || tile != first;
+      }
+      count += across;
     }
-    count += across;
-  }
+  });
   return count;
 }
 
@@ -67,9 +70,10 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
   run_scene(folder, job, options.ranks, options.threads);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-  const BlockResult result = read_result((job / "result/block.h5").string());
+  const BlockResult result = read_result_without_tracks((job / "result/block.h5").string());
+  const StoredTracks tracks((job / "result/block.h5").string());
   const Evaluation evaluation = evaluate(result, (folder / "truth.csv").string());
-  const ReprojectionStatistics statistics = reprojection_statistics(result);
+  const ReprojectionStatistics statistics = reprojection_statistics(result, tracks);
   const double per_iteration = seconds_per_iteration(job);
   return {{"scene", options.scene.scene},
           {"frames", options.scene.frames},
@@ -86,7 +90,7 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
           {"peak_rss_mib_per_rank", peak_rss_mib(result)},
           {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), std::uint8_t{1})},
           {"tiles", result.tiles.tile_count},
-          {"points_across_tiles", points_across_tiles(result)},
+          {"points_across_tiles", points_across_tiles(result, tracks)},
           {"newton_decrement", result.newton_decrement},
           {"normalised_error_position", evaluation.normalised_error_position},
           {"normalised_error_rotation", evaluation.normalised_error_rotation},

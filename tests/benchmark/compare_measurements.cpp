@@ -136,9 +136,9 @@ void write_result_of(const Store& store, const std::string& path) {
   file.group("points");
   file.group("observations");
   for (const char* name : {"points/id", "points/begin", "points/track"}) file.growing<std::int64_t>(name);
-  file.growing<double>("points/position", 3);
-  file.growing<float>("points/box", 6);
-  file.growing<float>("points/district", 6);
+  file.growing<double>("points/position", {3});
+  file.growing<float>("points/box", {6});
+  file.growing<float>("points/district", {6});
   for (const char* name :
        {"points/tile", "observations/image", "observations/x", "observations/y", "observations/feature"})
     file.growing<std::int32_t>(name);
