@@ -40,11 +40,11 @@ void read(ByteReader& reader, UnknownList& unknowns) { unknowns = reader.values<
 
 // One value per tile from the ranks that hold them, in tile order, on every rank.
 template <typename Value>
-std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<RankTile>& own,
+std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const TileStore& own,
                                   const std::vector<Value>& values) {
   ByteWriter writer;
   for (std::size_t i = 0; i < own.size(); ++i) {
-    writer.value(own[i].tile);
+    writer.value(own.number(i));
     write(writer, values[i]);
   }
   std::vector<Value> all(tiles);
@@ -76,9 +76,9 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
   return rank_of_tile;
 }
 
-RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile,
-                       std::vector<RankTile> tiles, const MemoryOptions& memory)
-    : ranks_(ranks), tiles_(std::move(tiles)), factors_(memory) {
+RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
+                       const MemoryOptions& memory)
+    : ranks_(ranks), tiles_(tiles), factors_(memory) {
   rank_of_node_.assign(tree.nodes.size(), 0);
   own_tile_of_node_.assign(tree.nodes.size(), -1);
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
@@ -86,16 +86,17 @@ RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<i
     rank_of_node_[n] = node.tile.valid() ? rank_of_tile[static_cast<std::size_t>(node.tile.value)]
                                          : rank_of_node_[static_cast<std::size_t>(node.left)];
     for (std::size_t i = 0; i < tiles_.size(); ++i)
-      if (node.tile.valid() && tiles_[i].tile == node.tile.value) own_tile_of_node_[n] = static_cast<std::int64_t>(i);
+      if (node.tile.valid() && tiles_.number(i) == node.tile.value) own_tile_of_node_[n] = static_cast<std::int64_t>(i);
   }
   make_plans(tree, rank_of_tile.size());
+  find_gauges();
 }
 
 RankRunner::~RankRunner() = default;
 
 void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
   std::vector<UnknownList> own;
-  for (const RankTile& tile : tiles_) own.push_back(tile_unknowns(tile.problem));
+  for (std::size_t row = 0; row < tiles_.size(); ++row) own.push_back(tile_unknowns(tiles_.whole(row).problem));
   plan_ = make_plan(tree, gather_by_tile(ranks_, tile_count, tiles_, own));
   on_one_rank_.assign(plan_.nodes.size(), false);
   for (std::size_t n = 0; n < plan_.nodes.size(); ++n) {
@@ -104,28 +105,35 @@ void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
         mine(static_cast<std::int64_t>(n)) && (node.leaf >= 0 || (on_one_rank_[static_cast<std::size_t>(node.left)] &&
                                                                   on_one_rank_[static_cast<std::size_t>(node.right)]));
   }
-  for (const RankTile& tile : tiles_)
-    tile_plans_.push_back(make_tile_plan(
-        tile.problem, plan_.nodes[static_cast<std::size_t>(plan_.node_of_leaf[static_cast<std::size_t>(tile.tile)])]));
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const std::int64_t node = plan_.node_of_leaf[static_cast<std::size_t>(tiles_.number(row))];
+    tile_plans_.push_back(make_tile_plan(tiles_.whole(row).problem, plan_.nodes[static_cast<std::size_t>(node)]));
+  }
+}
+
+void RankRunner::find_gauges() {
+  gauges_.clear();
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const RankTile& tile = tiles_.whole(row);
+    gauges_.push_back(tile_gauge(tile.problem, tile_plans_[row], tile.state));
+  }
 }
 
 BlockGauge RankRunner::gather_gauge() const {
-  std::vector<TileGauge> own;
-  for (std::size_t row = 0; row < tiles_.size(); ++row)
-    own.push_back(tile_gauge(tiles_[row].problem, tile_plans_[row], tiles_[row].state));
-  return make_gauge(gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
+  return make_gauge(gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, gauges_));
 }
 
 TileDatum RankRunner::datum_of(std::size_t row) const {
-  const RankTile& tile = tiles_[row];
+  const RankTile& tile = tiles_.outline(row);
   return tile_datum(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, with_columns_);
 }
 
 InnerSums RankRunner::gather_inner_sums(const std::vector<TileStep>& steps) const {
   std::vector<InnerSums> own;
-  for (std::size_t row = 0; row < tiles_.size(); ++row)
-    own.push_back(inner_sums(gauge_, tiles_[row].tile, tiles_[row].problem, tile_plans_[row], tiles_[row].state,
-                             steps[row].unknowns));
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const RankTile& tile = tiles_.outline(row);
+    own.push_back(inner_sums(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, steps[row].unknowns));
+  }
   const std::vector<InnerSums> all = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own);
   InnerSums sums = all.front();
   for (std::size_t t = 1; t < all.size(); ++t) sums.add(all[t]);
@@ -156,9 +164,10 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
 
 UpdateMatrix RankRunner::condense_leaf(std::int64_t node, const Pass& pass) {
   const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
-  const RankTile& tile = tiles_[row];
+  const RankTile& tile = tiles_.whole(row);
   TileCondensation condensed = condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
-  factors_.put(node, {std::move(condensed.factor), {}}, FactorStore::Loss::kRecompute);
+  factors_.put(node, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
+               FactorStore::Loss::kRecompute);
   return std::move(condensed.update);
 }
 
@@ -195,14 +204,11 @@ UpReport RankRunner::condense_all(const Pass& pass) {
   updates_.clear();
   factors_.clear();
   seams_.clear();
-  condensed_.clear();
   for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
     if (!mine(n)) continue;
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf >= 0) {
-      UpdateMatrix update = condense_leaf(n, pass);
-      if (check_seams_) condensed_[node.leaf] = update;
-      pass_up(n, std::move(update));
+      pass_up(n, condense_leaf(n, pass));
       continue;
     }
     const UpdateMatrix left = child_update(node.left), right = child_update(node.right);
@@ -254,9 +260,7 @@ std::vector<TileStep> RankRunner::steps_down(const Pass& pass) {
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
-    const RankTile& tile = tiles_[row];
-    steps[row] = solve_tile_down(tile.problem, tile_plans_[row], tile.state, pass, factors_of(n, pass).tile, passed,
-                                 datum_of(row));
+    steps[row] = solve_tile_unknowns(tile_plans_[row], factors_of(n, pass).tile, passed);
   }
   ranks_.flush_sends();
   return steps;
@@ -266,20 +270,27 @@ DownReport RankRunner::down(const Pass& pass) {
   struct Sums {
     double damping_norm = 0, trial_cost = 0;
   };
-  const std::vector<TileStep> steps = steps_down(pass);
+  std::vector<TileStep> steps = steps_down(pass);
   std::vector<MotionSums> own;
-  for (std::size_t row = 0; row < tiles_.size(); ++row)
-    own.push_back(motion_sums(gauge_, tiles_[row].tile, tiles_[row].problem, tile_plans_[row], tiles_[row].state,
-                              steps[row].unknowns));
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const RankTile& tile = tiles_.outline(row);
+    own.push_back(motion_sums(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, steps[row].unknowns));
+  }
   const std::vector<BlockMotion> motions =
       block_motions(gauge_, gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
   std::vector<Sums> sums(tiles_.size());
-  trial_.assign(tiles_.size(), {});
+  trial_gauges_.clear();
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
-    trial_[row] = apply_step(gauge_, motions, tiles_[row].tile, tiles_[row].problem, tile_plans_[row],
-                             tiles_[row].state, steps[row]);
-    refine_points(tiles_[row].problem, tile_plans_[row], trial_[row]);
-    sums[row] = {steps[row].damping_norm, evaluate_cost(tiles_[row].problem, trial_[row])};
+    const RankTile& tile = tiles_.whole(row);
+    const TilePlan& plan = tile_plans_[row];
+    TileStep& step = steps[row];
+    solve_tile_points(tile.problem, plan, tile.state, pass, step);
+    TileState trial = apply_step(gauge_, motions, tile.tile, tile.problem, plan, tile.state, step);
+    refine_points(tile.problem, plan, trial);
+    sums[row] = {step.damping_norm, evaluate_cost(tile.problem, trial)};
+    trial_gauges_.push_back(tile_gauge(tile.problem, plan, trial));
+    tiles_.put_trial(row, std::move(trial));
+    step = {};
   }
   DownReport report;
   for (const Sums& tile : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, sums)) {
@@ -290,15 +301,16 @@ DownReport RankRunner::down(const Pass& pass) {
 }
 
 void RankRunner::accept() {
-  for (std::size_t i = 0; i < tiles_.size(); ++i) tiles_[i].state = std::move(trial_[i]);
-  trial_.clear();
+  tiles_.accept();
+  gauges_ = std::move(trial_gauges_);
 }
 
-void RankRunner::reject() { trial_.clear(); }
+void RankRunner::reject() { tiles_.reject(); }
 
-RankRunner::Posterior RankRunner::posterior() {
+RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
   Posterior posterior;
   check_seams_ = true;
+  find_gauges();  // states may have followed what other tiles moved
   const auto inner =
       std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
   seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
@@ -306,7 +318,6 @@ RankRunner::Posterior RankRunner::posterior() {
   with_columns_ = gauge_.free();
   posterior.sums = condense_all(0).sums;
   posterior.gauge = gauge_;
-  check_seams_ = false;
   std::vector<TileStep> steps(tiles_.size());
   InnerSums inner_constraints;
   if (with_columns_) {
@@ -314,30 +325,32 @@ RankRunner::Posterior RankRunner::posterior() {
     inner_constraints = gather_inner_sums(steps);
   }
 
-  posterior.covariances.resize(tiles_.size());
   std::vector<TileCheck> checks(tiles_.size());
+  std::vector<ObservationTable> tables(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
     const CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    const NodeFactors& factors = factors_of(n, 0);
     if (node.leaf < 0) {
-      pass_down(n, covariance_node(factors_of(n, 0).front, passed));
+      pass_down(n, covariance_node(factors.front, passed));
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
-    const RankTile& tile = tiles_[row];
-    posterior.covariances[row] = covariance_tile(tile.problem, tile_plans_[row], tile.state, factors_of(n, 0).tile,
-                                                 passed, datum_of(row), steps[row].unknowns);
+    const RankTile& tile = tiles_.whole(row);
+    const TilePlan& plan = tile_plans_[row];
+    const Step& step = steps[row].unknowns;
+    TileCovariance covariance =
+        covariance_tile(tile.problem, plan, tile.state, factors.tile, passed, datum_of(row), step);
     if (with_columns_)
-      to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, tile_plans_[row], tile.state,
-                           steps[row].unknowns, posterior.covariances[row]);
-    checks[row] = check_tile(tile.tile, condensed_.at(tile.tile), passed, seam_probability_);
+      to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);
+    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability_);
+    tables[row] = covariance.observations;
+    if (visit) visit(tile, covariance);
   }
   ranks_.flush_sends();
-  with_columns_ = false;
+  with_columns_ = check_seams_ = false;
   posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
-  std::vector<ObservationTable> tables;
-  for (const TileCovariance& covariance : posterior.covariances) tables.push_back(covariance.observations);
   for (const ObservationTable& table : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, tables))
     posterior.observations.add(table);
 

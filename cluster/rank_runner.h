@@ -2,40 +2,36 @@
 // child; update matrices go up and steps, covariances come down as messages. All sums are formed in tile or child
 // order, so that the bits do not depend on the ranks.
 //
-// Factors wait for the way down within the rank's memory, else in its scratch, else they are computed again
+// Tiles lie in a store of their own, partly out of core (merge/tile_store.h): each pass asks for a tile as a whole
+// once. Factors wait for the way down within the rank's memory, else in its scratch, else they are computed again
 // (merge/memory.h). Those of a node whose subtree lies on several ranks are never given up: computing them again would
 // need the other ranks.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "cluster/communicator.h"
-#include "merge/condense.h"
 #include "merge/block_motion.h"
+#include "merge/condense.h"
 #include "merge/global_adjustment.h"
 #include "merge/inner_constraints.h"
 #include "merge/memory.h"
 #include "merge/node.h"
 #include "merge/seam_check.h"
+#include "merge/tile_store.h"
 
 namespace megablock {
-
-// One tile as its rank holds it.
-struct RankTile {
-  std::int64_t tile = -1;
-  TileProblem problem;
-  TileState state;
-};
 
 // Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
 std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
 
 class RankRunner : public TreeRunner {
  public:
-  // `tiles`: this rank's, ascending; rank_of_tile: of all tiles. Collective.
-  RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, std::vector<RankTile> tiles,
+  // `tiles`: this rank's, ascending, longer-lived than the runner; rank_of_tile: of all tiles. Collective.
+  RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
              const MemoryOptions& memory);
   ~RankRunner() override;
 
@@ -48,15 +44,16 @@ class RankRunner : public TreeRunner {
   struct Posterior {
     SubtreeSums sums;  // of the whole block
     BlockGauge gauge;
-    std::vector<SeamReport> seams;            // of all inner nodes, in node order; on every rank
-    std::vector<TileCheck> tile_checks;       // of all tiles, in tile order; on every rank
-    std::vector<TileCovariance> covariances;  // of this rank's tiles
-    ObservationTable observations;            // of the whole block, on every rank
+    std::vector<SeamReport> seams;       // of all inner nodes, in node order; on every rank
+    std::vector<TileCheck> tile_checks;  // of all tiles, in tile order; on every rank
+    ObservationTable observations;       // of the whole block, on every rank
   };
-  Posterior posterior();
+  // `visit` gets each of this rank's tiles once, as soon as its covariances are there: they are kept nowhere.
+  using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
+  Posterior posterior(const VisitCovariance& visit = {});
 
-  std::vector<RankTile>& tiles() { return tiles_; }
-  const std::vector<RankTile>& tiles() const { return tiles_; }
+  // The unknowns that a tile's kept residuals touch.
+  const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
   const MemoryStatistics& memory() const { return factors_.statistics(); }
 
  private:
@@ -69,23 +66,25 @@ class RankRunner : public TreeRunner {
   template <typename Values>
   Values from_parent(std::int64_t node);
   UpdateMatrix condense_leaf(std::int64_t node, const Pass& pass);
-  UpdateMatrix eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, const Pass& pass);
+  UpdateMatrix eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right,
+                               const Pass& pass);
   // The subtree of a node that lies on this rank alone, once more.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
   // One upward pass with the datum in gauge_.
   UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
+  void find_gauges();
   BlockGauge gather_gauge() const;
   TileDatum datum_of(std::size_t row) const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
-  // Down with the current factors: steps of this rank's tiles.
+  // Down with the current factors: steps of this rank's tiles without those of their points.
   std::vector<TileStep> steps_down(const Pass& pass);
 
   Communicator& ranks_;
-  std::vector<RankTile> tiles_;
-  std::vector<TilePlan> tile_plans_;  // of tiles_
-  std::vector<TileState> trial_;      // of tiles_
+  TileStore& tiles_;
+  std::vector<TilePlan> tile_plans_;              // of tiles_
+  std::vector<TileGauge> gauges_, trial_gauges_;  // of tiles_, at their states and after a step
   std::vector<int> rank_of_node_;
   std::vector<std::int64_t> own_tile_of_node_;  // row of tiles_, -1
   EliminationPlan plan_;
@@ -97,8 +96,7 @@ class RankRunner : public TreeRunner {
   bool check_seams_ = false;
   double seam_probability_ = 0;
   std::vector<SeamReport> seams_;
-  std::map<std::int64_t, UpdateMatrix> condensed_;  // of this rank's tiles, while seams are checked
-  std::map<std::int64_t, Bytes> downward_;          // what a parent on this rank left for its child
+  std::map<std::int64_t, Bytes> downward_;  // what a parent on this rank left for its child
 };
 
 }  // namespace megablock

@@ -107,14 +107,8 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
   return result;
 }
 
-TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                         const TileFactor& factor, const Step& boundary, const TileDatum& datum) {
-  if (factor.empty()) {
-    const TileFactor again = condense_tile(problem, plan, state, pass, datum).factor;
-    return solve_tile_down(problem, plan, state, pass, again, boundary);
-  }
+TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, const Step& boundary) {
   TileStep result;
-  result.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
   result.unknowns.unknowns = plan.unknowns;
   const std::vector<std::int64_t> offsets = row_offsets(plan.unknowns);
   const std::int64_t columns = factor.nodes.back().right_hand_sides, rows_in_all = offsets.back();
@@ -137,19 +131,32 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
                     result.unknowns.values.begin() + offsets[at(target)] + c * rows_in_all);
     }
   }
-
   const double* x = result.unknowns.values.data();
+  for (std::size_t i = 0; i < factor.diagonal.size(); ++i) result.damping_norm += factor.diagonal[i] * x[i] * x[i];
+  return result;
+}
+
+void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                       TileStep& step) {
+  step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
+  const std::vector<std::int64_t> offsets = row_offsets(plan.unknowns);
   PointEquations equations(problem, plan, state);
   for (const auto& cell : plan.points) {
     for (std::int64_t point : cell) {
       equations.linearise(point, pass);
-      const Eigen::Vector3d step = equations.step(x, offsets);
-      result.points[at(point)] = step;
-      result.damping_norm += equations.diagonal().dot(step.cwiseAbs2());
+      const Eigen::Vector3d x = equations.step(step.unknowns.values.data(), offsets);
+      step.points[at(point)] = x;
+      step.damping_norm += equations.diagonal().dot(x.cwiseAbs2());
     }
   }
-  for (std::size_t i = 0; i < factor.diagonal.size(); ++i) result.damping_norm += factor.diagonal[i] * x[i] * x[i];
-  return result;
+}
+
+TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                         const TileFactor& factor, const Step& boundary, const TileDatum& datum) {
+  TileStep step = solve_tile_unknowns(
+      plan, factor.empty() ? condense_tile(problem, plan, state, pass, datum).factor : factor, boundary);
+  solve_tile_points(problem, plan, state, pass, step);
+  return step;
 }
 
 }  // namespace megablock

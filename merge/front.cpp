@@ -160,6 +160,10 @@ void SubtreeSums::add(const SubtreeSums& other) {
   held.insert(held.end(), other.held.begin(), other.held.end());
 }
 
+std::int64_t UpdateMatrix::byte_count() const {
+  return static_cast<std::int64_t>((matrix.size() + rhs.size() + diagonal.size()) * sizeof(double));
+}
+
 Bytes UpdateMatrix::to_bytes() const {
   ByteWriter out;
   write_list(out, unknowns);

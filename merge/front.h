@@ -54,6 +54,7 @@ struct UpdateMatrix {
   std::vector<double> diagonal;  // [n] of the un-eliminated J'J below here: what lambda multiplies
   SubtreeSums sums;
 
+  std::int64_t byte_count() const;  // of its values
   Bytes to_bytes() const;
   static UpdateMatrix from_bytes(const Bytes& bytes);  // throws StoreError
 };

@@ -13,6 +13,7 @@ Bytes NodeFactors::to_bytes() const {
   ByteWriter out;
   out.values(tile.to_bytes());
   front.write(out);
+  out.values(condensed.to_bytes());
   return out.take();
 }
 
@@ -21,18 +22,20 @@ NodeFactors NodeFactors::from_bytes(const Bytes& bytes) {
   NodeFactors factors;
   factors.tile = TileFactor::from_bytes(in.values<char>());
   factors.front = FrontFactor::read(in);
+  factors.condensed = UpdateMatrix::from_bytes(in.values<char>());
   if (!in.at_end()) throw StoreError("merge: a spilled factor has the wrong size");
   return factors;
 }
 
-FactorStore::FactorStore(MemoryOptions options) : options_(std::move(options)) {
-  if (!options_.scratch_directory.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(options_.scratch_directory, error);
-    if (error)
-      throw InputError("cannot make the scratch directory " + options_.scratch_directory + ": " + error.message());
-  }
+void make_scratch_directory(const MemoryOptions& options) {
+  if (options.scratch_directory.empty()) return;
+  std::error_code error;
+  std::filesystem::create_directories(options.scratch_directory, error);
+  if (error)
+    throw InputError("cannot make the scratch directory " + options.scratch_directory + ": " + error.message());
 }
+
+FactorStore::FactorStore(MemoryOptions options) : options_(std::move(options)) { make_scratch_directory(options_); }
 
 FactorStore::~FactorStore() { clear(); }
 

@@ -1,3 +1,5 @@
+// What a rank keeps, and where: budgets, and the factors between the two passes. The tiles: tile_store.h.
+//
 // Keeping factors between the upward and the downward pass within a byte budget: in memory while they fit, else in a
 // scratch directory while its own budget and its disk last, else not at all (recomputed on the way down). The choice
 // never changes tiles or bits.
@@ -18,9 +20,13 @@ namespace megablock {
 
 struct MemoryOptions {
   std::int64_t factor_bytes = std::int64_t{4} << 30;  // budget of kept factors; the newest is kept in any case
-  std::string scratch_directory;                      // of this process alone; empty: recompute instead of spilling
-  std::int64_t scratch_bytes = std::numeric_limits<std::int64_t>::max();  // budget of spilled factors
+  // Of this process alone; empty: keep all tiles, recompute factors instead of spilling them.
+  std::string scratch_directory;
+  std::int64_t scratch_bytes = std::numeric_limits<std::int64_t>::max();  // budget of what is spilled
+  std::int64_t tile_bytes = std::int64_t{4} << 30;  // budget of tiles' measurements and points (tile_store.h)
 };
+// Makes it, where there is one. Throws InputError.
+void make_scratch_directory(const MemoryOptions& options);
 
 struct MemoryStatistics {
   std::int64_t put = 0, spilled = 0, dropped = 0;   // factors put, moved to scratch, given up
@@ -28,11 +34,13 @@ struct MemoryStatistics {
   std::int64_t peak_bytes = 0;                      // of kept factors
 };
 
-// Factors of one node of the merge tree: a tile's cells or an inner node's front.
+// Factors of one node of the merge tree: a tile's cells or an inner node's front; while seams are checked also a tile's
+// condensed normal equations.
 struct NodeFactors {
   TileFactor tile;
   FrontFactor front;
-  std::int64_t byte_count() const { return tile.byte_count() + front.byte_count(); }
+  UpdateMatrix condensed = {};
+  std::int64_t byte_count() const { return tile.byte_count() + front.byte_count() + condensed.byte_count(); }
   Bytes to_bytes() const;
   static NodeFactors from_bytes(const Bytes& bytes);
 };

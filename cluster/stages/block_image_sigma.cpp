@@ -22,9 +22,10 @@ std::int64_t orientation_unknowns(const Block& block, const BlockState& state) {
 }
 
 // Sums in tile order, whatever the ranks.
-ImageResiduals block_image_residuals(Job& job, const std::vector<RankTile>& own, std::size_t tile_count) {
+ImageResiduals block_image_residuals(Job& job, TileStore& own, std::size_t tile_count) {
   ByteWriter writer;
-  for (const RankTile& tile : own) {
+  for (std::size_t row = 0; row < own.size(); ++row) {
+    const RankTile& tile = own.whole(row);
     writer.value(tile.tile);
     writer.value(image_residuals(tile.problem, tile.state, job.settings.adjustment));
   }
@@ -59,24 +60,24 @@ double start_image_sigma(const Job& job, const std::vector<std::string>& adjuste
   return weight > 0 ? std::sqrt(sum / weight) : options.observations.image_sigma_px;
 }
 
-bool adopt_image_sigma(Job& job, std::vector<RankTile>& own, std::size_t tile_count, const BlockState& oriented) {
+bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented) {
   constexpr double kSettled = 0.02;
   if (!job.settings.adjustment.estimate_image_sigma) return false;
   const auto sigma =
       image_sigma(block_image_residuals(job, own, tile_count), orientation_unknowns(job.block, oriented));
   if (!sigma) return false;
   bool changed = false;
-  for (RankTile& tile : own) {
-    if (std::abs(*sigma / tile.problem.image_sigma_px - 1) < kSettled) continue;
-    set_image_sigma(tile.problem, *sigma);
+  for (std::size_t row = 0; row < own.size(); ++row) {
+    if (std::abs(*sigma / own.outline(row).problem.image_sigma_px - 1) < kSettled) continue;
+    own.change(row, [&](RankTile& tile) { set_image_sigma(tile.problem, *sigma); });
     changed = true;
   }
   return job.ranks.any(changed);
 }
 
-double common_image_sigma(Job& job, const std::vector<RankTile>& own) {
+double common_image_sigma(Job& job, const TileStore& own) {
   ByteWriter writer;
-  writer.value(own.empty() ? 0.0 : own.front().problem.image_sigma_px);
+  writer.value(own.size() == 0 ? 0.0 : own.outline(0).problem.image_sigma_px);
   const Bytes mine = writer.take();
   double sigma = 0;
   for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {

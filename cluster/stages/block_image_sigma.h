@@ -14,9 +14,9 @@ double start_image_sigma(const Job& job, const std::vector<std::string>& adjuste
 
 // At a solution, collective: the block's estimate, given to this rank's tiles when it differs enough from theirs to be
 // worth another adjustment. The same answer on every rank. `oriented`: which frames are unknowns.
-bool adopt_image_sigma(Job& job, std::vector<RankTile>& own, std::size_t tile_count, const BlockState& oriented);
+bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented);
 
 // Collective: what the tiles were adjusted with, on ranks without tiles too.
-double common_image_sigma(Job& job, const std::vector<RankTile>& own);
+double common_image_sigma(Job& job, const TileStore& own);
 
 }  // namespace megablock

@@ -71,8 +71,7 @@ std::uint64_t MergeCheckpoint::fingerprint(const std::string& folder) const {
   return hasher.value();
 }
 
-void MergeCheckpoint::write(const MergePosition& position, const std::vector<RankTile>& tiles,
-                            const BlockState& state) {
+void MergeCheckpoint::write(const MergePosition& position, TileStore& tiles, const BlockState& state) {
   const std::string here = folder(position);
   const std::string before = current_;
   on_first_rank(job_.ranks, [&] {
@@ -81,9 +80,9 @@ void MergeCheckpoint::write(const MergePosition& position, const std::vector<Ran
   });
   std::string problem;
   try {
-    for (const RankTile& tile : tiles)
-      job_.store.write(tile_unit(here, tile.tile), fingerprint(here),
-                       [&](const std::string& path) { write_adjustment(path, snapshot(tile)); });
+    for (std::size_t row = 0; row < tiles.size(); ++row)
+      job_.store.write(tile_unit(here, tiles.number(row)), fingerprint(here),
+                       [&](const std::string& path) { write_adjustment(path, snapshot(tiles.whole(row))); });
   } catch (const Error& error) {
     problem = error.what();
   }

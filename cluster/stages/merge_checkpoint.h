@@ -14,7 +14,7 @@
 namespace megablock {
 
 struct MergePosition {
-  std::int32_t round = 0;        // of screening
+  std::int32_t round = 0;  // of screening
   GlobalState global;
   SigmaScales scales;  // of the stated sigmas
 };
@@ -25,7 +25,7 @@ class MergeCheckpoint {
   MergeCheckpoint(Job& job, std::uint64_t inputs) : job_(job), inputs_(inputs) {}
 
   // Collective.
-  void write(const MergePosition& position, const std::vector<RankTile>& tiles, const BlockState& state);
+  void write(const MergePosition& position, TileStore& tiles, const BlockState& state);
   // The last valid position on disk; the same on every rank. Collective.
   std::optional<MergePosition> find();
   // State and points of the position found.
@@ -40,7 +40,7 @@ class MergeCheckpoint {
 
   Job& job_;
   std::uint64_t inputs_;
-  std::string current_;  // folder of the last checkpoint written or found
+  std::string current_;                  // folder of the last checkpoint written or found
   double last_s_ = monotonic_seconds();  // when it was written
 };
 

@@ -201,13 +201,15 @@ std::int64_t kept_observations(const TileProblem& problem) {
 }
 
 // The poses that a process has at the end: its frames count as oriented.
-void write_end(const std::string& path, BlockState state, const std::vector<RankTile>& tiles) {
+void write_end(const std::string& path, BlockState state, const std::vector<const RankTile*>& tiles) {
   std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
-  for (const RankTile& tile : tiles)
+  for (const RankTile* own : tiles) {
+    const RankTile& tile = *own;
     for (std::size_t f = 0; f < tile.problem.frames.size(); ++f) {
       state.frames[tile.problem.frames[f]] = tile.state.frames[f];
       state.oriented[tile.problem.frames[f]] = 1;
     }
+  }
   write_state(path, state);
 }
 
@@ -218,15 +220,14 @@ void run_ours(const Start& start, Communicator& ranks) {
   for (std::int64_t t = 0; t < inputs.tiles.tile_count; ++t)
     observations.push_back(static_cast<std::int64_t>(fs::file_size(start.tracks(t))));
   const std::vector<int> rank_of_tile = distribute_tiles(inputs.tiles.tree, observations, ranks.size());
-  std::vector<RankTile> tiles;
+  TileStore tiles{MemoryOptions()};
   std::int64_t own = 0;
   for (std::int64_t t = 0; t < inputs.tiles.tile_count; ++t)
     if (rank_of_tile[static_cast<std::size_t>(t)] == ranks.rank()) {
-      tiles.push_back(
-          inputs.tile(inputs.tiles, TileIndex(t), read_tracks(start.tracks(t)), read_points(start.points(t))));
-      own += kept_observations(tiles.back().problem);
+      tiles.add(inputs.tile(inputs.tiles, TileIndex(t), read_tracks(start.tracks(t)), read_points(start.points(t))));
+      own += kept_observations(tiles.outline(tiles.size() - 1).problem);
     }
-  RankRunner runner(ranks, inputs.tiles.tree, rank_of_tile, std::move(tiles), MemoryOptions());
+  RankRunner runner(ranks, inputs.tiles.tree, rank_of_tile, tiles, MemoryOptions());
   GlobalOptions options;
   options.max_decrement = 1e-6;
   GlobalState state = start_global(options);
@@ -236,7 +237,9 @@ void run_ours(const Start& start, Communicator& ranks) {
     if (now.iterations > seen) steps.add();  // else the end
     seen = now.iterations;
   });
-  write_end(start.file("end-" + std::to_string(ranks.rank()) + ".h5"), inputs.state, runner.tiles());
+  std::vector<const RankTile*> outlines;
+  for (std::size_t row = 0; row < tiles.size(); ++row) outlines.push_back(&tiles.outline(row));
+  write_end(start.file("end-" + std::to_string(ranks.rank()) + ".h5"), inputs.state, outlines);
   Json figures{{"cost", state.cost},
                {"start_cost", state.initial_cost},
                {"iterations", state.iterations},
@@ -325,9 +328,7 @@ void run_ceres(const Start& start, const Options& options) {
                {"peak_rss_mib", peak}};
   watch.steps.put(figures);
   std::ofstream(start.file(name + ".json")) << figures;
-  std::vector<RankTile> tiles;
-  tiles.push_back(std::move(tile));
-  write_end(start.file("end-" + name + ".h5"), inputs.state, tiles);
+  write_end(start.file("end-" + name + ".h5"), inputs.state, {&tile});
 }
 
 Json json_of(const std::string& path) {

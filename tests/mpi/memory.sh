@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Factors of the merge in memory, in scratch or computed again: the same bits, on one rank and on three, and each way is
-# really gone (the run says how many). Last, the disk of the scratch fills on the way. usage: memory.sh MEGABLOCK
+# Tiles and factors of the merge in memory, in scratch or, factors, computed again: the same bits, on one rank and on
+# three, and each way is really gone (the run says how many). Last, the disk of the scratch fills on the way.
+# usage: memory.sh MEGABLOCK
 set -euo pipefail
 megablock=$1
 work=$(mktemp -d); trap 'umount "$work/full/scratch" 2>/dev/null || true; rm -rf "$work"' EXIT
@@ -16,18 +17,18 @@ run() {
   mpirun --bind-to none --oversubscribe --mca mpi_yield_when_idle 1 -n "$ranks" \
     "$megablock" run "$work/block/block.yaml" -j "$work/$name" "$@" >/dev/null 2>"$work/$name.log"
   local line digest
-  line=$(grep -o 'factors: .*' "$work/$name.log")
+  line=$(grep -o '[0-9]* of [0-9]* tiles in scratch; factors: .*' "$work/$name.log")
   digest=$("$megablock" status "$work/$name" --digest)
   echo "$name: $digest, $line"
   [ "$digest" = "$reference" ] || { echo "digest differs, $reference in memory"; exit 1; }
   [[ $line =~ $pattern ]] || { echo "expected: $pattern"; exit 1; }
   [ -z "$(ls -A "$work/$name/scratch" 2>/dev/null)" ] || { echo "files left in scratch"; exit 1; }
 }
-run kept 1 ' 0 spilled .* 0 subtrees'
-run spilled_1 1 ' [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
-run spilled_3 3 ' [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
-run recomputed_1 1 ' 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
-run recomputed_3 3 ' 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
+run kept 1 '^0 of .* 0 spilled .* 0 subtrees'
+run spilled_1 1 '^[1-9].* [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
+run spilled_3 3 '^[1-9].* [1-9][0-9]* spilled .* 0 subtrees' --memory 0.2
+run recomputed_1 1 '^0 of .* 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
+run recomputed_3 3 '^0 of .* 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 0
 run both_2 2 ' [1-9][0-9]* spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 1
 "$megablock" adjust "$work/block/block.yaml" -j "$work/full" --quiet >/dev/null
 mkdir -p "$work/full/scratch"

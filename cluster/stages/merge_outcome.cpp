@@ -1,0 +1,118 @@
+#include "cluster/stages/merge_outcome.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "cluster/matrix_bytes.h"
+#include "cluster/stages/merge_start.h"
+#include "cluster/stages/provenance.h"
+#include "merge/gauge.h"
+
+namespace megablock {
+
+namespace {
+
+std::vector<SeamCheck> seam_checks(const RankRunner::Posterior& posterior) {
+  const std::vector<std::string> alarms = describe_seams(posterior.seams, posterior.tile_checks);
+  std::vector<SeamCheck> checks;
+  std::size_t alarm = 0;
+  for (const SeamReport& seam : posterior.seams) {
+    SeamCheck check{seam.node, seam.statistic, seam.degrees, seam.threshold, ""};
+    if (seam.alarm() && alarm < alarms.size()) check.note = alarms[alarm++];
+    checks.push_back(check);
+  }
+  return checks;
+}
+
+void send_covariances(Job& job, const Adjusted& adjusted, int tag) {
+  ByteWriter writer;
+  write_matrices<BlockResult::Matrix6>(writer, adjusted.frame_covariance);
+  for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(writer, covariance);
+  const Bytes bytes = writer.take();
+  job.ranks.send(0, tag, std::string(bytes.begin(), bytes.end()));
+}
+
+void receive_covariances(Job& job, int from, int tag, Adjusted& adjusted) {
+  const std::string text = job.ranks.receive(from, tag);
+  const Bytes bytes(text.begin(), text.end());
+  ByteReader reader(bytes);
+  const auto frames = read_matrices<BlockResult::Matrix6>(reader);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    if (!frames[f].isZero(0)) adjusted.frame_covariance[FrameIndex(static_cast<std::int64_t>(f))] = frames[f];
+  for (Eigen::MatrixXd& covariance : adjusted.camera_covariance)
+    if (Eigen::MatrixXd camera = read_matrix(reader); !camera.isZero(0)) covariance = std::move(camera);
+}
+
+}  // namespace
+
+std::string part_path(const Job& job, std::int64_t tile) {
+  return job.store.path("merge/parts/" + std::to_string(tile) + ".bin");
+}
+
+void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adjusted& adjusted) {
+  adjusted.frame_covariance.assign(job.block.frames.size(), BlockResult::Matrix6::Zero());
+  for (const Camera& camera : job.block.cameras)
+    adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.intrinsics.size(), camera.intrinsics.size()));
+  std::filesystem::create_directories(job.store.path("merge/parts"));
+  adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
+    for (std::size_t f = 0; f < tile.problem.frames.size(); ++f)
+      if (!covariance.frames[f].isZero(0)) adjusted.frame_covariance[tile.problem.frames[f]] = covariance.frames[f];
+    for (std::size_t c = 0; c < tile.problem.cameras.size(); ++c)
+      if (!covariance.cameras[c].isZero(0)) adjusted.camera_covariance[tile.problem.cameras[c]] = covariance.cameras[c];
+    const auto t = static_cast<std::size_t>(tile.tile);
+    const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
+    adjusted.parts.push_back(write_part(part_path(job, tile.tile), tile, tracks, covariance.points));
+  });
+}
+
+std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count) {
+  ByteWriter writer;
+  for (const TilePart& part : adjusted.parts) writer.values(part.to_bytes());
+  const Bytes mine = writer.take();
+  std::vector<TilePart> parts(tile_count);
+  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
+    const Bytes bytes(text.begin(), text.end());
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      TilePart part = TilePart::from_bytes(reader.values<char>());
+      const auto tile = static_cast<std::size_t>(part.tile);
+      parts[tile] = std::move(part);
+    }
+  }
+  return parts;
+}
+
+void gather_covariances(Job& job, Adjusted& adjusted) {
+  constexpr int kTag = 1 << 20;  // beyond those of the merge tree's nodes
+  if (!job.is_first_rank()) send_covariances(job, adjusted, kTag);
+  for (int r = 1; job.is_first_rank() && r < job.ranks.size(); ++r) receive_covariances(job, r, kTag, adjusted);
+  job.ranks.flush_sends();
+}
+
+MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {
+  MergeOutcome outcome;
+  outcome.state = adjusted.state;
+  outcome.frame_covariance = adjusted.frame_covariance;
+  outcome.camera_covariance = adjusted.camera_covariance;
+  const SubtreeSums& sums = adjusted.posterior.sums;
+  outcome.chi2 = sums.weighted_squares;
+  outcome.degrees_of_freedom =
+      sums.residuals - sums.unknowns + static_cast<std::int64_t>(sums.held.size()) + sums.held_points;
+  outcome.image_sigma_px = adjusted.image_sigma_px;
+  outcome.global_iterations = adjusted.position.global.accepted;
+  outcome.newton_decrement = std::sqrt(sums.decrement_squared);
+  const BlockGauge& gauge = adjusted.posterior.gauge;
+  outcome.gauge = judge_gauge(sums, gauge, names_of(block)).text;
+  for (const BlockComponent& part : gauge.components)
+    if (part.defect > 0) {
+      outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
+      outcome.degrees_of_freedom += part.defect;  // what only the datum fixes takes nothing of the observations
+    }
+  outcome.seams = seam_checks(adjusted.posterior);
+  outcome.observations = adjusted.posterior.observations;
+  for (std::size_t k = 0; k < kObservationKinds; ++k)
+    outcome.observations.kinds[k].scale = adjusted.position.scales.of[k];
+  return outcome;
+}
+
+}  // namespace megablock

@@ -1,0 +1,57 @@
+// What the adjusted block says of itself: covariances, figures, and each tile's part of the result.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cluster/rank_runner.h"
+#include "cluster/stages/merge_checkpoint.h"
+#include "cluster/stages/merge_tiles.h"
+#include "cluster/stages/result_parts.h"
+
+namespace megablock {
+
+// Figures of the merge that do not belong to a tile.
+struct MergeOutcome {
+  BlockState state;
+  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;
+  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
+  double chi2 = 0;
+  std::int64_t degrees_of_freedom = 0;
+  double variance_factor() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 1; }
+  double image_sigma_px = 0;  // of tie point measurements, as adjusted with
+  int global_iterations = 0;
+  double newton_decrement = 0;
+  std::string gauge;
+  std::vector<FreePart> free_parts;
+  std::vector<SeamCheck> seams;
+  ObservationTable observations;
+};
+
+// An adjusted block as a rank knows it.
+struct Adjusted {
+  RankRunner::Posterior posterior;
+  std::vector<TilePart> parts;                                       // of this rank's tiles
+  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;  // of this rank's frames, others zero
+  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
+  double image_sigma_px = 0;  // of tie point measurements
+  MergePosition position;
+  BlockState state;
+  bool converged = false;
+};
+
+// File of a tile's tracks until the result is written; lies with the checkpoints and goes with them.
+std::string part_path(const Job& job, std::int64_t tile);
+
+// Covariances at the solution; each tile's part of the result is written. Collective.
+void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adjusted& adjusted);
+
+// All tiles' parts, on every rank; collective. Then all ranks' covariances on the first one. All tiles that hold a
+// frame or camera have the same bits of its covariance.
+std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);
+void gather_covariances(Job& job, Adjusted& adjusted);
+
+// After gather_covariances().
+MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block);
+
+}  // namespace megablock

@@ -1,0 +1,159 @@
+#include "cluster/stages/merge_tiles.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "adjust/image_sigma.h"
+#include "cluster/matrix_bytes.h"
+#include "cluster/stages/merge_start.h"
+
+namespace megablock {
+
+void load_own_tiles(const Job& job, const MergeInputs& inputs, const BlockState& start,
+                    const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
+                    TileStore& own) {
+  for (std::size_t t = 0; t < rank_of_tile.size(); ++t) {
+    if (rank_of_tile[t] != job.ranks.rank()) continue;
+    MergeTile loaded = load_merge_tile(job, start, inputs.tiles, TileIndex(static_cast<std::int64_t>(t)),
+                                       inputs.tracks[t], inputs.adjusted[t]);
+    RankTile tile{static_cast<std::int64_t>(t), std::move(loaded.problem), std::move(loaded.state)};
+    prepare(tile);
+    own.add(std::move(tile));
+  }
+}
+
+BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const RankRunner& runner) {
+  ByteWriter writer;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const RankTile& tile = tiles.outline(i);
+    // What no kept residual of the tile touches has not moved with the block.
+    const UnknownList& touched = runner.unknowns(i);
+    const auto write = [&](const auto& table, const auto& values, auto&& id_of, auto&& write_values) {
+      std::decay_t<decltype(table)> rows;
+      std::decay_t<decltype(values)> their;
+      for (std::size_t row = 0; row < table.size(); ++row) {
+        if (find_unknown(touched, id_of(table[row])) < 0) continue;
+        rows.push_back(table[row]);
+        their.push_back(values[row]);
+      }
+      writer.values(rows);
+      write_values(their);
+    };
+    const auto as_poses = [&](const std::vector<Pose>& poses) { write_poses(writer, poses); };
+    writer.values(tile.problem.frames);
+    write(
+        tile.problem.frames, tile.state.frames,
+        [](FrameIndex f) {
+          return UnknownId{UnknownKind::kFrame, 0, f.value};
+        },
+        as_poses);
+    write(
+        tile.problem.cameras, tile.state.cameras,
+        [](CameraIndex c) {
+          return UnknownId{UnknownKind::kCamera, 0, c.value};
+        },
+        [&](const std::vector<Intrinsics>& values) { writer.values(values); });
+    write(
+        tile.problem.mounts, tile.state.mounts,
+        [](const MountId& m) {
+          return UnknownId{UnknownKind::kMount, m.mount, m.rig.value};
+        },
+        as_poses);
+  }
+  const Bytes mine = writer.take();
+  BlockState state = start;
+  std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
+  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
+    const Bytes bytes(text.begin(), text.end());
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      for (const FrameIndex frame : reader.values<FrameIndex>()) state.oriented[frame] = start.oriented[frame];
+      const auto frames = reader.values<FrameIndex>();
+      const auto poses = read_poses(reader);
+      for (std::size_t f = 0; f < frames.size(); ++f) state.frames[frames[f]] = poses[f];
+      const auto cameras = reader.values<CameraIndex>();
+      const auto intrinsics = reader.values<Intrinsics>();
+      for (std::size_t c = 0; c < cameras.size(); ++c) state.cameras[cameras[c]] = intrinsics[c];
+      const auto mounts = reader.values<MountId>();
+      const auto mount_poses = read_poses(reader);
+      for (std::size_t m = 0; m < mounts.size(); ++m)
+        state.mounts[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)] = mount_poses[m];
+    }
+  }
+  return state;
+}
+
+void follow(const BlockState& state, TileStore& tiles) {
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(
+        row, [&](RankTile& tile) { tile.state = make_tile_state(tile.problem, state, std::move(tile.state.points)); });
+}
+
+bool adopt_sigma_scales(RankRunner& runner, TileStore& tiles, SigmaScales& scales) {
+  const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
+  if (!change.matter()) return false;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] *= change.of[k];
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(row, [&](RankTile& tile) { scale_sigmas(tile.problem, change); });
+  return true;
+}
+
+std::int64_t screen(Job& job, TileStore& tiles) {
+  std::int64_t changed = 0;
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(row, [&](RankTile& tile) {
+      changed += screen_observations(tile.problem, tile.state,
+                                     screening_threshold(tile.problem, tile.state, job.settings.adjustment),
+                                     job.settings.adjustment);
+    });
+  std::int64_t total = 0;
+  for (const std::string& text : job.ranks.gather_all(std::to_string(changed))) total += std::stoll(text);
+  return total;
+}
+
+MemoryOptions memory_of_tiles(const Job& job) {
+  MemoryOptions memory;
+  memory.factor_bytes = static_cast<std::int64_t>(job.options.memory_mib * 1024 * 1024);
+  memory.tile_bytes = memory.factor_bytes / 2;
+  memory.scratch_directory = job.store.path("scratch/rank-" + std::to_string(job.ranks.rank()));
+  if (job.options.scratch_mib >= 0)
+    memory.scratch_bytes = static_cast<std::int64_t>(job.options.scratch_mib * 1024 * 1024);
+  return memory;
+}
+
+MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles) {
+  MemoryOptions memory = memory_of_tiles(job);
+  memory.factor_bytes = std::max<std::int64_t>(0, memory.factor_bytes - tiles.kept_bytes());
+  memory.scratch_bytes -= tiles.scratch_bytes();
+  return memory;
+}
+
+void say_memory(Job& job, const TileStore& tiles, const MemoryStatistics& factors) {
+  ByteWriter writer;
+  writer.value(factors);
+  writer.value(static_cast<std::int64_t>(tiles.size()));
+  writer.value(tiles.spilled());
+  const Bytes mine = writer.take();
+  MemoryStatistics all;
+  std::int64_t tile_count = 0, spilled_tiles = 0;
+  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
+    const Bytes bytes(text.begin(), text.end());
+    ByteReader reader(bytes);
+    const auto some = reader.value<MemoryStatistics>();
+    tile_count += reader.value<std::int64_t>();
+    spilled_tiles += reader.value<std::int64_t>();
+    all.put += some.put;
+    all.spilled += some.spilled;
+    all.recomputed += some.recomputed;
+    all.peak_bytes = std::max(all.peak_bytes, some.peak_bytes);
+  }
+  if (!job.is_first_rank() || job.options.quiet) return;
+  std::fprintf(stderr,
+               "merge        %lld of %lld tiles in scratch; factors: %lld made, %lld spilled to scratch, %lld subtrees "
+               "computed again, at most %.1f MiB on a rank\n",
+               static_cast<long long>(spilled_tiles), static_cast<long long>(tile_count),
+               static_cast<long long>(all.put), static_cast<long long>(all.spilled),
+               static_cast<long long>(all.recomputed), static_cast<double>(all.peak_bytes) / (1 << 20));
+}
+
+}  // namespace megablock

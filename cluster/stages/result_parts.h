@@ -1,0 +1,49 @@
+// From merged tiles to the tracks of the result. Each rank writes the tracks of its tiles into the job's scratch as
+// soon as their covariances are there; the first rank then reads them all, merged by their keys, a small piece of each
+// tile at a time: no rank holds more of the result than a tile.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/track_batches.h"
+#include "merge/tile_store.h"
+
+namespace megablock {
+
+// What a tile contributes besides its tracks.
+struct TilePart {
+  std::int64_t tile = -1;
+  std::int64_t track_count = 0;
+  std::vector<FrameIndex> frames;          // touched by observations that take part
+  std::vector<std::int64_t> control_rows;  // in block.control_points
+  std::vector<BlockResult::ControlResult> control;
+  Bytes to_bytes() const;
+  static TilePart from_bytes(const Bytes& bytes);
+};
+
+// Writes the tracks of a merged tile, whose first points they are, to `path`, ascending by their keys. `covariances`:
+// of the problem's points.
+// A full disk is an InputError.
+TilePart write_part(const std::string& path, const RankTile& tile, const TrackSet& tracks,
+                    const std::vector<Eigen::Matrix3d>& covariances);
+
+// All tiles' tracks with dense indices in the order of their keys; file_tracks has the keys. Covariances are multiplied
+// by `covariance_factor`. Throws StoreError when a file cannot be read.
+class PartTracks final : public TrackBatches {
+ public:
+  struct File {
+    std::string path;
+    std::int64_t track_count = 0;
+  };
+  PartTracks(std::vector<File> files, double covariance_factor);
+  std::int64_t track_count() const override { return count_; }
+  void visit(const Visit& visit) const override;
+
+ private:
+  std::vector<File> files_;  // [tiles]
+  double covariance_factor_;
+  std::int64_t count_ = 0;
+};
+
+}  // namespace megablock

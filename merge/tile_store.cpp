@@ -1,0 +1,181 @@
+#include "merge/tile_store.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+// The tables of a tile that grow with its measurements, but for the points' positions.
+template <typename Problem, typename Visit>
+void visit_tables(Problem& problem, Visit&& visit) {
+  visit(problem.points);
+  visit(problem.begin);
+  visit(problem.image);
+  visit(problem.x);
+  visit(problem.y);
+  visit(problem.inverse_sigma);
+  visit(problem.kept);
+}
+
+template <typename T>
+std::int64_t byte_count(const std::vector<T>& values) {
+  return static_cast<std::int64_t>(values.size() * sizeof(T));
+}
+
+// Of a tile as it takes part in a step: points twice.
+std::int64_t byte_count(const RankTile& tile) {
+  std::int64_t bytes = 2 * byte_count(tile.state.points);
+  visit_tables(tile.problem, [&](const auto& table) { bytes += byte_count(table); });
+  return bytes;
+}
+
+// One table behind the other, each with its length before it. Positions are three doubles each.
+template <typename T>
+void write_table(std::ofstream& file, const std::vector<T>& values) {
+  const auto count = static_cast<std::uint64_t>(values.size());
+  file.write(reinterpret_cast<const char*>(&count), sizeof count);
+  file.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
+}
+
+template <typename T>
+void read_table(std::ifstream& file, std::vector<T>& values) {
+  std::uint64_t count = 0;
+  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return;
+  values.resize(count);
+  file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
+}
+
+// False when the disk is full.
+template <typename WriteTables>
+bool write_file(const std::string& path, WriteTables&& write_tables) {
+  std::ofstream file(path, std::ios::binary);
+  write_tables(file);
+  file.close();
+  if (file) return true;
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  return false;
+}
+
+template <typename ReadTables>
+void read_file(const std::string& path, ReadTables&& read_tables) {
+  std::ifstream file(path, std::ios::binary);
+  read_tables(file);
+  if (!file) throw StoreError("cannot read " + path + " of the scratch directory; run again to resume");
+}
+
+bool write_points(const std::string& path, const std::vector<Eigen::Vector3d>& points) {
+  return write_file(path, [&](std::ofstream& file) { write_table(file, points); });
+}
+
+}  // namespace
+
+TileStore::TileStore(const MemoryOptions& options) : options_(options) { make_scratch_directory(options_); }
+
+TileStore::~TileStore() {
+  for (const Slot& slot : slots_) remove_files(slot);
+}
+
+std::string TileStore::path(const Slot& slot, const char* what) const {
+  return options_.scratch_directory + "/tile-" + std::to_string(slot.tile.tile) + "-" + what + ".bin";
+}
+
+std::string TileStore::points_path(const Slot& slot, int file) const {
+  return path(slot, file == 0 ? "points-0" : "points-1");
+}
+
+void TileStore::remove_files(const Slot& slot) const {
+  if (!slot.in_scratch) return;
+  std::error_code ignored;
+  for (const std::string& file : {path(slot, "measurements"), points_path(slot, 0), points_path(slot, 1)})
+    std::filesystem::remove(file, ignored);
+}
+
+void TileStore::add(RankTile tile) {
+  const std::int64_t bytes = byte_count(tile);
+  Slot& slot = slots_.emplace_back();
+  slot.tile = std::move(tile);
+  const bool fits = kept_bytes_ + bytes <= options_.tile_bytes;
+  const bool room = !options_.scratch_directory.empty() && scratch_bytes_ + bytes <= options_.scratch_bytes;
+  if (fits || !room || !spill(slot)) {
+    kept_bytes_ += bytes;
+    return;
+  }
+  slot.in_scratch = true;
+  scratch_bytes_ += bytes;
+  ++spilled_;
+  forget(slot);
+}
+
+bool TileStore::spill(Slot& slot) {
+  const bool whole = write_file(path(slot, "measurements"), [&](std::ofstream& file) {
+    visit_tables(slot.tile.problem, [&](const auto& table) { write_table(file, table); });
+  });
+  return whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points);
+}
+
+void TileStore::forget(Slot& slot) {
+  visit_tables(slot.tile.problem, [](auto& table) { std::exchange(table, {}); });
+  if (!slot.points_here) std::exchange(slot.tile.state.points, {});
+}
+
+RankTile& TileStore::load(std::size_t row) {
+  Slot& slot = slots_[row];
+  if (!slot.in_scratch || loaded_ == static_cast<std::int64_t>(row)) return slot.tile;
+  if (loaded_ >= 0) forget(slots_[static_cast<std::size_t>(std::exchange(loaded_, -1))]);
+  read_file(path(slot, "measurements"), [&](std::ifstream& file) {
+    visit_tables(slot.tile.problem, [&](auto& table) { read_table(file, table); });
+  });
+  if (!slot.points_here)
+    read_file(points_path(slot, slot.points_file),
+              [&](std::ifstream& file) { read_table(file, slot.tile.state.points); });
+  loaded_ = static_cast<std::int64_t>(row);
+  return slot.tile;
+}
+
+const RankTile& TileStore::whole(std::size_t row) { return load(row); }
+
+// A tile that has no room in scratch any more moves to memory.
+void TileStore::save(std::size_t row) {
+  Slot& slot = slots_[row];
+  if (!slot.in_scratch) return;
+  slot.points_here = false;
+  if (spill(slot)) return;
+  remove_files(slot);
+  slot.in_scratch = false;
+  loaded_ = -1;
+  --spilled_;
+  kept_bytes_ += byte_count(slot.tile);
+  scratch_bytes_ -= byte_count(slot.tile);
+}
+
+void TileStore::put_trial(std::size_t row, TileState trial) {
+  Slot& slot = slots_[row];
+  slot.trial = std::move(trial);
+  slot.trial_here = slot.in_scratch && !write_points(points_path(slot, 1 - slot.points_file), slot.trial.points);
+  if (slot.in_scratch && !slot.trial_here) std::exchange(slot.trial.points, {});
+}
+
+void TileStore::accept() {
+  if (loaded_ >= 0) forget(slots_[static_cast<std::size_t>(std::exchange(loaded_, -1))]);
+  for (Slot& slot : slots_) {
+    slot.tile.state = std::exchange(slot.trial, {});
+    slot.points_here = std::exchange(slot.trial_here, false);
+    if (slot.in_scratch && !slot.points_here) slot.points_file = 1 - slot.points_file;
+  }
+}
+
+void TileStore::reject() {
+  for (Slot& slot : slots_) {
+    slot.trial = {};
+    slot.trial_here = false;
+  }
+}
+
+}  // namespace megablock

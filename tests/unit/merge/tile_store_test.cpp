@@ -1,0 +1,212 @@
+// Tiles out of core: what comes back is what was put, whatever the memory and whatever becomes of the scratch disk.
+#include "merge/tile_store.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "io/error.h"
+#include "tests/unit/io/scratch_directory.h"
+
+namespace megablock {
+namespace {
+
+// Tile `number` with `points` points of three observations each; every value tells where it belongs.
+RankTile made_up_tile(std::int64_t number, std::int64_t points) {
+  RankTile tile;
+  tile.tile = number;
+  tile.problem.frames = {FrameIndex(number)};
+  tile.state.frames.resize(1);
+  tile.state.frames[0].centre = Eigen::Vector3d(static_cast<double>(number), 0, 0);
+  tile.problem.begin.push_back(0);
+  for (std::int64_t p = 0; p < points; ++p) {
+    const auto value = static_cast<double>(1000 * number + p);
+    tile.problem.points.push_back({PointRole::kTie, 1000 * number + p});
+    tile.state.points.emplace_back(value, value + 0.25, value + 0.5);
+    for (int k = 0; k < 3; ++k) {
+      tile.problem.image.push_back(LocalImage(k));
+      tile.problem.x.push_back(value + k);
+      tile.problem.y.push_back(-value - k);
+      tile.problem.inverse_sigma.push_back(2 + k);
+      tile.problem.kept.push_back(static_cast<std::uint8_t>(p % 2));
+    }
+    tile.problem.begin.push_back(3 * (p + 1));
+  }
+  return tile;
+}
+
+void expect_equal(const RankTile& found, const RankTile& expected) {
+  EXPECT_EQ(found.tile, expected.tile);
+  EXPECT_EQ(found.problem.frames, expected.problem.frames);
+  EXPECT_EQ(found.state.frames[0].centre, expected.state.frames[0].centre);
+  ASSERT_EQ(found.problem.points.size(), expected.problem.points.size());
+  for (std::size_t p = 0; p < expected.problem.points.size(); ++p)
+    EXPECT_EQ(found.problem.points[p].index, expected.problem.points[p].index);
+  EXPECT_EQ(found.problem.begin, expected.problem.begin);
+  EXPECT_EQ(found.problem.image, expected.problem.image);
+  EXPECT_EQ(found.problem.x, expected.problem.x);
+  EXPECT_EQ(found.problem.y, expected.problem.y);
+  EXPECT_EQ(found.problem.inverse_sigma, expected.problem.inverse_sigma);
+  EXPECT_EQ(found.problem.kept, expected.problem.kept);
+  EXPECT_EQ(found.state.points, expected.state.points);
+}
+
+class TileStoreTest : public testing::Test {
+ protected:
+  static constexpr std::int64_t kTiles = 5, kPoints = 40;
+
+  // Room for about two of the five tiles.
+  MemoryOptions options() const {
+    MemoryOptions options;
+    options.scratch_directory = scratch_.path("rank-0");
+    options.tile_bytes = 2 * 40 * (2 * 24 + 16 + 8 + 3 * 29) + 100;
+    return options;
+  }
+  static void fill(TileStore& store) {
+    for (std::int64_t t = 0; t < kTiles; ++t) store.add(made_up_tile(t, kPoints));
+  }
+  std::int64_t files() const {
+    const std::filesystem::directory_iterator all(scratch_.path("rank-0"));
+    return std::distance(begin(all), end(all));
+  }
+  ScratchDirectory scratch_;
+};
+
+TEST_F(TileStoreTest, EveryTileComesBackWhole) {
+  TileStore store(options());
+  fill(store);
+  ASSERT_EQ(store.size(), 5u);
+  EXPECT_EQ(store.spilled(), 3);
+  for (const std::size_t row : {0u, 4u, 2u, 2u, 1u, 3u, 0u})
+    expect_equal(store.whole(row), made_up_tile(static_cast<std::int64_t>(row), kPoints));
+  EXPECT_EQ(store.number(3), 3);
+  EXPECT_EQ(store.outline(3).problem.frames, made_up_tile(3, kPoints).problem.frames);
+}
+
+TEST_F(TileStoreTest, ATileInScratchTakesNoMemory) {
+  TileStore store(options());
+  fill(store);
+  store.whole(4);
+  store.whole(3);
+  EXPECT_TRUE(store.outline(4).problem.x.empty());
+  EXPECT_TRUE(store.outline(4).state.points.empty());
+}
+
+TEST_F(TileStoreTest, ChangesStay) {
+  TileStore store(options());
+  fill(store);
+  for (std::size_t row = 0; row < store.size(); ++row)
+    store.change(row, [](RankTile& tile) {
+      tile.problem.kept.assign(tile.problem.kept.size(), 1);
+      tile.state.points[7].setConstant(static_cast<double>(tile.tile));
+    });
+  for (std::size_t row = 0; row < store.size(); ++row) {
+    RankTile expected = made_up_tile(static_cast<std::int64_t>(row), kPoints);
+    expected.problem.kept.assign(expected.problem.kept.size(), 1);
+    expected.state.points[7].setConstant(static_cast<double>(row));
+    expect_equal(store.whole(row), expected);
+  }
+}
+
+// A state whose points and frame are moved by `step`.
+TileState moved(TileState state, double step) {
+  for (Eigen::Vector3d& point : state.points) point.x() += step;
+  state.frames[0].centre.x() += step;
+  return state;
+}
+
+TEST_F(TileStoreTest, TrialsAreTakenOrLeft) {
+  TileStore store(options());
+  fill(store);
+  double total = 0;
+  for (const double step : {1.0, 0.5, 0.25}) {
+    for (std::size_t row = 0; row < store.size(); ++row) store.put_trial(row, moved(store.whole(row).state, step));
+    if (step == 0.5) {
+      store.reject();
+    } else {
+      store.accept();
+      total += step;
+    }
+    for (std::size_t row = 0; row < store.size(); ++row) {
+      RankTile expected = made_up_tile(static_cast<std::int64_t>(row), kPoints);
+      expected.state = moved(expected.state, total);
+      expect_equal(store.whole(row), expected);
+    }
+  }
+}
+
+// As on a disk that fills while the adjustment runs: the files cannot be written any more.
+TEST_F(TileStoreTest, NothingIsLostWhenTheScratchDiskFails) {
+  TileStore store(options());
+  fill(store);
+  const auto break_disk = [&] {
+    std::filesystem::rename(scratch_.path("rank-0"), scratch_.path("gone"));
+    std::ofstream(scratch_.path("rank-0")) << "in the way";
+  };
+  const auto mend_disk = [&] {
+    std::filesystem::remove(scratch_.path("rank-0"));
+    std::filesystem::rename(scratch_.path("gone"), scratch_.path("rank-0"));
+  };
+  // Points of a step that find no room stay in memory...
+  for (std::size_t row = 0; row < store.size(); ++row) {
+    TileState trial = moved(store.whole(row).state, 2);
+    break_disk();
+    store.put_trial(row, std::move(trial));
+    mend_disk();
+  }
+  store.accept();
+  // ... and so do whole tiles.
+  for (std::size_t row = 0; row < store.size(); ++row) {
+    store.whole(row);
+    break_disk();
+    store.change(row, [](RankTile& tile) { tile.problem.kept[0] = 1; });
+    mend_disk();
+  }
+  EXPECT_EQ(store.spilled(), 0);
+  for (std::size_t row = 0; row < store.size(); ++row) {
+    RankTile expected = made_up_tile(static_cast<std::int64_t>(row), kPoints);
+    expected.problem.kept[0] = 1;
+    expected.state = moved(expected.state, 2);
+    expect_equal(store.whole(row), expected);
+  }
+}
+
+TEST_F(TileStoreTest, KeepsWhatHasNoRoomInScratch) {
+  MemoryOptions none = options();
+  none.scratch_bytes = 0;
+  MemoryOptions nowhere = options();
+  nowhere.scratch_directory.clear();
+  for (const MemoryOptions& memory : {none, nowhere}) {
+    TileStore store(memory);
+    fill(store);
+    EXPECT_EQ(store.spilled(), 0);
+    for (std::size_t row = 0; row < store.size(); ++row)
+      expect_equal(store.whole(row), made_up_tile(static_cast<std::int64_t>(row), kPoints));
+  }
+}
+
+TEST_F(TileStoreTest, NamesAFileThatIsDamaged) {
+  TileStore store(options());
+  fill(store);
+  const std::string file = scratch_.path("rank-0/tile-4-measurements.bin");
+  std::filesystem::resize_file(file, 100);
+  try {
+    store.whole(4);
+    FAIL() << "a truncated file was read";
+  } catch (const StoreError& error) {
+    EXPECT_NE(std::string(error.what()).find(file), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(TileStoreTest, LeavesNoFiles) {
+  {
+    TileStore store(options());
+    fill(store);
+    EXPECT_GT(files(), 0);
+  }
+  EXPECT_EQ(files(), 0);
+}
+
+}  // namespace
+}  // namespace megablock
