@@ -1,8 +1,9 @@
 // HDF5 files behind two small classes: everything the project stores goes through them.
 //
 // Files are written with libver 'latest', without time stamps and in a fixed order of calls, so that equal contents
-// give equal bytes. One writer per file; HDF5's own file locking is off (network file systems). Datasets above 16 KiB
-// are chunked, shuffled and deflated. Every file carries the root attributes `kind` and `format_version`.
+// give equal bytes. One writer per file; HDF5's own file locking is off (network file systems). Datasets of
+// integers and texts above 16 KiB are chunked, shuffled and deflated. Every file carries the root attributes `kind` and
+// `format_version`.
 //
 // Errors: StoreError naming file and dataset; a full disk, quota or read-only directory while writing is an InputError.
 // One thread at a time.
@@ -108,7 +109,7 @@ class Hdf5Writer {
   void dataset(const std::string& name, ElementType type, const void* values, const std::vector<std::int64_t>& shape,
                const DatasetNote& note);
 
-  // A dataset that grows: no rows at first, each of this shape (none: one value), always in compressed chunks.
+  // A dataset that grows: no rows at first, each of this shape (none: one value), always in chunks.
   template <typename T>
   void growing(const std::string& name, const std::vector<std::int64_t>& row = {}, const DatasetNote& note = {}) {
     growing_dataset(name, element_type<T>(), row, note);

@@ -74,6 +74,8 @@ void TrackResults::append(const TrackResults& from, std::size_t first, std::size
   copy(from.kept, kept, row, end);
   copy(from.residual_x, residual_x, row, end);
   copy(from.residual_y, residual_y, row, end);
+  copy(from.redundancy_x, redundancy_x, row, end);
+  copy(from.redundancy_y, redundancy_y, row, end);
   for (std::size_t t = first; t < last; ++t) tracks.begin.push_back(from.tracks.begin[t + 1] + offset);
 }
 

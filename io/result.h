@@ -71,6 +71,8 @@ struct TrackResults {
   std::vector<Eigen::Matrix3d> point_covariance;  // [tracks] or empty
   std::vector<std::uint8_t> kept;                 // [observations]
   std::vector<float> residual_x, residual_y;      // [observations] adjusted minus measured, px
+  // [observations] or empty: redundancy numbers along x and y (io/reliability.h) in 1 / 255; 0: takes no part.
+  std::vector<std::uint8_t> redundancy_x, redundancy_y;
 
   // Rows [first, last) of another one's tracks.
   void append(const TrackResults& from, std::size_t first, std::size_t last);
@@ -104,9 +106,9 @@ struct BlockResult : TrackResults {
   double variance_factor = 1;  // a-posteriori, = chi2_per_dof
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
-  double image_sigma_px = 0;  // of tie point measurements per axis, as adjusted with (stated or estimated)
+  double image_sigma_px = 0;           // of tie point measurements per axis, as adjusted with (stated or estimated)
   ObservationTable observation_table;  // by kind: count, weighted squares, redundancy; empty: not known
-  bool sigma_scaled = false;  // covariances are multiplied by variance_factor
+  bool sigma_scaled = false;           // covariances are multiplied by variance_factor
   int global_iterations = 0;
   double newton_decrement = 0;
   double decrement_limit = 0;  // at which the block counts as adjusted; 0: not known

@@ -48,6 +48,8 @@ void check_track_sizes(const TrackResults& result) {
   require_size(result.residual_x.size(), observations, "residuals");
   require_size(result.residual_y.size(), observations, "residuals");
   if (!result.point_covariance.empty()) require_size(result.point_covariance.size(), tracks, "point covariances");
+  require_size(result.redundancy_y.size(), result.redundancy_x.size(), "redundancy numbers");
+  if (!result.redundancy_x.empty()) require_size(result.redundancy_x.size(), observations, "redundancy numbers");
   require_size(result.file_tiles.size(), result.file_tracks.size(), "tiles of tracks");
   if (!result.file_tracks.empty()) require_size(result.file_tracks.size(), tracks, "indices of tracks in their tiles");
 }
@@ -130,6 +132,10 @@ class PointWriter {
     file_.append("observations/kept", batch.kept);
     file_.append("observations/residual_x", batch.residual_x);
     file_.append("observations/residual_y", batch.residual_y);
+    if (!batch.redundancy_x.empty()) {
+      file_.append("observations/redundancy_x", batch.redundancy_x);
+      file_.append("observations/redundancy_y", batch.redundancy_y);
+    }
   }
 
   void finish() {
@@ -149,6 +155,9 @@ class PointWriter {
       file_.growing<std::int64_t>("points/track", {}, {"", "index of the track in the file of its tile"});
       file_.growing<std::int32_t>("points/tile", {}, {"", "that owns the track"});
     }
+    if (!batch.redundancy_x.empty())
+      for (const char* name : {"observations/redundancy_x", "observations/redundancy_y"})
+        file_.growing<std::uint8_t>(name, {}, {"1/255", "redundancy number, 0 to 1; 0 as well: takes no part"});
     if (!batch.point_covariance.empty()) file_.growing<float>("points/covariance", {3, 3}, {"m^2", "posterior"});
   }
 
@@ -192,6 +201,10 @@ TrackResults read_tracks(const Hdf5Reader& file, const RowRange& rows_of_points)
   result.kept = file.rows<std::uint8_t>("observations/kept", observations);
   result.residual_x = file.rows<float>("observations/residual_x", observations);
   result.residual_y = file.rows<float>("observations/residual_y", observations);
+  if (file.has("observations/redundancy_x")) {
+    result.redundancy_x = file.rows<std::uint8_t>("observations/redundancy_x", observations);
+    result.redundancy_y = file.rows<std::uint8_t>("observations/redundancy_y", observations);
+  }
   const auto positions = file.rows<double>("points/position", points);
   for (std::size_t p = 0; p < tracks.id.size(); ++p) result.points.push_back(vector3(positions, p));
   if (file.has("points/track")) {
@@ -226,6 +239,8 @@ std::int64_t check_columns(const Hdf5Reader& file) {
   if (file.has("points/covariance")) require("points/covariance", {count, 3, 3});
   for (const char* name : {"x", "y", "feature", "kept", "residual_x", "residual_y"})
     require(std::string("observations/") + name, {observations});
+  if (file.has("observations/redundancy_x"))
+    for (const char* name : {"observations/redundancy_x", "observations/redundancy_y"}) require(name, {observations});
   if (file.rows<std::int64_t>("points/begin", {{count, 1}}).front() != observations)
     file.fail("points/begin", "does not end with the number of observations, " + std::to_string(observations));
   return count;

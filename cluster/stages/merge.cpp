@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "adjust/image_sigma.h"
 #include "cluster/collective.h"
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"

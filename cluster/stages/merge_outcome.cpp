@@ -61,7 +61,7 @@ void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adj
       if (!covariance.cameras[c].isZero(0)) adjusted.camera_covariance[tile.problem.cameras[c]] = covariance.cameras[c];
     const auto t = static_cast<std::size_t>(tile.tile);
     const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
-    adjusted.parts.push_back(write_part(part_path(job, tile.tile), tile, tracks, covariance.points));
+    adjusted.parts.push_back(write_part(part_path(job, tile.tile), tile, tracks, covariance));
   });
 }
 

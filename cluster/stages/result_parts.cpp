@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <numeric>
@@ -45,9 +46,20 @@ std::vector<std::uint8_t> verdicts(const TileProblem& problem) {
   return kept;
 }
 
+// In 1 / 255 (TrackResults); what takes no part is NaN.
+std::vector<std::uint8_t> redundancy_column(const std::vector<float>& values, std::int64_t rows) {
+  std::vector<std::uint8_t> column;
+  column.reserve(static_cast<std::size_t>(rows));
+  for (std::int64_t o = 0; o < rows; ++o) {
+    const float value = values[static_cast<std::size_t>(o)];
+    column.push_back(value > 0 ? static_cast<std::uint8_t>(std::lround(255 * std::min(value, 1.f))) : 0);
+  }
+  return column;
+}
+
 // The tile's tracks; ids are their keys.
 TrackResults track_results(const RankTile& tile, const TrackSet& tracks, const std::vector<std::uint8_t>& kept,
-                           const std::vector<Eigen::Matrix3d>& covariances) {
+                           const TileCovariance& covariance) {
   TrackResults result;
   result.tracks = tracks;
   const std::int64_t count = tracks.track_count(), rows = tracks.observation_count();
@@ -55,7 +67,12 @@ TrackResults track_results(const RankTile& tile, const TrackSet& tracks, const s
   result.file_tiles.assign(static_cast<std::size_t>(count), TileIndex(tile.tile));
   result.points.assign(tile.state.points.begin(), tile.state.points.begin() + count);
   result.kept.assign(kept.begin(), kept.begin() + rows);
-  if (!covariances.empty()) result.point_covariance.assign(covariances.begin(), covariances.begin() + count);
+  if (!covariance.points.empty())
+    result.point_covariance.assign(covariance.points.begin(), covariance.points.begin() + count);
+  if (!covariance.redundancy_x.empty()) {
+    result.redundancy_x = redundancy_column(covariance.redundancy_x, rows);
+    result.redundancy_y = redundancy_column(covariance.redundancy_y, rows);
+  }
   result.residual_x.reserve(static_cast<std::size_t>(rows));
   result.residual_y.reserve(static_cast<std::size_t>(rows));
   for (std::int64_t p = 0; p < count; ++p)
@@ -110,6 +127,8 @@ void visit_columns(Tracks& t, Visit&& visit) {
   visit(t.kept);
   visit(t.residual_x);
   visit(t.residual_y);
+  visit(t.redundancy_x);
+  visit(t.redundancy_y);
 }
 
 Bytes bytes_of(const TrackResults& tracks) {
@@ -219,15 +238,15 @@ TilePart TilePart::from_bytes(const Bytes& bytes) {
 }
 
 TilePart write_part(const std::string& path, const RankTile& tile, const TrackSet& tracks,
-                    const std::vector<Eigen::Matrix3d>& covariances) {
+                    const TileCovariance& covariance) {
   const std::vector<std::uint8_t> kept = verdicts(tile.problem);
   TilePart part;
   part.tile = tile.tile;
   part.track_count = tracks.track_count();
   part.frames = touched_frames(tile.problem, kept);
-  add_control(tile, kept, covariances, part);
+  add_control(tile, kept, covariance.points, part);
 
-  const TrackResults ordered = in_key_order(track_results(tile, tracks, kept, covariances));
+  const TrackResults ordered = in_key_order(track_results(tile, tracks, kept, covariance));
   errno = 0;
   std::ofstream file(path, std::ios::binary);
   for (std::int64_t first = 0; first < part.track_count; first += kPieceTracks) {

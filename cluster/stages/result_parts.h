@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/track_batches.h"
+#include "merge/condense.h"
 #include "merge/tile_store.h"
 
 namespace megablock {
@@ -22,11 +23,10 @@ struct TilePart {
   static TilePart from_bytes(const Bytes& bytes);
 };
 
-// Writes the tracks of a merged tile, whose first points they are, to `path`, ascending by their keys. `covariances`:
-// of the problem's points.
+// Writes the tracks of a merged tile, whose first points they are, to `path`, ascending by their keys.
 // A full disk is an InputError.
 TilePart write_part(const std::string& path, const RankTile& tile, const TrackSet& tracks,
-                    const std::vector<Eigen::Matrix3d>& covariances);
+                    const TileCovariance& covariance);
 
 // All tiles' tracks with dense indices in the order of their keys; file_tracks has the keys. Covariances are multiplied
 // by `covariance_factor`. Throws StoreError when a file cannot be read.

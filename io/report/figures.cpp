@@ -1,10 +1,13 @@
 #include "io/report/figures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <set>
+
+#include "io/reliability.h"
 
 namespace megablock::report {
 
@@ -12,7 +15,7 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::int64_t kSampleLimit = 500000;  // values a median is taken from
-constexpr std::int64_t kRayLimit = 24;        // rays of a track compared for its intersection angle
+constexpr std::int64_t kRayLimit = 24;         // rays of a track compared for its intersection angle
 
 // The columns of the tracks are there for all of them.
 bool consistent(const TrackResults& tracks) {
@@ -38,10 +41,37 @@ Track track_of(const TrackResults& result, std::size_t row) {
   return track;
 }
 
+// Tests of the measurements, with the limits of the block, and the largest of them.
+struct Tests {
+  double normal_limit = normal_critical_value(), tau_limit, sigma_0, shift = least_shift();
+
+  explicit Tests(const BlockResult& result)
+      : tau_limit(result.degrees_of_freedom > 1 ? tau_critical_value(result.degrees_of_freedom) : kUnknown),
+        sigma_0(std::sqrt(std::max(0.0, result.variance_factor))) {}
+
+  void add(const TestedMeasurement& test, Reliability& sums) const {
+    constexpr std::size_t kListed = 10;
+    ++sums.tested;
+    sums.poorly_checked += test.redundancy < Reliability::kPoorRedundancy;
+    sums.beyond_normal += test.normalised > normal_limit;
+    sums.beyond_tau += tau_statistic(test.normalised, sigma_0) > tau_limit;
+    const auto larger = [](const TestedMeasurement& a, const TestedMeasurement& b) {
+      return a.normalised > b.normalised;
+    };
+    auto& largest = sums.largest;
+    if (largest.size() == kListed && !larger(test, largest.back())) return;
+    largest.insert(std::upper_bound(largest.begin(), largest.end(), test, larger), test);
+    if (largest.size() > kListed) largest.pop_back();
+  }
+};
+
 class Gatherer {
  public:
   Gatherer(const BlockResult& result, const TrackBatches& tracks)
-      : result_(result), block_(result.block), tracks_(tracks) {}
+      : result_(result), block_(result.block), tracks_(tracks), tests_(result) {
+    f_.reliability.normal_limit = tests_.normal_limit;
+    f_.reliability.tau_limit = tests_.tau_limit;
+  }
 
   Figures run() {
     const bool sound = complete();
@@ -122,11 +152,17 @@ class Gatherer {
         f_.all_observations += track.all;
         if (track.kept.empty()) continue;
         f_.track_length.add(static_cast<double>(track.kept.size()));
-        for (std::size_t o : track.kept) observation(batch, o);
+        for (std::size_t o : track.kept) {
+          observation(batch, o);
+          reliability(batch, row, o, sampled);
+        }
         if (sampled) intersection(batch, row, track, resolution);
       }
       before += batch.points.size();
     });
+    f_.reliability.detectable_px = spread(std::move(detectable_px_));
+    if (f_.reliability.tested > 0)
+      f_.reliability.worst_external = external_reliability(least_redundancy_, tests_.shift);
     f_.ground_resolution_m = spread(std::move(resolution)).median;
     for (std::size_t t = 0; t < f_.tile_rms_px.size(); ++t)
       f_.tile_rms_px[t] = f_.tile_observations[t]
@@ -247,6 +283,25 @@ class Gatherer {
     f_.point_sigma_up = spread(std::move(point_up_));
   }
 
+  // Of an observation that counts.
+  void reliability(const TrackResults& batch, std::size_t row, std::size_t o, bool sampled) {
+    if (batch.redundancy_x.empty() || !(result_.image_sigma_px > 0)) return;
+    const std::array<std::pair<float, std::uint8_t>, 2> axes = {std::pair(batch.residual_x[o], batch.redundancy_x[o]),
+                                                                std::pair(batch.residual_y[o], batch.redundancy_y[o])};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto [residual, stored] = axes[axis];
+      if (stored == 0) {
+        ++f_.reliability.unchecked;
+        continue;
+      }
+      const double redundancy = stored / 255.0;
+      const double w = normalised_residual(residual, result_.image_sigma_px, redundancy);
+      tests_.add({batch.tracks.id[row], batch.tracks.image[o], axis == 1, residual, redundancy, w}, f_.reliability);
+      if (sampled) detectable_px_.push_back(minimal_detectable_error(result_.image_sigma_px, redundancy, tests_.shift));
+      least_redundancy_ = std::min(least_redundancy_, redundancy);
+    }
+  }
+
   void point_accuracy(const TrackResults& batch, std::size_t row) {
     if (batch.point_covariance.empty()) return;
     const Eigen::Matrix3d& c = batch.point_covariance[row];
@@ -258,6 +313,9 @@ class Gatherer {
   const BlockResult& result_;
   const Block& block_;
   const TrackBatches& tracks_;
+  Tests tests_;
+  std::vector<double> detectable_px_;  // of a sample of the tracks
+  double least_redundancy_ = 1;
   std::vector<double> point_horizontal_, point_up_;  // sigmas of a sample of the points, m
   Figures f_;
 };

@@ -59,6 +59,28 @@ struct MeasurementResidual {
   double ratio;                    // larger component / stated sigma
 };
 
+// Reliability of the tie point measurements (io/reliability.h): each axis of an image is an observation.
+struct TestedMeasurement {
+  TrackIndex track;  // of the result
+  ImageIndex image;
+  bool vertical = false;  // the image's y
+  double residual = 0;    // px
+  double redundancy = 0;  // 0 to 1
+  double normalised = 0;  // w
+};
+struct Reliability {
+  static constexpr double kPoorRedundancy = 0.1;
+  std::int64_t tested = 0;          // with redundancy
+  std::int64_t unchecked = 0;       // kept, but no other observation checks them
+  std::int64_t poorly_checked = 0;  // redundancy below kPoorRedundancy
+  std::int64_t beyond_normal = 0;   // |w| above Baarda's critical value
+  std::int64_t beyond_tau = 0;      // |tau| above Pope's
+  double normal_limit = kUnknown, tau_limit = kUnknown;
+  std::vector<TestedMeasurement> largest;  // |w|, largest first
+  Spread detectable_px;                    // smallest detectable errors
+  double worst_external = kUnknown;        // largest external reliability of the tested, sigmas
+};
+
 // What hangs together by kept observations and relative poses.
 struct BlockPart {
   std::int64_t frames = 0, images = 0;  // oriented
@@ -82,6 +104,7 @@ struct Figures {
   std::vector<AttitudeResidual> attitudes;                   // frames with observed attitude and pose, block order
   IndexedVector<ImageIndex, double> image_squares;           // sum of squared kept residuals, px^2
   IndexedVector<ImageIndex, std::int64_t> measured;          // observations in tracks, rejected ones included
+  Reliability reliability;                                   // tested = 0: redundancy numbers are not known
   std::vector<BlockPart> parts;                              // largest first
   IndexedVector<FrameIndex, std::int32_t> part_of_frame;     // row of parts; -1: not oriented
   Spread sigma_east, sigma_north, sigma_up, sigma_rotation;  // frames; metres, radians (largest of the three axes)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/reliability.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
 
@@ -18,9 +19,35 @@ bool misstated(const ObservationStatistics& statistics) {
   return std::isfinite(factor) && std::abs(factor - 1) > tolerance;
 }
 
+// Baarda's and Pope's tests of the tie point measurements, and how large an error must be to be found.
+std::string reliability_part(const BlockResult& result, const Reliability& r) {
+  if (r.tested == 0) return "";
+  Table tests({"test of tie point measurements", "limit", "beyond it", "expected by chance"});
+  const auto expected = static_cast<std::int64_t>(std::llround(kFalseAlarmProbability * static_cast<double>(r.tested)));
+  tests.add({"Baarda: |w| = |residual| ÷ (sigma √redundancy)", fixed(r.normal_limit, 2), count(r.beyond_normal),
+             count(expected)});
+  if (std::isfinite(r.tau_limit))
+    tests.add({"Pope: |τ| = |w| ÷ sigma0", fixed(r.tau_limit, 2), count(r.beyond_tau), count(expected)});
+  Table largest({"largest |w|", "image", "axis", "residual [px]", "redundancy", "|w|"});
+  for (const TestedMeasurement& test : r.largest)
+    largest.add({"track " + std::to_string(test.track.value), escape(result.block.images[test.image].name),
+                 test.vertical ? "y" : "x", fixed(test.residual, 2), fixed(test.redundancy, 2),
+                 fixed(test.normalised, 2)});
+  const std::string reliability = fmt::format(
+      "Reliability: an error of one measurement is found (with a probability of {:.0f} %, at a false alarm in {:.0f}) "
+      "from {} px on for half of the measurements, from {} px on for 95 % of them. {} of {} have a redundancy below "
+      "{}; "
+      "{} are checked by nothing else. An error that is just not found moves no result by more than {} of its own "
+      "sigmas.",
+      100 * kDetectionProbability, 1 / kFalseAlarmProbability, significant(r.detectable_px.median, 2),
+      significant(r.detectable_px.p95, 2), count(r.poorly_checked), count(r.tested),
+      fixed(Reliability::kPoorRedundancy, 1), count(r.unchecked), significant(r.worst_external, 2));
+  return tests.html("compact") + paragraph(reliability) + largest.html("compact");
+}
+
 }  // namespace
 
-std::string observations_section(const BlockResult& result) {
+std::string observations_section(const BlockResult& result, const Figures& figures) {
   Table table({"observations", "number", "redundancy", "share", "shown ÷ stated sigma"});
   std::int64_t number = 0;
   double redundancy = 0;
@@ -40,7 +67,7 @@ std::string observations_section(const BlockResult& result) {
   return section("observations", "Observations and their sigmas",
                  paragraph("Redundancy says how much of the observations of a kind is checked by all others; the last "
                            "column how far their residuals are from what the stated sigmas promise (1: as promised).") +
-                     table.html("compact"));
+                     table.html("compact") + reliability_part(result, figures.reliability));
 }
 
 }  // namespace megablock::report

@@ -21,7 +21,7 @@ std::string coverage_section(const BlockResult& result, const Figures& figures);
 std::string images_section(const BlockResult& result, const Figures& figures);
 std::string tie_points_section(const BlockResult& result, const Figures& figures);
 std::string residuals_section(const BlockResult& result, const Figures& figures);
-std::string observations_section(const BlockResult& result);
+std::string observations_section(const BlockResult& result, const Figures& figures);
 std::string positions_section(const BlockResult& result, const Figures& figures);
 std::string attitudes_section(const BlockResult& result, const Figures& figures);
 std::string control_section(const BlockResult& result, const Figures& figures);

@@ -15,7 +15,7 @@ namespace {
 struct Part {
   RankTile tile;
   TrackSet tracks;
-  std::vector<Eigen::Matrix3d> covariances;
+  TileCovariance covariance;
 };
 
 // Tracks of two to four observations, with keys from a common range; a control point behind them. Images have no pose.
@@ -40,17 +40,19 @@ Part made_up_part(std::int64_t number, std::int64_t count, std::int64_t keys) {
       part.tracks.feature.push_back(static_cast<std::int32_t>(random() % 500));
       problem.image.push_back(LocalImage(-1));
       problem.kept.push_back(0);
+      part.covariance.redundancy_x.push_back(static_cast<float>(random() % 256) / 255);
+      part.covariance.redundancy_y.push_back(std::nanf(""));
     }
     part.tracks.begin.push_back(part.tracks.observation_count());
     problem.begin.push_back(part.tracks.observation_count());
-    part.covariances.push_back(Eigen::Matrix3d::Constant(static_cast<double>(random() % 100)));
+    part.covariance.points.push_back(Eigen::Matrix3d::Constant(static_cast<double>(random() % 100)));
   }
   problem.points.push_back({PointRole::kCheck, 2});
   part.tile.state.points.emplace_back(1, 2, 3);
   problem.image.push_back(LocalImage(-1));
   problem.kept.push_back(0);
   problem.begin.push_back(problem.begin.back() + 1);
-  part.covariances.push_back(Eigen::Matrix3d::Identity());
+  part.covariance.points.push_back(Eigen::Matrix3d::Identity());
   problem.x.assign(problem.image.size(), 0);
   problem.y.assign(problem.image.size(), 0);
   return part;
@@ -61,18 +63,26 @@ struct Row {
   Eigen::Vector3d point;
   double covariance;
   std::vector<std::int64_t> observations;  // image, x, y, feature
+  std::vector<int> redundancy;
 };
 
 std::vector<Row> rows_of(const Part& part) {
   std::vector<Row> rows;
   for (std::int64_t t = 0; t < part.tracks.track_count(); ++t) {
     const auto row = static_cast<std::size_t>(t);
-    Row made{
-        part.tracks.id[row].value, part.tile.tile, t, part.tile.state.points[row], part.covariances[row](0, 0), {}};
+    Row made{part.tracks.id[row].value,
+             part.tile.tile,
+             t,
+             part.tile.state.points[row],
+             part.covariance.points[row](0, 0),
+             {},
+             {}};
     for (auto o = static_cast<std::size_t>(part.tracks.begin[row]);
-         o < static_cast<std::size_t>(part.tracks.begin[row + 1]); ++o)
+         o < static_cast<std::size_t>(part.tracks.begin[row + 1]); ++o) {
       made.observations.insert(made.observations.end(), {part.tracks.image[o].value, part.tracks.x[o], part.tracks.y[o],
                                                          part.tracks.feature[o]});
+      made.redundancy.push_back(static_cast<int>(std::lround(255 * part.covariance.redundancy_x[o])));
+    }
     rows.push_back(std::move(made));
   }
   return rows;
@@ -87,7 +97,7 @@ TEST_P(ResultPartsTest, AreMergedByKeyAndTile) {
   for (const std::int64_t count : GetParam()) {
     const auto tile = static_cast<std::int64_t>(files.size());
     const Part part = made_up_part(tile, count, 3000);
-    const TilePart written = write_part(scratch.path(std::to_string(tile)), part.tile, part.tracks, part.covariances);
+    const TilePart written = write_part(scratch.path(std::to_string(tile)), part.tile, part.tracks, part.covariance);
     EXPECT_EQ(written.track_count, count);
     files.push_back({scratch.path(std::to_string(tile)), written.track_count});
     for (Row& row : rows_of(part)) expected.push_back(std::move(row));
@@ -108,11 +118,13 @@ TEST_P(ResultPartsTest, AreMergedByKeyAndTile) {
     EXPECT_EQ(all.points[t], row.point);
     EXPECT_EQ(all.point_covariance[t](1, 2), 2 * row.covariance);
     std::vector<std::int64_t> observations;
-    for (auto o = static_cast<std::size_t>(all.tracks.begin[t]); o < static_cast<std::size_t>(all.tracks.begin[t + 1]);
-         ++o) {
+    const auto first = static_cast<std::size_t>(all.tracks.begin[t]);
+    for (std::size_t o = first; o < static_cast<std::size_t>(all.tracks.begin[t + 1]); ++o) {
       observations.insert(observations.end(),
                           {all.tracks.image[o].value, all.tracks.x[o], all.tracks.y[o], all.tracks.feature[o]});
       EXPECT_EQ(all.kept[o], 0);
+      EXPECT_EQ(all.redundancy_x[o], row.redundancy[o - first]);
+      EXPECT_EQ(all.redundancy_y[o], 0);
       EXPECT_TRUE(std::isnan(all.residual_x[o]));  // no pose, no residual
     }
     EXPECT_EQ(observations, row.observations);
@@ -128,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(Tiles, ResultPartsTest,
 TEST(ResultPartsTest, RestTravelsAsBytes) {
   const ScratchDirectory scratch;
   const Part part = made_up_part(4, 20, 100);
-  const TilePart written = write_part(scratch.path("4"), part.tile, part.tracks, part.covariances);
+  const TilePart written = write_part(scratch.path("4"), part.tile, part.tracks, part.covariance);
   const TilePart back = TilePart::from_bytes(written.to_bytes());
   EXPECT_EQ(back.tile, 4);
   EXPECT_EQ(back.track_count, 20);
