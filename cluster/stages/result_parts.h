@@ -1,4 +1,4 @@
-// From merged tiles to the tracks of the result. Each rank writes the tracks of its tiles into the job's scratch as
+// From merged tiles to the tracks of the result. Each rank writes the tracks of its tiles to the job's disk as
 // soon as their covariances are there; the first rank then reads them all, merged by their keys, a small piece of each
 // tile at a time: no rank holds more of the result than a tile.
 #pragma once
