@@ -118,7 +118,7 @@ class Resection {
 
 }  // namespace
 
-int recover_lost_frames(const TileProblem& problem, TileState& state, double threshold_sigmas) {
+std::vector<LocalFrame> recover_lost_frames(const TileProblem& problem, TileState& state, double threshold_sigmas) {
   std::vector<std::int64_t> point_of_row;
   const std::vector<std::vector<std::int64_t>> rows = rows_of_frames(problem, point_of_row);
   const Resection resection(problem, state, point_of_row, threshold_sigmas);
@@ -130,13 +130,13 @@ int recover_lost_frames(const TileProblem& problem, TileState& state, double thr
     found[f] = resection.find(rows[f], static_cast<std::uint64_t>(problem.frames[f].value));
     if (found[f] && resection.agreeing(*found[f], rows[f]) <= now) found[f].reset();
   }
-  int count = 0;
+  std::vector<LocalFrame> frames;
   for (std::size_t f = 0; f < found.size(); ++f) {
     if (!found[f]) continue;
     state.frames[f] = *found[f];
-    ++count;
+    frames.emplace_back(static_cast<std::int32_t>(f));
   }
-  return count;
+  return frames;
 }
 
 }  // namespace megablock

@@ -18,6 +18,7 @@ namespace megablock {
 namespace {
 
 constexpr double kGenerous = 1.5;  // times the threshold: for a point that may stay where the adjustment put it
+constexpr double kSettled = 1e-3;  // sigmas: an adjustment follows
 const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 class PointSettler {
@@ -114,7 +115,7 @@ class PointSettler {
     std::vector<PointView> used;
     for (std::size_t i = 0; i < views_.size(); ++i)
       if (kept_[i]) used.push_back(views_[i]);
-    const auto refined = triangulate(used);
+    const auto refined = triangulate(used, kSettled);
     if (!refined) return std::nullopt;
     return refined->position;
   }
@@ -148,11 +149,16 @@ class PointSettler {
 }  // namespace
 
 void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options) {
+  triangulate_points(problem, state, options, std::vector<std::uint8_t>(problem.points.size(), 1));
+}
+
+void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options,
+                        const std::vector<std::uint8_t>& which) {
   state.points.resize(problem.points.size(), kNowhere);
   constexpr double kAnything = 1e3;  // sigmas: only rays that have nothing to do with the others are left out
   PointSettler settler(problem, state, options.min_intersection_deg);
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
-    if (problem.active(p)) settler.intersect(p, kAnything);
+    if (which[p] && problem.active(p)) settler.intersect(p, kAnything);
 }
 
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,

@@ -25,12 +25,13 @@ void AdjustOptions::check() const {
 
 namespace {
 
-// Sigma of the kept image residuals from their median (1.1774 is the median of a Rayleigh distribution), in a-priori
-// sigmas: untouched by outliers.
-double robust_sigma(const TileProblem& problem, const TileState& state) {
+// Lengths of kept image residuals, in a-priori sigmas; of many points every n-th will do.
+std::vector<double> residual_lengths(const TileProblem& problem, const TileState& state) {
+  constexpr std::int64_t kEnough = 20'000;  // points
+  const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / kEnough);
   const std::vector<ImageView> views = image_views(problem, state);
   std::vector<double> lengths;
-  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+  for (std::int64_t p = 0; p < problem.point_count(); p += stride) {
     if (!problem.active(p)) continue;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
       if (!problem.kept[row]) continue;
@@ -40,10 +41,19 @@ double robust_sigma(const TileProblem& problem, const TileState& state) {
       lengths.push_back(std::isfinite(length) ? length : std::numeric_limits<double>::max());
     }
   }
+  return lengths;
+}
+
+// Sigma of the kept image residuals from their median (1.1774 is the median of a Rayleigh distribution), in a-priori
+// sigmas: untouched by outliers.
+double robust_sigma(std::vector<double> lengths) {
   if (lengths.empty()) throw ComputeError("the tile has no points that can be intersected");
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
   return *middle / 1.1774;
+}
+double robust_sigma(const TileProblem& problem, const TileState& state) {
+  return robust_sigma(residual_lengths(problem, state));
 }
 
 // Mean redundancy of an image residual: least squares shortens residuals by its root.
@@ -59,8 +69,11 @@ double redundancy(const TileProblem& problem) {
 }
 
 // The a-priori sigma may be too small for the images at hand: thresholds follow the residuals upwards.
+double threshold_factor(const TileProblem& problem, double robust_sigma) {
+  return std::max(1.0, robust_sigma / std::sqrt(redundancy(problem)));
+}
 double threshold_factor(const TileProblem& problem, const TileState& state) {
-  return std::max(1.0, robust_sigma(problem, state) / std::sqrt(redundancy(problem)));
+  return threshold_factor(problem, robust_sigma(problem, state));
 }
 
 class TileAdjuster {
@@ -73,19 +86,21 @@ class TileAdjuster {
   AdjustSummary run() {
     approach();
     recover();
-    AdjustSummary summary;
     for (int round = 0; round + 1 < options_.screening_rounds; ++round) {
       // From 8 x to 1 x of the final threshold.
       const double left = 1 - static_cast<double>(round) / (options_.screening_rounds - 1);
       screen(options_.max_residual_sigmas * std::pow(8, left));
+      if (fits()) break;
+      chosen_.assign(chosen_.size(), 1);
       solve_rough(Stage::kAll);
     }
     adopt_image_sigma();
     screen(options_.max_residual_sigmas);
-    summary = solve_fine();
+    AdjustSummary summary = solve_fine();
     // What the last solve moved across the threshold, or weighs otherwise.
     const bool reweighted = adopt_image_sigma();
-    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / 10000 || reweighted)
+    if (screen(options_.max_residual_sigmas) > problem_.observation_count() / (options_.only_start ? 1000 : 10000) ||
+        reweighted)
       summary = solve_fine();
     return count(summary);
   }
@@ -94,27 +109,38 @@ class TileAdjuster {
   enum class Stage { kFocal, kAll };
 
   // From rough start values to residuals of a few pixels: gross errors are left out, only focal length and k1 are
-  // estimated, and of dense tiles only the longest tracks take part.
+  // estimated, and of dense tiles only the longest tracks take part, until they are of one mind.
   void approach() {
     constexpr int kMaxRounds = 6;
-    constexpr double kWide = 4;
+    constexpr double kWide = 4, kApart = 3;
+    constexpr int kFew = 6;  // iterations: to test again which rays belong together helps more than others
     const std::vector<std::uint8_t> all = problem_.kept;
-    select_long_tracks();
+    const bool dense = select_long_tracks();
+    // Dense: wide enough for what ties passes that start apart; of a few tracks that would hold too many gross errors.
+    const double widest = 8 * options_.max_residual_sigmas * (dense ? kApart : 1);
     triangulate_points(problem_, state_, options_);
-    const std::vector<std::uint8_t> chosen = active_points();
+    chosen_ = active_points();
+    const std::int64_t settled = active_observations() / 500;
+    bool falling = true;
     for (int round = 0; round < kMaxRounds; ++round) {
       const double sigma = robust_sigma(problem_, state_);
-      screen_observations(problem_, state_, std::max(8 * options_.max_residual_sigmas, kWide * sigma), options_,
-                          chosen);
-      solve_rough(Stage::kFocal);
+      const double threshold = std::max(widest, kWide * sigma);
+      const std::int64_t changed = screen_observations(problem_, state_, threshold, options_, chosen_);
+      if (!falling && changed <= settled) break;
+      solve_rough(Stage::kFocal, dense ? kFew : kMany);
       const double next = robust_sigma(problem_, state_);
-      if (next < 2 || next > 0.7 * sigma) break;
+      falling = next >= 2 && next <= 0.7 * sigma;
+      if (!dense && !falling) break;  // the later rounds take the same tracks
     }
-    for (std::int64_t p = 0; p < problem_.point_count(); ++p)
-      if (!chosen[p])
+    std::vector<std::uint8_t> others(chosen_.size());
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
+      others[p] = !chosen_[p];
+      if (others[p])
         std::copy(all.begin() + problem_.begin[p], all.begin() + problem_.begin[p + 1],
                   problem_.kept.begin() + problem_.begin[p]);
-    triangulate_points(problem_, state_, options_);
+    }
+    if (!dense) chosen_.assign(chosen_.size(), 1);
+    triangulate_points(problem_, state_, options_, others);
   }
 
   // Frames that none of it has brought to their points; a few rounds, as they may hang on one another.
@@ -122,21 +148,40 @@ class TileAdjuster {
     constexpr int kMaxRounds = 3;
     for (int round = 0; round < kMaxRounds; ++round) {
       screen(8 * options_.max_residual_sigmas);
-      if (recover_lost_frames(problem_, state_, 8 * options_.max_residual_sigmas) == 0) return;
+      const std::vector<LocalFrame> found = recover_lost_frames(problem_, state_, 8 * options_.max_residual_sigmas);
+      if (found.empty()) return;
       screen(8 * options_.max_residual_sigmas);
+      choose_points_of(found);
       solve_rough(Stage::kFocal);
     }
   }
 
-  // Enough tracks for each frame, the longest first, shared out among its images.
-  void select_long_tracks() {
+  void choose_points_of(const std::vector<LocalFrame>& frames) {
+    std::vector<std::uint8_t> wanted(problem_.frames.size(), 0);
+    for (const LocalFrame frame : frames) wanted[frame.value] = 1;
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p)
+      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1] && !chosen_[p]; ++row)
+        chosen_[p] = problem_.image[row].valid() && wanted[problem_.images[problem_.image[row].value].frame.value];
+  }
+
+  // Whether rough solutions have done their work: hardly any residual is beyond the final threshold.
+  bool fits() const {
+    constexpr double kHardlyAny = 0.01;
+    const std::vector<double> lengths = residual_lengths(problem_, state_);
+    const double limit = options_.max_residual_sigmas * threshold_factor(problem_, robust_sigma(lengths));
+    const auto beyond = std::count_if(lengths.begin(), lengths.end(), [&](double length) { return length > limit; });
+    return static_cast<double>(beyond) <= kHardlyAny * static_cast<double>(lengths.size());
+  }
+
+  // Enough tracks for each frame, the longest first, shared out among its images. Whether there are more.
+  bool select_long_tracks() {
     constexpr std::int64_t kEnough = 200, kFewest = 20;  // of a frame, of an image
     std::vector<std::int64_t> images(problem_.frames.size(), 0);
     for (const TileImage& image : problem_.images) ++images[image.frame.value];
     std::vector<std::int64_t> enough;  // [images]
     for (const TileImage& image : problem_.images)
       enough.push_back(std::max(kFewest, kEnough / images[image.frame.value]));
-    if (problem_.observation_count() < 2 * std::accumulate(enough.begin(), enough.end(), std::int64_t{0})) return;
+    if (problem_.observation_count() < 2 * std::accumulate(enough.begin(), enough.end(), std::int64_t{0})) return false;
     std::vector<std::int64_t> order(problem_.points.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
@@ -156,20 +201,25 @@ class TileAdjuster {
           ++covered[problem_.image[row].value];
       }
     }
+    return true;
   }
 
   // Whether the weights have changed enough to matter.
   bool adopt_image_sigma() {
-    constexpr double kSettled = 0.02;
+    const double settled = options_.only_start ? 0.05 : 0.02;
     const double before = problem_.image_sigma_px;
     if (options_.estimate_image_sigma) estimate_image_sigma(problem_, state_, options_);
-    return std::abs(problem_.image_sigma_px / before - 1) > kSettled;
+    return std::abs(problem_.image_sigma_px / before - 1) > settled;
   }
 
   std::vector<std::uint8_t> active_points() const {
     std::vector<std::uint8_t> result(problem_.points.size());
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) result[p] = problem_.active(p);
     return result;
+  }
+
+  std::int64_t active_observations() const {
+    return std::count(problem_.kept.begin(), problem_.kept.end(), std::uint8_t{1});
   }
 
   std::int64_t screen(double threshold) {
@@ -180,21 +230,33 @@ class TileAdjuster {
     return changed;
   }
 
-  // A few iterations with a loss that forgets gross errors and is as wide as the residuals are.
-  void solve_rough(Stage stage) {
-    constexpr int kIterations = 10;
+  // A few iterations of the chosen points with a loss that forgets gross errors and is as wide as the residuals are.
+  static constexpr int kMany = 10;
+  void solve_rough(Stage stage, int iterations = kMany) {
+    constexpr double kNear = 0.5, kFlat = 1e-3;  // sigmas of the frames, share of the cost
+    const std::vector<std::uint8_t> all = problem_.kept;
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p)
+      if (!chosen_[p])
+        std::fill(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0);
     const RobustLoss loss = problem_.image_loss;
     problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_))};
-    solve({std::min(kIterations, options_.max_iterations), 1e-3, camera_free(stage)});
+    const double near = 0.5 * kNear * kNear * frame_unknowns() / static_cast<double>(active_observations());
+    solve({std::min(iterations, options_.max_iterations), std::max(kFlat, near), camera_free(stage)});
     problem_.image_loss = loss;
+    problem_.kept = all;
   }
 
-  // To where another iteration would lower the cost by less than kResolved, a small fraction of a sigma.
+  // To where another iteration would lower the cost by a small fraction of a sigma; or, where the tile is only a
+  // start, move its frames by less than a tenth of theirs.
   AdjustSummary solve_fine() {
-    constexpr double kResolved = 0.01;
+    constexpr double kResolved = 0.01, kNear = 0.1;
     const double cost = static_cast<double>(std::max<std::int64_t>(1, problem_.observation_count()));
-    return solve({options_.max_iterations, std::min(1e-6, kResolved / cost), camera_free(Stage::kAll)});
+    const double tolerance = options_.only_start ? std::max(kResolved, 0.5 * kNear * kNear * frame_unknowns()) / cost
+                                                 : std::min(1e-6, kResolved / cost);
+    return solve({options_.max_iterations, tolerance, camera_free(Stage::kAll)});
   }
+
+  double frame_unknowns() const { return 6 * static_cast<double>(problem_.frames.size()); }
 
   AdjustSummary solve(const SolveOptions& solve_options) {
     const AdjustSummary summary = solver_(problem_, state_, solve_options);
@@ -237,6 +299,7 @@ class TileAdjuster {
   const AdjustOptions& options_;
   const TileSolver& solver_;
   std::vector<std::int64_t> images_;  // of each camera
+  std::vector<std::uint8_t> chosen_;  // [points] that take part in rough solutions
   std::int64_t restored_ = 0;
 };
 

@@ -17,6 +17,7 @@ struct AdjustOptions {
   double max_residual_sigmas = 4.0;  // screening threshold at the end; starts at 8 x and falls
   int screening_rounds = 3;          // re-tests every observation against the current solution, both ways
   int max_iterations = 50;           // of the solver per round
+  bool only_start = false;           // a block's adjustment follows: near the tile's optimum is enough
   // Images a camera needs in the tile before the tile's own adjustment estimates parameters without a prior sigma:
   // focal length and k1; principal point, k2 and decentring; k3. Below, they stay at their values here and are left to
   // the adjustment of the whole block (TileProblem::camera_free is never changed).
@@ -27,6 +28,9 @@ struct AdjustOptions {
 // Intersects all rays of every active point (linear start, Gauss-Newton refinement); NaN where it fails.
 // Sets kept = 0 on the observations of points that fail, that are behind a camera, or below min_intersection_deg.
 void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options);
+// The same for the points marked in `which` [points].
+void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options,
+                        const std::vector<std::uint8_t>& which);
 
 // Re-tests every observation (also rejected ones) of every point against the current solution; returns how many
 // changed. Threshold in sigmas. A rejected observation comes back when it passes; a point whose observations split into

@@ -24,8 +24,8 @@ std::array<double, 3> RobustLoss::evaluate(double squared_norm) const {
       }
       break;
     case Kind::kCauchy: {
-      const double inverse = 1 / (1 + s / b);
-      return {b * std::log1p(s / b), std::max(kTiny, inverse), -inverse * inverse / b};
+      const double sum = 1 + s / b, inverse = 1 / sum;
+      return {b * std::log(sum), std::max(kTiny, inverse), -inverse * inverse / b};
     }
   }
   return {s, 1, 0};

@@ -71,7 +71,7 @@ bool linearise(const Eigen::Vector3d& point, std::span<const PointView> views, P
 }  // namespace
 
 std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span<const PointView> views,
-                                         int max_iterations) {
+                                         int max_iterations, double settled) {
   RefinedPoint result{start};
   PointEquations equations;
   if (views.size() < 2 || !linearise(start, views, equations)) return std::nullopt;
@@ -95,8 +95,8 @@ std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span
       result.position += length * step;
       equations = next;
     }
-    // A step of 1e-6 sigmas, or a cost that rounding no longer lets fall.
-    if (decrement < 1e-12 || (!improved && decrement < 1e-8 * (1 + equations.squared_error))) {
+    // A short step, or a cost that rounding no longer lets fall.
+    if (decrement < settled * settled || (!improved && decrement < 1e-8 * (1 + equations.squared_error))) {
       result.squared_error = equations.squared_error;
       return result;
     }
@@ -105,7 +105,7 @@ std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span
   return std::nullopt;
 }
 
-std::optional<RefinedPoint> triangulate(std::span<const PointView> views) {
+std::optional<RefinedPoint> triangulate(std::span<const PointView> views, double settled) {
   std::vector<Ray> rays;
   rays.reserve(views.size());
   for (const PointView& view : views) {
@@ -115,7 +115,7 @@ std::optional<RefinedPoint> triangulate(std::span<const PointView> views) {
   }
   const auto start = intersect_rays(rays);
   if (!start) return std::nullopt;
-  return refine_point(*start, views);
+  return refine_point(*start, views, 20, settled);
 }
 
 double max_intersection_angle(const Eigen::Vector3d& point, std::span<const Eigen::Vector3d> centres) {

@@ -45,12 +45,14 @@ struct RefinedPoint {
 };
 
 // Minimises the squared pixel residuals over the point, by Gauss-Newton with step halving. Empty when a view sees the
-// point behind it, the normal matrix is singular or the iterations do not converge.
+// point behind it, the normal matrix is singular or the iterations do not converge: to a step shorter than `settled`
+// sigmas.
+inline constexpr double kSettledPoint = 1e-6;
 std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span<const PointView> views,
-                                         int max_iterations = 20);
+                                         int max_iterations = 20, double settled = kSettledPoint);
 
 // Linear intersection and refinement.
-std::optional<RefinedPoint> triangulate(std::span<const PointView> views);
+std::optional<RefinedPoint> triangulate(std::span<const PointView> views, double settled = kSettledPoint);
 
 // Largest angle at the point between two of its rays, radians in [0, pi].
 double max_intersection_angle(const Eigen::Vector3d& point, std::span<const Eigen::Vector3d> centres);

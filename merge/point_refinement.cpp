@@ -2,7 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <limits>
+#include <optional>
+#include <vector>
 
+#include "geometry/triangulation.h"
 #include "merge/point_equations.h"
 
 namespace megablock {
@@ -10,22 +13,31 @@ namespace megablock {
 namespace {
 
 constexpr int kMaxSteps = 100;
-constexpr double kSettled = 1e-12;  // squared decrement
 constexpr double kMaxDamping = 1e6;
 
 class PointRefiner {
  public:
-  PointRefiner(const TileProblem& problem, TileState& state)
-      : problem_(problem), state_(state), views_(image_views(problem, state)), prior_(prior_rows(problem)) {}
+  PointRefiner(const TileProblem& problem, TileState& state, double settled)
+      : problem_(problem),
+        state_(state),
+        settled_squared_(settled * settled),
+        views_(image_views(problem, state)),
+        prior_(prior_rows(problem)) {}
 
   void refine(std::int64_t point) {
     if (!in_tail(point)) return;
     Eigen::Vector3d& position = state_.points[static_cast<std::size_t>(point)];
     Equations now = equations(point, position);
-    if (!std::isfinite(now.cost)) return;
+    if (!std::isfinite(now.cost)) {
+      const auto start = intersection(point);
+      if (!start) return;
+      now = equations(point, *start);
+      if (!std::isfinite(now.cost)) return;
+      position = *start;
+    }
     double damping = 1e-4;
     bool raised = false;
-    for (int step = 0; step < kMaxSteps && now.decrement_squared() > kSettled; ++step) {
+    for (int step = 0; step < kMaxSteps && now.decrement_squared() > settled_squared_; ++step) {
       const Eigen::Vector3d trial = position + now.step(damping);
       Equations next = equations(point, trial);
       if (next.cost < now.cost) {
@@ -54,13 +66,28 @@ class PointRefiner {
     }
   };
 
-  // Whether an observation lies beyond the corner; most points are settled by this.
+  std::optional<Eigen::Vector3d> intersection(std::int64_t point) {
+    rays_.clear();
+    for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
+      if (!problem_.kept[row]) continue;
+      const ImageView& view = views_[problem_.image[row].value];
+      const auto direction = viewing_ray(*view.intrinsics, {problem_.x[row], problem_.y[row]});
+      if (!direction) return std::nullopt;
+      const Eigen::Matrix3d to_ground = view.rotation.transpose();
+      rays_.push_back({view.centre + to_ground * view.shift, to_ground * *direction});
+    }
+    return intersect_rays(rays_);
+  }
+
+  // Whether an observation lies beyond the corner or behind its camera; most points are settled by this.
   bool in_tail(std::int64_t point) const {
+    if (problem_.image_loss.kind == RobustLoss::Kind::kCauchy) return true;  // it has no corner
     for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
       if (!problem_.kept[row]) continue;
       const Eigen::Vector2d difference =
           views_[problem_.image[row].value].difference_px(state_.points[point], {problem_.x[row], problem_.y[row]});
-      if (problem_.image_loss.evaluate((problem_.inverse_sigma[row] * difference).squaredNorm())[2] < 0) return true;
+      const double squares = (problem_.inverse_sigma[row] * difference).squaredNorm();
+      if (!std::isfinite(squares) || problem_.image_loss.evaluate(squares)[2] < 0) return true;
     }
     return false;
   }
@@ -101,15 +128,17 @@ class PointRefiner {
 
   const TileProblem& problem_;
   TileState& state_;
+  const double settled_squared_;
   std::vector<ImageView> views_;
   std::vector<std::int64_t> prior_;
+  std::vector<Ray> rays_;  // of the point at hand
 };
 
 }  // namespace
 
-void refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state) {
+void refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return;
-  PointRefiner refiner(problem, state);
+  PointRefiner refiner(problem, state, settled);
   for (const auto& cell : plan.points)
     for (std::int64_t point : cell) refiner.refine(point);
 }

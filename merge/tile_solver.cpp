@@ -15,6 +15,8 @@ namespace megablock {
 
 namespace {
 
+constexpr double kSettled = 1e-2;  // sigmas, of a point at held poses: the next step moves them on
+
 // Passes over a tree of one leaf.
 class LoneTile : public TreeRunner {
  public:
@@ -34,7 +36,7 @@ class LoneTile : public TreeRunner {
     const std::vector<BlockMotion> motions =
         block_motions(gauge_, {motion_sums(gauge_, 0, problem_, plan_, state_, step.unknowns)});
     trial_ = apply_step(gauge_, motions, 0, problem_, plan_, state_, step);
-    refine_points(problem_, plan_, trial_);
+    refine_points(problem_, plan_, trial_, kSettled);
     trial_cost_ = evaluate_cost(problem_, trial_);
     return {step.damping_norm, trial_cost_};
   }

@@ -58,7 +58,8 @@ TileStart with_parts(const TileStart& adjusted, const TrackParts& parts, TileSta
 
 TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
                           const std::string& tracks_unit) {
-  const AdjustOptions& options = job.settings.adjustment;
+  AdjustOptions options = job.settings.adjustment;
+  options.only_start = true;
   const auto start = [&](TrackSet tracks) { return make_start(job, oriented, tiles, tile, std::move(tracks)); };
   TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)));
   const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);

@@ -108,6 +108,29 @@ TEST(PointRefinement, EndsWhereEveryPointIsAtItsOptimum) {
     EXPECT_LE((again.points[p] - after.points[p]).norm(), 1e-5) << "point " << p;
 }
 
+// A step through the cameras is no reason to give up the points that it has turned behind them.
+TEST(PointRefinement, BringsPointsBackFromBehindTheirCameras) {
+  const TiledBlock block(simulate_block(heavy_tailed()), 12, {}, 0.05);
+  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  const TileProblem& problem = runner.problems().front();
+  const TilePlan& plan = runner.tile_plans().front();
+  TileState expected = runner.states().front(), state = expected;
+  refine_points(problem, plan, expected);
+  int refined = 0;
+  for (const auto& cell : plan.points)
+    for (const std::int64_t p : cell) {
+      const auto row = static_cast<std::size_t>(p);
+      if (expected.points[row] == state.points[row]) continue;
+      const Eigen::Vector3d& camera = state.frames[static_cast<std::size_t>(frame_of_point(problem, p))].centre;
+      state.points[row] = 2 * camera - state.points[row];
+      ++refined;
+    }
+  ASSERT_GT(refined, 20);
+  EXPECT_FALSE(std::isfinite(evaluate_cost(problem, state)));
+  refine_points(problem, plan, state);
+  EXPECT_NEAR(evaluate_cost(problem, state), evaluate_cost(problem, expected), 1e-9 * evaluate_cost(problem, expected));
+}
+
 TEST(PointRefinement, LeavesPointsWithoutTailAlone) {
   SimulationOptions options = heavy_tailed();
   options.image_noise_px = 0.05;

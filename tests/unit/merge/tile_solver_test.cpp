@@ -249,5 +249,31 @@ TEST(TileSolver, WholeAdjustmentFromAPoorStart) {
   }
 }
 
+// Passes of a street that start up to 2 m apart, seen by many short and some common tracks: the tile is brought as near
+// as a start for its block has to be, with the ties between the passes kept.
+TEST(TileSolver, DenseTileAsAStart) {
+  SimulationOptions simulation = street(14);
+  simulation.frames = 60;
+  simulation.points_per_frame = 1000;
+  simulation.calibrate = false;
+  simulation.gps_sigma_m = 0.5;
+  simulation.gps_share = 0.5;
+  simulation.relative_position_sigma_m = 0.01;
+  simulation.relative_rotation_sigma_deg = 0.01;
+  simulation.start_position_error_m = 0;
+  simulation.start_rotation_error_deg = 0;
+  simulation.start_offset_m = 2;
+  simulation.start_chain_frames = 20;
+  SingleTile tile(simulation);
+  tile.options.only_start = true;
+  const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
+  EXPECT_NEAR(summary.sigma0, 1, 0.05);
+  const auto kept = std::count(tile.problem.kept.begin(), tile.problem.kept.end(), std::uint8_t{1});
+  EXPECT_GT(static_cast<double>(kept), 0.995 * static_cast<double>(tile.problem.observation_count()));
+  const TilePlan plan = make_lone_tile_plan(tile.problem, tile.problem.camera_free);
+  const BlockGauge gauge = make_gauge({tile_gauge(tile.problem, plan, tile.state)});
+  EXPECT_LT(max_pose_difference_sigmas(tile.problem, tile.state, gauge, plan), 1) << summary.text;
+}
+
 }  // namespace
 }  // namespace megablock
