@@ -11,6 +11,7 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
+#include "merge/bytes.h"
 #include "merge/tile_solver.h"
 
 namespace megablock {
@@ -98,23 +99,59 @@ TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tile
   return result;
 }
 
+struct TileMark {
+  std::uint64_t fingerprint = 0;
+  std::int64_t observations = 0;
+};
+
+// Of all tiles: every rank reads its share of them. Collective.
+std::vector<TileMark> tile_marks(const Job& job, const BlockState& oriented, const Tiles& tiles,
+                                 const std::vector<std::string>& tracks) {
+  const auto ranks = static_cast<std::size_t>(job.ranks.size());
+  ByteWriter writer;
+  char kind = 'c';
+  std::string error;
+  try {
+    for (auto t = static_cast<std::size_t>(job.ranks.rank()); t < tracks.size(); t += ranks) {
+      const TileStart start = make_start(job, oriented, tiles, TileIndex(static_cast<std::int64_t>(t)),
+                                         read_tracks(job.store.verified_path(tracks[t])));
+      Hasher hasher;
+      hasher.add(algorithm::kAdjustment);
+      add_to_hash(hasher, job.settings.adjustment);
+      add_to_hash(hasher, start.problem, start.state);
+      writer.value(TileMark{hasher.value(), start.problem.observation_count()});
+    }
+  } catch (const InputError& e) {
+    kind = 'i';
+    error = e.what();
+  } catch (const std::exception& e) {
+    error = e.what();
+  }
+  share_error(job.ranks, kind, error);
+  const Bytes mine = writer.take();
+  std::vector<TileMark> marks(tracks.size());
+  const std::vector<std::string> all = job.ranks.gather_all(std::string(mine.begin(), mine.end()));
+  for (std::size_t rank = 0; rank < ranks; ++rank) {
+    const Bytes bytes(all[rank].begin(), all[rank].end());
+    ByteReader reader(bytes);
+    for (std::size_t t = rank; t < tracks.size(); t += ranks) marks[t] = reader.value<TileMark>();
+  }
+  return marks;
+}
+
 }  // namespace
 
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
+  const std::vector<TileMark> marks = tile_marks(job, oriented, tiles, tracks);
   std::vector<Unit> units;
   std::vector<std::string> names;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const TileIndex tile(static_cast<std::int64_t>(t));
-    const TileStart start = make_start(job, oriented, tiles, tile, read_tracks(job.store.verified_path(tracks[t])));
-    Hasher hasher;
-    hasher.add(algorithm::kAdjustment);
-    add_to_hash(hasher, job.settings.adjustment);
-    add_to_hash(hasher, start.problem, start.state);
     Unit unit;
     unit.name = unit_name("adjust", tile.value);
-    unit.fingerprint = hasher.value();
-    unit.cost = static_cast<double>(start.problem.observation_count());
+    unit.fingerprint = marks[t].fingerprint;
+    unit.cost = static_cast<double>(marks[t].observations);
     unit.write = [&job, &oriented, &tiles, tile, track = tracks[t]](const std::string& path) {
       write_adjustment(path, adjust_one(job, oriented, tiles, tile, track));
     };
