@@ -1,73 +1,140 @@
 #include "cluster/stages/given_tracks.h"
 
-#include <algorithm>
-#include <limits>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "adjust/tile_problem.h"
 #include "io/error.h"
 #include "io/track_reader.h"
 #include "io/unit_files.h"
+#include "merge/bytes.h"
 
 namespace megablock {
 
 namespace {
 
-using TileNumber = std::int32_t;
+TrackSet no_tracks() {
+  TrackSet tracks;
+  tracks.begin.push_back(0);
+  return tracks;
+}
 
-struct Owners {
-  std::vector<TileNumber> of_track;        // [rows of the file], -1: none
-  std::vector<std::int64_t> observations;  // [tiles]
+template <typename Values>
+void append(const Values& values, std::int64_t first, std::int64_t last, Values& to) {
+  to.insert(to.end(), values.begin() + first, values.begin() + last);
+}
+
+void append_tracks(const TrackSet& from, std::int64_t first, std::int64_t last, TrackSet& tracks) {
+  const std::int64_t shift = tracks.observation_count() - from.begin[first];
+  append(from.id, first, last, tracks.id);
+  for (std::int64_t t = first; t < last; ++t) tracks.begin.push_back(from.begin[t + 1] + shift);
+  append(from.image, from.begin[first], from.begin[last], tracks.image);
+  append(from.x, from.begin[first], from.begin[last], tracks.x);
+  append(from.y, from.begin[first], from.begin[last], tracks.y);
+  append(from.feature, from.begin[first], from.begin[last], tracks.feature);
+}
+
+// Tracks on their way to their tiles; what memory does not hold waits in a scratch file, run behind run.
+class TracksOfTiles {
+ public:
+  TracksOfTiles(std::int64_t tiles, std::string scratch_file, std::int64_t most)
+      : held_(static_cast<std::size_t>(tiles), no_tracks()),
+        runs_(held_.size()),
+        path_(std::move(scratch_file)),
+        most_(most) {}
+  ~TracksOfTiles() {
+    std::error_code ignored;
+    if (file_) std::filesystem::remove(path_, ignored);
+  }
+  TracksOfTiles(const TracksOfTiles&) = delete;
+  TracksOfTiles& operator=(const TracksOfTiles&) = delete;
+
+  void add(TileIndex tile, const TrackSet& batch, std::int64_t track) {
+    append_tracks(batch, track, track + 1, held_[static_cast<std::size_t>(tile.value)]);
+    observations_ += batch.begin[track + 1] - batch.begin[track];
+    if (observations_ > most_) write_all();
+  }
+
+  // Of the tile, in the order in which they were added.
+  TrackSet take(std::size_t tile) {
+    TrackSet tracks = no_tracks();
+    for (const Run& run : runs_[tile]) {
+      const TrackSet part = read(run);
+      append_tracks(part, 0, part.track_count(), tracks);
+    }
+    append_tracks(held_[tile], 0, held_[tile].track_count(), tracks);
+    held_[tile] = TrackSet();
+    return tracks;
+  }
+
+ private:
+  struct Run {
+    std::int64_t offset = 0, bytes = 0;
+  };
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+
+  [[noreturn]] void fail(const char* what) const {
+    throw StoreError(path_ + ": tracks could not be " + what + " (" + std::strerror(errno) +
+                     "); make room on the disk of the job and run the same command again");
+  }
+
+  void write_all() {
+    if (!file_) {
+      std::error_code ignored;  // reported when the file cannot be opened
+      std::filesystem::create_directories(std::filesystem::path(path_).parent_path(), ignored);
+      file_.reset(std::fopen(path_.c_str(), "w+b"));
+      if (!file_) fail("written");
+    }
+    for (std::size_t tile = 0; tile < held_.size(); ++tile) {
+      TrackSet& tracks = held_[tile];
+      if (tracks.id.empty()) continue;
+      ByteWriter writer;
+      writer.values(tracks.id);
+      writer.values(tracks.begin);
+      writer.values(tracks.image);
+      writer.values(tracks.x);
+      writer.values(tracks.y);
+      writer.values(tracks.feature);
+      const Bytes bytes = writer.take();
+      if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail("written");
+      runs_[tile].push_back({end_, static_cast<std::int64_t>(bytes.size())});
+      end_ += static_cast<std::int64_t>(bytes.size());
+      tracks = no_tracks();
+    }
+    observations_ = 0;
+  }
+
+  TrackSet read(const Run& run) {
+    Bytes bytes(static_cast<std::size_t>(run.bytes));
+    if (std::fflush(file_.get()) != 0) fail("written");
+    if (::fseeko(file_.get(), run.offset, SEEK_SET) != 0 ||
+        std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
+      fail("read back");
+    ByteReader reader(bytes);
+    TrackSet tracks;
+    tracks.id = reader.values<TrackIndex>();
+    tracks.begin = reader.values<std::int64_t>();
+    tracks.image = reader.values<ImageIndex>();
+    tracks.x = reader.values<std::int32_t>();
+    tracks.y = reader.values<std::int32_t>();
+    tracks.feature = reader.values<std::int32_t>();
+    return tracks;
+  }
+
+  std::vector<TrackSet> held_;          // [tiles]
+  std::vector<std::vector<Run>> runs_;  // [tiles] in the file
+  const std::string path_;
+  const std::int64_t most_;
+  std::int64_t observations_ = 0, end_ = 0;
+  std::unique_ptr<std::FILE, Close> file_;
 };
-
-Owners find_owners(const std::string& path, const TrackReader& file, const Block& block, const Tiles& tiles) {
-  if (tiles.tile_count > std::numeric_limits<TileNumber>::max()) throw ComputeError("more than 2^31 tiles");
-  Owners owners;
-  owners.observations.resize(static_cast<std::size_t>(tiles.tile_count), 0);
-  const auto add = [&](const TrackSet& batch) {
-    check_images(path, batch, block);
-    for (std::int64_t t = 0; t < batch.track_count(); ++t) {
-      const ImageIndex* images = batch.image.data();
-      const TileIndex owner = owner_tile(block, tiles, images + batch.begin[t], images + batch.begin[t + 1]);
-      owners.of_track.push_back(static_cast<TileNumber>(owner.value));
-      if (owner.valid())
-        owners.observations[static_cast<std::size_t>(owner.value)] += batch.begin[t + 1] - batch.begin[t];
-    }
-  };
-  file.visit(add, [](std::int64_t, std::int64_t) { return false; });
-  return owners;
-}
-
-void append_track(const TrackSet& from, std::int64_t t, TrackSet& tracks) {
-  const auto append = [&](const auto& values, auto& to) {
-    to.insert(to.end(), values.begin() + from.begin[t], values.begin() + from.begin[t + 1]);
-  };
-  tracks.id.push_back(from.id[t]);
-  append(from.image, tracks.image);
-  append(from.x, tracks.x);
-  append(from.y, tracks.y);
-  append(from.feature, tracks.feature);
-  tracks.begin.push_back(tracks.observation_count());
-}
-
-// Tracks of the tiles [first, last).
-std::vector<TrackSet> read_tiles(const TrackReader& file, const Owners& owners, TileNumber first, TileNumber last) {
-  std::vector<TrackSet> tiles(static_cast<std::size_t>(last - first));
-  for (TrackSet& tile : tiles) tile.begin.push_back(0);
-  const auto ours = [&](TileNumber owner) { return owner >= first && owner < last; };
-  std::int64_t row = 0;  // of the batch's first track
-  const auto take = [&](const TrackSet& batch) {
-    for (std::int64_t t = 0; t < batch.track_count() && !batch.x.empty(); ++t) {
-      const TileNumber owner = owners.of_track[static_cast<std::size_t>(row + t)];
-      if (ours(owner)) append_track(batch, t, tiles[static_cast<std::size_t>(owner - first)]);
-    }
-    row += batch.track_count();
-  };
-  file.visit(take, [&](std::int64_t begin, std::int64_t count) {
-    return std::any_of(owners.of_track.begin() + begin, owners.of_track.begin() + begin + count, ours);
-  });
-  return tiles;
-}
 
 }  // namespace
 
@@ -87,18 +154,18 @@ TrackSet read_given_tracks(const std::string& tie_points, const Block& block) {
 }
 
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
-                       const std::function<void(const TrackSet&)>& take, std::int64_t observations_at_a_time) {
-  const TrackReader file(tie_points);
-  const Owners owners = find_owners(tie_points, file, block, tiles);
-  const auto count = static_cast<TileNumber>(tiles.tile_count);
-  for (TileNumber first = 0, last; first < count; first = last) {
-    std::int64_t held = 0;
-    for (last = first; last < count; ++last) {
-      held += owners.observations[static_cast<std::size_t>(last)];
-      if (last > first && held > observations_at_a_time) break;
+                       const std::string& scratch_file, const std::function<void(const TrackSet&)>& take,
+                       std::int64_t observations_at_a_time) {
+  TracksOfTiles dealt(tiles.tile_count, scratch_file, observations_at_a_time);
+  TrackReader(tie_points).visit([&](const TrackSet& batch) {
+    check_images(tie_points, batch, block);
+    for (std::int64_t t = 0; t < batch.track_count(); ++t) {
+      const ImageIndex* images = batch.image.data();
+      const TileIndex owner = owner_tile(block, tiles, images + batch.begin[t], images + batch.begin[t + 1]);
+      if (owner.valid()) dealt.add(owner, batch, t);
     }
-    for (const TrackSet& tile : read_tiles(file, owners, first, last)) take(tile);
-  }
+  });
+  for (std::size_t tile = 0; tile < static_cast<std::size_t>(tiles.tile_count); ++tile) take(dealt.take(tile));
 }
 
 }  // namespace megablock

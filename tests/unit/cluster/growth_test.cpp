@@ -123,7 +123,7 @@ TEST(GivenTracks, GoToTheirOwnersHoweverFewAreHeld) {
   for (const std::int64_t held : {std::int64_t{1} << 24, std::int64_t{300}, std::int64_t{1}}) {
     std::int64_t tile = 0, dealt = 0;
     deal_given_tracks(
-        scratch.path("tie_points.h5"), simulated.block, tiles,
+        scratch.path("tie_points.h5"), simulated.block, tiles, scratch.path("waiting/tracks"),
         [&](const TrackSet& own) {
           std::int64_t row = 0;
           for (std::int64_t t = 0; t < all.track_count(); ++t) {
@@ -147,6 +147,7 @@ TEST(GivenTracks, GoToTheirOwnersHoweverFewAreHeld) {
         held);
     EXPECT_EQ(tile, 7);
     EXPECT_GT(dealt, 300);
+    EXPECT_FALSE(std::filesystem::exists(scratch.path("waiting/tracks")));
   }
 }
 
