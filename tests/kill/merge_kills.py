@@ -77,16 +77,24 @@ with tempfile.TemporaryDirectory() as folder:
     if len(set(found.values())) != 1:
         sys.exit("digest differs")
 
+    def checkpoints(job):
+        return set((job / "merge").glob("*/iteration.bin"))
+
     moments = random.Random(options.seed)
     job, kills, resumed, finished, left_s = fresh("killed"), 0, 0, 0, []
     while kills < options.kills:
-        with_checkpoint = any((job / "merge").glob("*/iteration.bin*"))
+        there = checkpoints(job)
         run = begin(job, 2)
         try:
-            run.wait(timeout=length_s * moments.uniform(0.1, 1))
+            if moments.random() < 0.5:  # behind the next checkpoint, however fast the machine
+                while run.poll() is None and checkpoints(job) <= there:
+                    time.sleep(0.001)
+                run.wait(timeout=0.1 * length_s * moments.random())
+            else:
+                run.wait(timeout=length_s * moments.uniform(0.1, 1))
         except subprocess.TimeoutExpired:
             kills += 1
-            resumed += with_checkpoint
+            resumed += bool(there)
             own = ranks_of(run.pid)
             if kills % 2 == 0 and own:
                 os.kill(moments.choice(sorted(own)), signal.SIGKILL)
