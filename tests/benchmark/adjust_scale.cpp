@@ -1,6 +1,7 @@
 // One job on a simulated block of any size, from given tie points to the evaluated result:
 //
-//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--folder F] [--seed 1]
+//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 1024] [--folder F]
+//                [--seed 1]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
 // its last line; seconds are those of the run on the wall clock. What --folder holds is not simulated again.
@@ -26,6 +27,7 @@ namespace fs = std::filesystem;
 struct ScaleOptions {
   SceneOptions scene;
   int ranks = 1, threads = 1;
+  double memory_mib = 1024;  // per rank, for tiles and factors of the merge
 };
 
 // Median over the steps of the global adjustment, of which each leaves one event on the first rank.
@@ -67,7 +69,7 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
   const fs::path job = folder / ("job-" + std::to_string(options.ranks) + "x" + std::to_string(options.threads));
   simulate_scene(options.scene, folder);
   const auto start = std::chrono::steady_clock::now();
-  run_scene(folder, job, options.ranks, options.threads);
+  run_scene(folder, job, options.ranks, options.threads, "--memory " + std::to_string(options.memory_mib));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   const BlockResult result = read_result_without_tracks((job / "result/block.h5").string());
@@ -105,6 +107,8 @@ int main(int argc, char** argv) {
   add_scene_options(app, options.scene);
   app.add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 1024));
   app.add_option("--threads", options.threads, "Threads per rank")->check(CLI::Range(1, 1024));
+  app.add_option("--memory", options.memory_mib, "Memory per rank for tiles and factors, MiB")
+      ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
     const ScratchDirectory scratch;

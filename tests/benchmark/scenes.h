@@ -89,10 +89,11 @@ inline void simulate_scene(const SceneOptions& options, const std::filesystem::p
 }
 
 // Its job, from the beginning.
-inline void run_scene(const std::filesystem::path& folder, const std::filesystem::path& job, int ranks, int threads) {
+inline void run_scene(const std::filesystem::path& folder, const std::filesystem::path& job, int ranks, int threads,
+                      const std::string& further_options = {}) {
   std::filesystem::remove_all(job);
   run_command(on_ranks(ranks) + program() + "run " + block_of(folder) + "-j '" + job.string() + "' --quiet --threads " +
-              std::to_string(threads));
+              std::to_string(threads) + " " + further_options);
 }
 
 }  // namespace megablock
