@@ -91,6 +91,7 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
         }
       },
       tiles);
+  give_back_memory();
 
   Adjusted adjusted;
   MergePosition& position = adjusted.position;
@@ -170,6 +171,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
 void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
                const std::vector<std::string>& adjusted_units) {
   const double start = monotonic_seconds();
+  give_back_memory();  // of the stages before
   reset_peak_rss();
   const MergeInputs inputs{oriented, tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);

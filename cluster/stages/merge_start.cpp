@@ -5,6 +5,7 @@
 
 #include "adjust/tile_adjustment.h"
 #include "adjust/track_parts.h"
+#include "adjust/turned_stretches.h"
 #include "geometry/rotation.h"
 #include "geometry/similarity.h"
 #include "merge/tile_alignment.h"
@@ -132,6 +133,7 @@ BlockState merge_start(const Job& job, const BlockState& oriented, const std::ve
     tiles.push_back({std::move(tile.frames), std::move(tile.poses), std::move(tile.observations)});
   }
   take_richest(tiles, align_tiles(tiles), start);
+  turn_back_stretches(job.block, oriented, start);
   means.store(start);
   return start;
 }
