@@ -27,7 +27,11 @@ double peak_rss_mib() { return read_kib("/proc/self/status", "VmHWM:") / 1024; }
 
 void reset_peak_rss() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
-void give_back_memory() { malloc_trim(0); }
+void use_memory_sparingly() {
+  constexpr int kLargeBlock = 1 << 20;
+  mallopt(M_MMAP_THRESHOLD, kLargeBlock);
+  malloc_trim(0);
+}
 
 double host_memory_mib() {
   return std::min(read_kib("/proc/meminfo", "MemTotal:") / 1024,

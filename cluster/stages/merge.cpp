@@ -91,7 +91,6 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
         }
       },
       tiles);
-  give_back_memory();
 
   Adjusted adjusted;
   MergePosition& position = adjusted.position;
@@ -171,7 +170,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
 void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
                const std::vector<std::string>& adjusted_units) {
   const double start = monotonic_seconds();
-  give_back_memory();  // of the stages before
+  use_memory_sparingly();
   reset_peak_rss();
   const MergeInputs inputs{oriented, tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
