@@ -54,11 +54,12 @@ int most_rounds(const MergeSettings& settings) {
 
 // Before a run (a killed one may have left files) and after it. The folder itself stays where another disk is mounted.
 void clear_scratch(Job& job) {
+  job.ranks.barrier();  // ranks remove their own files first
   on_first_rank(job.ranks, [&] {
     const std::filesystem::path folder(job.store.path("scratch"));
     std::error_code ignored;
     for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
-      std::filesystem::remove_all(entry.path());
+      std::filesystem::remove_all(entry.path(), ignored);
     std::filesystem::remove(folder, ignored);
     return std::string();
   });
