@@ -43,7 +43,8 @@ class StretchTurner {
 
   std::int64_t run() {
     join_agreeing();
-    // Largest groups first; a group that was moved joins the one it was moved to, so that others may follow.
+    // In the order of the relative poses; a group that was moved joins the one it was moved to, so that others may
+    // follow.
     std::int64_t moved = 0;
     for (bool again = true; again;) {
       again = false;
@@ -98,6 +99,30 @@ class StretchTurner {
     return *middle;
   }
 
+  // Whether a group has observed positions and is not further from them than they allow, or half as far again as
+  // before.
+  bool keeps_positions(const std::vector<FrameIndex>& frames, const Movement& movement) const {
+    constexpr double kAllowed = 3;  // sigmas, median
+    std::vector<double> before, after;
+    for (const FrameIndex frame : frames) {
+      const auto& prior = block_.frames[frame].position_prior;
+      if (!prior) continue;
+      const auto sigmas = [&](const Pose& pose) {
+        const Eigen::Vector3d antenna = pose.centre + pose.rotation.conjugate() * prior->lever_arm;
+        return (antenna - prior->position).cwiseQuotient(prior->sigma).norm();
+      };
+      before.push_back(sigmas(state_.frames[frame]));
+      after.push_back(sigmas(movement(state_.frames[frame])));
+    }
+    if (before.empty()) return false;
+    const auto median = [](std::vector<double>& values) {
+      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), middle, values.end());
+      return *middle;
+    };
+    return median(after) <= std::max(kAllowed, 1.5 * median(before));
+  }
+
   // Frames moved; 0: the relative pose holds, or it is not the smaller group that is wrong.
   std::int64_t try_to_move(const RelativePose& relative) {
     if (!both_oriented(relative) || find(at(relative.from)) == find(at(relative.to)) || !contradicted(relative))
@@ -110,7 +135,7 @@ class StretchTurner {
     const Movement movement(before, after);
     const std::vector<FrameIndex>& frames = members_[find(at(frame))];
     const auto stay = [](const Pose& pose) { return pose; };
-    if (distance(frames, movement) > 0.5 * distance(frames, stay)) return 0;
+    if (distance(frames, movement) > 0.5 * distance(frames, stay) || !keeps_positions(frames, movement)) return 0;
     for (const FrameIndex member : frames) state_.frames[member] = movement(state_.frames[member]);
     const auto count = static_cast<std::int64_t>(frames.size());
     join(at(relative.from), at(relative.to));

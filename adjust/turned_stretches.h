@@ -8,7 +8,8 @@
 //
 // Frames are joined by the relative poses that their orientations fulfil. A group that only contradicted ones tie to a
 // larger one is moved as a whole so that it fulfils one of these, if that brings it nearer to the rotations of the
-// initial orientation: a wrong relative pose moves nothing.
+// initial orientation and keeps it at its observed positions; a group without any stays. So a wrong relative pose moves
+// nothing, unless the initial orientation was made from it and it is wrong about the line of the positions only.
 #pragma once
 
 #include <cstdint>

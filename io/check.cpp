@@ -60,7 +60,7 @@ class Check {
     for (const std::string& name : store_.list("")) {
       const bool top = name.find('/') == std::string::npos;
       const bool text = name.starts_with("events/") || name.starts_with("stages/") || name.starts_with("scratch/") ||
-                        (name.starts_with("result/") && name != kResult) ||
+                        name.starts_with("merge/parts/") || (name.starts_with("result/") && name != kResult) ||
                         (name.starts_with("register/") && !name.ends_with(".h5"));
       if (top ? name.ends_with(".h5") : !text) names.push_back(name);
     }

@@ -117,7 +117,10 @@ bool TileStore::spill(Slot& slot) {
   const bool whole = write_file(path(slot, "measurements"), [&](std::ofstream& file) {
     visit_tables(slot.tile.problem, [&](const auto& table) { write_table(file, table); });
   });
-  return whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points);
+  if (whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points)) return true;
+  std::error_code ignored;
+  std::filesystem::remove(path(slot, "measurements"), ignored);  // room for others
+  return false;
 }
 
 void TileStore::forget(Slot& slot) {

@@ -185,7 +185,10 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
     }
     return std::filesystem::exists(job.store.path("result/report.html")) ? "current" : "";
   });
-  if (!current.empty()) return;
+  if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
+    if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();
+    return;
+  }
 
   MergeCheckpoint checkpoint(job, fingerprint);
   clear_scratch(job);

@@ -102,6 +102,10 @@ std::int64_t screen(Job& job, TileStore& tiles) {
   std::int64_t changed = 0;
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change(row, [&](RankTile& tile) {
+      const TileProblem& problem = tile.problem;
+      bool any = false;  // a tile whose own adjustment failed keeps nothing, and has no residuals to judge by
+      for (std::int64_t p = 0; p < problem.point_count() && !any; ++p) any = problem.active(p);
+      if (!any) return;
       changed += screen_observations(tile.problem, tile.state,
                                      screening_threshold(tile.problem, tile.state, job.settings.adjustment),
                                      job.settings.adjustment);

@@ -37,8 +37,11 @@ std::string reliability_part(const BlockResult& result, const Reliability& r) {
       "Reliability: an error of one measurement is found (with a probability of {:.0f} %, at a false alarm in {:.0f}) "
       "from {} px on for half of the measurements, from {} px on for 95 % of them. {} of {} have a redundancy below "
       "{}; "
-      "{} are checked by nothing else. An error that is just not found moves no result by more than {} of its own "
-      "sigmas.",
+      "{} are checked by nothing else; of the others, an error that is just not found moves no result by more than {} "
+      "of "
+      "its own sigmas. Residuals are taken as they are: beyond the corner of a robust loss, |w| is too large by the "
+      "root "
+      "of the loss's weight.",
       100 * kDetectionProbability, 1 / kFalseAlarmProbability, significant(r.detectable_px.median, 2),
       significant(r.detectable_px.p95, 2), count(r.poorly_checked), count(r.tested),
       fixed(Reliability::kPoorRedundancy, 1), count(r.unchecked), significant(r.worst_external, 2));

@@ -29,6 +29,12 @@ struct Pass {
       const Pose pose{rotation_exp<double>({0.01 * f, 0.3 + 0.02 * f, 0.1}), {4.0 * f, std::sin(0.1 * f), 2}};
       truth.frames.push_back(pose);
       truth.oriented.push_back(1);
+      if (f % 2 == 0) {
+        PositionPrior prior;
+        prior.position = pose.centre;
+        prior.sigma.setConstant(0.5);
+        block.frames.back().position_prior = prior;
+      }
       const Eigen::Vector3d turn(0.003 * gauss(random), 0.003 * gauss(random), 0.003 * gauss(random));
       initial.frames.push_back({rotation_exp<double>(turn) * pose.rotation, pose.centre});
       initial.oriented.push_back(1);
@@ -98,6 +104,30 @@ TEST(TurnedStretches, AWrongRelativePoseMovesNothing) {
   BlockState state = pass.truth;
   EXPECT_EQ(turn_back_stretches(pass.block, pass.initial, state), 0);
   pass.expect_truth(state, 1e-15);
+}
+
+// The initial orientation follows the wrong relative pose; the positions do not.
+TEST(TurnedStretches, NorDoesOneThatMadeTheInitialOrientation) {
+  Pass pass;
+  RelativePose& wrong = pass.block.relative_poses[30];
+  const Eigen::Quaterniond turn = rotation_exp<double>({0, 0.2, 0});
+  wrong.pose.rotation = turn * wrong.pose.rotation;
+  for (int f = 31; f < 60; ++f) {
+    const Pose& from = pass.initial.frames[FrameIndex(f - 1)];
+    const Pose& relative = pass.block.relative_poses[static_cast<std::size_t>(f - 1)].pose;
+    pass.initial.frames[FrameIndex(f)] = {relative.rotation * from.rotation,
+                                          from.centre + from.rotation.conjugate() * relative.centre};
+  }
+  BlockState state = pass.truth;
+  EXPECT_EQ(turn_back_stretches(pass.block, pass.initial, state), 0);
+  pass.expect_truth(state, 1e-15);
+}
+
+TEST(TurnedStretches, NothingMovesWithoutPositions) {
+  Pass pass;
+  for (Frame& frame : pass.block.frames) frame.position_prior.reset();
+  BlockState state = pass.turned(20, 35, 48 * kDegree);
+  EXPECT_EQ(turn_back_stretches(pass.block, pass.initial, state), 0);
 }
 
 TEST(TurnedStretches, FramesWithoutPoseAreLeftOut) {
