@@ -20,6 +20,7 @@
 #include "io/hash.h"
 #include "io/measurements.h"
 #include "io/project.h"
+#include "io/track_rows.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -193,16 +194,8 @@ TrackSet read_all_tracks(const Job& job, const std::vector<std::string>& units) 
   TrackSet all;
   all.begin.push_back(0);
   for (const auto& [id, place] : order) {
-    const TrackSet& part = parts[place.first];
-    all.id.push_back(id);
-    for (auto o = static_cast<std::size_t>(part.begin[place.second]);
-         o < static_cast<std::size_t>(part.begin[place.second + 1]); ++o) {
-      all.image.push_back(part.image[o]);
-      all.x.push_back(part.x[o]);
-      all.y.push_back(part.y[o]);
-      all.feature.push_back(part.feature[o]);
-    }
-    all.begin.push_back(all.observation_count());
+    const auto row = static_cast<std::int64_t>(place.second);
+    append_tracks(parts[place.first], row, row + 1, all);
   }
   return all;
 }

@@ -8,6 +8,7 @@
 #include "io/hash.h"
 #include "io/result_digest.h"
 #include "io/track_batches.h"
+#include "io/track_rows.h"
 
 namespace megablock {
 
@@ -53,30 +54,21 @@ void add_point(Hasher& hasher, const TrackResults& result, std::size_t row) {
 }  // namespace
 
 void TrackResults::append(const TrackResults& from, std::size_t first, std::size_t last) {
-  if (tracks.begin.empty()) tracks.begin.push_back(0);
-  const auto copy = [](const auto& source, auto& target, std::size_t begin, std::size_t end) {
-    if (source.empty()) return;  // an optional column
-    target.insert(target.end(), source.begin() + static_cast<std::ptrdiff_t>(begin),
-                  source.begin() + static_cast<std::ptrdiff_t>(end));
+  const auto begin = static_cast<std::int64_t>(first), end = static_cast<std::int64_t>(last);
+  const auto copy = [](const auto& source, std::int64_t row, std::int64_t behind, auto& target) {
+    if (!source.empty()) append_rows(source, row, behind, target);  // an optional column
   };
-  copy(from.tracks.id, tracks.id, first, last);
-  copy(from.points, points, first, last);
-  copy(from.file_tracks, file_tracks, first, last);
-  copy(from.file_tiles, file_tiles, first, last);
-  copy(from.point_covariance, point_covariance, first, last);
-  const auto row = static_cast<std::size_t>(from.tracks.begin[first]);
-  const auto end = static_cast<std::size_t>(from.tracks.begin[last]);
-  const std::int64_t offset = tracks.observation_count() - from.tracks.begin[first];
-  copy(from.tracks.image, tracks.image, row, end);
-  copy(from.tracks.x, tracks.x, row, end);
-  copy(from.tracks.y, tracks.y, row, end);
-  copy(from.tracks.feature, tracks.feature, row, end);
-  copy(from.kept, kept, row, end);
-  copy(from.residual_x, residual_x, row, end);
-  copy(from.residual_y, residual_y, row, end);
-  copy(from.redundancy_x, redundancy_x, row, end);
-  copy(from.redundancy_y, redundancy_y, row, end);
-  for (std::size_t t = first; t < last; ++t) tracks.begin.push_back(from.tracks.begin[t + 1] + offset);
+  append_tracks(from.tracks, begin, end, tracks);
+  copy(from.points, begin, end, points);
+  copy(from.file_tracks, begin, end, file_tracks);
+  copy(from.file_tiles, begin, end, file_tiles);
+  copy(from.point_covariance, begin, end, point_covariance);
+  const std::int64_t row = from.tracks.begin[first], behind = from.tracks.begin[last];
+  copy(from.kept, row, behind, kept);
+  copy(from.residual_x, row, behind, residual_x);
+  copy(from.residual_y, row, behind, residual_y);
+  copy(from.redundancy_x, row, behind, redundancy_x);
+  copy(from.redundancy_y, row, behind, redundancy_y);
 }
 
 TrackResults sample_of(const TrackBatches& tracks, std::int64_t most) {

@@ -11,6 +11,7 @@
 #include "adjust/tile_problem.h"
 #include "io/error.h"
 #include "io/track_reader.h"
+#include "io/track_rows.h"
 #include "io/unit_files.h"
 #include "merge/bytes.h"
 
@@ -22,21 +23,6 @@ TrackSet no_tracks() {
   TrackSet tracks;
   tracks.begin.push_back(0);
   return tracks;
-}
-
-template <typename Values>
-void append(const Values& values, std::int64_t first, std::int64_t last, Values& to) {
-  to.insert(to.end(), values.begin() + first, values.begin() + last);
-}
-
-void append_tracks(const TrackSet& from, std::int64_t first, std::int64_t last, TrackSet& tracks) {
-  const std::int64_t shift = tracks.observation_count() - from.begin[first];
-  append(from.id, first, last, tracks.id);
-  for (std::int64_t t = first; t < last; ++t) tracks.begin.push_back(from.begin[t + 1] + shift);
-  append(from.image, from.begin[first], from.begin[last], tracks.image);
-  append(from.x, from.begin[first], from.begin[last], tracks.x);
-  append(from.y, from.begin[first], from.begin[last], tracks.y);
-  append(from.feature, from.begin[first], from.begin[last], tracks.feature);
 }
 
 // Tracks on their way to their tiles; what memory does not hold waits in a scratch file, run behind run.

@@ -1,0 +1,27 @@
+// Lists of square matrices in HDF5 files. Inner header of io/.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace megablock {
+
+// Square matrices of a list, one behind the other (symmetric, so the order of rows and columns does not matter).
+template <typename Scalar, typename Matrices>
+std::vector<Scalar> flattened(const Matrices& matrices) {
+  std::vector<Scalar> values;
+  for (const auto& matrix : matrices)
+    for (Eigen::Index i = 0; i < matrix.size(); ++i) values.push_back(static_cast<Scalar>(matrix.data()[i]));
+  return values;
+}
+
+template <typename Matrix, typename Scalar>
+std::vector<Matrix> square_matrices(const std::vector<Scalar>& values) {
+  constexpr std::size_t kSize = Matrix::SizeAtCompileTime;
+  std::vector<Matrix> matrices(values.size() / kSize);
+  for (std::size_t m = 0; m < matrices.size(); ++m)
+    for (std::size_t i = 0; i < kSize; ++i) matrices[m].data()[i] = static_cast<double>(values[m * kSize + i]);
+  return matrices;
+}
+
+}  // namespace megablock
