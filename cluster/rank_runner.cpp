@@ -12,9 +12,6 @@ namespace megablock {
 
 namespace {
 
-std::string text_of(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
-Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
-
 template <typename Value>
 concept MakesBytes = requires(const Value& value) {
   value.to_bytes();
@@ -23,7 +20,7 @@ concept MakesBytes = requires(const Value& value) {
 template <typename Value>
 void write(ByteWriter& writer, const Value& value) {
   if constexpr (MakesBytes<Value>)
-    writer.values(value.to_bytes());
+    writer.bytes(value.to_bytes());
   else
     writer.value(value);
 }
@@ -32,7 +29,7 @@ void write(ByteWriter& writer, const UnknownList& unknowns) { writer.values(unkn
 template <typename Value>
 void read(ByteReader& reader, Value& value) {
   if constexpr (MakesBytes<Value>)
-    value = Value::from_bytes(reader.values<char>());
+    value = Value::from_bytes(reader.bytes());
   else
     value = reader.value<Value>();
 }
@@ -48,8 +45,7 @@ std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const 
     write(writer, values[i]);
   }
   std::vector<Value> all(tiles);
-  for (const std::string& text : ranks.gather_all(text_of(writer.take()))) {
-    const Bytes bytes = bytes_of(text);
+  for (const Bytes& bytes : ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     while (!reader.at_end()) {
       const auto tile = reader.value<std::int64_t>();
@@ -149,14 +145,14 @@ void RankRunner::pass_up(std::int64_t node, UpdateMatrix update) {
   if (parent < 0 || mine(parent)) {
     updates_[node] = std::move(update);
   } else {
-    ranks_.send(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(node), text_of(update.to_bytes()));
+    ranks_.send(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(node), update.to_bytes());
   }
 }
 
 UpdateMatrix RankRunner::child_update(std::int64_t child) {
   if (!mine(child))
     return UpdateMatrix::from_bytes(
-        bytes_of(ranks_.receive(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child))));
+        ranks_.receive(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child)));
   UpdateMatrix update = std::move(updates_.at(child));
   updates_.erase(child);
   return update;
@@ -217,10 +213,9 @@ UpReport RankRunner::condense_all(const Pass& pass) {
   }
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
-  const std::string at_root = mine(root) ? text_of(updates_.at(root).to_bytes()) : std::string();
+  const std::string at_root = mine(root) ? updates_.at(root).to_bytes() : std::string();
   updates_.clear();
-  return {UpdateMatrix::from_bytes(bytes_of(ranks_.broadcast(at_root, rank_of_node_[static_cast<std::size_t>(root)])))
-              .sums};
+  return {UpdateMatrix::from_bytes(ranks_.broadcast(at_root, rank_of_node_[static_cast<std::size_t>(root)])).sums};
 }
 
 // Messages of the two directions never mix: an upward pass has ended everywhere (its root is broadcast) before a
@@ -233,7 +228,7 @@ void RankRunner::pass_down(std::int64_t n, const Values& front) {
     if (mine(child))
       downward_[child] = std::move(bytes);
     else
-      ranks_.send(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child), text_of(bytes));
+      ranks_.send(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child), std::move(bytes));
   }
 }
 
@@ -242,8 +237,7 @@ Values RankRunner::from_parent(std::int64_t n) {
   const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(n)].parent;
   if (parent < 0) return {};
   if (!mine(parent))
-    return Values::from_bytes(
-        bytes_of(ranks_.receive(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(n))));
+    return Values::from_bytes(ranks_.receive(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(n)));
   const Bytes bytes = std::move(downward_.at(n));
   downward_.erase(n);
   return Values::from_bytes(bytes);
@@ -329,11 +323,11 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
   std::vector<ObservationTable> tables(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
-    const CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
+    CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     const NodeFactors& factors = factors_of(n, 0);
     if (node.leaf < 0) {
-      pass_down(n, covariance_node(factors.front, passed));
+      pass_down(n, covariance_node(factors.front, std::move(passed)));
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
@@ -356,8 +350,7 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
 
   ByteWriter writer;
   writer.values(seams_);
-  for (const std::string& text : ranks_.gather_all(text_of(writer.take()))) {
-    const Bytes bytes = bytes_of(text);
+  for (const Bytes& bytes : ranks_.gather_all(writer.take())) {
     ByteReader reader(bytes);
     const std::vector<SeamReport> some = reader.values<SeamReport>();
     posterior.seams.insert(posterior.seams.end(), some.begin(), some.end());

@@ -47,13 +47,12 @@ inline Eigen::Matrix3d crossed(const Eigen::Vector3d& u, const Eigen::Matrix3d& 
 
 }  // namespace
 
-void add_block(double* matrix, std::int64_t n, std::int64_t row, std::int64_t column,
-               const Eigen::Ref<const Eigen::MatrixXd>& block) {
+void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen::Ref<const Eigen::MatrixXd>& block) {
+  const bool below = row >= column;
+  const Front::Place place = below ? front.place(row, column) : front.place(column, row);
   for (Eigen::Index j = 0; j < block.cols(); ++j)
-    for (Eigen::Index i = row == column ? j : 0; i < block.rows(); ++i) {
-      const std::int64_t r = row + i, c = column + j;
-      matrix[std::max(r, c) + std::min(r, c) * n] += block(i, j);
-    }
+    for (Eigen::Index i = row == column ? j : 0; i < block.rows(); ++i)
+      place.values[below ? i + j * place.stride : j + i * place.stride] += block(i, j);
 }
 
 CellAssembler::CellAssembler(const TilePlan& plan, Front& front)
@@ -130,11 +129,12 @@ void CellAssembler::add_shared(const PointEquations& point) {
 }
 
 void CellAssembler::subtract_outer(const Factor& a, const Factor& b) {
-  const std::int64_t n = front_.dimension(), row = rows_[at(a.unknown)], column = rows_[at(b.unknown)];
-  if (row >= column)
-    subtract_product(front_.matrix() + row + column * n, n, a.values, a.stride, a.rows, b.values, b.stride, b.rows);
-  else
-    subtract_product(front_.matrix() + column + row * n, n, b.values, b.stride, b.rows, a.values, a.stride, a.rows);
+  const std::int64_t row = rows_[at(a.unknown)], column = rows_[at(b.unknown)];
+  const bool below = row >= column;
+  const Factor &left = below ? a : b, &right = below ? b : a;
+  const Front::Place place = front_.place(std::max(row, column), std::min(row, column));
+  subtract_product(place.values, place.stride, left.values, left.stride, left.rows, right.values, right.stride,
+                   right.rows);
 }
 
 void CellAssembler::add_term(const TermResidual& term) {
@@ -143,7 +143,7 @@ void CellAssembler::add_term(const TermResidual& term) {
     const std::int64_t row = rows_[at(block.unknown)];
     const Eigen::Index dimension = block.jacobian.cols();
     for (int b = 0; b < a; ++b)
-      add_block(front_.matrix(), front_.dimension(), row, rows_[at(term.blocks[at(b)].unknown)],
+      add_block(front_, row, rows_[at(term.blocks[at(b)].unknown)],
                 block.jacobian.transpose().lazyProduct(term.blocks[at(b)].jacobian));
     add_normal(block.unknown, block.jacobian.transpose().lazyProduct(block.jacobian));
     Eigen::Map<Eigen::VectorXd>(front_.rhs() + row, dimension) -= block.jacobian.transpose() * term.residual;
@@ -156,7 +156,7 @@ void CellAssembler::add_term(const TermResidual& term) {
 
 void CellAssembler::add_normal(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& normal) {
   const std::int64_t row = rows_[at(unknown)];
-  add_block(front_.matrix(), front_.dimension(), row, row, normal);
+  add_block(front_, row, row, normal);
   Eigen::Map<Eigen::VectorXd>(front_.diagonal() + row, normal.cols()) += normal.diagonal();
 }
 
@@ -166,7 +166,7 @@ void CellAssembler::finish(std::vector<double>& diagonal) {
     const FrameSum& sum = frames_[u];
     Eigen::Matrix<double, 6, 6> normal;
     normal << sum.by_rotation, -sum.mixed, -sum.mixed.transpose(), sum.by_centre;
-    add_block(front_.matrix(), front_.dimension(), rows_[u], rows_[u], normal);
+    add_block(front_, rows_[u], rows_[u], normal);
     Eigen::Map<Vector6>(front_.diagonal() + rows_[u]) += sum.diagonal;
     Eigen::Map<Vector6>(front_.rhs() + rows_[u]) += sum.rhs;
   }
@@ -183,8 +183,7 @@ void CellAssembler::finish(std::vector<double>& diagonal) {
     add(u.camera, 0, camera);
     add(u.mount, camera, mount);
     if (u.camera >= 0 && u.mount >= 0)
-      add_block(front_.matrix(), front_.dimension(), rows_[at(u.mount)], rows_[at(u.camera)],
-                normal.block(camera, 0, mount, camera));
+      add_block(front_, rows_[at(u.mount)], rows_[at(u.camera)], normal.block(camera, 0, mount, camera));
   }
   std::size_t offset = 0;
   for (std::size_t u = 0; u < rows_.size(); ++u) {

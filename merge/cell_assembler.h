@@ -11,10 +11,9 @@
 
 namespace megablock {
 
-// Adds `block` at (row, column) of the lower triangle of an n x n matrix, transposed when it would lie above; of a
+// Adds the block of two unknowns at (row, column) of the front, transposed when it would lie above the diagonal; of a
 // diagonal block (row = column) the lower triangle alone counts.
-void add_block(double* matrix, std::int64_t n, std::int64_t row, std::int64_t column,
-               const Eigen::Ref<const Eigen::MatrixXd>& block);
+void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen::Ref<const Eigen::MatrixXd>& block);
 
 class CellAssembler {
  public:

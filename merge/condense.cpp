@@ -47,7 +47,7 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
       const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
       const Eigen::MatrixXd basis = orthonormal_basis(scaled);
       const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();
-      add_block(front.matrix(), front.dimension(), row, row, weight);
+      add_block(front, row, row, weight);
     }
   }
 }
@@ -60,21 +60,17 @@ std::int64_t TileFactor::byte_count() const {
   return sum + static_cast<std::int64_t>(diagonal.size() * sizeof(double));
 }
 
-Bytes TileFactor::to_bytes() const {
-  ByteWriter out;
+void TileFactor::write(ByteWriter& out) const {
   out.value<std::uint64_t>(nodes.size());
   for (const FrontFactor& node : nodes) node.write(out);
   out.values(diagonal);
-  return out.take();
 }
 
-TileFactor TileFactor::from_bytes(const Bytes& bytes) {
-  ByteReader in(bytes);
+TileFactor TileFactor::read(ByteReader& in) {
   TileFactor factor;
   const auto count = in.value<std::uint64_t>();
   for (std::uint64_t i = 0; i < count; ++i) factor.nodes.push_back(FrontFactor::read(in));
   factor.diagonal = in.values<double>();
-  if (!in.at_end()) throw StoreError("merge: a tile's factor has the wrong size");
   return factor;
 }
 

@@ -52,8 +52,8 @@ struct TileFactor {
   std::vector<double> diagonal;  // of J'J over the scalar unknowns of the plan: the tile's own residuals
   bool empty() const { return nodes.empty(); }
   std::int64_t byte_count() const;
-  Bytes to_bytes() const;
-  static TileFactor from_bytes(const Bytes& bytes);
+  void write(ByteWriter& out) const;
+  static TileFactor read(ByteReader& in);
 };
 
 struct TileCondensation {

@@ -59,7 +59,8 @@ class TileCovarianceBuilder {
 
   void descend(std::int64_t number, const CovarianceMatrix& parent) {
     const PlanNode& node = plan_.cells.nodes[at(number)];
-    const CovarianceMatrix covariance = covariance_down(factor_.nodes[at(number)], parent);
+    const FrontFactor& factor = factor_.nodes[at(number)];
+    const CovarianceMatrix covariance = covariance_down(factor, parent.restricted_to(factor.passed)).whole();
     take(covariance, node.eliminated);
     if (node.leaf >= 0) add_points(at(node.leaf), covariance);
     if (node.left >= 0) descend(node.left, covariance);

@@ -65,20 +65,29 @@ SubtreeSums read_sums(ByteReader& in) {
   return sums;
 }
 
-// Partial Cholesky of the first e rows and columns of a symmetric n x n matrix (lower triangle, column-major).
+// The lower triangle of an n x n matrix column by column.
+std::vector<double> packed(const std::vector<double>& square, std::int64_t n) {
+  std::vector<double> triangle;
+  triangle.reserve(static_cast<std::size_t>(n * (n + 1) / 2));
+  for (std::int64_t j = 0; j < n; ++j)
+    triangle.insert(triangle.end(), square.begin() + j + j * n, square.begin() + n + j * n);
+  return triangle;
+}
+
+// Partial Cholesky of the first e rows and columns of a symmetric n x n matrix: `factor` [n x e], the rest `update`
+// [p x p] (lower triangles, column-major).
 class PartialCholesky {
  public:
-  PartialCholesky(double* matrix, std::int64_t n, std::int64_t e, double* rhs, std::int64_t right_hand_sides,
-                  const double* reference)
-      : a_(matrix), n_(n), e_(e), rhs_(rhs), columns_(right_hand_sides), reference_(reference) {}
+  PartialCholesky(double* factor, double* update, std::int64_t n, std::int64_t e, double* rhs,
+                  std::int64_t right_hand_sides, const double* reference)
+      : a_(factor), update_(update), n_(n), e_(e), rhs_(rhs), columns_(right_hand_sides), reference_(reference) {}
 
   void run() {
     for (std::int64_t first = 0; first < e_; first += kPanel) panel(first, std::min(kPanel, e_ - first));
     const std::int64_t p = n_ - e_;
-    if (p > 0 && e_ > 0) {
-      cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, blas(p), blas(e_), -1, a_ + e_, blas(n_), 1,
-                  a_ + e_ + e_ * n_, blas(n_));
-    }
+    if (p > 0 && e_ > 0)
+      cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, blas(p), blas(e_), -1, a_ + e_, blas(n_), 1, update_,
+                  blas(p));
   }
   std::vector<std::int64_t> held;
   std::vector<double> held_ratio;
@@ -139,7 +148,7 @@ class PartialCholesky {
                   &at(end, first), blas(n_), rhs_ + first, blas(n_), 1, rhs_ + end, blas(n_));
   }
 
-  double* a_;
+  double *a_, *update_;
   std::int64_t n_, e_;
   double* rhs_;
   std::int64_t columns_;
@@ -164,19 +173,29 @@ std::int64_t UpdateMatrix::byte_count() const {
   return static_cast<std::int64_t>((matrix.size() + rhs.size() + diagonal.size()) * sizeof(double));
 }
 
-Bytes UpdateMatrix::to_bytes() const {
-  ByteWriter out;
+void UpdateMatrix::write(ByteWriter& out) const {
   write_list(out, unknowns);
   out.value(right_hand_sides);
   out.values(matrix);
   out.values(rhs);
   out.values(diagonal);
   write_sums(out, sums);
+}
+
+Bytes UpdateMatrix::to_bytes() const {
+  ByteWriter out;
+  write(out);
   return out.take();
 }
 
 UpdateMatrix UpdateMatrix::from_bytes(const Bytes& bytes) {
   ByteReader in(bytes);
+  UpdateMatrix update = read(in);
+  if (!in.at_end()) throw StoreError("merge: an update matrix has the wrong size");
+  return update;
+}
+
+UpdateMatrix UpdateMatrix::read(ByteReader& in) {
   UpdateMatrix update;
   update.unknowns = in.values<Unknown>();
   update.right_hand_sides = in.value<std::int64_t>();
@@ -185,7 +204,7 @@ UpdateMatrix UpdateMatrix::from_bytes(const Bytes& bytes) {
   update.diagonal = in.values<double>();
   update.sums = read_sums(in);
   const auto n = static_cast<std::size_t>(total_dimension(update.unknowns));
-  if (!in.at_end() || update.right_hand_sides < 1 || update.matrix.size() != n * (n + 1) / 2 ||
+  if (update.right_hand_sides < 1 || update.matrix.size() != n * (n + 1) / 2 ||
       update.rhs.size() != n * static_cast<std::size_t>(update.right_hand_sides) || update.diagonal.size() != n)
     throw StoreError("merge: an update matrix has the wrong size");
   return update;
@@ -278,7 +297,7 @@ bool CovarianceMatrix::block(const UnknownId& row, const UnknownId& column, doub
 Bytes CovarianceMatrix::to_bytes() const {
   ByteWriter out;
   write_list(out, unknowns);
-  out.values(matrix);
+  out.values(packed(matrix, total_dimension(unknowns)));
   return out.take();
 }
 
@@ -286,10 +305,15 @@ CovarianceMatrix CovarianceMatrix::from_bytes(const Bytes& bytes) {
   ByteReader in(bytes);
   CovarianceMatrix covariance;
   covariance.unknowns = in.values<Unknown>();
-  covariance.matrix = in.values<double>();
-  const auto n = static_cast<std::size_t>(total_dimension(covariance.unknowns));
-  if (!in.at_end() || covariance.matrix.size() != n * n)
+  const std::vector<double> triangle = in.values<double>();
+  const std::int64_t n = total_dimension(covariance.unknowns);
+  if (!in.at_end() || static_cast<std::int64_t>(triangle.size()) != n * (n + 1) / 2)
     throw StoreError("merge: a covariance matrix has the wrong size");
+  covariance.matrix.resize(at(n * n));
+  auto value = triangle.begin();
+  for (std::int64_t j = 0; j < n; ++j)
+    for (std::int64_t i = j; i < n; ++i, ++value)
+      covariance.matrix[at(i + j * n)] = covariance.matrix[at(j + i * n)] = *value;
   return covariance;
 }
 
@@ -303,7 +327,9 @@ Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand
   if (dimension_ > 100000)
     throw ComputeError("merge: a front of " + std::to_string(dimension_) +
                        " unknowns; make tiles smaller or drop weak links between tiles");
-  matrix_.assign(static_cast<std::size_t>(dimension_ * dimension_), 0);
+  const std::int64_t passed_dimension = dimension_ - eliminated_dimension_;
+  factor_.assign(static_cast<std::size_t>(dimension_ * eliminated_dimension_), 0);
+  update_.assign(static_cast<std::size_t>(passed_dimension * passed_dimension), 0);
   rhs_.assign(static_cast<std::size_t>(dimension_ * right_hand_sides_), 0);
   diagonal_.assign(static_cast<std::size_t>(dimension_), 0);
 }
@@ -339,11 +365,12 @@ void Front::add(const UpdateMatrix& child) {
         const std::int64_t skipped = down == across ? k : 0, count = down->count - skipped;
         const std::int64_t row = down->row + skipped;
         const bool below = row >= column;  // else transposed
-        double* target = matrix_.data() + (below ? row + column * dimension_ : column + row * dimension_);
-        if (below)
-          for (std::int64_t i = 0; i < count; ++i) target[i] += source[i];
+        const Place target = below ? place(row, column) : place(column, row);
+        const std::int64_t step = below ? 1 : target.stride;
+        if (step == 1)
+          for (std::int64_t i = 0; i < count; ++i) target.values[i] += source[i];
         else
-          for (std::int64_t i = 0; i < count; ++i) target[i * dimension_] += source[i];
+          for (std::int64_t i = 0; i < count; ++i) target.values[i * step] += source[i];
         source += count;
       }
     }
@@ -361,24 +388,22 @@ Front::Result Front::eliminate(double lambda) && {
   std::vector<double> reference(static_cast<std::size_t>(e));
   for (std::int64_t k = 0; k < e; ++k) {
     const double d = diagonal_[static_cast<std::size_t>(k)];
-    matrix_[static_cast<std::size_t>(k + k * n)] += lambda * d;
+    factor_[static_cast<std::size_t>(k + k * n)] += lambda * d;
     reference[static_cast<std::size_t>(k)] = (1 + lambda) * d;
   }
-  PartialCholesky cholesky(matrix_.data(), n, e, rhs_.data(), right_hand_sides_, reference.data());
+  PartialCholesky cholesky(factor_.data(), update_.data(), n, e, rhs_.data(), right_hand_sides_, reference.data());
   cholesky.run();
 
   Result result;
   result.factor.right_hand_sides = right_hand_sides_;
-  result.factor.factor.assign(matrix_.begin(), matrix_.begin() + n * e);
+  result.factor.factor = std::move(factor_);
   for (std::int64_t c = 0; c < right_hand_sides_; ++c)
     result.factor.z.insert(result.factor.z.end(), rhs_.begin() + c * n, rhs_.begin() + c * n + e);
   result.factor.held = cholesky.held;
 
   UpdateMatrix& update = result.update;
   update.right_hand_sides = right_hand_sides_;
-  update.matrix.reserve(static_cast<std::size_t>(p * (p + 1) / 2));
-  for (std::int64_t j = e; j < n; ++j)
-    update.matrix.insert(update.matrix.end(), matrix_.begin() + j + j * n, matrix_.begin() + n + j * n);
+  update.matrix = packed(update_, p);
   for (std::int64_t c = 0; c < right_hand_sides_; ++c)
     update.rhs.insert(update.rhs.end(), rhs_.begin() + e + c * n, rhs_.begin() + n + c * n);
   update.diagonal.assign(diagonal_.begin() + e, diagonal_.end());
@@ -427,47 +452,62 @@ Step back_substitute(const FrontFactor& factor, const Step& passed) {
   return step;
 }
 
-CovarianceMatrix covariance_down(const FrontFactor& factor, const CovarianceMatrix& parent) {
+FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix given) {
+  if (given.unknowns != factor.passed) throw ComputeError("merge: a covariance is not of what a front passes on");
   const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
-  const CovarianceMatrix outer = factor.passed.empty() ? CovarianceMatrix{} : parent.restricted_to(factor.passed);
+  FrontCovariance covariance{factor.eliminated, factor.passed, {}, {}, std::move(given.matrix)};
+  if (e == 0) return covariance;
 
-  // Rows E, then P: [C_EE; C_PE] (n x e). inverse = L^-1, x = K_PE K_EE^-1 = Y L^-1.
-  std::vector<double> inverse(static_cast<std::size_t>(e * e), 0), x(static_cast<std::size_t>(p * e));
-  for (std::int64_t k = 0; k < e; ++k) inverse[static_cast<std::size_t>(k + k * e)] = 1;
-  for (std::int64_t h : factor.held) inverse[static_cast<std::size_t>(h + h * e)] = 0;
-  std::vector<double> inner(static_cast<std::size_t>(e * e), 0), cross(static_cast<std::size_t>(p * e), 0);
-  if (e > 0) {
+  covariance.inner.assign(static_cast<std::size_t>(e * e), 0);
+  {
+    std::vector<double> inverse(static_cast<std::size_t>(e * e), 0);  // L^-1
+    for (std::int64_t k = 0; k < e; ++k) inverse[static_cast<std::size_t>(k + k * e)] = 1;
+    for (std::int64_t h : factor.held) inverse[static_cast<std::size_t>(h + h * e)] = 0;
     cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, blas(e), blas(e), 1,
                 factor.factor.data(), blas(n), inverse.data(), blas(e));
-    cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, blas(e), blas(e), 1, inverse.data(), blas(e), 0, inner.data(),
-                blas(e));
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, blas(e), blas(e), 1, inverse.data(), blas(e), 0,
+                covariance.inner.data(), blas(e));
   }
-  if (e > 0 && p > 0) {
-    for (std::int64_t j = 0; j < e; ++j) std::copy_n(factor.factor.begin() + e + j * n, p, x.begin() + j * p);
-    cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, blas(p), blas(e), 1,
-                factor.factor.data(), blas(n), x.data(), blas(p));
-    cblas_dsymm(CblasColMajor, CblasLeft, CblasLower, blas(p), blas(e), -1, outer.matrix.data(), blas(p), x.data(),
-                blas(p), 0, cross.data(), blas(p));
-    cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, blas(e), blas(e), blas(p), -1, x.data(), blas(p), cross.data(),
-                blas(p), 1, inner.data(), blas(e));
-  }
+  if (p == 0) return covariance;
 
-  CovarianceMatrix covariance;
-  covariance.unknowns = unite({&factor.eliminated, &factor.passed});
-  covariance.matrix.assign(static_cast<std::size_t>(n * n), 0);
-  const auto rows_e = scalar_rows(factor.eliminated, rows_in(covariance.unknowns, factor.eliminated, "covariance"));
-  const auto rows_p = scalar_rows(factor.passed, rows_in(covariance.unknowns, factor.passed, "covariance"));
-  const auto set = [&](std::int64_t row, std::int64_t column, double value) {
-    covariance.matrix[static_cast<std::size_t>(row + column * n)] = value;
-    covariance.matrix[static_cast<std::size_t>(column + row * n)] = value;
-  };
-  for (std::size_t j = 0; j < rows_e.size(); ++j) {
-    for (std::size_t i = j; i < rows_e.size(); ++i) set(rows_e[i], rows_e[j], inner[i + j * rows_e.size()]);
-    for (std::size_t i = 0; i < rows_p.size(); ++i) set(rows_p[i], rows_e[j], cross[i + j * rows_p.size()]);
-  }
-  for (std::size_t j = 0; j < rows_p.size(); ++j)
-    for (std::size_t i = j; i < rows_p.size(); ++i) set(rows_p[i], rows_p[j], outer.matrix[i + j * rows_p.size()]);
+  std::vector<double> x(static_cast<std::size_t>(p * e));  // K_PE K_EE^-1 = Y L^-1
+  for (std::int64_t j = 0; j < e; ++j) std::copy_n(factor.factor.begin() + e + j * n, p, x.begin() + j * p);
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, blas(p), blas(e), 1,
+              factor.factor.data(), blas(n), x.data(), blas(p));
+  covariance.cross.assign(static_cast<std::size_t>(p * e), 0);
+  cblas_dsymm(CblasColMajor, CblasLeft, CblasLower, blas(p), blas(e), -1, covariance.outer.data(), blas(p), x.data(),
+              blas(p), 0, covariance.cross.data(), blas(p));
+  cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, blas(e), blas(e), blas(p), -1, x.data(), blas(p),
+              covariance.cross.data(), blas(p), 1, covariance.inner.data(), blas(e));
   return covariance;
 }
+
+CovarianceMatrix FrontCovariance::restricted_to(const UnknownList& wanted) const {
+  struct Row {
+    bool inside;         // of E
+    std::int64_t index;  // in E or P
+  };
+  const std::vector<std::int64_t> inner_rows = row_offsets(eliminated), outer_rows = row_offsets(passed);
+  std::vector<Row> rows;
+  for (const Unknown& u : wanted) {
+    const std::int64_t own = find_unknown(eliminated, u.id), other = own < 0 ? find_unknown(passed, u.id) : -1;
+    if (own < 0 && other < 0) throw ComputeError("covariance lacks " + describe(u.id));
+    const std::int64_t first = own >= 0 ? inner_rows[at(own)] : outer_rows[at(other)];
+    for (std::int64_t k = 0; k < u.dimension; ++k) rows.push_back({own >= 0, first + k});
+  }
+  const std::int64_t e = inner_rows.back(), p = outer_rows.back();
+  const auto element = [&](const Row& a, const Row& b) {
+    if (a.inside && b.inside) return inner[at(std::max(a.index, b.index) + std::min(a.index, b.index) * e)];
+    if (a.inside) return cross[at(b.index + a.index * p)];
+    return b.inside ? cross[at(a.index + b.index * p)] : outer[at(a.index + b.index * p)];
+  };
+  CovarianceMatrix part{wanted, {}};
+  part.matrix.reserve(rows.size() * rows.size());
+  for (const Row& column : rows)
+    for (const Row& row : rows) part.matrix.push_back(element(row, column));
+  return part;
+}
+
+CovarianceMatrix FrontCovariance::whole() const { return restricted_to(unite({&eliminated, &passed})); }
 
 }  // namespace megablock

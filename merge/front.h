@@ -55,8 +55,10 @@ struct UpdateMatrix {
   SubtreeSums sums;
 
   std::int64_t byte_count() const;  // of its values
+  void write(ByteWriter& out) const;
+  static UpdateMatrix read(ByteReader& in);  // throws StoreError
   Bytes to_bytes() const;
-  static UpdateMatrix from_bytes(const Bytes& bytes);  // throws StoreError
+  static UpdateMatrix from_bytes(const Bytes& bytes);
 };
 
 // What back-substitution and covariances need of an eliminated front.
@@ -96,14 +98,24 @@ struct CovarianceMatrix {
   static CovarianceMatrix from_bytes(const Bytes& bytes);
 };
 
-// A front being filled. Rows: eliminated unknowns first, then passed ones.
+// A front being filled. Rows: eliminated unknowns first, then passed ones; the columns of the two lie apart, so that
+// the first become the factor as they are. Only the lower triangle is used.
 class Front {
  public:
   Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1);
 
   std::int64_t dimension() const { return dimension_; }
   std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
-  double* matrix() { return matrix_.data(); }      // [n x n] column-major, only the lower triangle is used
+  // A block of the lower triangle, whose columns belong to one unknown: its first element and what is between columns.
+  struct Place {
+    double* values;
+    std::int64_t stride;
+  };
+  Place place(std::int64_t row, std::int64_t column) {
+    const std::int64_t e = eliminated_dimension_, p = dimension_ - e;
+    if (column < e) return {factor_.data() + row + column * dimension_, dimension_};
+    return {update_.data() + (row - e) + (column - e) * p, p};
+  }
   double* rhs() { return rhs_.data(); }            // [n x right_hand_sides]
   double* diagonal() { return diagonal_.data(); }  // [n] of J'J
   SubtreeSums& sums() { return sums_; }
@@ -118,7 +130,9 @@ class Front {
   UnknownList eliminated_, passed_;
   std::vector<std::int64_t> eliminated_rows_, passed_rows_;
   std::int64_t dimension_ = 0, eliminated_dimension_ = 0, right_hand_sides_ = 1;
-  std::vector<double> matrix_, rhs_, diagonal_;
+  std::vector<double> factor_;  // [n x e]
+  std::vector<double> update_;  // [p x p]
+  std::vector<double> rhs_, diagonal_;
   SubtreeSums sums_;
 };
 
@@ -130,8 +144,19 @@ struct Front::Result {
 // x over E and P (ascending) from x over at least P.
 Step back_substitute(const FrontFactor& factor, const Step& passed);
 
-// Covariance over E and P from the parent's covariance, which holds at least P:
+// Covariance over E and P of a front, by its parts: the whole of an upper front is never put together.
+struct FrontCovariance {
+  UnknownList eliminated, passed;  // each ascending
+  std::vector<double> inner;       // C_EE [e x e] column-major, lower triangle
+  std::vector<double> cross;       // C_PE [p x e]
+  std::vector<double> outer;       // C_PP [p x p]
+
+  CovarianceMatrix restricted_to(const UnknownList& wanted) const;  // throws ComputeError when one is missing
+  CovarianceMatrix whole() const;                                   // of E and P, ascending
+};
+
+// From the covariance of P (all of it, nothing else):
 // C_EE = K_EE^-1 + K_EE^-1 K_EP C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
-CovarianceMatrix covariance_down(const FrontFactor& factor, const CovarianceMatrix& parent);
+FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix passed);
 
 }  // namespace megablock

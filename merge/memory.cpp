@@ -9,20 +9,17 @@
 
 namespace megablock {
 
-Bytes NodeFactors::to_bytes() const {
-  ByteWriter out;
-  out.values(tile.to_bytes());
+void NodeFactors::write(ByteWriter& out) const {
+  tile.write(out);
   front.write(out);
-  out.values(condensed.to_bytes());
-  return out.take();
+  condensed.write(out);
 }
 
-NodeFactors NodeFactors::from_bytes(const Bytes& bytes) {
-  ByteReader in(bytes);
+NodeFactors NodeFactors::read(ByteReader& in) {
   NodeFactors factors;
-  factors.tile = TileFactor::from_bytes(in.values<char>());
+  factors.tile = TileFactor::read(in);
   factors.front = FrontFactor::read(in);
-  factors.condensed = UpdateMatrix::from_bytes(in.values<char>());
+  factors.condensed = UpdateMatrix::read(in);
   if (!in.at_end()) throw StoreError("merge: a spilled factor has the wrong size");
   return factors;
 }
@@ -84,9 +81,9 @@ bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
       scratch_bytes_ + factors.byte_count() > options_.scratch_bytes)
     return false;
   const std::string path = scratch_path(node);
-  const Bytes bytes = factors.to_bytes();
   std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  ByteWriter writer(file);
+  factors.write(writer);
   file.close();
   if (!file) {  // the disk is full: what is there stays, the rest is computed again
     std::error_code ignored;
@@ -106,11 +103,11 @@ const NodeFactors* FactorStore::get(std::int64_t node) {
   if (entry == spilled_.end()) return nullptr;
   std::ifstream file(entry->second, std::ios::binary | std::ios::ate);
   if (!file) throw StoreError("cannot read " + entry->second);
-  Bytes bytes(static_cast<std::size_t>(file.tellg()));
+  const auto size = static_cast<std::size_t>(file.tellg());
   file.seekg(0);
-  if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
-    throw StoreError("cannot read " + entry->second);
-  loaded_ = NodeFactors::from_bytes(bytes);
+  ByteReader reader(file, size);
+  loaded_ = NodeFactors();  // makes room first
+  loaded_ = NodeFactors::read(reader);
   return &loaded_;
 }
 

@@ -29,9 +29,9 @@ struct MemoryOptions {
 void make_scratch_directory(const MemoryOptions& options);
 
 struct MemoryStatistics {
-  std::int64_t put = 0, spilled = 0, dropped = 0;   // factors put, moved to scratch, given up
-  std::int64_t recomputed = 0;                      // subtrees condensed again
-  std::int64_t peak_bytes = 0;                      // of kept factors
+  std::int64_t put = 0, spilled = 0, dropped = 0;  // factors put, moved to scratch, given up
+  std::int64_t recomputed = 0;                     // subtrees condensed again
+  std::int64_t peak_bytes = 0;                     // of kept factors
 };
 
 // Factors of one node of the merge tree: a tile's cells or an inner node's front; while seams are checked also a tile's
@@ -41,8 +41,8 @@ struct NodeFactors {
   FrontFactor front;
   UpdateMatrix condensed = {};
   std::int64_t byte_count() const { return tile.byte_count() + front.byte_count() + condensed.byte_count(); }
-  Bytes to_bytes() const;
-  static NodeFactors from_bytes(const Bytes& bytes);
+  void write(ByteWriter& out) const;
+  static NodeFactors read(ByteReader& in);
 };
 
 class FactorStore {
@@ -69,7 +69,7 @@ class FactorStore {
   MemoryOptions options_;
   MemoryStatistics statistics_;
   std::int64_t bytes_ = 0, scratch_bytes_ = 0, clock_ = 0;
-  bool scratch_full_ = false;  // its disk
+  bool scratch_full_ = false;                          // its disk
   std::map<std::int64_t, NodeFactors> kept_;           // by node
   std::map<std::int64_t, std::int64_t> node_by_time_;  // of kept ones
   std::map<std::int64_t, std::int64_t> time_of_node_;

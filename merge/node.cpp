@@ -12,8 +12,8 @@ Front::Result eliminate_node(const PlanNode& node, const std::vector<const Updat
 
 Step back_substitute_node(const FrontFactor& factor, const Step& parent) { return back_substitute(factor, parent); }
 
-CovarianceMatrix covariance_node(const FrontFactor& factor, const CovarianceMatrix& parent) {
-  return covariance_down(factor, parent);
+FrontCovariance covariance_node(const FrontFactor& factor, CovarianceMatrix passed) {
+  return covariance_down(factor, std::move(passed));
 }
 
 }  // namespace megablock

@@ -16,7 +16,7 @@ Front::Result eliminate_node(const PlanNode& node, const std::vector<const Updat
 // is empty. The child's boundary step is inside it.
 Step back_substitute_node(const FrontFactor& factor, const Step& parent);
 
-// As above for covariances.
-CovarianceMatrix covariance_node(const FrontFactor& factor, const CovarianceMatrix& parent);
+// Covariance of the node's front from that of what it passes on.
+FrontCovariance covariance_node(const FrontFactor& factor, CovarianceMatrix passed);
 
 }  // namespace megablock

@@ -125,21 +125,18 @@ void SerialRunner::accept() { states_ = std::move(trial_); }
 
 void SerialRunner::reject() { trial_.clear(); }
 
-void SerialRunner::covariances_from(std::int64_t number, const CovarianceMatrix& parent,
-                                    std::vector<TileCovariance>& result) {
+void SerialRunner::covariances_from(std::int64_t number, CovarianceMatrix passed, std::vector<TileCovariance>& result) {
   const PlanNode& node = plan_.nodes[at(number)];
   if (node.leaf >= 0) {
     const std::size_t t = at(node.leaf);
-    const CovarianceMatrix boundary = node.passed.empty() ? CovarianceMatrix{} : parent.restricted_to(node.passed);
     const TileFactor& factor = inner_factor(number, 0).tile;
-    const TileDatum datum = datum_of(t);
-    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], factor, boundary, datum,
+    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], factor, passed, datum_of(t),
                                 with_columns_ ? steps_[t].unknowns : Step{});
     return;
   }
-  const CovarianceMatrix covariance = covariance_node(inner_factor(number, 0).front, parent);
-  covariances_from(node.right, covariance, result);
-  covariances_from(node.left, covariance, result);
+  const FrontCovariance covariance = covariance_node(inner_factor(number, 0).front, std::move(passed));
+  for (const std::int64_t child : {node.right, node.left})
+    covariances_from(child, covariance.restricted_to(plan_.nodes[at(child)].passed), result);
 }
 
 std::vector<TileCovariance> SerialRunner::covariances() {

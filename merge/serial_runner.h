@@ -51,7 +51,7 @@ class SerialRunner : public TreeRunner {
   // Factor of an inner node or a tile; recomputes the subtree where it was dropped.
   const NodeFactors& inner_factor(std::int64_t node, const Pass& pass);
   void down_from(std::int64_t node, const Pass& pass, const Step& parent);
-  void covariances_from(std::int64_t node, const CovarianceMatrix& parent, std::vector<TileCovariance>& result);
+  void covariances_from(std::int64_t node, CovarianceMatrix passed, std::vector<TileCovariance>& result);
   BlockGauge find_gauge() const;
   TileDatum datum_of(std::size_t tile) const;
   UpReport run_up(const Pass& pass, bool final_pass);

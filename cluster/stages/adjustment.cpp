@@ -128,12 +128,10 @@ std::vector<TileMark> tile_marks(const Job& job, const BlockState& oriented, con
     error = e.what();
   }
   share_error(job.ranks, kind, error);
-  const Bytes mine = writer.take();
   std::vector<TileMark> marks(tracks.size());
-  const std::vector<std::string> all = job.ranks.gather_all(std::string(mine.begin(), mine.end()));
+  const std::vector<Bytes> all = job.ranks.gather_all(writer.take());
   for (std::size_t rank = 0; rank < ranks; ++rank) {
-    const Bytes bytes(all[rank].begin(), all[rank].end());
-    ByteReader reader(bytes);
+    ByteReader reader(all[rank]);
     for (std::size_t t = rank; t < tracks.size(); t += ranks) marks[t] = reader.value<TileMark>();
   }
   return marks;

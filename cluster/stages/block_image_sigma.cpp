@@ -29,10 +29,8 @@ ImageResiduals block_image_residuals(Job& job, TileStore& own, std::size_t tile_
     writer.value(tile.tile);
     writer.value(image_residuals(tile.problem, tile.state, job.settings.adjustment));
   }
-  const Bytes mine = writer.take();
   std::vector<ImageResiduals> by_tile(tile_count);
-  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
-    const Bytes bytes(text.begin(), text.end());
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     while (!reader.at_end()) {
       const auto tile = reader.value<std::int64_t>();
@@ -78,10 +76,8 @@ bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const B
 double common_image_sigma(Job& job, const TileStore& own) {
   ByteWriter writer;
   writer.value(own.size() == 0 ? 0.0 : own.outline(0).problem.image_sigma_px);
-  const Bytes mine = writer.take();
   double sigma = 0;
-  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
-    const Bytes bytes(text.begin(), text.end());
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     sigma = std::max(sigma, ByteReader(bytes).value<double>());
   }
   return sigma;

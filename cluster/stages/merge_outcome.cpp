@@ -28,13 +28,11 @@ void send_covariances(Job& job, const Adjusted& adjusted, int tag) {
   ByteWriter writer;
   write_matrices<BlockResult::Matrix6>(writer, adjusted.frame_covariance);
   for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(writer, covariance);
-  const Bytes bytes = writer.take();
-  job.ranks.send(0, tag, std::string(bytes.begin(), bytes.end()));
+  job.ranks.send(0, tag, writer.take());
 }
 
 void receive_covariances(Job& job, int from, int tag, Adjusted& adjusted) {
-  const std::string text = job.ranks.receive(from, tag);
-  const Bytes bytes(text.begin(), text.end());
+  const Bytes bytes = job.ranks.receive(from, tag);
   ByteReader reader(bytes);
   const auto frames = read_matrices<BlockResult::Matrix6>(reader);
   for (std::size_t f = 0; f < frames.size(); ++f)
@@ -67,14 +65,12 @@ void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adj
 
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count) {
   ByteWriter writer;
-  for (const TilePart& part : adjusted.parts) writer.values(part.to_bytes());
-  const Bytes mine = writer.take();
+  for (const TilePart& part : adjusted.parts) writer.bytes(part.to_bytes());
   std::vector<TilePart> parts(tile_count);
-  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
-    const Bytes bytes(text.begin(), text.end());
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     while (!reader.at_end()) {
-      TilePart part = TilePart::from_bytes(reader.values<char>());
+      TilePart part = TilePart::from_bytes(reader.bytes());
       const auto tile = static_cast<std::size_t>(part.tile);
       parts[tile] = std::move(part);
     }

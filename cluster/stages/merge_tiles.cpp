@@ -60,11 +60,9 @@ BlockState gather_state(Job& job, const BlockState& start, const TileStore& tile
         },
         as_poses);
   }
-  const Bytes mine = writer.take();
   BlockState state = start;
   std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
-  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
-    const Bytes bytes(text.begin(), text.end());
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     while (!reader.at_end()) {
       for (const FrameIndex frame : reader.values<FrameIndex>()) state.oriented[frame] = start.oriented[frame];
@@ -137,11 +135,9 @@ void say_memory(Job& job, const TileStore& tiles, const MemoryStatistics& factor
   writer.value(factors);
   writer.value(static_cast<std::int64_t>(tiles.size()));
   writer.value(tiles.spilled());
-  const Bytes mine = writer.take();
   MemoryStatistics all;
   std::int64_t tile_count = 0, spilled_tiles = 0;
-  for (const std::string& text : job.ranks.gather_all(std::string(mine.begin(), mine.end()))) {
-    const Bytes bytes(text.begin(), text.end());
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     const auto some = reader.value<MemoryStatistics>();
     tile_count += reader.value<std::int64_t>();

@@ -254,7 +254,7 @@ TEST(GlobalController, RefusesBadOptions) {
 
 TEST(UpdateMatrixBytes, RoundTripAndTruncation) {
   Front front({}, {{{UnknownKind::kFrame, 0, 3}, 6}});
-  for (int k = 0; k < 6; ++k) front.matrix()[7 * k] = k + 1;
+  for (int k = 0; k < 6; ++k) *front.place(k, k).values = k + 1;
   const UpdateMatrix update = std::move(front).eliminate(0).update;
   Bytes bytes = update.to_bytes();
   EXPECT_EQ(UpdateMatrix::from_bytes(bytes).matrix, update.matrix);
