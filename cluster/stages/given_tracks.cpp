@@ -98,7 +98,7 @@ class TracksOfTiles {
   }
 
   TrackSet read(const Run& run) {
-    Bytes bytes(static_cast<std::size_t>(run.bytes));
+    Bytes bytes(static_cast<std::size_t>(run.bytes), '\0');
     if (std::fflush(file_.get()) != 0) fail("written");
     if (::fseeko(file_.get(), run.offset, SEEK_SET) != 0 ||
         std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())

@@ -186,7 +186,7 @@ class PartCursor {
     in.seekg(offset_);
     std::uint64_t length = 0;
     in.read(reinterpret_cast<char*>(&length), sizeof length);
-    Bytes bytes(in ? length : 0);
+    Bytes bytes(in ? length : 0, '\0');
     if (!in.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
       throw StoreError("cannot read " + file_.path + "; run again to resume");
     offset_ += static_cast<std::streamoff>(sizeof length + length);
