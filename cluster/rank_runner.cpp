@@ -167,10 +167,9 @@ UpdateMatrix RankRunner::condense_leaf(std::int64_t node, const Pass& pass) {
   return std::move(condensed.update);
 }
 
-UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right,
-                                         const Pass& pass) {
+UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass) {
   const auto n = static_cast<std::size_t>(node);
-  Front::Result result = eliminate_node(plan_.nodes[n], {&left, &right}, pass.lambda);
+  Front::Result result = eliminate_node(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
   factors_.put(node, {{}, std::move(result.factor)},
                on_one_rank_[n] ? FactorStore::Loss::kRecompute : FactorStore::Loss::kNever);
   return std::move(result.update);
@@ -179,8 +178,26 @@ UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, const UpdateMatrix& 
 UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   if (plan.leaf >= 0) return condense_leaf(node, pass);
-  const UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
-  return eliminate_inner(node, left, right, pass);
+  UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
+  return eliminate_inner(node, std::move(left), std::move(right), pass);
+}
+
+// The eliminated columns, and the rest once whole and once as a triangle. Of the covariances as much; a seam's check
+// puts the unknowns that its sides share into a few matrices of their own.
+std::int64_t RankRunner::front_bytes(std::int64_t node) const {
+  const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
+  const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
+  constexpr std::int64_t kSeamMatrices = 6;
+  const std::int64_t elimination = (e + p) * e + p * p + p * p / 2;
+  return static_cast<std::int64_t>(sizeof(double)) *
+         (check_seams_ ? std::max(elimination, kSeamMatrices * e * e) : elimination);
+}
+
+std::int64_t RankRunner::waiting_bytes() const {
+  std::int64_t bytes = 0;
+  for (const auto& [node, update] : updates_) bytes += update.byte_count();
+  for (const auto& [node, values] : downward_) bytes += static_cast<std::int64_t>(values.size());
+  return bytes;
 }
 
 const NodeFactors& RankRunner::factors_of(std::int64_t node, const Pass& pass) {
@@ -204,12 +221,14 @@ UpReport RankRunner::condense_all(const Pass& pass) {
     if (!mine(n)) continue;
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     if (node.leaf >= 0) {
+      factors_.leave_room(waiting_bytes());
       pass_up(n, condense_leaf(n, pass));
       continue;
     }
-    const UpdateMatrix left = child_update(node.left), right = child_update(node.right);
+    UpdateMatrix left = child_update(node.left), right = child_update(node.right);
+    factors_.leave_room(waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n));
     if (check_seams_) seams_.push_back(check_seam(n, left, right, seam_probability_));
-    pass_up(n, eliminate_inner(n, left, right, pass));
+    pass_up(n, eliminate_inner(n, std::move(left), std::move(right), pass));
   }
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
@@ -325,9 +344,12 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
     if (!mine(n)) continue;
     CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    factors_.leave_room(waiting_bytes() + front_bytes(n));
     const NodeFactors& factors = factors_of(n, 0);
     if (node.leaf < 0) {
-      pass_down(n, covariance_node(factors.front, std::move(passed)));
+      const FrontCovariance covariance = covariance_node(factors.front, std::move(passed));
+      factors_.discard(n);
+      pass_down(n, covariance);
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
@@ -340,6 +362,7 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
       to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);
     checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability_);
     tables[row] = covariance.observations;
+    factors_.discard(n);
     if (visit) visit(tile, covariance);
   }
   ranks_.flush_sends();

@@ -66,8 +66,10 @@ class RankRunner : public TreeRunner {
   template <typename Values>
   Values from_parent(std::int64_t node);
   UpdateMatrix condense_leaf(std::int64_t node, const Pass& pass);
-  UpdateMatrix eliminate_inner(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right,
-                               const Pass& pass);
+  UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass);
+  // Bytes of a node's front at work, whether its unknowns or their covariances; of what waits for a parent or a child.
+  std::int64_t front_bytes(std::int64_t node) const;
+  std::int64_t waiting_bytes() const;
   // The subtree of a node that lies on this rank alone, once more.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);

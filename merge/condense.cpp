@@ -13,10 +13,8 @@ namespace {
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-Front fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                const PlanNode& node, PointEquations& equations, std::int64_t right_hand_sides,
-                std::vector<double>& diagonal) {
-  Front front(node.eliminated, node.passed, right_hand_sides);
+void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+               const PlanNode& node, PointEquations& equations, std::vector<double>& diagonal, Front& front) {
   CellAssembler assembler(plan, front);
   for (std::int64_t point : plan.points[at(node.leaf)]) {
     equations.linearise(point, pass);
@@ -25,7 +23,6 @@ Front fill_cell(const TileProblem& problem, const TilePlan& plan, const TileStat
   }
   visit_terms(problem, plan, state, pass, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
   assembler.finish(diagonal);
-  return front;
 }
 
 // The datum enters where its unknown completes, or at the tile's top, where the diagonal is that of the whole tile.
@@ -80,17 +77,18 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
   PointEquations equations(problem, plan, state);
   std::vector<UpdateMatrix> updates(nodes.size());
+  FrontMemory memory;
   TileCondensation result;
   result.factor.nodes.resize(nodes.size());
   result.factor.diagonal.assign(at(total_dimension(plan.unknowns)), 0);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const PlanNode& node = nodes[i];
-    Front front = node.leaf >= 0
-                      ? fill_cell(problem, plan, state, pass, node, equations, right_hand_sides, result.factor.diagonal)
-                      : Front(node.eliminated, node.passed, right_hand_sides);
+    Front front(node.eliminated, node.passed, right_hand_sides, &memory);
+    if (node.leaf >= 0) fill_cell(problem, plan, state, pass, node, equations, result.factor.diagonal, front);
     for (std::int64_t child : {node.left, node.right}) {
       if (child < 0) continue;
       front.add(updates[at(child)]);
+      memory.give(std::move(updates[at(child)].matrix));
       updates[at(child)] = UpdateMatrix();
     }
     add_datum(datum, node.eliminated, front);
@@ -100,6 +98,7 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
     result.factor.nodes[i] = std::move(eliminated.factor);
   }
   result.update = std::move(updates.back());
+  result.update.matrix.shrink_to_fit();  // waits for its sibling
   return result;
 }
 

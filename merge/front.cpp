@@ -65,13 +65,11 @@ SubtreeSums read_sums(ByteReader& in) {
   return sums;
 }
 
-// The lower triangle of an n x n matrix column by column.
-std::vector<double> packed(const std::vector<double>& square, std::int64_t n) {
-  std::vector<double> triangle;
-  triangle.reserve(static_cast<std::size_t>(n * (n + 1) / 2));
+// Appends the lower triangle of an n x n matrix column by column.
+void pack(const std::vector<double>& square, std::int64_t n, std::vector<double>& triangle) {
+  triangle.reserve(at(n * (n + 1) / 2));
   for (std::int64_t j = 0; j < n; ++j)
     triangle.insert(triangle.end(), square.begin() + j + j * n, square.begin() + n + j * n);
-  return triangle;
 }
 
 // Partial Cholesky of the first e rows and columns of a symmetric n x n matrix: `factor` [n x e], the rest `update`
@@ -297,7 +295,9 @@ bool CovarianceMatrix::block(const UnknownId& row, const UnknownId& column, doub
 Bytes CovarianceMatrix::to_bytes() const {
   ByteWriter out;
   write_list(out, unknowns);
-  out.values(packed(matrix, total_dimension(unknowns)));
+  std::vector<double> triangle;
+  pack(matrix, total_dimension(unknowns), triangle);
+  out.values(triangle);
   return out.take();
 }
 
@@ -317,8 +317,31 @@ CovarianceMatrix CovarianceMatrix::from_bytes(const Bytes& bytes) {
   return covariance;
 }
 
-Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides)
-    : eliminated_(std::move(eliminated)), passed_(std::move(passed)), right_hand_sides_(right_hand_sides) {
+std::vector<double> FrontMemory::take(std::size_t size) {
+  std::vector<double> buffer;
+  const auto enough = std::find_if(free_.begin(), free_.end(), [&](const auto& b) { return b.capacity() >= size; });
+  if (enough != free_.end()) {
+    buffer = std::move(*enough);
+    free_.erase(enough);
+  } else if (!free_.empty()) {
+    free_.pop_back();  // grows instead of being kept beside a larger one
+  }
+  buffer.clear();
+  buffer.reserve(size);
+  return buffer;
+}
+
+void FrontMemory::give(std::vector<double> buffer) {
+  const auto place =
+      std::find_if(free_.begin(), free_.end(), [&](const auto& b) { return b.capacity() >= buffer.capacity(); });
+  free_.insert(place, std::move(buffer));
+}
+
+Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides, FrontMemory* memory)
+    : eliminated_(std::move(eliminated)),
+      passed_(std::move(passed)),
+      right_hand_sides_(right_hand_sides),
+      memory_(memory) {
   eliminated_rows_ = row_offsets(eliminated_);
   passed_rows_ = row_offsets(passed_);
   eliminated_dimension_ = eliminated_rows_.back();
@@ -329,7 +352,9 @@ Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand
                        " unknowns; make tiles smaller or drop weak links between tiles");
   const std::int64_t passed_dimension = dimension_ - eliminated_dimension_;
   factor_.assign(static_cast<std::size_t>(dimension_ * eliminated_dimension_), 0);
-  update_.assign(static_cast<std::size_t>(passed_dimension * passed_dimension), 0);
+  const std::int64_t update_size = passed_dimension * passed_dimension;
+  if (memory_) update_ = memory_->take(at(update_size));
+  update_.assign(at(update_size), 0);
   rhs_.assign(static_cast<std::size_t>(dimension_ * right_hand_sides_), 0);
   diagonal_.assign(static_cast<std::size_t>(dimension_), 0);
 }
@@ -403,7 +428,9 @@ Front::Result Front::eliminate(double lambda) && {
 
   UpdateMatrix& update = result.update;
   update.right_hand_sides = right_hand_sides_;
-  update.matrix = packed(update_, p);
+  if (memory_) update.matrix = memory_->take(at(p * (p + 1) / 2));
+  pack(update_, p, update.matrix);
+  if (memory_) memory_->give(std::move(update_));
   for (std::int64_t c = 0; c < right_hand_sides_; ++c)
     update.rhs.insert(update.rhs.end(), rhs_.begin() + e + c * n, rhs_.begin() + n + c * n);
   update.diagonal.assign(diagonal_.begin() + e, diagonal_.end());

@@ -98,11 +98,24 @@ struct CovarianceMatrix {
   static CovarianceMatrix from_bytes(const Bytes& bytes);
 };
 
+// Memory of what small fronts leave behind, for the next ones: fetching it anew from the system costs as much as their
+// arithmetic.
+class FrontMemory {
+ public:
+  // Empty, with a capacity of at least `size` values.
+  std::vector<double> take(std::size_t size);
+  void give(std::vector<double> buffer);
+
+ private:
+  std::vector<std::vector<double>> free_;  // ascending by capacity
+};
+
 // A front being filled. Rows: eliminated unknowns first, then passed ones; the columns of the two lie apart, so that
 // the first become the factor as they are. Only the lower triangle is used.
 class Front {
  public:
-  Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1);
+  // `memory` (may be null) outlives the front.
+  Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1, FrontMemory* memory = nullptr);
 
   std::int64_t dimension() const { return dimension_; }
   std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
@@ -133,6 +146,7 @@ class Front {
   std::vector<double> factor_;  // [n x e]
   std::vector<double> update_;  // [p x p]
   std::vector<double> rhs_, diagonal_;
+  FrontMemory* memory_;
   SubtreeSums sums_;
 };
 

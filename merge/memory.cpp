@@ -58,7 +58,7 @@ void FactorStore::put(std::int64_t node, NodeFactors factors, Loss loss) {
 // The oldest leave first; the newest stays.
 void FactorStore::make_room() {
   for (auto oldest = node_by_time_.begin();
-       bytes_ > options_.factor_bytes && std::next(oldest) != node_by_time_.end();) {
+       bytes_ + others_ > options_.factor_bytes && std::next(oldest) != node_by_time_.end();) {
     const std::int64_t node = oldest->second;
     const auto entry = kept_.find(node);
     if (!spill(node, entry->second)) {
@@ -111,6 +111,26 @@ const NodeFactors* FactorStore::get(std::int64_t node) {
   return &loaded_;
 }
 
+void FactorStore::discard(std::int64_t node) {
+  if (const auto entry = kept_.find(node); entry != kept_.end()) {
+    bytes_ -= entry->second.byte_count();
+    node_by_time_.erase(time_of_node_[node]);
+    time_of_node_.erase(node);
+    kept_.erase(entry);
+  }
+  if (const auto entry = spilled_.find(node); entry != spilled_.end()) {
+    std::error_code ignored;
+    std::filesystem::remove(entry->second, ignored);
+    spilled_.erase(entry);
+    loaded_ = NodeFactors();
+  }
+}
+
+void FactorStore::leave_room(std::int64_t bytes) {
+  others_ = bytes;
+  if (!node_by_time_.empty()) make_room();
+}
+
 void FactorStore::clear() {
   std::error_code ignored;
   for (const auto& [node, path] : spilled_) std::filesystem::remove(path, ignored);
@@ -119,7 +139,7 @@ void FactorStore::clear() {
   node_by_time_.clear();
   time_of_node_.clear();
   never_lost_.clear();
-  bytes_ = scratch_bytes_ = 0;
+  bytes_ = others_ = scratch_bytes_ = 0;
   scratch_full_ = false;
   loaded_ = NodeFactors();
 }

@@ -57,6 +57,9 @@ class FactorStore {
   void put(std::int64_t node, NodeFactors factors, Loss loss = Loss::kRecompute);
   // nullptr: dropped, compute it again. The pointer holds until the next put or get.
   const NodeFactors* get(std::int64_t node);
+  void discard(std::int64_t node);  // it is not needed any more
+  // From now on so much of the budget is taken by others: fronts at work, what waits for a parent or a child.
+  void leave_room(std::int64_t bytes);
   void clear();
   void note_recomputed() { ++statistics_.recomputed; }
   const MemoryStatistics& statistics() const { return statistics_; }
@@ -68,7 +71,7 @@ class FactorStore {
 
   MemoryOptions options_;
   MemoryStatistics statistics_;
-  std::int64_t bytes_ = 0, scratch_bytes_ = 0, clock_ = 0;
+  std::int64_t bytes_ = 0, others_ = 0, scratch_bytes_ = 0, clock_ = 0;
   bool scratch_full_ = false;                          // its disk
   std::map<std::int64_t, NodeFactors> kept_;           // by node
   std::map<std::int64_t, std::int64_t> node_by_time_;  // of kept ones

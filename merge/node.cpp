@@ -2,11 +2,12 @@
 
 namespace megablock {
 
-Front::Result eliminate_node(const PlanNode& node, const std::vector<const UpdateMatrix*>& children, double lambda) {
-  std::int64_t right_hand_sides = 1;
-  for (const UpdateMatrix* child : children) right_hand_sides = std::max(right_hand_sides, child->right_hand_sides);
-  Front front(node.eliminated, node.passed, right_hand_sides);
-  for (const UpdateMatrix* child : children) front.add(*child);
+Front::Result eliminate_node(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) {
+  Front front(node.eliminated, node.passed, std::max(left.right_hand_sides, right.right_hand_sides));
+  for (UpdateMatrix* child : {&left, &right}) {
+    front.add(*child);
+    *child = UpdateMatrix();  // its memory is wanted
+  }
   return std::move(front).eliminate(lambda);
 }
 

@@ -9,8 +9,8 @@
 
 namespace megablock {
 
-// Adds the children (in the order given: left, right), damps and eliminates what completes at `node`.
-Front::Result eliminate_node(const PlanNode& node, const std::vector<const UpdateMatrix*>& children, double lambda);
+// Adds the children, left before right, damps and eliminates what completes at `node`.
+Front::Result eliminate_node(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda);
 
 // Step of the node's front (eliminated and passed unknowns) from the step of its parent's front; at the root `parent`
 // is empty. The child's boundary step is inside it.

@@ -41,11 +41,11 @@ UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, const Pass& pas
     update = std::move(condensed.update);
     factors.tile = std::move(condensed.factor);
   } else {
-    const UpdateMatrix left = condense_subtree(node.left, pass, check_seams);
-    const UpdateMatrix right = condense_subtree(node.right, pass, check_seams);
+    UpdateMatrix left = condense_subtree(node.left, pass, check_seams);
+    UpdateMatrix right = condense_subtree(node.right, pass, check_seams);
     if (check_seams)
       seams_.push_back(check_seam(number, left, right, kSeamAlarmProbability / static_cast<double>(seam_count())));
-    Front::Result result = eliminate_node(node, {&left, &right}, pass.lambda);
+    Front::Result result = eliminate_node(node, std::move(left), std::move(right), pass.lambda);
     update = std::move(result.update);
     factors.front = std::move(result.factor);
   }

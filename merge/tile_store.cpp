@@ -12,15 +12,15 @@ namespace megablock {
 namespace {
 
 // The tables of a tile that grow with its measurements, but for the points' positions.
-template <typename Problem, typename Visit>
-void visit_tables(Problem& problem, Visit&& visit) {
-  visit(problem.points);
-  visit(problem.begin);
-  visit(problem.image);
-  visit(problem.x);
-  visit(problem.y);
-  visit(problem.inverse_sigma);
-  visit(problem.kept);
+template <typename Visit, typename... Problems>
+void visit_tables(Visit&& visit, Problems&... problems) {
+  visit(problems.points...);
+  visit(problems.begin...);
+  visit(problems.image...);
+  visit(problems.x...);
+  visit(problems.y...);
+  visit(problems.inverse_sigma...);
+  visit(problems.kept...);
 }
 
 template <typename T>
@@ -31,7 +31,7 @@ std::int64_t byte_count(const std::vector<T>& values) {
 // Of a tile as it takes part in a step: points twice.
 std::int64_t byte_count(const RankTile& tile) {
   std::int64_t bytes = 2 * byte_count(tile.state.points);
-  visit_tables(tile.problem, [&](const auto& table) { bytes += byte_count(table); });
+  visit_tables([&](const auto& table) { bytes += byte_count(table); }, tile.problem);
   return bytes;
 }
 
@@ -115,7 +115,7 @@ void TileStore::add(RankTile tile) {
 
 bool TileStore::spill(Slot& slot) {
   const bool whole = write_file(path(slot, "measurements"), [&](std::ofstream& file) {
-    visit_tables(slot.tile.problem, [&](const auto& table) { write_table(file, table); });
+    visit_tables([&](const auto& table) { write_table(file, table); }, slot.tile.problem);
   });
   if (whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points)) return true;
   std::error_code ignored;
@@ -124,16 +124,21 @@ bool TileStore::spill(Slot& slot) {
 }
 
 void TileStore::forget(Slot& slot) {
-  visit_tables(slot.tile.problem, [](auto& table) { std::exchange(table, {}); });
+  visit_tables([](auto& table) { std::exchange(table, {}); }, slot.tile.problem);
   if (!slot.points_here) std::exchange(slot.tile.state.points, {});
 }
 
 RankTile& TileStore::load(std::size_t row) {
   Slot& slot = slots_[row];
   if (!slot.in_scratch || loaded_ == static_cast<std::int64_t>(row)) return slot.tile;
-  if (loaded_ >= 0) forget(slots_[static_cast<std::size_t>(std::exchange(loaded_, -1))]);
+  if (loaded_ >= 0) {  // its memory goes on to the next one
+    Slot& before = slots_[static_cast<std::size_t>(std::exchange(loaded_, -1))];
+    visit_tables([](auto& from, auto& to) { to.swap(from); }, before.tile.problem, slot.tile.problem);
+    if (!before.points_here && !slot.points_here) slot.tile.state.points.swap(before.tile.state.points);
+    forget(before);
+  }
   read_file(path(slot, "measurements"), [&](std::ifstream& file) {
-    visit_tables(slot.tile.problem, [&](auto& table) { read_table(file, table); });
+    visit_tables([&](auto& table) { read_table(file, table); }, slot.tile.problem);
   });
   if (!slot.points_here)
     read_file(points_path(slot, slot.points_file),
