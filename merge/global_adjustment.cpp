@@ -83,6 +83,8 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
   if (state.pass_lambda == 0) {
     if (small) return stop(state, GlobalOutcome::kConverged);
     if (at_floor) return stop(state, GlobalOutcome::kRoundingFloor);
+  } else if (small && !options.confirm && state.pass_lambda <= kHardlyDamped) {
+    return stop(state, GlobalOutcome::kConverged);
   } else if ((small || at_floor) && state.confirm != 0) {
     state.pass_lambda = 0;  // this pass decides
     state.pass_curvature = 0;

@@ -25,6 +25,7 @@ namespace megablock {
 struct GlobalOptions {
   double initial_lambda = 1e-10;
   double max_decrement = 1e-4;  // posterior sigmas; exactness tests use 1e-7
+  bool confirm = true;          // the limit with a pass of lambda = 0; without, a pass that is hardly damped may do
   int max_iterations = 50;      // accepted and rejected steps
   // Above 0: also stops when a step that is hardly damped changes the cost by less than this share of it, or promises
   // to. Of tiles on their own, which only start the block: not every weak mode is at its optimum then.

@@ -27,6 +27,9 @@ namespace megablock {
 namespace {
 
 constexpr const char* kResult = "result/block.h5";
+// Decrement of the rounds that only lead to verdicts on observations and to sigmas: no unknown is further than this
+// share of its sigma from the optimum, and chi-square from its least value by its square.
+constexpr double kSettledDecrement = 0.1;
 
 std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
   Hasher hasher;
@@ -65,6 +68,15 @@ void clear_scratch(Job& job) {
   });
 }
 
+// The last round alone goes to the end.
+GlobalOptions options_of(const MergeSettings& settings, bool last) {
+  GlobalOptions options;
+  options.max_decrement = last ? settings.decrement : std::max(settings.decrement, kSettledDecrement);
+  options.confirm = last;
+  options.max_iterations = settings.max_iterations;
+  return options;
+}
+
 void say_iteration(const Job& job, const GlobalState& state) {
   if (!job.is_first_rank() || job.options.quiet) return;
   std::fprintf(stderr, "merge        %s\n", describe(state).c_str());
@@ -73,10 +85,6 @@ void say_iteration(const Job& job, const GlobalState& state) {
 Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& checkpoint) {
   const std::vector<int> rank_of_tile =
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
-  GlobalOptions options;
-  options.max_decrement = job.settings.merge.decrement;
-  options.max_iterations = job.settings.merge.max_iterations;
-
   const std::optional<MergePosition> found = checkpoint.find();
   BlockState block = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
   const double start_sigma = found ? 0 : start_image_sigma(job, inputs.adjusted);
@@ -95,9 +103,11 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
 
   Adjusted adjusted;
   MergePosition& position = adjusted.position;
-  position = found ? *found : MergePosition{0, start_global(options), {}};
+  position = found ? *found : MergePosition{0, start_global(options_of(job.settings.merge, false)), {}};
   std::int32_t saved = position.global.accepted;
   for (;;) {
+    const bool last = position.round >= most_rounds(job.settings.merge);
+    const GlobalOptions options = options_of(job.settings.merge, last);
     RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(job, tiles));
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       say_iteration(job, state);
@@ -113,16 +123,15 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
                          position.global.outcome == GlobalOutcome::kRoundingFloor;
     block = gather_state(job, block, tiles, runner);
     follow(block, tiles);
-    const bool last = position.round >= most_rounds(job.settings.merge);
-    bool reweighted = !last && adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
-    if (!last && job.settings.merge.estimate_sigmas)
-      reweighted = adopt_sigma_scales(runner, tiles, position.scales) || reweighted;
-    if (last || (screen(job, tiles) == 0 && !reweighted)) {
+    if (last) {
       find_posterior(job, inputs, runner, adjusted);
       say_memory(job, tiles, runner.memory());
       break;
     }
-    ++position.round;
+    bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
+    if (job.settings.merge.estimate_sigmas) changed = adopt_sigma_scales(runner, tiles, position.scales) || changed;
+    changed = screen(job, tiles) > 0 || changed;
+    position.round = changed ? position.round + 1 : most_rounds(job.settings.merge);
     const std::int32_t accepted = position.global.accepted;
     position.global = start_global(options);
     position.global.accepted = accepted;
