@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <numeric>
+#include <set>
 
 #include "geometry/chi_square.h"
 
@@ -18,6 +20,8 @@ namespace megablock {
 namespace {
 
 constexpr double kRankTolerance = 1e-10;  // of the scaled matrix (unit diagonal)
+// Information about a frame's turn, of the most there is of any in the tile: below, its turn is not asked for.
+constexpr double kVisibleTurn = 0.25;
 
 struct Quadratic {
   Eigen::MatrixXd s;  // full symmetric
@@ -68,42 +72,116 @@ Minimum minimum(const Eigen::MatrixXd& s, const Eigen::VectorXd& b, const Eigen:
   return m;
 }
 
-Eigen::VectorXd scale_of(const Eigen::MatrixXd& s) {
+template <typename Matrix>
+Eigen::Matrix<double, Matrix::RowsAtCompileTime, 1> scale_of(const Matrix& s) {
   return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
 }
 
-// product: covariance times tile.s.
-UnknownCheck check_unknown(const Quadratic& tile, const Eigen::MatrixXd& product, const Unknown& unknown,
-                           std::int64_t row, double probability, double variance_factor) {
+// Quantiles of one alarm probability.
+class Limits {
+ public:
+  explicit Limits(double probability) : probability_(probability) {}
+  double of(std::int64_t degrees) {
+    const auto [place, fresh] = known_.emplace(degrees, 0);
+    if (fresh) place->second = chi_square_quantile(probability_, degrees);
+    return place->second;
+  }
+
+ private:
+  double probability_;
+  std::map<std::int64_t, double> known_;
+};
+
+// The score of some scalar unknowns; `own`: what the tile knows of them, `left`: A.
+template <int Size>
+UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eigen::Matrix<double, Size, Size>& own,
+                         const Eigen::Matrix<double, Size, Size>& left, double variance_factor, Limits& limits) {
   UnknownCheck check;
-  check.id = unknown.id;
-  const auto rows = tile.s.middleRows(row, unknown.dimension);
-  const Eigen::MatrixXd own = rows.middleCols(row, unknown.dimension);
-  const Eigen::MatrixXd left = own - rows * product.middleCols(row, unknown.dimension);
   // In units of what the tile knows; directions that it alone knows leave nothing to test.
   constexpr double kShared = 1e-6;
-  const Eigen::VectorXd scale = scale_of(own);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * left * scale.asDiagonal());
-  const Eigen::VectorXd score =
-      eigen.eigenvectors().transpose() * scale.cwiseProduct(tile.b.segment(row, unknown.dimension));
-  for (Eigen::Index i = 0; i < score.size(); ++i) {
+  const Eigen::Matrix<double, Size, 1> scale = scale_of(own);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, Size, Size>> eigen(scale.asDiagonal() * left *
+                                                                               scale.asDiagonal());
+  const Eigen::Matrix<double, Size, 1> along = eigen.eigenvectors().transpose() * scale.cwiseProduct(score);
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
     if (eigen.eigenvalues()[i] < kShared) continue;
     ++check.degrees;
-    check.statistic += score[i] * score[i] / eigen.eigenvalues()[i] / variance_factor;
+    check.statistic += along[i] * along[i] / eigen.eigenvalues()[i] / variance_factor;
   }
-  if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+  if (check.degrees > 0) check.threshold = limits.of(check.degrees);
   return check;
 }
 
-// Keeps the worst, in order.
-void insert(const UnknownCheck& check, std::array<UnknownCheck, 4>& worst) {
-  const auto badness = [](const UnknownCheck& c) { return c.degrees > 0 ? c.statistic / c.threshold : 0; };
-  for (std::size_t i = 0; i < worst.size(); ++i) {
-    if (badness(check) <= badness(worst[i])) continue;
-    std::copy_backward(worst.begin() + static_cast<std::ptrdiff_t>(i), worst.end() - 1, worst.end());
-    worst[i] = check;
-    return;
+// All checks of a tile. product: covariance times tile.s.
+std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::MatrixXd& product,
+                                         const UnknownList& unknowns, double probability, double variance_factor) {
+  constexpr int kKinds = 3, kTurn = 3;  // a frame's first three scalar unknowns are its rotation
+  const std::vector<std::int64_t> rows = row_offsets(unknowns);
+  std::vector<UnknownCheck> checks;
+  const auto add = [&](UnknownCheck check, const UnknownId& id, const UnknownId& other, bool turn) {
+    if (check.degrees == 0) return;
+    check.id = id;
+    check.other = other;
+    check.turn = turn;
+    checks.push_back(check);
+  };
+
+  struct Turn {
+    UnknownId frame;
+    Eigen::Index row;
+    double information;
+  };
+  std::vector<Turn> turns;
+  double most = 0;
+  Limits wholes(probability / kKinds / static_cast<double>(unknowns.size()));
+  for (std::size_t u = 0; u < unknowns.size(); ++u) {
+    const Eigen::Index row = rows[u], n = unknowns[u].dimension;
+    const Eigen::MatrixXd own = tile.s.block(row, row, n, n);
+    const Eigen::MatrixXd left = own - tile.s.middleRows(row, n) * product.middleCols(row, n);
+    add(check_score<Eigen::Dynamic>(tile.b.segment(row, n), own, left, variance_factor, wholes), unknowns[u].id, {},
+        false);
+    if (unknowns[u].id.kind != UnknownKind::kFrame) continue;
+    turns.push_back({unknowns[u].id, row, left.diagonal().head<kTurn>().sum()});
+    most = std::max(most, turns.back().information);
   }
+  std::erase_if(turns, [&](const Turn& t) { return t.information < kVisibleTurn * most; });
+
+  std::vector<Eigen::Index> wanted;
+  for (const Turn& turn : turns)
+    for (Eigen::Index k = 0; k < kTurn; ++k) wanted.push_back(turn.row + k);
+  const Eigen::VectorXd score = tile.b(wanted);
+  const Eigen::MatrixXd own = tile.s(wanted, wanted);
+  const Eigen::MatrixXd left = own - tile.s(wanted, Eigen::all) * product(Eigen::all, wanted);
+  const auto count = static_cast<double>(turns.size());
+  Limits singles(probability / kKinds / count), pairs(probability / kKinds / (0.5 * count * (count - 1)));
+  std::array<Eigen::Index, 2 * kTurn> both;
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i) * kTurn;
+    std::iota(both.begin(), both.begin() + kTurn, row);
+    add(check_score<kTurn>(score.segment<kTurn>(row), own.block<kTurn, kTurn>(row, row),
+                           left.block<kTurn, kTurn>(row, row), variance_factor, singles),
+        turns[i].frame, {}, true);
+    for (std::size_t j = i + 1; j < turns.size(); ++j) {
+      std::iota(both.begin() + kTurn, both.end(), static_cast<Eigen::Index>(j) * kTurn);
+      add(check_score<2 * kTurn>(score(both), own(both, both), left(both, both), variance_factor, pairs),
+          turns[i].frame, turns[j].frame, true);
+    }
+  }
+  return checks;
+}
+
+// The worst by excess that have no unknown in common.
+std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
+  std::stable_sort(checks.begin(), checks.end(),
+                   [](const UnknownCheck& a, const UnknownCheck& b) { return a.excess() > b.excess(); });
+  std::array<UnknownCheck, 4> worst;
+  auto free = worst.begin();
+  for (const UnknownCheck& check : checks) {
+    if (free == worst.end()) break;
+    if (std::none_of(worst.begin(), free, [&](const UnknownCheck& w) { return w.shares_unknown(check); }))
+      *free++ = check;
+  }
+  return worst;
 }
 
 }  // namespace
@@ -153,47 +231,53 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   check.statistic = std::max(0.0, alone.value + own.b.dot(moved)) / variance_factor;
   if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
 
-  const std::vector<std::int64_t> rows = row_offsets(condensed.unknowns);
-  for (std::size_t u = 0; u < condensed.unknowns.size(); ++u)
-    insert(check_unknown(own, product, condensed.unknowns[u], rows[u],
-                         probability / static_cast<double>(condensed.unknowns.size()), variance_factor),
-           check.worst);
+  check.worst = worst_of(check_unknowns(own, product, condensed.unknowns, probability, variance_factor));
   return check;
 }
 
+bool UnknownCheck::shares_unknown(const UnknownCheck& check) const {
+  const auto among = [&](const UnknownId& u) { return u.index >= 0 && (u == check.id || u == check.other); };
+  return among(id) || among(other);
+}
+
 std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& tiles, const UnknownName& name) {
-  std::vector<double> blame(tiles.size(), 0);
-  std::map<UnknownId, std::vector<std::size_t>> by_unknown;  // tiles that see it differently
-  for (std::size_t t = 0; t < tiles.size(); ++t)
-    for (const UnknownCheck& check : tiles[t].worst) {
-      if (!check.alarm()) continue;
-      blame[t] += check.excess();
-      by_unknown[check.id].push_back(t);
-    }
-  std::vector<std::pair<double, std::string>> lines;
-  for (auto& [id, who] : by_unknown) {
-    std::stable_sort(who.begin(), who.end(), [&](std::size_t a, std::size_t b) { return blame[a] > blame[b]; });
-    const auto& worst = tiles[who.front()].worst;
-    const UnknownCheck& check =
-        *std::find_if(worst.begin(), worst.end(), [&, wanted = id](const UnknownCheck& c) { return c.id == wanted; });
-    const bool either = who.size() > 1 && blame[who[1]] > 0.5 * blame[who[0]];
-    char line[240];
-    std::snprintf(line, sizeof line, "T = %.0f with %lld degrees of freedom (limit %.0f)", check.statistic,
-                  static_cast<long long>(check.degrees), check.threshold);
-    lines.emplace_back(check.excess(), (either ? "tiles " + std::to_string(tiles[who[0]].tile) + " and " +
-                                                     std::to_string(tiles[who[1]].tile) + " see " + name(id) +
-                                                     " differently, one of them wrongly: "
-                                               : "tile " + std::to_string(tiles[who[0]].tile) + " sees " + name(id) +
-                                                     " differently from the rest of the block: ") +
-                                           line);
-  }
-  std::stable_sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::pair<std::int64_t, UnknownCheck>> all;  // tile, what it disagrees about
+  for (const TileCheck& tile : tiles)
+    for (const UnknownCheck& check : tile.worst)
+      if (check.degrees > 0) all.emplace_back(tile.tile, check);
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.second.excess() > b.second.excess(); });
+
+  const double decisive = -2 * std::log(kSeamAlarmProbability);
   constexpr std::size_t kLines = 3;
-  std::vector<std::string> result;
-  for (std::size_t i = 0; i < std::min(kLines, lines.size()); ++i) result.push_back(std::move(lines[i].second));
-  if (lines.size() > kLines)
-    result.push_back(std::to_string(lines.size() - kLines) + " more unknowns that tiles see differently");
-  return result;
+  std::vector<std::string> lines;
+  std::size_t more = 0;
+  std::vector<UnknownCheck> said;
+  for (const auto& [tile, check] : all) {
+    if (!check.alarm()) break;
+    if (std::any_of(said.begin(), said.end(), [&](const UnknownCheck& s) { return s.shares_unknown(check); })) continue;
+    said.push_back(check);
+    if (lines.size() == kLines) {
+      ++more;
+      continue;
+    }
+    std::set<std::int64_t> suspects{tile};
+    for (const auto& [rival, other] : all)
+      if (other.shares_unknown(check) && other.excess() > check.excess() - decisive) suspects.insert(rival);
+    std::string who, what = name(check.id);
+    for (const std::int64_t suspect : suspects) who += (who.empty() ? "" : " and ") + std::to_string(suspect);
+    if (check.other.index >= 0) what += " and " + name(check.other);
+    if (check.turn) what = "the turn of " + what;
+    char figures[120];
+    std::snprintf(figures, sizeof figures, ": T = %.0f with %lld degrees of freedom (limit %.0f)", check.statistic,
+                  static_cast<long long>(check.degrees), check.threshold);
+    lines.push_back((suspects.size() > 1
+                         ? "tiles " + who + " see " + what + " differently, one of them wrongly"
+                         : "tile " + who + " sees " + what + " differently from the rest of the block") +
+                    figures);
+  }
+  if (more > 0) lines.push_back(std::to_string(more) + " more unknowns that tiles see differently");
+  return lines;
 }
 
 std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles) {

@@ -33,20 +33,27 @@ struct SeamReport {
 SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
                       double variance_factor = 1);
 
-// T asks all common unknowns at once, and a single frame that a tile sees differently drowns in hundreds of degrees of
-// freedom. So each boundary or shared unknown u of a tile is tested by itself: were it free to differ by v between the
-// tile and the rest, the block's optimum would have the score g = b_u of the tile alone for v, and
+// T asks all common unknowns at once, and one or two frames that a tile sees differently drown in hundreds of degrees
+// of freedom. So what a tile says of a few scalar unknowns u is tested by itself: were they free to differ by v between
+// the tile and the rest, the block's optimum would have the score g = b_u of the tile alone for v, and
 //
 //     T_u = g' A^+ g,   A = S_uu - S_u C S_u'   (v's normal equations after elimination of the block)
 //
-// is chi-square distributed with rank A degrees of freedom. S_u: rows of the tile's condensed normal equations.
+// is chi-square distributed with rank A degrees of freedom, and non-centrality v'Av where they do differ. S_u: rows of
+// the tile's condensed normal equations. Everything else, the neighbouring frames and the points of both sides, is
+// adjusted (A is conditional, not marginal), so that among tests that do not know v none is more powerful (Baarda's w
+// is the case of one u). Only u itself is open. It is, with a third of the alarm probability each:
+//   every boundary or shared unknown as a whole; the turn of every frame; the turns of every two frames (of those whose
+// turn shows at least half as well as the tile's best: the others would only raise the limits).
 struct UnknownCheck {
-  UnknownId id;
+  UnknownId id, other;       // other.index < 0: one unknown
+  bool turn = false;         // of a frame, without its position
   double statistic = 0;      // T_u
   std::int64_t degrees = 0;  // of freedom; 0: no check
   double threshold = 0;      // of T_u at the alarm probability
   bool alarm() const { return degrees > 0 && statistic > threshold; }
-  double excess() const { return degrees > 0 ? statistic - threshold : 0; }
+  double excess() const { return statistic - threshold; }
+  bool shares_unknown(const UnknownCheck& check) const;
 };
 
 // A tile's own consistency and its agreement with the rest of the block, used to name the tile behind an alarm.
@@ -57,16 +64,16 @@ struct TileCheck {
   double statistic = 0;  // T of the tile against the rest
   std::int64_t degrees = 0;
   double threshold = 0;
-  std::array<UnknownCheck, 4> worst;  // by T_u over its limit, the worst first
+  std::array<UnknownCheck, 4> worst;  // by excess, the worst first; no two share an unknown
 };
 // From the tile's condensed normal equations and the block's covariance of its boundary unknowns (lambda = 0, at the
 // optimum, where the rest's gradient is minus the tile's).
 TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
                      double probability, double variance_factor = 1);
 
-// One line per unknown that a tile sees differently, the three worst: the unknown, the figures, and the tile. Of the
-// tiles that say so of one unknown, it is the one with most such disagreements; two that disagree about as much are
-// both named: either may be wrong.
+// One line per disagreement, the three worst: the unknowns, the figures, and the tile. Where other tiles explain it
+// about as well, they are named too: of a frame that two tiles alone see, either may be wrong. Since 2 ln of the ratio
+// of likelihoods is the difference of T, a tile is named alone at 1 : kSeamAlarmProbability.
 std::vector<std::string> describe_disagreements(
     const std::vector<TileCheck>& tiles, const UnknownName& name = [](const UnknownId& id) { return describe(id); });
 
