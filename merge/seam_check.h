@@ -39,12 +39,14 @@ SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateM
 //
 //     T_u = g' A^+ g,   A = S_uu - S_u C S_u'   (v's normal equations after elimination of the block)
 //
-// is chi-square distributed with rank A degrees of freedom, and non-centrality v'Av where they do differ. S_u: rows of
-// the tile's condensed normal equations. Everything else, the neighbouring frames and the points of both sides, is
-// adjusted (A is conditional, not marginal), so that among tests that do not know v none is more powerful (Baarda's w
-// is the case of one u). Only u itself is open. It is, with a third of the alarm probability each:
-//   every boundary or shared unknown as a whole; the turn of every frame; the turns of every two frames (of those whose
-// turn shows at least half as well as the tile's best: the others would only raise the limits).
+// is chi-square distributed with rank A degrees of freedom, and with non-centrality v'Av where they do differ. S_u:
+// rows of the tile's condensed normal equations. All else, the neighbouring frames and the points of both sides, is
+// adjusted with it: this is Baarda's test of a bias v, and of tests that do not know v's direction none has more power.
+// Only what u is remains open. It is, with a third of the alarm probability each,
+//   * every boundary or shared unknown as a whole,
+//   * the turn of every frame,
+//   * the turns of every two frames,
+// turns of those frames alone that show half as well as the best of the tile: the others would only raise the limits.
 struct UnknownCheck {
   UnknownId id, other;       // other.index < 0: one unknown
   bool turn = false;         // of a frame, without its position
