@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "adjust/linearise.h"
+#include "cluster/progress.h"
 #include "io/error.h"
 #include "merge/point_refinement.h"
 
@@ -54,6 +55,19 @@ std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const 
   }
   return all;
 }
+
+// Adds the time of its life to a sum.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& sum) : sum_(sum), start_(monotonic_seconds()) {}
+  ~Stopwatch() { sum_ += monotonic_seconds() - start_; }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& sum_;
+  const double start_;
+};
 
 }  // namespace
 
@@ -105,6 +119,12 @@ void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
     const std::int64_t node = plan_.node_of_leaf[static_cast<std::size_t>(tiles_.number(row))];
     tile_plans_.push_back(make_tile_plan(tiles_.whole(row).problem, plan_.nodes[static_cast<std::size_t>(node)]));
   }
+}
+
+double RankRunner::seam_probability() const {
+  const auto inner =
+      std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
+  return kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
 }
 
 void RankRunner::find_gauges() {
@@ -160,16 +180,25 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
 
 UpdateMatrix RankRunner::condense_leaf(std::int64_t node, const Pass& pass) {
   const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
+  const Stopwatch watch(seconds_.tiles);
   const RankTile& tile = tiles_.whole(row);
   TileCondensation condensed = condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
+  if (check_seams_) condensed.update.alone = least_squares(condensed.update);
   factors_.put(node, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
                FactorStore::Loss::kRecompute);
   return std::move(condensed.update);
 }
 
-UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass) {
+UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
+                                         bool check_seam_here) {
   const auto n = static_cast<std::size_t>(node);
+  const Stopwatch watch(seconds_.fronts);
+  const LeastSquares left_alone = left.alone, right_alone = right.alone;
   Front::Result result = eliminate_node(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
+  if (check_seam_here) {
+    result.update.alone = least_squares(result.update);
+    seams_.push_back(check_seam(node, left_alone, right_alone, result, seam_probability()));
+  }
   factors_.put(node, {{}, std::move(result.factor)},
                on_one_rank_[n] ? FactorStore::Loss::kRecompute : FactorStore::Loss::kNever);
   return std::move(result.update);
@@ -179,18 +208,16 @@ UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   if (plan.leaf >= 0) return condense_leaf(node, pass);
   UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
-  return eliminate_inner(node, std::move(left), std::move(right), pass);
+  return eliminate_inner(node, std::move(left), std::move(right), pass, false);
 }
 
-// The eliminated columns, and the rest once whole and once as a triangle. Of the covariances as much; a seam's check
-// puts the unknowns that its sides share into a few matrices of their own.
+// The eliminated columns, and the rest once whole and once as a triangle; of the covariances as much. A seam's check
+// works on two copies of the rest.
 std::int64_t RankRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
-  constexpr std::int64_t kSeamMatrices = 6;
-  const std::int64_t elimination = (e + p) * e + p * p + p * p / 2;
-  return static_cast<std::int64_t>(sizeof(double)) *
-         (check_seams_ ? std::max(elimination, kSeamMatrices * e * e) : elimination);
+  const std::int64_t rests = check_seams_ ? 3 : 1;
+  return static_cast<std::int64_t>(sizeof(double)) * ((e + p) * e + rests * p * p + p * p / 2);
 }
 
 std::int64_t RankRunner::waiting_bytes() const {
@@ -208,9 +235,15 @@ const NodeFactors& RankRunner::factors_of(std::int64_t node, const Pass& pass) {
 }
 
 UpReport RankRunner::up(const Pass& pass) {
+  const Stopwatch watch(seconds_.all);
   // Of the state at hand, not of the first one: a resumed run gets the same bits.
   gauge_ = gather_gauge();
-  return condense_all(pass);
+  last_pass_.reset();
+  check_seams_ = posterior_expected_ && pass.lambda == 0 && !pass.curvature && !gauge_.free();
+  const UpReport report = condense_all(pass);
+  if (check_seams_) last_pass_ = report.sums;
+  check_seams_ = false;
+  return report;
 }
 
 UpReport RankRunner::condense_all(const Pass& pass) {
@@ -227,8 +260,7 @@ UpReport RankRunner::condense_all(const Pass& pass) {
     }
     UpdateMatrix left = child_update(node.left), right = child_update(node.right);
     factors_.leave_room(waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n));
-    if (check_seams_) seams_.push_back(check_seam(n, left, right, seam_probability_));
-    pass_up(n, eliminate_inner(n, std::move(left), std::move(right), pass));
+    pass_up(n, eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_));
   }
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
@@ -268,6 +300,7 @@ std::vector<TileStep> RankRunner::steps_down(const Pass& pass) {
     if (!mine(n)) continue;
     const Step passed = from_parent<Step>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    const Stopwatch watch(node.leaf < 0 ? seconds_.fronts : seconds_.tiles);
     if (node.leaf < 0) {
       pass_down(n, back_substitute_node(factors_of(n, pass).front, passed));
       continue;
@@ -283,6 +316,7 @@ DownReport RankRunner::down(const Pass& pass) {
   struct Sums {
     double damping_norm = 0, trial_cost = 0;
   };
+  const Stopwatch watch(seconds_.all);
   std::vector<TileStep> steps = steps_down(pass);
   std::vector<MotionSums> own;
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
@@ -294,6 +328,7 @@ DownReport RankRunner::down(const Pass& pass) {
   std::vector<Sums> sums(tiles_.size());
   trial_gauges_.clear();
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const Stopwatch tile_watch(seconds_.tiles);
     const RankTile& tile = tiles_.whole(row);
     const TilePlan& plan = tile_plans_[row];
     TileStep& step = steps[row];
@@ -314,6 +349,7 @@ DownReport RankRunner::down(const Pass& pass) {
 }
 
 void RankRunner::accept() {
+  last_pass_.reset();
   tiles_.accept();
   gauges_ = std::move(trial_gauges_);
 }
@@ -323,13 +359,14 @@ void RankRunner::reject() { tiles_.reject(); }
 RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
   Posterior posterior;
   check_seams_ = true;
-  find_gauges();  // states may have followed what other tiles moved
-  const auto inner =
-      std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
-  seam_probability_ = kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
-  gauge_ = gather_gauge();
-  with_columns_ = gauge_.free();
-  posterior.sums = condense_all(0).sums;
+  if (last_pass_) {
+    posterior.sums = *std::exchange(last_pass_, std::nullopt);
+  } else {
+    find_gauges();  // states may have followed what other tiles moved
+    gauge_ = gather_gauge();
+    with_columns_ = gauge_.free();
+    posterior.sums = condense_all(0).sums;
+  }
   posterior.gauge = gauge_;
   std::vector<TileStep> steps(tiles_.size());
   InnerSums inner_constraints;
@@ -360,7 +397,7 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
         covariance_tile(tile.problem, plan, tile.state, factors.tile, passed, datum_of(row), step);
     if (with_columns_)
       to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);
-    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability_);
+    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability());
     tables[row] = covariance.observations;
     factors_.discard(n);
     if (visit) visit(tile, covariance);

@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,12 @@
 #include "merge/tile_store.h"
 
 namespace megablock {
+
+// On this rank's clock, of all passes up and down: work on its tiles, on fronts above them, and everything, waiting for
+// other ranks included.
+struct PassSeconds {
+  double tiles = 0, fronts = 0, all = 0;
+};
 
 // Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
 std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
@@ -40,6 +47,10 @@ class RankRunner : public TreeRunner {
   void accept() override;
   void reject() override;
 
+  // The next pass with lambda = 0 may be the last one: what the posterior needs of it is kept, so that it has not to be
+  // gone again. Not of free blocks.
+  void expect_posterior() { posterior_expected_ = true; }
+
   // Collective, at the solution: an upward pass with lambda = 0, seams and gauge, then covariances.
   struct Posterior {
     SubtreeSums sums;  // of the whole block
@@ -54,6 +65,8 @@ class RankRunner : public TreeRunner {
 
   // The unknowns that a tile's kept residuals touch.
   const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
+  const EliminationPlan& plan() const { return plan_; }
+  const PassSeconds& seconds() const { return seconds_; }
   const MemoryStatistics& memory() const { return factors_.statistics(); }
 
  private:
@@ -66,7 +79,8 @@ class RankRunner : public TreeRunner {
   template <typename Values>
   Values from_parent(std::int64_t node);
   UpdateMatrix condense_leaf(std::int64_t node, const Pass& pass);
-  UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass);
+  UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
+                               bool check_seam_here);
   // Bytes of a node's front at work, whether its unknowns or their covariances; of what waits for a parent or a child.
   std::int64_t front_bytes(std::int64_t node) const;
   std::int64_t waiting_bytes() const;
@@ -77,6 +91,7 @@ class RankRunner : public TreeRunner {
   UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   void find_gauges();
+  double seam_probability() const;  // of a false alarm at one seam
   BlockGauge gather_gauge() const;
   TileDatum datum_of(std::size_t row) const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
@@ -96,8 +111,10 @@ class RankRunner : public TreeRunner {
   BlockGauge gauge_;
   bool with_columns_ = false;  // the pass carries the further right-hand sides of a free datum
   bool check_seams_ = false;
-  double seam_probability_ = 0;
+  bool posterior_expected_ = false;
+  std::optional<SubtreeSums> last_pass_;  // of a pass at the present state with what the posterior needs
   std::vector<SeamReport> seams_;
+  PassSeconds seconds_;
   std::map<std::int64_t, Bytes> downward_;  // what a parent on this rank left for its child
 };
 

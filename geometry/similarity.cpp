@@ -13,6 +13,10 @@ Similarity Similarity::inverse() const {
   return {1 / scale, back, -(back * translation) / scale};
 }
 
+Similarity Similarity::operator*(const Similarity& first) const {
+  return {scale * first.scale, rotation * first.rotation, (*this)(first.translation)};
+}
+
 std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                          std::span<const double> weights) {
   const std::size_t count = from.size();

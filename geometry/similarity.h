@@ -26,6 +26,7 @@ struct Similarity {
     return {(pose.rotation * rotation.conjugate()).normalized(), (*this)(pose.centre)};
   }
   Similarity inverse() const;
+  Similarity operator*(const Similarity& first) const;  // `first`, then this one
 };
 
 // Weighted least squares from -> to; weights of squared distances, empty = all one. Two points or points on one line

@@ -78,11 +78,27 @@ std::string report_html(const BlockResult& result, const ReportContext& context)
   return page_of(result, report::figures_of(result), context);
 }
 
+struct Report::Gathered {
+  report::Figures figures;
+  TrackResults sample;
+};
+
+Report::Report(const BlockResult& result, const TrackBatches& tracks) {
+  constexpr std::int64_t kDrawn = 400000;  // tracks at most
+  gathered_.reset(new Gathered{report::figures_of(result, tracks), sample_of(tracks, kDrawn)});
+}
+
+Report::~Report() = default;
+Report::Report(Report&&) noexcept = default;
+
+std::string Report::html(BlockResult result, const ReportContext& context) const {
+  static_cast<TrackResults&>(result) = gathered_->sample;
+  return page_of(result, gathered_->figures, context);
+}
+
 std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context) {
-  constexpr std::int64_t kDrawn = 400000;  // at most
-  const report::Figures figures = report::figures_of(result, tracks);
-  static_cast<TrackResults&>(result) = sample_of(tracks, kDrawn);
-  return page_of(result, figures, context);
+  const Report report(result, tracks);
+  return report.html(std::move(result), context);
 }
 
 }  // namespace megablock

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <string>
 
 #include "io/result.h"
@@ -22,5 +23,19 @@ struct ReportContext {
 std::string report_html(const BlockResult& result, const ReportContext& context = {});
 // Of a result without tracks and all of these; maps draw a sample of them.
 std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context);
+
+// The same in two steps. The first one goes through the tracks, which takes its time, and reads all of the result but
+// its digest.
+class Report {
+ public:
+  Report(const BlockResult& result, const TrackBatches& tracks);
+  ~Report();
+  Report(Report&&) noexcept;
+  std::string html(BlockResult result, const ReportContext& context) const;
+
+ private:
+  struct Gathered;
+  std::unique_ptr<Gathered> gathered_;
+};
 
 }  // namespace megablock

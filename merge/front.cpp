@@ -178,6 +178,7 @@ void UpdateMatrix::write(ByteWriter& out) const {
   out.values(rhs);
   out.values(diagonal);
   write_sums(out, sums);
+  out.value(alone);
 }
 
 Bytes UpdateMatrix::to_bytes() const {
@@ -201,6 +202,7 @@ UpdateMatrix UpdateMatrix::read(ByteReader& in) {
   update.rhs = in.values<double>();
   update.diagonal = in.values<double>();
   update.sums = read_sums(in);
+  update.alone = in.value<LeastSquares>();
   const auto n = static_cast<std::size_t>(total_dimension(update.unknowns));
   if (update.right_hand_sides < 1 || update.matrix.size() != n * (n + 1) / 2 ||
       update.rhs.size() != n * static_cast<std::size_t>(update.right_hand_sides) || update.diagonal.size() != n)

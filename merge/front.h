@@ -45,6 +45,12 @@ struct SubtreeSums {
   void add(const SubtreeSums& other);  // in the order of the calls
 };
 
+// The least value of a quadratic form x'Sx - 2 b'x, negative: b'S^+ b, and the rank of S.
+struct LeastSquares {
+  double value = 0;
+  std::int64_t rank = 0;
+};
+
 // Condensed normal equations on the passed unknowns: what a child hands to its parent.
 struct UpdateMatrix {
   UnknownList unknowns;  // passed, ascending
@@ -53,6 +59,7 @@ struct UpdateMatrix {
   std::vector<double> rhs;       // [n x right_hand_sides], column-major
   std::vector<double> diagonal;  // [n] of the un-eliminated J'J below here: what lambda multiplies
   SubtreeSums sums;
+  LeastSquares alone;  // of these equations by themselves; where seams are checked (seam_check.h)
 
   std::int64_t byte_count() const;  // of its values
   void write(ByteWriter& out) const;

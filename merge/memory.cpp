@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "io/error.h"
+#include "merge/scratch_file.h"
 
 namespace megablock {
 
@@ -34,7 +35,9 @@ void make_scratch_directory(const MemoryOptions& options) {
 
 FactorStore::FactorStore(MemoryOptions options) : options_(std::move(options)) { make_scratch_directory(options_); }
 
-FactorStore::~FactorStore() { clear(); }
+FactorStore::~FactorStore() {
+  for (const std::string& path : files_) remove_scratch_file(path);
+}
 
 std::string FactorStore::scratch_path(std::int64_t node) const {
   return options_.scratch_directory + "/factor-" + std::to_string(node) + ".bin";
@@ -81,13 +84,12 @@ bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
       scratch_bytes_ + factors.byte_count() > options_.scratch_bytes)
     return false;
   const std::string path = scratch_path(node);
-  std::ofstream file(path, std::ios::binary);
-  ByteWriter writer(file);
-  factors.write(writer);
-  file.close();
-  if (!file) {  // the disk is full: what is there stays, the rest is computed again
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
+  files_.insert(path);
+  const bool whole = write_scratch_file(path, [&](std::ofstream& file) {
+    ByteWriter writer(file);
+    factors.write(writer);
+  });
+  if (!whole) {  // the disk is full: what is there stays, the rest is computed again
     scratch_full_ = true;
     return false;
   }
@@ -118,12 +120,7 @@ void FactorStore::discard(std::int64_t node) {
     time_of_node_.erase(node);
     kept_.erase(entry);
   }
-  if (const auto entry = spilled_.find(node); entry != spilled_.end()) {
-    std::error_code ignored;
-    std::filesystem::remove(entry->second, ignored);
-    spilled_.erase(entry);
-    loaded_ = NodeFactors();
-  }
+  if (spilled_.erase(node) > 0) loaded_ = NodeFactors();
 }
 
 void FactorStore::leave_room(std::int64_t bytes) {
@@ -132,8 +129,6 @@ void FactorStore::leave_room(std::int64_t bytes) {
 }
 
 void FactorStore::clear() {
-  std::error_code ignored;
-  for (const auto& [node, path] : spilled_) std::filesystem::remove(path, ignored);
   spilled_.clear();
   kept_.clear();
   node_by_time_.clear();

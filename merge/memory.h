@@ -78,6 +78,7 @@ class FactorStore {
   std::map<std::int64_t, std::int64_t> time_of_node_;
   std::set<std::int64_t> never_lost_;
   std::map<std::int64_t, std::string> spilled_;  // node -> file
+  std::set<std::string> files_;                  // also of passes before: written over
   NodeFactors loaded_;                           // last one read back
 };
 

@@ -90,4 +90,18 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
   return plan;
 }
 
+FrontCosts front_costs(const EliminationPlan& plan) {
+  FrontCosts costs;
+  for (const PlanNode& node : plan.nodes) {
+    if (node.leaf >= 0) continue;
+    const std::int64_t width = node.front_dimension();
+    costs.widest = std::max(costs.widest, width);
+    // Cholesky of e columns, their rows below, the update of the rest.
+    const auto e = static_cast<double>(total_dimension(node.eliminated)), p = static_cast<double>(width) - e;
+    costs.operations += e * e * e / 3 + p * e * e + p * p * e;
+  }
+  if (!plan.nodes.empty()) costs.root = plan.nodes.back().front_dimension();
+  return costs;
+}
+
 }  // namespace megablock

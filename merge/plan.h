@@ -26,6 +26,13 @@ struct EliminationPlan {
   std::int64_t root() const { return static_cast<std::int64_t>(nodes.size()) - 1; }
 };
 
+// What the inner nodes cost; the leaves' share is in their own plans.
+struct FrontCosts {
+  std::int64_t root = 0, widest = 0;  // unknowns of the root's front, of the largest one
+  double operations = 0;              // floating-point additions and multiplications of eliminating all of them once
+};
+FrontCosts front_costs(const EliminationPlan& plan);
+
 // leaf_unknowns: ascending list per leaf (of the unknowns its residuals touch). `kept`: ascending; these are never
 // eliminated but passed up beyond the root (a tile's boundary unknowns).
 EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>& leaf_unknowns,

@@ -11,6 +11,7 @@
 #include "geometry/chi_square.h"
 
 extern "C" {
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void dpstrf_(const char* uplo, const int* n, double* a, const int* lda, int* pivots, int* rank, const double* tolerance,
              double* work, int* info);
 }
@@ -28,48 +29,41 @@ struct Quadratic {
   Eigen::VectorXd b;
 };
 
-// Condensed normal equations on `wanted`, minimised over the rest.
-Quadratic reduced_to(const UpdateMatrix& update, const UnknownList& wanted) {
-  UnknownList others;
-  for (const Unknown& u : update.unknowns)
-    if (find_unknown(wanted, u.id) < 0) others.push_back(u);
-  Front front(others, wanted);
-  front.add(update);
-  const UpdateMatrix reduced = std::move(front).eliminate(0).update;
-  const std::int64_t n = total_dimension(wanted);
-  Quadratic q{Eigen::MatrixXd::Zero(n, n), Eigen::Map<const Eigen::VectorXd>(reduced.rhs.data(), n)};
-  const double* value = reduced.matrix.data();
+Quadratic unpacked(const UpdateMatrix& update) {
+  const std::int64_t n = total_dimension(update.unknowns);
+  Quadratic q{Eigen::MatrixXd(n, n), Eigen::Map<const Eigen::VectorXd>(update.rhs.data(), n)};
+  const double* value = update.matrix.data();
   for (std::int64_t j = 0; j < n; ++j)
     for (std::int64_t i = j; i < n; ++i) q.s(i, j) = q.s(j, i) = *value++;
   return q;
 }
 
-struct Minimum {
-  double value = 0;  // b' S^+ b = -2 min q
-  std::int64_t rank = 0;
-};
-
-// By Cholesky factorisation with diagonal pivoting of the scaled matrix, P'SP = LL' to its rank. The scale leaves rank
-// and minimum as they are; b lies in the range, so that the leading rows alone give b'S^+ b = |L_11^-1 b_1|^2.
-Minimum minimum(const Eigen::MatrixXd& s, const Eigen::VectorXd& b, const Eigen::VectorXd& scale) {
-  Minimum m;
+// By Cholesky factorisation of the scaled matrix (the scale leaves rank and minimum as they are): without pivoting,
+// which is several times as fast, where no pivot comes near to vanishing; else with it, P'SP = LL' to its rank. b lies
+// in the range, so that the leading rows alone give b'S^+ b = |L_11^-1 b_1|^2.
+LeastSquares minimum(const Eigen::MatrixXd& s, const Eigen::VectorXd& b, const Eigen::VectorXd& scale) {
+  constexpr double kPlainlyThere = 1e-7;  // pivot, of a unit diagonal
   const int n = static_cast<int>(b.size());
-  if (n == 0 || s.diagonal().maxCoeff() <= 0) return m;
-  Eigen::MatrixXd factor = scale.asDiagonal() * s * scale.asDiagonal();
+  if (n == 0 || s.diagonal().maxCoeff() <= 0) return {};
+  const auto scaled = [&]() -> Eigen::MatrixXd { return scale.asDiagonal() * s * scale.asDiagonal(); };
+  Eigen::MatrixXd factor = scaled();
+  Eigen::VectorXd z = scale.cwiseProduct(b);
+  int info = 0;
+  dpotrf_("L", &n, factor.data(), &n, &info);
+  if (info == 0 && factor.diagonal().minCoeff() > std::sqrt(kPlainlyThere)) {
+    factor.triangularView<Eigen::Lower>().solveInPlace(z);
+    return {z.squaredNorm(), n};
+  }
+  factor = scaled();
   const double tolerance = kRankTolerance * factor.diagonal().maxCoeff();
   std::vector<int> pivots(static_cast<std::size_t>(n));
   std::vector<double> work(2 * static_cast<std::size_t>(n));
-  int rank = 0, info = 0;
+  int rank = 0;
   dpstrf_("L", &n, factor.data(), &n, pivots.data(), &rank, &tolerance, work.data(), &info);
-  Eigen::VectorXd z(rank);
-  for (int i = 0; i < rank; ++i) {
-    const int row = pivots[static_cast<std::size_t>(i)] - 1;
-    z[i] = scale[row] * b[row];
-  }
-  factor.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(z);
-  m.value = z.squaredNorm();
-  m.rank = rank;
-  return m;
+  Eigen::VectorXd leading(rank);
+  for (int i = 0; i < rank; ++i) leading[i] = z[pivots[static_cast<std::size_t>(i)] - 1];
+  factor.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
+  return {leading.squaredNorm(), rank};
 }
 
 template <typename Matrix>
@@ -186,20 +180,23 @@ std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
 
 }  // namespace
 
-SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
-                      double variance_factor) {
+LeastSquares least_squares(const UpdateMatrix& condensed) {
+  const Quadratic q = unpacked(condensed);
+  return minimum(q.s, q.b, scale_of(q.s));
+}
+
+SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSquares& right,
+                      const Front::Result& together, double probability, double variance_factor) {
+  const FrontFactor& factor = together.factor;
+  const std::int64_t eliminated = total_dimension(factor.eliminated);
+  double squares = 0;  // of z, which has further columns in free blocks
+  for (std::int64_t i = 0; i < eliminated; ++i)
+    squares += factor.z[static_cast<std::size_t>(i)] * factor.z[static_cast<std::size_t>(i)];
+  const LeastSquares& rest = together.update.alone;
   SeamReport report;
   report.node = node;
-  UnknownList common;
-  for (const Unknown& u : left.unknowns)
-    if (find_unknown(right.unknowns, u.id) >= 0) common.push_back(u);
-  if (common.empty()) return report;
-  const Quadratic a = reduced_to(left, common), b = reduced_to(right, common);
-  const Eigen::VectorXd scale = scale_of(a.s + b.s);
-  const Minimum ma = minimum(a.s, a.b, scale), mb = minimum(b.s, b.b, scale);
-  const Minimum both = minimum(a.s + b.s, a.b + b.b, scale);
-  report.degrees = ma.rank + mb.rank - both.rank;
-  report.statistic = std::max(0.0, ma.value + mb.value - both.value) / variance_factor;
+  report.degrees = left.rank + right.rank - (eliminated - std::ssize(factor.held)) - rest.rank;
+  report.statistic = std::max(0.0, left.value + right.value - squares - rest.value) / variance_factor;
   if (report.degrees > 0) report.threshold = chi_square_quantile(probability, report.degrees);
   return report;
 }
@@ -208,9 +205,9 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
                      double probability, double variance_factor) {
   TileCheck check;
   check.tile = tile;
-  const Quadratic own = reduced_to(condensed, condensed.unknowns);
+  const Quadratic own = unpacked(condensed);
   const Eigen::VectorXd scale = scale_of(own.s);
-  const Minimum alone = minimum(own.s, own.b, scale);
+  const LeastSquares alone = minimum(own.s, own.b, scale);
   const SubtreeSums& sums = condensed.sums;
   check.own_chi2 = (sums.weighted_squares - sums.decrement_squared - alone.value) / variance_factor;
   check.own_degrees =

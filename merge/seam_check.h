@@ -6,7 +6,9 @@
 //     s_b)
 //
 // is chi-square distributed with rank S_a + rank S_b - rank(S_a + S_b) degrees of freedom; it holds for singular S too
-// (halves without a datum). Unknowns that only one half has are minimised over first.
+// (halves without a datum), and for unknowns that only one half has. What both have together has been eliminated in
+// part: s'S^+ s = |z|^2 + s_p'S_p^+ s_p with z and S_p of the front's factor and update matrix (front.h), so that each
+// node of the tree takes one factorisation, of what it passes on.
 #pragma once
 
 #include <array>
@@ -29,9 +31,12 @@ struct SeamReport {
   bool alarm() const { return degrees > 0 && statistic > threshold; }
 };
 
+LeastSquares least_squares(const UpdateMatrix& condensed);
+
+// `left`, `right`: of the halves alone; `together`: the front of their sum, its update matrix with what it is alone.
 // `probability`: of a false alarm at this seam. variance_factor: T is divided by it (1 = a priori).
-SeamReport check_seam(std::int64_t node, const UpdateMatrix& left, const UpdateMatrix& right, double probability,
-                      double variance_factor = 1);
+SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSquares& right,
+                      const Front::Result& together, double probability, double variance_factor = 1);
 
 // T asks all common unknowns at once, and one or two frames that a tile sees differently drown in hundreds of degrees
 // of freedom. So what a tile says of a few scalar unknowns u is tested by itself: were they free to differ by v between

@@ -39,13 +39,18 @@ UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, const Pass& pas
     const std::size_t t = at(node.leaf);
     TileCondensation condensed = condense_tile(problems_[t], tile_plans_[t], states_[t], pass, datum_of(t));
     update = std::move(condensed.update);
+    if (check_seams) update.alone = least_squares(update);
     factors.tile = std::move(condensed.factor);
   } else {
     UpdateMatrix left = condense_subtree(node.left, pass, check_seams);
     UpdateMatrix right = condense_subtree(node.right, pass, check_seams);
-    if (check_seams)
-      seams_.push_back(check_seam(number, left, right, kSeamAlarmProbability / static_cast<double>(seam_count())));
+    const LeastSquares left_alone = left.alone, right_alone = right.alone;
     Front::Result result = eliminate_node(node, std::move(left), std::move(right), pass.lambda);
+    if (check_seams) {
+      result.update.alone = least_squares(result.update);
+      seams_.push_back(check_seam(number, left_alone, right_alone, result,
+                                  kSeamAlarmProbability / static_cast<double>(seam_count())));
+    }
     update = std::move(result.update);
     factors.front = std::move(result.factor);
   }

@@ -1,6 +1,7 @@
 // Symbolic work of a tile: its unknowns, its cells and what each cell owns.
 #include <algorithm>
-#include <map>
+#include <numeric>
+#include <utility>
 
 #include "adjust/disjoint_sets.h"
 #include "merge/condense.h"
@@ -69,30 +70,44 @@ void frames_of_point(const TileProblem& problem, std::int64_t point, std::vector
   std::sort(frames.begin(), frames.end());
 }
 
-// Edges between frames that share points, and relative poses.
+// Edges between frames that share points, relative poses or lines: ascending, weighted by how many they share. Pairs
+// are sorted by their lower frame by counting, and of each of these counted by their upper one: there are millions.
 FrameGraph graph_of(const TileProblem& problem) {
-  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
+  const std::size_t frame_count = problem.frames.size();
   std::vector<std::int32_t> frames;
-  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
-    if (!problem.active(p)) continue;
-    frames_of_point(problem, p, frames);
-    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-    for (std::size_t a = 0; a < frames.size(); ++a)
-      for (std::size_t b = a + 1; b < frames.size(); ++b) pairs.emplace_back(frames[a], frames[b]);
-  }
-  for (const auto& term : problem.relatives)
-    pairs.emplace_back(std::min(term.from.value, term.to.value), std::max(term.from.value, term.to.value));
-  for (const auto& term : problem.lines)
-    pairs.emplace_back(std::min(term.frame.value, term.seen_by().value),
-                       std::max(term.frame.value, term.seen_by().value));
-  std::sort(pairs.begin(), pairs.end());
+  const auto visit_pairs = [&](auto&& visit) {
+    for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+      if (!problem.active(p)) continue;
+      frames_of_point(problem, p, frames);
+      frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+      for (std::size_t a = 0; a < frames.size(); ++a)
+        for (std::size_t b = a + 1; b < frames.size(); ++b) visit(frames[a], frames[b]);
+    }
+    const auto visit_term = [&](LocalFrame a, LocalFrame b) {
+      if (a != b) visit(std::min(a, b).value, std::max(a, b).value);
+    };
+    for (const auto& term : problem.relatives) visit_term(term.from, term.to);
+    for (const auto& term : problem.lines) visit_term(term.frame, term.seen_by());
+  };
+  std::vector<std::size_t> end(frame_count + 1, 0);  // of each lower frame's pairs; first the end of those before
+  visit_pairs([&](std::int32_t a, std::int32_t) { ++end[static_cast<std::size_t>(a) + 1]; });
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<std::int32_t> upper(end.back());
+  visit_pairs([&](std::int32_t a, std::int32_t b) { upper[end[static_cast<std::size_t>(a)]++] = b; });
+
   FrameGraph graph;
-  graph.frame_count = static_cast<std::int64_t>(problem.frames.size());
-  for (const auto& [a, b] : pairs) {
-    if (a == b) continue;
-    if (graph.edges.empty() || graph.edges.back().a.value != a || graph.edges.back().b.value != b)
-      graph.edges.push_back({FrameIndex(a), FrameIndex(b), 0});
-    ++graph.edges.back().weight;
+  graph.frame_count = static_cast<std::int64_t>(frame_count);
+  std::vector<std::int32_t> met;
+  std::vector<std::int64_t> weight(frame_count, 0);
+  std::size_t row = 0;
+  for (std::size_t a = 0; a < frame_count; ++a) {
+    met.clear();
+    for (; row < end[a]; ++row)
+      if (weight[static_cast<std::size_t>(upper[row])]++ == 0) met.push_back(upper[row]);
+    std::sort(met.begin(), met.end());
+    for (const std::int32_t b : met)
+      graph.edges.push_back({FrameIndex(static_cast<std::int64_t>(a)), FrameIndex(b),
+                             std::exchange(weight[static_cast<std::size_t>(b)], 0)});
   }
   return graph;
 }

@@ -1,11 +1,10 @@
 #include "merge/tile_store.h"
 
-#include <cstdio>
-#include <filesystem>
 #include <fstream>
 #include <utility>
 
 #include "io/error.h"
+#include "merge/scratch_file.h"
 
 namespace megablock {
 
@@ -51,18 +50,6 @@ void read_table(std::ifstream& file, std::vector<T>& values) {
   file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
 }
 
-// False when the disk is full.
-template <typename WriteTables>
-bool write_file(const std::string& path, WriteTables&& write_tables) {
-  std::ofstream file(path, std::ios::binary);
-  write_tables(file);
-  file.close();
-  if (file) return true;
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);
-  return false;
-}
-
 template <typename ReadTables>
 void read_file(const std::string& path, ReadTables&& read_tables) {
   std::ifstream file(path, std::ios::binary);
@@ -71,7 +58,7 @@ void read_file(const std::string& path, ReadTables&& read_tables) {
 }
 
 bool write_points(const std::string& path, const std::vector<Eigen::Vector3d>& points) {
-  return write_file(path, [&](std::ofstream& file) { write_table(file, points); });
+  return write_scratch_file(path, [&](std::ofstream& file) { write_table(file, points); });
 }
 
 }  // namespace
@@ -92,9 +79,8 @@ std::string TileStore::points_path(const Slot& slot, int file) const {
 
 void TileStore::remove_files(const Slot& slot) const {
   if (!slot.in_scratch) return;
-  std::error_code ignored;
   for (const std::string& file : {path(slot, "measurements"), points_path(slot, 0), points_path(slot, 1)})
-    std::filesystem::remove(file, ignored);
+    remove_scratch_file(file);
 }
 
 void TileStore::add(RankTile tile) {
@@ -114,12 +100,11 @@ void TileStore::add(RankTile tile) {
 }
 
 bool TileStore::spill(Slot& slot) {
-  const bool whole = write_file(path(slot, "measurements"), [&](std::ofstream& file) {
+  const bool whole = write_scratch_file(path(slot, "measurements"), [&](std::ofstream& file) {
     visit_tables([&](const auto& table) { write_table(file, table); }, slot.tile.problem);
   });
   if (whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points)) return true;
-  std::error_code ignored;
-  std::filesystem::remove(path(slot, "measurements"), ignored);  // room for others
+  remove_scratch_file(path(slot, "measurements"));  // room for others
   return false;
 }
 

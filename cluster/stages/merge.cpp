@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
@@ -27,9 +29,6 @@ namespace megablock {
 namespace {
 
 constexpr const char* kResult = "result/block.h5";
-// Decrement of the rounds that only lead to verdicts on observations and to sigmas: no unknown is further than this
-// share of its sigma from the optimum, and chi-square from its least value by its square.
-constexpr double kSettledDecrement = 0.1;
 
 std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
   Hasher hasher;
@@ -68,10 +67,14 @@ void clear_scratch(Job& job) {
   });
 }
 
-// The last round alone goes to the end.
-GlobalOptions options_of(const MergeSettings& settings, bool last) {
+// The last round alone goes to the end. Those before it only lead to verdicts on observations and to sigmas: a
+// hundredth of a sigma of the frames' unknowns, in the mean, is enough for them. Chi-square is then off by 1e-4 of
+// their number.
+GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool last) {
+  constexpr double kSettled = 0.01;
+  const double settled = kSettled * std::sqrt(6 * static_cast<double>(frames));
   GlobalOptions options;
-  options.max_decrement = last ? settings.decrement : std::max(settings.decrement, kSettledDecrement);
+  options.max_decrement = last ? settings.decrement : std::max(settings.decrement, settled);
   options.confirm = last;
   options.max_iterations = settings.max_iterations;
   return options;
@@ -86,11 +89,12 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
   const std::vector<int> rank_of_tile =
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
-  BlockState block = found ? checkpoint.state() : merge_start(job, inputs.oriented, inputs.adjusted);
+  MergeStart start =
+      found ? MergeStart{checkpoint.state(), {}, {}} : merge_start(job, inputs.oriented, inputs.adjusted);
   const double start_sigma = found ? 0 : start_image_sigma(job, inputs.adjusted);
   TileStore tiles(memory_of_tiles(job));
   load_own_tiles(
-      job, inputs, block, rank_of_tile,
+      job, inputs, start, rank_of_tile,
       [&](RankTile& tile) {
         if (found) {
           checkpoint.load_tile(tile);
@@ -100,15 +104,18 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
         }
       },
       tiles);
+  BlockState block = std::move(start.state);
 
   Adjusted adjusted;
   MergePosition& position = adjusted.position;
-  position = found ? *found : MergePosition{0, start_global(options_of(job.settings.merge, false)), {}};
+  position = found ? *found
+                   : MergePosition{0, start_global(options_of(job.settings.merge, job.block.frames.size(), false)), {}};
   std::int32_t saved = position.global.accepted;
   for (;;) {
     const bool last = position.round >= most_rounds(job.settings.merge);
-    const GlobalOptions options = options_of(job.settings.merge, last);
+    const GlobalOptions options = options_of(job.settings.merge, job.block.frames.size(), last);
     RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(job, tiles));
+    if (last) runner.expect_posterior();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       say_iteration(job, state);
       if (state.accepted != saved) {
@@ -125,7 +132,7 @@ Adjusted adjust_block(Job& job, const MergeInputs& inputs, MergeCheckpoint& chec
     follow(block, tiles);
     if (last) {
       find_posterior(job, inputs, runner, adjusted);
-      say_memory(job, tiles, runner.memory());
+      say_memory(job, tiles, runner);
       break;
     }
     bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
@@ -170,9 +177,11 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   std::vector<PartTracks::File> files;
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
   const PartTracks tracks(std::move(files), result.sigma_scaled ? result.variance_factor : 1);
+  // Both go through all tracks, while the other ranks have nothing left to do.
+  std::future<Report> report = std::async(std::launch::async, [&] { return Report(result, tracks); });
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  job.store.write_text("result/report.html",
-                       report_html(std::move(result), tracks, {job.options.directory, seconds_since_1970()}));
+  const ReportContext context{job.options.directory, seconds_since_1970()};
+  job.store.write_text("result/report.html", report.get().html(std::move(result), context));
 }
 
 }  // namespace

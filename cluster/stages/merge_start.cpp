@@ -25,7 +25,7 @@ bool has_datum(const Job& job) {
 }
 
 // Brings a tile without datum onto the initial orientation of its frames; robust, as single frames may have moved.
-void align(TileAdjustment& tile, const BlockState& oriented) {
+Similarity align(TileAdjustment& tile, const BlockState& oriented) {
   std::vector<Eigen::Vector3d> from, to;
   Eigen::AlignedBox3d extent;
   for (std::size_t i = 0; i < tile.frames.size(); ++i) {
@@ -36,8 +36,9 @@ void align(TileAdjustment& tile, const BlockState& oriented) {
   constexpr double kSigmaShare = 1e-3;  // of the tile's extent: what the initial orientation is good for
   const std::vector<double> sigma(from.size(), kSigmaShare * extent.diagonal().norm());
   const std::optional<Similarity> similarity = fit_similarity_robust(from, to, sigma);
-  if (!similarity) return;
+  if (!similarity) return {};
   for (Pose& pose : tile.poses) pose = (*similarity)(pose);
+  return *similarity;
 }
 
 // Means of what tiles share, weighted by observations.
@@ -102,7 +103,8 @@ constexpr std::int64_t kFewestObservations = 6;
 
 // Poses from the tile that holds most of a frame's observations.
 void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Similarity>& similarities,
-                  BlockState& state) {
+                  const std::vector<TileIndex>& numbers, MergeStart& start) {
+  BlockState& state = start.state;
   IndexedVector<FrameIndex, std::int64_t> richest(state.frames.size(), 0), total(state.frames.size(), 0);
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     for (std::size_t i = 0; i < tiles[t].frames.size(); ++i) {
@@ -111,6 +113,7 @@ void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Sim
       if (tiles[t].observations[i] <= richest[frame]) continue;
       richest[frame] = tiles[t].observations[i];
       state.frames[frame] = similarities[t](tiles[t].poses[i]);
+      start.tile_of_frame[frame] = numbers[t];
     }
   }
   for (std::size_t f = 0; f < total.size(); ++f)
@@ -118,23 +121,57 @@ void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Sim
       state.oriented[FrameIndex(static_cast<std::int64_t>(f))] = 0;
 }
 
+// Points with a frame that has not gone with the tile, and those that the tile has not found. [points]
+std::vector<std::uint8_t> left_behind(const MergeTile& merge, const MergeStart& start) {
+  const TileProblem& problem = merge.problem;
+  std::vector<std::uint8_t> result(problem.points.size(), 0);
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    result[p] = !merge.state.points[static_cast<std::size_t>(p)].allFinite();
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1] && !result[p]; ++row) {
+      if (!problem.kept[row]) continue;
+      const LocalFrame frame = problem.images[problem.image[row].value].frame;
+      result[p] = start.tile_of_frame[problem.frames[frame.value]] != merge.tile;
+    }
+  }
+  return result;
+}
+
+bool any_free(const TileProblem& problem) {
+  const auto set = [](auto flag) { return flag != 0; };
+  return std::any_of(problem.camera_free.begin(), problem.camera_free.end(), set) ||
+         std::any_of(problem.mount_free.begin(), problem.mount_free.end(), set);
+}
+
 }  // namespace
 
-BlockState merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted) {
+MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted) {
   const bool datum = has_datum(job);
-  BlockState start = oriented;
+  MergeStart start{oriented, std::vector<Similarity>(adjusted.size()), {}};
+  start.tile_of_frame.assign(oriented.frames.size(), TileIndex());
   std::vector<AlignmentTile> tiles;
+  std::vector<TileIndex> numbers;  // [tiles]
   SharedMeans means(job.block);
-  for (const std::string& name : adjusted) {
-    if (name.empty()) continue;
-    TileAdjustment tile = read_adjustment(job.store.verified_path(name));
-    if (!datum) align(tile, oriented);
+  for (std::size_t t = 0; t < adjusted.size(); ++t) {
+    if (adjusted[t].empty()) continue;
+    TileAdjustment tile = read_adjustment(job.store.verified_path(adjusted[t]));
+    if (!datum) start.motions[t] = align(tile, oriented);
     means.add(tile);
     tiles.push_back({std::move(tile.frames), std::move(tile.poses), std::move(tile.observations)});
+    numbers.emplace_back(static_cast<std::int64_t>(t));
   }
-  take_richest(tiles, align_tiles(tiles), start);
-  turn_back_stretches(job.block, oriented, start);
-  means.store(start);
+  const std::vector<Similarity> similarities = align_tiles(tiles);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    Similarity& motion = start.motions[static_cast<std::size_t>(numbers[i].value)];
+    motion = similarities[i] * motion;
+  }
+  take_richest(tiles, similarities, numbers, start);
+  const IndexedVector<FrameIndex, Pose> before = start.state.frames;
+  turn_back_stretches(job.block, oriented, start.state);
+  for (FrameIndex f(0); before.contains(f); ++f.value)
+    if (before[f].centre != start.state.frames[f].centre ||
+        before[f].rotation.coeffs() != start.state.frames[f].rotation.coeffs())
+      start.tile_of_frame[f] = TileIndex();
+  means.store(start.state);
   return start;
 }
 
@@ -143,8 +180,9 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
   return adjusted.empty() ? all : split_tracks(all, read_adjustment(job.store.verified_path(adjusted)).parts);
 }
 
-MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& tiles, TileIndex tile,
+MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& tiles, TileIndex tile,
                           const std::string& tracks, const std::string& adjusted) {
+  const BlockState& state = start.state;
   MergeTile merge;
   merge.tile = tile;
   merge.tracks = read_tracks(job.store.verified_path(tracks));
@@ -164,7 +202,13 @@ MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& 
   }
   for (std::size_t o = 0; o < merge.problem.kept.size(); ++o) merge.problem.kept[o] &= adjustment.kept[o];
   merge.state.points = adjustment.points;
-  triangulate_points(merge.problem, merge.state, options);
+  if (start.motions.empty()) return merge;
+  const Similarity& motion = start.motions[static_cast<std::size_t>(tile.value)];
+  for (Eigen::Vector3d& point : merge.state.points) point = motion(point);
+  if (any_free(merge.problem))
+    triangulate_points(merge.problem, merge.state, options);
+  else
+    triangulate_points(merge.problem, merge.state, options, left_behind(merge, start));
   return merge;
 }
 

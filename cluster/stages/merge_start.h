@@ -6,6 +6,7 @@
 
 #include "adjust/tile_problem.h"
 #include "cluster/job.h"
+#include "geometry/similarity.h"
 #include "io/image_graph.h"
 #include "io/tracks.h"
 #include "io/unit_files.h"
@@ -25,13 +26,20 @@ struct MergeTile {
 // most of its observations (ties: lower tile), stretches that contradict their relative poses are turned back
 // (adjust/turned_stretches.h), intrinsics and free mounts are means over the tiles weighted by
 // observations. Frames that no adjusted tile holds lose their orientation.
-BlockState merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
+struct MergeStart {
+  BlockState state;
+  std::vector<Similarity> motions;                     // [tiles] that aligned them; empty: of a checkpoint
+  IndexedVector<FrameIndex, TileIndex> tile_of_frame;  // whose motion brought the frame here; invalid: more than that
+};
+MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
 
 // The tracks of a tile, split into the parts that its adjustment found. `adjusted` empty: as they are.
 TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std::string& adjusted);
 
-// A tile's problem with the kept flags of its adjustment, its points re-triangulated in `state`.
-MergeTile load_merge_tile(const Job& job, const BlockState& state, const Tiles& tiles, TileIndex tile,
+// A tile's problem with the kept flags of its adjustment. Its points go with the tile; those whose frames have not all
+// done so, or whose cameras are the mean of several tiles', are triangulated anew. Of a checkpoint, which has points of
+// its own, they are left as they were.
+MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& tiles, TileIndex tile,
                           const std::string& tracks, const std::string& adjusted);
 
 }  // namespace megablock

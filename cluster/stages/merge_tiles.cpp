@@ -9,7 +9,7 @@
 
 namespace megablock {
 
-void load_own_tiles(const Job& job, const MergeInputs& inputs, const BlockState& start,
+void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart& start,
                     const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
                     TileStore& own) {
   for (std::size_t t = 0; t < rank_of_tile.size(); ++t) {
@@ -130,24 +130,37 @@ MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles) {
   return memory;
 }
 
-void say_memory(Job& job, const TileStore& tiles, const MemoryStatistics& factors) {
+void say_memory(Job& job, const TileStore& tiles, const RankRunner& runner) {
   ByteWriter writer;
-  writer.value(factors);
+  writer.value(runner.memory());
+  writer.value(runner.seconds());
   writer.value(static_cast<std::int64_t>(tiles.size()));
   writer.value(tiles.spilled());
   MemoryStatistics all;
+  PassSeconds seconds;
   std::int64_t tile_count = 0, spilled_tiles = 0;
   for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     const auto some = reader.value<MemoryStatistics>();
+    const auto time = reader.value<PassSeconds>();
     tile_count += reader.value<std::int64_t>();
     spilled_tiles += reader.value<std::int64_t>();
     all.put += some.put;
     all.spilled += some.spilled;
     all.recomputed += some.recomputed;
     all.peak_bytes = std::max(all.peak_bytes, some.peak_bytes);
+    seconds.tiles += time.tiles / job.ranks.size();
+    seconds.fronts += time.fronts / job.ranks.size();
+    seconds.all = std::max(seconds.all, time.all);
   }
   if (!job.is_first_rank() || job.options.quiet) return;
+  const FrontCosts fronts = front_costs(runner.plan());
+  std::fprintf(stderr, "merge        fronts above the tiles: widest %lld unknowns, at the root %lld, %.3g operations\n",
+               static_cast<long long>(fronts.widest), static_cast<long long>(fronts.root), fronts.operations);
+  std::fprintf(
+      stderr,
+      "merge        last round: %.1f s, of them %.1f s on tiles and %.1f s on fronts above them (mean of the ranks)\n",
+      seconds.all, seconds.tiles, seconds.fronts);
   std::fprintf(stderr,
                "merge        %lld of %lld tiles in scratch; factors: %lld made, %lld spilled to scratch, %lld subtrees "
                "computed again, at most %.1f MiB on a rank\n",

@@ -9,6 +9,7 @@
 #include "adjust/sigma_scales.h"
 #include "cluster/job.h"
 #include "cluster/rank_runner.h"
+#include "cluster/stages/merge_start.h"
 
 namespace megablock {
 
@@ -21,7 +22,7 @@ struct MergeInputs {
 };
 
 // Adds this rank's tiles to `own`, each as `prepare` leaves it.
-void load_own_tiles(const Job& job, const MergeInputs& inputs, const BlockState& start,
+void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart& start,
                     const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
                     TileStore& own);
 
@@ -41,7 +42,8 @@ std::int64_t screen(Job& job, TileStore& tiles);
 // The memory of a rank: half of it for tiles; factors get what these leave of it.
 MemoryOptions memory_of_tiles(const Job& job);
 MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles);
-// Says what `--memory` led to, over all ranks. Collective.
-void say_memory(Job& job, const TileStore& tiles, const MemoryStatistics& factors);
+// Says how large the fronts were, where the time of the last round went, and what `--memory` led to, over all ranks.
+// Collective.
+void say_memory(Job& job, const TileStore& tiles, const RankRunner& runner);
 
 }  // namespace megablock

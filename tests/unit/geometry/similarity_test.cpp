@@ -72,6 +72,14 @@ TEST(Similarity, MovesPosesWithTheirGround) {
   EXPECT_LT((to_inside(s(pose), s(point)) - s.scale * to_inside(pose, point)).norm(), 1e-12);
 }
 
+TEST(Similarity, ProductIsOneBehindTheOther) {
+  const Similarity first{0.5, rotation_exp<double>({0.1, 0.2, -2}), {7, 8, 9}};
+  const Similarity then{3, rotation_exp<double>({-1, 0.3, 0.5}), {-70, 5, 1}};
+  const Eigen::Vector3d point(10, 20, -30);
+  EXPECT_LT(((then * first)(point) - then(first(point))).norm(), 1e-12);
+  EXPECT_LT(((first.inverse() * first)(point) - point).norm(), 1e-12);
+}
+
 TEST(Similarity, NeverReflectsFlatOrMirroredPoints) {
   const Clouds flat(20, 0, {100, 60, 0});
   expect_same(fit_similarity(flat.from, flat.to).value(), flat.truth, 1e-10, 1e-7);

@@ -246,6 +246,26 @@ TEST(GlobalController, TakesTheCurvatureOfTheLossesWhileItsModelHolds) {
   EXPECT_FALSE(next_pass(state).curvature);
 }
 
+// Without confirmation a pass may stop, unless damping makes its decrement small.
+TEST(GlobalController, StopsUnconfirmedWhereItIsHardlyDamped) {
+  GlobalOptions options;
+  options.max_decrement = 0.1;
+  options.confirm = false;
+  UpReport up;
+  up.sums.cost = 100;
+  up.sums.decrement_squared = 1e-4;
+  GlobalState state = start_global(options);
+  report_up(state, options, up);
+  EXPECT_EQ(state.outcome, GlobalOutcome::kConverged);
+  options.initial_lambda = 1;
+  state = start_global(options);
+  report_up(state, options, up);
+  ASSERT_EQ(state.next, GlobalAction::kUp);
+  EXPECT_EQ(next_pass(state).lambda, 0);
+  report_up(state, options, up);
+  EXPECT_EQ(state.outcome, GlobalOutcome::kConverged);
+}
+
 TEST(GlobalController, RefusesBadOptions) {
   GlobalOptions options;
   options.max_decrement = 0;
