@@ -17,8 +17,9 @@ struct Setting {
   const char* name;
   const char* value;
 };
+constexpr const char* kCoreType = "OPENBLAS_CORETYPE";
+constexpr const char* kAvx512Cores = "SkylakeX";
 constexpr Setting kSettings[] = {
-    {"OPENBLAS_CORETYPE", "Haswell"},
     {"OPENBLAS_NUM_THREADS", "1"},
     {"OPENCV_IPP", "disabled"},
     // Ceres' own remarks on standard error; a unit that fails is reported with its reason by us.
@@ -37,12 +38,32 @@ bool set(const Setting& setting) {
   return false;
 }
 
+// The option's value wherever it stands; the command line's parser checks it afterwards.
+std::string wanted_level(int argc, char** argv) {
+  const std::string option = kArithmeticOption;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == option && i + 1 < argc) return argv[i + 1];
+    if (word.starts_with(option + "=")) return word.substr(option.size() + 1);
+  }
+  return kArithmeticLevels[0];
+}
+
 }  // namespace
 
-void pin_arithmetic(char** argv) {
+std::string arithmetic_level() {
+  const char* cores = std::getenv(kCoreType);
+  return kArithmeticLevels[cores != nullptr && std::strcmp(cores, kAvx512Cores) == 0];
+}
+
+void pin_arithmetic(int argc, char** argv) {
+  const bool wide = wanted_level(argc, argv) == "avx512";
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma"))
     throw InputError("this processor has no AVX2/FMA; jobs use the arithmetic level avx2: run on a newer processor");
-  bool pinned = true;
+  if (wide && !(__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")))
+    throw InputError("this processor has no AVX-512; leave out '--arithmetic avx512', or run on one that has");
+  bool pinned = set({kCoreType, wide ? kAvx512Cores : "Haswell"});
   for (const Setting& setting : kSettings) pinned = set(setting) && pinned;
   if (__builtin_cpu_supports("avx512f")) pinned = set(kWithoutAvx512) && pinned;
   if (pinned) return;

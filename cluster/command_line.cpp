@@ -92,9 +92,15 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
                    "Memory per rank for tiles and factors of the merge, MiB; beyond it they go to the job's scratch")
       ->check(not_negative());
   command
-      ->add_option("--scratch", options->scratch_mib,
-                   "Scratch per rank for these, MiB; beyond it (0: at once) tiles stay in memory, factors are computed again")
+      ->add_option(
+          "--scratch", options->scratch_mib,
+          "Scratch per rank for these, MiB; beyond it (0: at once) tiles stay in memory, factors are computed again")
       ->check(not_negative());
+  auto level = std::make_shared<std::string>();  // taken before there is a parser
+  command
+      ->add_option(kArithmeticOption, *level,
+                   "Of the whole job, avx2 or avx512: faster dense algebra, other last digits. Default: avx2")
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kArithmeticLevels), std::end(kArithmeticLevels))));
   command->add_flag("--strict", options->strict, "End at the first failed unit");
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   auto monolithic = std::make_shared<bool>(false);
@@ -102,7 +108,7 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
     command->add_flag("--monolithic", *monolithic,
                       "Then compare with one monolithic adjustment of the same observations (JSON)");
   command->callback([=, &action, &ranks] {
-    action = [options, monolithic, &ranks] {
+    action = [options, monolithic, level, &ranks] {
       const int code = run_job(*options, ranks);
       if (ranks.rank() != 0) return code;
       print_result(*options);
@@ -319,7 +325,7 @@ int run_action(const Action& action, Communicator& ranks) {
 int command_line(int argc, char** argv) {
   CLI::App app{"megablock orients image blocks of any size: tiles on ranks, exact block-wise compensation, resumable."};
   app.name("megablock");
-  app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + kArithmeticLevel + ")");
+  app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + arithmetic_level() + ")");
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* command, const CLI::Error& error) {
     std::string name = command->get_name();
@@ -338,7 +344,7 @@ int command_line(int argc, char** argv) {
       "Forms:\n  megablock init IMAGES -o block.yaml\n  megablock run block.yaml -j JOB      (again = resume)\n"
       "  mpirun --bind-to none -n N megablock run block.yaml -j JOB\n  megablock status JOB [--json|--digest]\n");
   try {
-    pin_arithmetic(argv);
+    pin_arithmetic(argc, argv);
     limit_libraries_to_one_thread();
     Communicator ranks(&argc, &argv);
     Action action;  // of all ranks together

@@ -47,9 +47,10 @@ void check_job_json(const JobStore& store, const Json& json) {
     throw InputError(store.path("job.json") + ": job of version " + std::to_string(version) +
                      ", this program writes version " + std::to_string(kJobVersion) + "; start a new job directory");
   const std::string level = json.value("arithmetic", "");
-  if (level != kArithmeticLevel)
-    throw InputError(store.path("job.json") + ": job of arithmetic level '" + level + "', this program computes '" +
-                     kArithmeticLevel + "'; run it where it was begun or start a new job directory");
+  if (level != arithmetic_level())
+    throw InputError(store.path("job.json") + ": job of arithmetic level '" + level + "', this run computes '" +
+                     arithmetic_level() + "'; give " + kArithmeticOption + " " + level +
+                     " on a processor that has it, or start a new job directory");
 }
 
 // The images of an earlier run keep their indices; new ones follow. Records when the block grew.
@@ -110,7 +111,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
     effective[option.section][option.key] = option.value;
   Json job{{"version", kJobVersion},
            {"program", kProgram},
-           {"arithmetic", kArithmeticLevel},
+           {"arithmetic", arithmetic_level()},
            {"project", project.file},
            {"generations", generations},
            {"settings", settings},

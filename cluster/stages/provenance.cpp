@@ -27,7 +27,7 @@ Provenance provenance_of(const Job& job) {
   Provenance provenance;
   provenance.project = std::filesystem::path(job.options.project).filename().string();
   provenance.program = kProgram;
-  provenance.arithmetic = kArithmeticLevel;
+  provenance.arithmetic = arithmetic_level();
   const std::vector<OptionValue> values = option_values(job.settings), defaults = option_values({});
   for (std::size_t i = 0; i < values.size(); ++i)
     provenance.options.push_back({values[i].section + "." + values[i].key, values[i].value, defaults[i].value});

@@ -27,7 +27,8 @@ namespace fs = std::filesystem;
 struct ScaleOptions {
   SceneOptions scene;
   int ranks = 1, threads = 1;
-  double memory_mib = 1024;  // per rank, for tiles and factors of the merge
+  double memory_mib = 896;  // per rank, for tiles, fronts and factors of the merge
+  std::string arithmetic = "avx2";
 };
 
 // Median over the steps of the global adjustment, of which each leaves one event on the first rank.
@@ -40,10 +41,28 @@ double seconds_per_iteration(const fs::path& job) {
   return seconds[seconds.size() / 2];
 }
 
+// From the start of the stages to the checkpoint behind the last step.
+double seconds_to_last_step(const fs::path& job, double start_s) {
+  double last = start_s;
+  for (const UnitEvent& event : read_events(JobStore(job.string())))
+    if (event.rank == 0 && event.unit.starts_with("merge/")) last = std::max(last, event.time_s);
+  return last - start_s;
+}
+
+double seconds_since_1970() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 double peak_rss_mib(const BlockResult& result) {
   double peak = 0;
   for (const StageStatistics& stage : result.stages) peak = std::max(peak, stage.peak_rss_mib);
   return peak;
+}
+
+nlohmann::json stage_seconds(const BlockResult& result) {
+  nlohmann::json seconds = nlohmann::json::object();
+  for (const StageStatistics& stage : result.stages) seconds[stage.name] = stage.seconds;
+  return seconds;
 }
 
 // Points with kept observations in frames of several tiles.
@@ -69,7 +88,9 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
   const fs::path job = folder / ("job-" + std::to_string(options.ranks) + "x" + std::to_string(options.threads));
   simulate_scene(options.scene, folder);
   const auto start = std::chrono::steady_clock::now();
-  run_scene(folder, job, options.ranks, options.threads, "--memory " + std::to_string(options.memory_mib));
+  const double start_s = seconds_since_1970();
+  run_scene(folder, job, options.ranks, options.threads,
+            "--memory " + std::to_string(options.memory_mib) + " --arithmetic " + options.arithmetic);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   const BlockResult result = read_result_without_tracks((job / "result/block.h5").string());
@@ -85,7 +106,10 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
           {"observations", statistics.observations},
           {"observations_per_second_per_core",
            static_cast<double>(statistics.observations) / per_iteration / options.ranks / options.threads},
+          {"arithmetic", options.arithmetic},
           {"seconds", seconds},
+          {"seconds_to_last_step", seconds_to_last_step(job, start_s)},
+          {"stage_seconds", stage_seconds(result)},
           {"seconds_per_iteration", per_iteration},
           {"global_iterations", result.global_iterations},
           {"chi2_per_dof", result.variance_factor},
@@ -107,8 +131,9 @@ int main(int argc, char** argv) {
   add_scene_options(app, options.scene);
   app.add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 1024));
   app.add_option("--threads", options.threads, "Threads per rank")->check(CLI::Range(1, 1024));
-  app.add_option("--memory", options.memory_mib, "Memory per rank for tiles and factors, MiB")
+  app.add_option("--memory", options.memory_mib, "Memory per rank for tiles, fronts and factors, MiB")
       ->check(CLI::PositiveNumber);
+  app.add_option("--arithmetic", options.arithmetic, "Of the job")->check(CLI::IsMember({"avx2", "avx512"}));
   CLI11_PARSE(app, argc, argv);
   try {
     const ScratchDirectory scratch;

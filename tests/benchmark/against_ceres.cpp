@@ -446,12 +446,12 @@ int main(int argc, char** argv) {
   try {
     const Start start{options.scene.folder};
     if (options.role == "ours") {
-      pin_arithmetic(argv);
+      pin_arithmetic(argc, argv);
       limit_libraries_to_one_thread();
       Communicator ranks(&argc, &argv);
       run_ours(start, ranks);
     } else if (options.role == "exactness") {
-      pin_arithmetic(argv);
+      pin_arithmetic(argc, argv);
       limit_libraries_to_one_thread();
       std::ofstream(start.file("exactness.json")) << compare_with_monolithic(JobStore(start.job().string()));
     } else if (!options.role.empty()) {
