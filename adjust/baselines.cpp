@@ -4,18 +4,15 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <tuple>
 
 #include "adjust/disjoint_sets.h"
+#include "geometry/angles.h"
 #include "geometry/median.h"
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
-std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 struct TrackRay {
   std::int32_t track;

@@ -12,7 +12,7 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kMaxPairs = 36;  // all pairs of nine rays
-constexpr double kGenerous = 1.5;      // times the threshold: for points of two rays, less exact than those of all
+constexpr double kTwoRayFactor = 1.5;  // times the threshold: for points of two rays, less exact than those of all
 
 // All pairs of rays; of many a fixed number.
 std::vector<std::pair<std::size_t, std::size_t>> pairs_of(std::size_t rays, std::uint64_t seed) {
@@ -47,7 +47,7 @@ std::optional<ConsistentRays> refine_part(std::span<const PointView> views, Eige
   for (int round = 0; round < kRounds; ++round) {
     std::vector<PointView> used;
     for (std::size_t i = 0; i < views.size(); ++i) {
-      passing[i] = residual_sigmas(views[i], point) <= (round == 0 ? kGenerous * threshold : threshold);
+      passing[i] = residual_sigmas(views[i], point) <= (round == 0 ? kTwoRayFactor * threshold : threshold);
       if (passing[i]) used.push_back(views[i]);
     }
     if (used.size() < 2) return std::nullopt;

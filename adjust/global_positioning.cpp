@@ -13,9 +13,9 @@ namespace {
 using RowMatrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 // v - (X - C - offset) / |X - C - offset|, over sigma; blocks C and X.
-class RayResidual : public ceres::SizedCostFunction<3, 3, 3> {
+class SightResidual : public ceres::SizedCostFunction<3, 3, 3> {
  public:
-  RayResidual(const Eigen::Vector3d& ray, const Eigen::Vector3d& offset, double inverse_sigma)
+  SightResidual(const Eigen::Vector3d& ray, const Eigen::Vector3d& offset, double inverse_sigma)
       : ray_(ray), offset_(offset), inverse_sigma_(inverse_sigma) {}
 
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
@@ -39,9 +39,9 @@ class RayResidual : public ceres::SizedCostFunction<3, 3, 3> {
 };
 
 // (C - P) / sigma.
-class PositionResidual : public ceres::SizedCostFunction<3, 3> {
+class StatedPosition : public ceres::SizedCostFunction<3, 3> {
  public:
-  PositionResidual(const Eigen::Vector3d& position, const Eigen::Vector3d& sigma)
+  StatedPosition(const Eigen::Vector3d& position, const Eigen::Vector3d& sigma)
       : position_(position), weight_(sigma.cwiseInverse()) {}
 
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
@@ -73,8 +73,8 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
       const auto& image = graph.images[static_cast<std::size_t>(graph.observations[o].image)];
       auto& frame = values.frames[static_cast<std::size_t>(image.frame)];
       const Pose camera = camera_pose(*frame, image.mount);
-      problem.AddResidualBlock(new RayResidual(camera.rotation.conjugate() * rays[o], camera.centre - frame->centre,
-                                               1 / options.ray_sigma_rad),
+      problem.AddResidualBlock(new SightResidual(camera.rotation.conjugate() * rays[o], camera.centre - frame->centre,
+                                                 1 / options.ray_sigma_rad),
                                &ray_loss, frame->centre.data(), point);
     }
     ordering->AddElementToGroup(point, 0);
@@ -89,7 +89,7 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
       problem.SetParameterBlockConstant(centre);
     else if (prior && options.use_positions)
       problem.AddResidualBlock(
-          new PositionResidual(prior->position - frame->rotation.conjugate() * prior->lever_arm, prior->sigma),
+          new StatedPosition(prior->position - frame->rotation.conjugate() * prior->lever_arm, prior->sigma),
           &position_loss, centre);
   }
   if (problem.NumResidualBlocks() == 0) return;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <sstream>
 
 #include "adjust/baselines.h"
@@ -12,6 +11,7 @@
 #include "adjust/orientation_graph.h"
 #include "adjust/resection.h"
 #include "adjust/rotation_averaging.h"
+#include "geometry/angles.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -25,9 +25,6 @@ void OrientationOptions::check() const {
 }
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
-std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 // The steps of one component; each leaves `values_` better than it found it.
 class Orientation {

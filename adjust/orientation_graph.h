@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -13,6 +14,9 @@
 #include "io/features.h"
 
 namespace megablock {
+
+// Local numbers are signed; the standard library wants them unsigned.
+inline std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 struct OrientationGraph {
   struct FrameNode {

@@ -5,10 +5,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <numbers>
 #include <random>
 #include <set>
 
+#include "geometry/angles.h"
 #include "geometry/gp3p.h"
 #include "geometry/line_ratio.h"
 #include "io/error.h"
@@ -17,7 +17,6 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 // Whitened residual and its derivative by the pose.

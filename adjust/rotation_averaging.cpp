@@ -3,11 +3,12 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <tuple>
 
 #include "adjust/disjoint_sets.h"
+#include "adjust/orientation_graph.h"
+#include "geometry/angles.h"
 
 namespace megablock {
 
@@ -15,9 +16,6 @@ namespace {
 
 using Edges = std::vector<RelativeRotation>;
 using Priors = std::vector<std::optional<RotationPrior>>;
-constexpr double kDegree = std::numbers::pi / 180;
-
-std::size_t row(std::int32_t node) { return static_cast<std::size_t>(node); }
 
 struct Neighbour {
   std::int32_t node;

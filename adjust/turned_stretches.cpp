@@ -10,7 +10,7 @@ namespace megablock {
 
 namespace {
 
-std::size_t at(FrameIndex frame) { return static_cast<std::size_t>(frame.value); }
+std::size_t row_of(FrameIndex frame) { return static_cast<std::size_t>(frame.value); }
 
 // What `to` must be for the relative pose to hold, and the other way round.
 Pose predicted_to(const RelativePose& relative, const Pose& from) {
@@ -85,7 +85,7 @@ class StretchTurner {
     std::iota(group_.begin(), group_.end(), std::size_t{0});
     for (std::size_t f = 0; f < group_.size(); ++f) members_.push_back({FrameIndex(static_cast<std::int64_t>(f))});
     for (const RelativePose& relative : block_.relative_poses)
-      if (both_oriented(relative) && !contradicted(relative)) join(at(relative.from), at(relative.to));
+      if (both_oriented(relative) && !contradicted(relative)) join(row_of(relative.from), row_of(relative.to));
   }
 
   // Median angle to the initial orientation of a group, moved or not.
@@ -125,20 +125,20 @@ class StretchTurner {
 
   // Frames moved; 0: the relative pose holds, or it is not the smaller group that is wrong.
   std::int64_t try_to_move(const RelativePose& relative) {
-    if (!both_oriented(relative) || find(at(relative.from)) == find(at(relative.to)) || !contradicted(relative))
+    if (!both_oriented(relative) || find(row_of(relative.from)) == find(row_of(relative.to)) || !contradicted(relative))
       return 0;
-    const bool move_to = members_[find(at(relative.to))].size() <= members_[find(at(relative.from))].size();
+    const bool move_to = members_[find(row_of(relative.to))].size() <= members_[find(row_of(relative.from))].size();
     const FrameIndex frame = move_to ? relative.to : relative.from;
     const Pose& before = state_.frames[frame];
     const Pose after = move_to ? predicted_to(relative, state_.frames[relative.from])
                                : predicted_from(relative, state_.frames[relative.to]);
     const Movement movement(before, after);
-    const std::vector<FrameIndex>& frames = members_[find(at(frame))];
+    const std::vector<FrameIndex>& frames = members_[find(row_of(frame))];
     const auto stay = [](const Pose& pose) { return pose; };
     if (distance(frames, movement) > 0.5 * distance(frames, stay) || !keeps_positions(frames, movement)) return 0;
     for (const FrameIndex member : frames) state_.frames[member] = movement(state_.frames[member]);
     const auto count = static_cast<std::int64_t>(frames.size());
-    join(at(relative.from), at(relative.to));
+    join(row_of(relative.from), row_of(relative.to));
     return count;
   }
 

@@ -15,7 +15,7 @@ namespace megablock {
 
 namespace {
 
-constexpr const char *kResult = "result/block.h5", *kBlock = "block.h5", *kTracks = "tracks";
+constexpr const char *kBlock = "block.h5", *kTracks = "tracks";
 
 void append_rows(const TrackSet& from, std::int64_t track, const std::vector<std::uint8_t>& kept, TrackSet& to) {
   const std::int64_t before = to.observation_count();

@@ -38,8 +38,6 @@ namespace megablock {
 
 namespace {
 
-constexpr const char* kResult = "result/block.h5";
-
 // Path of a finished job's result; warns of one that is older than what was asked since.
 std::string finished_result(const std::string& job) {
   const JobStore store(job);

@@ -123,7 +123,6 @@ ObservationOptions observation_options(const JobStore& store) {
 }
 
 std::string compare_with_monolithic(const JobStore& store) {
-  constexpr const char* kResult = "result/block.h5";
   if (!store.seal(kResult)) throw InputError(store.path(kResult) + ": the job has no result yet; run it to the end");
   const BlockResult result = read_result(store.verified_path(kResult));
   const SingleTile tile = single_tile(result, observation_options(store));

@@ -7,20 +7,18 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <numbers>
 
 #include "adjust/registration/frame_resection.h"
 #include "cluster/exit_codes.h"
 #include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
+#include "geometry/angles.h"
 #include "io/error.h"
 #include "io/project.h"
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 struct ResectOptions {
   std::string project, output;

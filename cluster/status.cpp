@@ -22,8 +22,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr const char* kResult = "result/block.h5";
-
 Json job_json(const JobStore& store) {
   std::ifstream in(store.path("job.json"));
   if (!in)

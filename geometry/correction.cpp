@@ -105,16 +105,16 @@ struct Basis {
 };
 
 // A function of an additive correction and its derivatives by x and y.
-struct Value {
+struct ValueAndSlopes {
   double value, by_x, by_y;
 };
 
-Value polynomial_value(const CorrectionTerm& t, const Basis& x, const Basis& y) {
+ValueAndSlopes polynomial_value(const CorrectionTerm& t, const Basis& x, const Basis& y) {
   const auto i = static_cast<std::size_t>(t.i), j = static_cast<std::size_t>(t.j);
   return {x.value[i] * y.value[j], x.slope[i] * y.value[j], x.value[i] * y.slope[j]};
 }
 
-Value fourier_value(const CorrectionTerm& t, double x, double y) {
+ValueAndSlopes fourier_value(const CorrectionTerm& t, double x, double y) {
   constexpr double kHalfPi = std::numbers::pi / 2;
   const double phase = kHalfPi * (t.i * x + t.j * y), c = std::cos(phase), s = std::sin(phase);
   const double slope = kHalfPi * (t.sine ? c : -s);
@@ -133,7 +133,7 @@ Correction additive(const Intrinsics& k, const Eigen::Vector2d& pixel, bool para
   const Basis basis_x(model.kind, fourier ? 0 : model.order, x), basis_y(model.kind, fourier ? 0 : model.order, y);
   int p = kCorrectionTerms;
   for (const CorrectionTerm& t : correction_term_list(model)) {
-    const Value v = fourier ? fourier_value(t, x, y) : polynomial_value(t, basis_x, basis_y);
+    const ValueAndSlopes v = fourier ? fourier_value(t, x, y) : polynomial_value(t, basis_x, basis_y);
     c.value[t.component] += k[p] * v.value;
     c.by_pixel(t.component, 0) += k[p] * v.by_x * scale_x;
     c.by_pixel(t.component, 1) += k[p] * v.by_y * scale_y;

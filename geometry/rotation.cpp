@@ -30,9 +30,10 @@ Eigen::Matrix3d axis_rotation(double angle, const Eigen::Vector3d& axis) {
 
 // Camera axes from body axes (x forward, y right, z down): camera x = body y, y = body z, z = body x.
 const Eigen::Matrix3d kCameraFromBody = (Eigen::Matrix3d() << 0, 1, 0, 0, 0, 1, 1, 0, 0).finished();
-const Eigen::Matrix3d kEnuFromNed = (Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished();
 
 }  // namespace
+
+const Eigen::Matrix3d kEnuFromNed = (Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished();
 
 // The photo's axes in the ground: M = Rx(omega) Ry(phi) Rz(kappa), photo -> ground.
 OmegaPhiKappa omega_phi_kappa(const Eigen::Quaterniond& rotation_cw) {

@@ -67,6 +67,9 @@ Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& w);
 // Angle of the rotation between two attitudes, radians in [0, pi].
 double rotation_angle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
+// East, north, up of north, east, down.
+extern const Eigen::Matrix3d kEnuFromNed;
+
 // Photogrammetric omega-phi-kappa (radians): R_cw(photo, y up, looking along -z) = Rk Rp Ro; and the navigation
 // yaw-pitch-roll of a body (x forward, y right, z down) in NED. Both refer to the camera of architecture.md
 // (x right, y down, looking along +z); see rotation.cpp for the axis changes.

@@ -68,10 +68,6 @@ void keep_former_bits(const Block& previous, Block& moved) {
   }
 }
 
-bool same_origin(const GroundFrame& a, const GroundFrame& b) {
-  return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
-}
-
 }  // namespace
 
 Block append_to(const Block& previous, const Block& now) {

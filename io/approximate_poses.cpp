@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "geometry/angles.h"
 #include "geometry/body_attitude.h"
 #include "io/csv_table.h"
 #include "io/error.h"
@@ -16,8 +17,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-constexpr double kGimbalDoubt = 20 * kRadiansPerDegree;  // of pitch -90: an aircraft does not stand on its nose
+constexpr double kGimbalDoubt = 20 * kDegree;  // of pitch -90: an aircraft does not stand on its nose
 
 // The three ways in which a file gives attitudes.
 enum class Angles { kPhotogrammetric, kGimbal, kBody };
@@ -39,7 +39,7 @@ void require_angles(const CsvTable& csv, Angles angles) {
 }
 
 Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, Angles angles) {
-  const auto angle = [&](const char* column) { return csv.needed_number(row, column) * kRadiansPerDegree; };
+  const auto angle = [&](const char* column) { return csv.needed_number(row, column) * kDegree; };
   if (angles == Angles::kPhotogrammetric)
     return rotation_from(OmegaPhiKappa{angle("omega_deg"), angle("phi_deg"), angle("kappa_deg")});
   if (angles == Angles::kGimbal)
@@ -98,10 +98,6 @@ ApproximatePoses read_quaternions(const std::string& path) {
                           table.poses[i],
                           table.passes.empty() ? std::nullopt : std::optional(table.passes[i])});
   return poses;
-}
-
-bool same_origin(const GroundFrame& a, const GroundFrame& b) {
-  return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
 }
 
 // Poses of the file in the block's frame.

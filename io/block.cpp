@@ -49,6 +49,10 @@ bool positive(const Eigen::Vector3d& sigma) { return (sigma.array() > 0).all(); 
 
 }  // namespace
 
+bool same_origin(const GroundFrame& a, const GroundFrame& b) {
+  return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
+}
+
 void check(const Block& block) {
   check_names(block.cameras, "camera");
   check_names(block.images, "image");
@@ -79,9 +83,9 @@ void check(const Block& block) {
                   positive(frame.position_prior->sigma),
               "frame '" + frame.name + "': position prior must be finite with positive sigmas (metres)");
     if (frame.attitude_prior)
-      require(positive(frame.attitude_prior->sigma_rad) &&
-                  std::abs(frame.attitude_prior->rotation_cw.norm() - 1) < 1e-9,
-              "frame '" + frame.name + "': attitude prior must be a unit quaternion with positive sigmas");
+      require(
+          positive(frame.attitude_prior->sigma_rad) && std::abs(frame.attitude_prior->rotation_cw.norm() - 1) < 1e-9,
+          "frame '" + frame.name + "': attitude prior must be a unit quaternion with positive sigmas");
     if (frame.given_pose) check_unit(*frame.given_pose, "frame '" + frame.name + "'");
   }
   for (const Image& image : block.images) {

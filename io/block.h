@@ -24,6 +24,7 @@ struct GroundFrame {
   double height_m = 0;        // ellipsoidal
   std::string crs = "local";  // of the inputs: "EPSG:4326", "EPSG:25832", "local"
 };
+bool same_origin(const GroundFrame& a, const GroundFrame& b);
 
 struct Camera {
   std::string name;

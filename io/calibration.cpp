@@ -5,15 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "geometry/decompositions.h"
 
 namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double worst_axis(const Eigen::Matrix3d& covariance) {
@@ -23,14 +22,14 @@ double worst_axis(const Eigen::Matrix3d& covariance) {
 // Per axis, of all directions.
 double mean_axis(const Eigen::Matrix3d& covariance) { return std::sqrt(std::max(0.0, covariance.trace() / 3)); }
 
-std::string quoted(const std::string& name) { return "\"" + name + "\""; }
+std::string quoted_name(const std::string& name) { return "\"" + name + "\""; }
 
 std::string list_of(const Eigen::Vector3d& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
 
 std::string camera_yaml(const CameraCalibration& camera) {
   const Intrinsics& k = camera.intrinsics;
   const CameraModel& model = k.model();
-  std::string text = fmt::format("  {}:\n    model: {}\n", quoted(camera.name), model_name(model));
+  std::string text = fmt::format("  {}:\n    model: {}\n", quoted_name(camera.name), model_name(model));
   if (!is_fixed(model, kFocal)) text += fmt::format("    focal_px: {}\n", k[kFocal]);
   text += fmt::format("    principal_point_px: [{}, {}]\n", k[kPrincipalX], k[kPrincipalY]);
   std::string distortion, sigma;
@@ -50,7 +49,7 @@ std::string camera_yaml(const CameraCalibration& camera) {
 std::string mount_yaml(const MountCalibration& m) {
   const Eigen::Vector3d translation = -(m.pose.rotation * m.pose.centre);
   return fmt::format("  {}: {{rotation: {}, translation: {}, sigma_rotation_deg: {:.3g}, sigma_position_m: {:.3g}}}\n",
-                     quoted(m.name), list_of(rotation_log<double>(m.pose.rotation)), list_of(translation),
+                     quoted_name(m.name), list_of(rotation_log<double>(m.pose.rotation)), list_of(translation),
                      mean_axis(m.covariance.topLeftCorner<3, 3>()) / kDegree,
                      mean_axis(m.covariance.bottomRightCorner<3, 3>()));
 }

@@ -4,23 +4,22 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
+
+#include "geometry/angles.h"
 
 namespace megablock {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
+OrderedJson number(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json fit_json(const RigFit& fit) {
-  Json json{{"measurements", fit.images.observations},
-            {"rms_px", number(fit.images.rms_px())},
-            {"mean_px", number(fit.images.mean_px())},
-            {"deviation_px", number(fit.images.deviation_px())}};
+OrderedJson fit_json(const RigFit& fit) {
+  OrderedJson json{{"measurements", fit.images.observations},
+                   {"rms_px", number(fit.images.rms_px())},
+                   {"mean_px", number(fit.images.mean_px())},
+                   {"deviation_px", number(fit.images.deviation_px())}};
   if (fit.check_points) {
     const PointFit& points = *fit.check_points;
     json["check_points"] = {{"points", points.points},         {"rms_m", points.rms_m},
@@ -30,13 +29,13 @@ Json fit_json(const RigFit& fit) {
   return json;
 }
 
-Json mount_json(const MountCalibration& m) {
+OrderedJson mount_json(const MountCalibration& m) {
   return {{"name", m.name},
           {"held", m.held},
           {"moved_m", (m.pose.centre - m.start.centre).norm()},
-          {"turned_deg", m.start.rotation.angularDistance(m.pose.rotation) * kDegrees},
+          {"turned_deg", m.start.rotation.angularDistance(m.pose.rotation) * kDegreesPerRadian},
           {"position_sigma_m", m.position_sigma_m()},
-          {"rotation_sigma_deg", m.rotation_sigma_rad() * kDegrees},
+          {"rotation_sigma_deg", m.rotation_sigma_rad() * kDegreesPerRadian},
           {"position_determined", m.position_determined},
           {"rotation_determined", m.rotation_determined},
           {"images", m.images},
@@ -66,8 +65,8 @@ std::string mount_line(const MountCalibration& m) {
                   column(m.after.rms_px()), m.quadrant[0], m.quadrant[1], m.quadrant[2], m.quadrant[3]);
   if (m.held) return fmt::format("{:<14}{:<40}", m.name, "held") + counted;
   return fmt::format("{:<14}{:>8.2f}{:>9.2f}{:>11.4f}{:>11.4f} ", m.name, 1e3 * (m.pose.centre - m.start.centre).norm(),
-                     1e3 * m.position_sigma_m(), m.start.rotation.angularDistance(m.pose.rotation) * kDegrees,
-                     m.rotation_sigma_rad() * kDegrees) +
+                     1e3 * m.position_sigma_m(), m.start.rotation.angularDistance(m.pose.rotation) * kDegreesPerRadian,
+                     m.rotation_sigma_rad() * kDegreesPerRadian) +
          counted;
 }
 
@@ -109,36 +108,36 @@ std::string calibration_text(const RigCalibration& c) {
 }
 
 std::string calibration_json(const RigCalibration& c) {
-  Json json{{"project", c.project},
-            {"mode", c.mode},
-            {"frames", c.frames},
-            {"points", c.points},
-            {"control_points", c.control_points},
-            {"residuals", c.residuals},
-            {"redundancy", number(c.redundancy)},
-            {"iterations", c.iterations},
-            {"sigma0", number(c.sigma0)},
-            {"image_sigma_px", number(c.image_sigma_px)},
-            {"before", fit_json(c.before)},
-            {"after", fit_json(c.after)},
-            {"held_out", c.held_out},
-            {"held_out_before_px", number(c.held_out_before_px)},
-            {"held_out_px", number(c.held_out_px)}};
+  OrderedJson json{{"project", c.project},
+                   {"mode", c.mode},
+                   {"frames", c.frames},
+                   {"points", c.points},
+                   {"control_points", c.control_points},
+                   {"residuals", c.residuals},
+                   {"redundancy", number(c.redundancy)},
+                   {"iterations", c.iterations},
+                   {"sigma0", number(c.sigma0)},
+                   {"image_sigma_px", number(c.image_sigma_px)},
+                   {"before", fit_json(c.before)},
+                   {"after", fit_json(c.after)},
+                   {"held_out", c.held_out},
+                   {"held_out_before_px", number(c.held_out_before_px)},
+                   {"held_out_px", number(c.held_out_px)}};
   if (c.verification_before) json["verification_before"] = fit_json(*c.verification_before);
   if (c.verification) json["verification"] = fit_json(*c.verification);
   json["datum"] = c.gauge;
-  json["mounts"] = Json::array();
+  json["mounts"] = OrderedJson::array();
   for (const MountCalibration& mount : c.mounts) json["mounts"].push_back(mount_json(mount));
-  json["cameras"] = Json::object();
+  json["cameras"] = OrderedJson::object();
   for (const CameraCalibration& camera : c.cameras) {
-    Json& entry = json["cameras"][camera.name];
+    OrderedJson& entry = json["cameras"][camera.name];
     for (int k = 0; k < camera.intrinsics.size(); ++k)
       entry[parameter_name(camera.intrinsics.model(), k)] = {{"value", camera.intrinsics[static_cast<std::size_t>(k)]},
                                                              {"sigma", camera.sigma[static_cast<std::size_t>(k)]}};
   }
   json["warnings"] = c.warnings;
   json["refused"] = c.refused;
-  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+  return json.dump(1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
 }  // namespace megablock

@@ -21,8 +21,6 @@ namespace megablock {
 
 namespace {
 
-constexpr const char* kResult = "result/block.h5";
-
 class Check {
  public:
   explicit Check(const JobStore& store) : store_(store) {}

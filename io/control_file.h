@@ -23,6 +23,8 @@
 
 namespace megablock {
 
+inline constexpr double kUnknownHeightSigma = 1000;  // metres: as good as free
+
 // As read: coordinates in `crs`, images by name.
 struct ControlTable {
   struct Measurement {

@@ -12,8 +12,6 @@ namespace megablock {
 
 namespace {
 
-constexpr double kUnknownHeightSigma = 1000;  // metres
-
 // Also by the last part of the name, where that is unique: control files often leave folders out.
 std::map<std::string, ImageIndex> images_by_name(const Block& block) {
   std::map<std::string, ImageIndex> by_name, by_last;

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct Format {
+struct ExportFormat {
   std::string name;
   bool folder;  // else one file
   void (*write)(const BlockResult&, const std::string&);
@@ -22,27 +22,27 @@ struct Format {
 
 void export_h5(const BlockResult& result, const std::string& path) { write_result(path, result); }
 
-const std::vector<Format>& formats() {
-  static const std::vector<Format> all = {{"colmap-text", true, export_colmap_text},
-                                          {"colmap-bin", true, export_colmap_binary},
-                                          {"bal", false, export_bal},
-                                          {"bundler", false, export_bundler},
-                                          {"ply", false, export_ply},
-                                          {"geojson", false, export_geojson},
-                                          {"csv", true, export_csv},
-                                          {"h5", false, export_h5}};
+const std::vector<ExportFormat>& writers() {
+  static const std::vector<ExportFormat> all = {{"colmap-text", true, export_colmap_text},
+                                                {"colmap-bin", true, export_colmap_binary},
+                                                {"bal", false, export_bal},
+                                                {"bundler", false, export_bundler},
+                                                {"ply", false, export_ply},
+                                                {"geojson", false, export_geojson},
+                                                {"csv", true, export_csv},
+                                                {"h5", false, export_h5}};
   return all;
 }
 
 }  // namespace
 
 const std::vector<std::string>& export_formats() {
-  static const std::vector<std::string> names = names_of(formats());
+  static const std::vector<std::string> names = names_of(writers());
   return names;
 }
 
 void export_result(const BlockResult& result, const std::string& format, const std::string& out) {
-  const Format& found = format_named(formats(), format, "export");
+  const ExportFormat& found = format_named(writers(), format, "export");
   const fs::path folder = found.folder ? fs::path(out) : fs::absolute(out).parent_path();
   std::error_code error;
   fs::create_directories(folder, error);

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "geometry/body_attitude.h"
 #include "io/crs.h"
 #include "io/export_tables.h"
@@ -14,8 +14,6 @@ namespace megablock {
 namespace fs = std::filesystem;
 
 namespace {
-
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
   const OmegaPhiKappa o = omega_phi_kappa(rotation);

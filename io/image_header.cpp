@@ -14,15 +14,13 @@ namespace megablock {
 
 namespace {
 
-constexpr double kNaN = ImageHeader::kUnknown;
-
 // Exiv2 and its XMP parser keep global tables: one reader at a time.
 std::mutex& exiv2_mutex() {
   static std::mutex mutex;
   return mutex;
 }
 
-std::string trimmed(std::string text) {
+std::string trimmed_exif(std::string text) {
   while (!text.empty() && (text.back() == ' ' || text.back() == '\0' || text.back() == '\n')) text.pop_back();
   text.erase(0, text.find_first_not_of(' ') == std::string::npos ? text.size() : text.find_first_not_of(' '));
   return text;
@@ -34,19 +32,19 @@ class ExifFields {
 
   std::string text(const char* key) const {
     const auto* value = find(key);
-    return value ? trimmed(value->toString()) : "";
+    return value ? trimmed_exif(value->toString()) : "";
   }
   // The n-th component; NaN when absent or with denominator zero.
   double number(const char* key, long n = 0) const {
     const auto* value = find(key);
-    if (!value || n >= value->count()) return kNaN;
+    if (!value || n >= value->count()) return ImageHeader::kUnknown;
     const Exiv2::TypeId type = value->typeId();
     if (type == Exiv2::unsignedRational || type == Exiv2::signedRational) {
       const Exiv2::Rational r = value->toRational(n);
       const bool is_unsigned = type == Exiv2::unsignedRational;
       const double top = is_unsigned ? static_cast<std::uint32_t>(r.first) : r.first;
       const double bottom = is_unsigned ? static_cast<std::uint32_t>(r.second) : r.second;
-      return bottom != 0 ? top / bottom : kNaN;
+      return bottom != 0 ? top / bottom : ImageHeader::kUnknown;
     }
     return static_cast<double>(value->toFloat(n));
   }
@@ -63,10 +61,10 @@ class ExifFields {
 double xmp_number(const Exiv2::XmpData& data, const std::string& group, const std::string& name) {
   for (const auto& property : data) {
     if (property.groupName() != group || property.tagName() != name) continue;
-    double value = kNaN;
-    return std::sscanf(property.toString().c_str(), "%lf", &value) == 1 ? value : kNaN;
+    double value = ImageHeader::kUnknown;
+    return std::sscanf(property.toString().c_str(), "%lf", &value) == 1 ? value : ImageHeader::kUnknown;
   }
-  return kNaN;
+  return ImageHeader::kUnknown;
 }
 
 // Degrees of the three rationals degrees, minutes, seconds (the latter two may be absent).
@@ -107,10 +105,11 @@ void read_attitude(const Exiv2::XmpData& xmp, ImageHeader& header) {
 double read_time(const ExifFields& exif) {
   const std::string text = exif.text("Exif.Photo.DateTimeOriginal");
   int year, month, day, hour, minute, second;
-  if (std::sscanf(text.c_str(), "%d:%d:%d %d:%d:%d", &year, &month, &day, &hour, &minute, &second) != 6) return kNaN;
+  if (std::sscanf(text.c_str(), "%d:%d:%d %d:%d:%d", &year, &month, &day, &hour, &minute, &second) != 6)
+    return ImageHeader::kUnknown;
   const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
-  if (!date.ok() || year < 1900) return kNaN;
+  if (!date.ok() || year < 1900) return ImageHeader::kUnknown;
   const double days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
   double time = days * 86400 + hour * 3600 + minute * 60 + second;
   const std::string fraction = exif.text("Exif.Photo.SubSecTimeOriginal");

@@ -15,28 +15,28 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct Format {
+struct ImportFormat {
   std::string name;
   ImportedBlock (*read)(const std::string&);
 };
 
-const std::vector<Format>& formats() {
-  static const std::vector<Format> all = {{"colmap-text", import_colmap_text},
-                                          {"colmap-bin", import_colmap_binary},
-                                          {"bal", import_bal},
-                                          {"bundler", import_bundler}};
+const std::vector<ImportFormat>& readers() {
+  static const std::vector<ImportFormat> all = {{"colmap-text", import_colmap_text},
+                                                {"colmap-bin", import_colmap_binary},
+                                                {"bal", import_bal},
+                                                {"bundler", import_bundler}};
   return all;
 }
 
 }  // namespace
 
 const std::vector<std::string>& import_formats() {
-  static const std::vector<std::string> names = names_of(formats());
+  static const std::vector<std::string> names = names_of(readers());
   return names;
 }
 
 ImportedBlock import_block(const std::string& format, const std::string& path) {
-  return format_named(formats(), format, "import").read(path);
+  return format_named(readers(), format, "import").read(path);
 }
 
 void write_imported(const ImportedBlock& imported, const std::string& folder) {

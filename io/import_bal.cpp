@@ -11,8 +11,6 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kMany = std::int64_t{1} << 40;
-
 std::string numbered(const char* prefix, std::int64_t i) {
   std::string digits = std::to_string(i);
   if (digits.size() < 6) digits.insert(0, 6 - digits.size(), '0');

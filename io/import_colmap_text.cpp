@@ -8,8 +8,6 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kMany = std::int64_t{1} << 40;
-
 class TextReader {
  public:
   explicit TextReader(const std::string& folder) : folder_(folder) {}

@@ -2,8 +2,9 @@
 //
 // A unit file is written under a temporary name in its final directory, sealed by a 64-byte trailer (magic, format
 // version, payload length, XXH3 of the payload, fingerprint), fsynced, renamed, and its directory fsynced. HDF5 ignores
-// bytes behind its own end of file, so a sealed unit opens in any HDF5 reader. The fingerprint is the hash of everything
-// the unit was computed from; a unit is up to date when it is there, whole, and has the fingerprint asked for.
+// bytes behind its own end of file, so a sealed unit opens in any HDF5 reader. The fingerprint is the hash of
+// everything the unit was computed from; a unit is up to date when it is there, whole, and has the fingerprint asked
+// for.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +16,11 @@
 
 namespace megablock {
 
+inline constexpr const char* kResult = "result/block.h5";  // a unit of every finished job
+
 struct UnitSeal {
-  std::uint64_t length = 0;       // of the payload, bytes
-  std::uint64_t content_hash = 0; // XXH3 of the payload
+  std::uint64_t length = 0;        // of the payload, bytes
+  std::uint64_t content_hash = 0;  // XXH3 of the payload
   std::uint64_t fingerprint = 0;
 };
 

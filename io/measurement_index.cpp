@@ -95,10 +95,10 @@ void check_measurement_index(const JobStore& store) {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kBeyond = std::numeric_limits<float>::infinity(), kUnset = std::numeric_limits<float>::quiet_NaN();
 
-struct Box {
-  std::array<float, 3> lowest = {kNaN, kNaN, kNaN}, highest = {kNaN, kNaN, kNaN};
+struct Bounds {
+  std::array<float, 3> lowest = {kUnset, kUnset, kUnset}, highest = {kUnset, kUnset, kUnset};
 
   // fmin and fmax pass over NaN.
   void add(const float* low, const float* high) {
@@ -118,12 +118,12 @@ struct Box {
 std::vector<float> boxes_of(const std::vector<Eigen::Vector3d>& points) {
   std::vector<float> boxes;
   for (std::size_t first = 0; first < points.size(); first += kPointRun) {
-    Box box;
+    Bounds box;
     for (std::size_t row = first; row < std::min<std::size_t>(points.size(), first + kPointRun); ++row) {
       if (!points[row].allFinite()) continue;
       const Eigen::Vector3f point = points[row].cast<float>();
-      const Eigen::Vector3f low = point.unaryExpr([](float v) { return std::nextafter(v, -kInfinity); });
-      const Eigen::Vector3f high = point.unaryExpr([](float v) { return std::nextafter(v, kInfinity); });
+      const Eigen::Vector3f low = point.unaryExpr([](float v) { return std::nextafter(v, -kBeyond); });
+      const Eigen::Vector3f high = point.unaryExpr([](float v) { return std::nextafter(v, kBeyond); });
       box.add(low.data(), high.data());
     }
     box.append_to(boxes);
@@ -135,7 +135,7 @@ std::vector<float> districts_of(const std::vector<float>& boxes) {
   constexpr std::size_t kValues = 6 * kDistrictRuns;
   std::vector<float> districts;
   for (std::size_t first = 0; first < boxes.size(); first += kValues) {
-    Box box;
+    Bounds box;
     for (std::size_t i = first; i < std::min(boxes.size(), first + kValues); i += 6) box.add(&boxes[i], &boxes[i + 3]);
     box.append_to(districts);
   }

@@ -13,7 +13,6 @@ namespace megablock {
 
 namespace {
 
-constexpr const char* kResult = "result/block.h5";
 constexpr std::int64_t kGap = 4096;  // rows; closer ones lie in one chunk, mostly
 
 // The values of some rows of a column of which `ranges` were read.

@@ -7,6 +7,9 @@
 
 namespace megablock {
 
+// More than a file can count.
+inline constexpr std::int64_t kMany = std::int64_t{1} << 40;
+
 class NumberReader {
  public:
   explicit NumberReader(const std::string& path);  // InputError when it cannot be read

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::array<const char*, 8> kColumns = {"name", "qw", "qx", "qy", "qz", "x", "y", "z"};
 
-std::vector<std::string> split(const std::string& line) {
+std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> fields;
   std::stringstream stream(line);
   for (std::string field; std::getline(stream, field, ',');) {
@@ -40,9 +40,9 @@ class CsvReader {
       if (line.front() == '#') {
         read_origin(line);
       } else if (columns_.empty()) {
-        read_header(split(line));
+        read_header(cells_of(line));
       } else {
-        read_row(split(line));
+        read_row(cells_of(line));
       }
     }
     if (table_.names.empty()) fail("no poses; expected the columns name,qw,qx,qy,qz,x,y,z");

@@ -1,8 +1,8 @@
 // calibration: cameras and mounts that `megablock calibrate` found, of this block or of another one that the same rig
 // recorded.
 #include <algorithm>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/calibration.h"
 #include "io/error.h"
 #include "io/project_sections.h"
@@ -10,8 +10,6 @@
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 std::string listed(const std::vector<std::string>& names) {
   std::string text;

@@ -1,8 +1,8 @@
 // Position and attitude priors: what the images say (EXIF, XMP), the options `gps`, `attitude`, `origin`.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/project_sections.h"
@@ -12,9 +12,7 @@ namespace megablock {
 namespace {
 
 constexpr double kDefaultHorizontalSigma = 3, kDefaultVerticalSigma = 6;  // metres
-constexpr double kUnknownHeightSigma = 1000;                              // metres: the height is not known
 constexpr double kTiltSigmaDeg = 3, kYawSigmaDeg = 10;                    // of a gimbal
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 struct GpsOptions {
   bool use = true;
@@ -125,8 +123,8 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
     for (Frame& frame : block.frames) frame.attitude_prior.reset();
   if (!use || scanned.empty() || !block.ground.georeferenced) return;
   const Georeference georeference(block.ground);
-  const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kRadiansPerDegree;
-  const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kRadiansPerDegree;
+  const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kDegree;
+  const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kDegree;
   for (std::size_t i = 0; i < scanned.size(); ++i) {
     if (!scanned[i].header.attitude) continue;
     const auto& angles = *scanned[i].header.attitude;
@@ -134,8 +132,8 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
     Frame& frame = block.frames[block.images[image].frame];
     if (frame.attitude_prior) continue;
     AttitudePrior prior;
-    prior.rotation_cw = rotation_from(YawPitchRoll{
-        angles.yaw_deg * kRadiansPerDegree, angles.pitch_deg * kRadiansPerDegree, angles.roll_deg * kRadiansPerDegree});
+    prior.rotation_cw =
+        rotation_from(YawPitchRoll{angles.yaw_deg * kDegree, angles.pitch_deg * kDegree, angles.roll_deg * kDegree});
     if (frame.position_prior)
       prior.rotation_cw =
           (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))

@@ -14,7 +14,7 @@ namespace megablock {
 
 namespace {
 
-using Json = nlohmann::ordered_json;  // keeps the order of the file
+using OrderedJson = nlohmann::ordered_json;  // keeps the order of the file
 
 constexpr double kPositionSigma = 0.05, kRotationSigmaDeg = 1;  // of a mount, unless the project file says otherwise
 
@@ -28,16 +28,16 @@ struct Exposure {
   std::vector<std::pair<std::string, std::string>> images;  // image, rig camera
 };
 
-Json read_json(const std::string& path) {
+OrderedJson read_json(const std::string& path) {
   std::ifstream stream(path);
   try {
-    return Json::parse(stream);
-  } catch (const Json::exception& error) {
+    return OrderedJson::parse(stream);
+  } catch (const OrderedJson::exception& error) {
     throw InputError(path + ": not valid JSON: " + error.what());
   }
 }
 
-Eigen::Vector3d vector_of(const Json& object, const char* key, const std::string& where) {
+Eigen::Vector3d vector_of(const OrderedJson& object, const char* key, const std::string& where) {
   const auto found = object.is_object() ? object.find(key) : object.end();
   if (found == object.end() || !found->is_array() || found->size() != 3)
     throw InputError(where + ": '" + key + "' must be a list of 3 numbers");
@@ -50,7 +50,7 @@ Eigen::Vector3d vector_of(const Json& object, const char* key, const std::string
 }
 
 std::vector<RigCamera> read_rig_cameras(const std::string& path) {
-  const Json json = read_json(path);
+  const OrderedJson json = read_json(path);
   if (!json.is_object() || json.empty()) throw InputError(path + ": expected an object of rig cameras by name");
   std::vector<RigCamera> cameras;
   for (const auto& [name, value] : json.items()) {
@@ -62,10 +62,10 @@ std::vector<RigCamera> read_rig_cameras(const std::string& path) {
   return cameras;
 }
 
-Exposure read_exposure(const Json& list, const std::string& name, const std::string& where) {
+Exposure read_exposure(const OrderedJson& list, const std::string& name, const std::string& where) {
   Exposure exposure{name, {}};
   if (!list.is_array()) throw InputError(where + " must be a list of [image, rig camera]");
-  for (const Json& pair : list) {
+  for (const OrderedJson& pair : list) {
     if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string())
       throw InputError(where + " must be a list of [image, rig camera]");
     exposure.images.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
@@ -75,7 +75,7 @@ Exposure read_exposure(const Json& list, const std::string& name, const std::str
 
 // A list of exposures, or an object of them by name.
 std::vector<Exposure> read_exposures(const std::string& path) {
-  const Json json = read_json(path);
+  const OrderedJson json = read_json(path);
   if (!json.is_array() && !json.is_object()) throw InputError(path + ": expected a list of rig exposures");
   std::vector<Exposure> exposures;
   std::int64_t number = 0;

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/report/figures.h"
 
 namespace megablock {
@@ -15,7 +15,6 @@ namespace {
 constexpr std::size_t kNamed = 5;           // points by name
 constexpr std::size_t kParts = 5;           // of a free datum, described
 constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 // Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
 std::string pixels(double value) {
@@ -39,7 +38,7 @@ Placing placing_of(const BlockResult& result, const report::Figures& figures, st
     placing.positions += result.block.frames[f].position_prior.has_value();
     placing.attitudes += result.block.frames[f].attitude_prior.has_value();
     if (result.frame_covariance.contains(f))
-      sigmas.push_back(std::sqrt(result.frame_covariance[f].diagonal().head<3>().maxCoeff()) * kDegrees);
+      sigmas.push_back(std::sqrt(result.frame_covariance[f].diagonal().head<3>().maxCoeff()) * kDegreesPerRadian);
   }
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
     const ControlPoint& given = result.block.control_points[p];
@@ -79,7 +78,7 @@ report::Figures parts_of(const BlockResult& result, const TrackBatches& tracks) 
   return figures;
 }
 
-std::string sigma_text(const Placing& placing) {
+std::string sigmas_of(const Placing& placing) {
   if (!std::isfinite(placing.rotation_deg) || placing.rotation_deg < 1) return "";
   return fmt::format(" (sigma of the rotations {:.0f} degrees)", placing.rotation_deg);
 }
@@ -142,7 +141,7 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
       lines.push_back(
           fmt::format("{} free: nothing determines {}{}; {}",
                       whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
-                      undetermined(part.defect, placing), sigma_text(placing), consequence(part.defect, placing)));
+                      undetermined(part.defect, placing), sigmas_of(placing), consequence(part.defect, placing)));
     } else if (placing.rotation_deg > kUnusableRotationDeg) {
       lines.push_back(
           fmt::format("The rotations{} are known to {:.0f} degrees only (sigma): heights and attitudes are "

@@ -20,7 +20,7 @@ std::string parse_leading(const std::string& text, Value& value) {
   return error == std::errc() ? std::string(end, text.data() + text.size()) : text;
 }
 
-std::string quoted(const std::string& text) { return "'" + text + "'"; }
+std::string in_apostrophes(const std::string& text) { return "'" + text + "'"; }
 
 // Edit distance of Levenshtein, for the suggestion in a message.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -43,11 +43,13 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 double parse_number(const std::string& text, const std::string& what, const std::string& where) {
   double value = 0;
   const std::string rest = parse_leading(text, value);
-  if (rest == text || text.empty()) throw InputError(where + ": " + what + ": " + quoted(text) + " is not a number");
+  if (rest == text || text.empty())
+    throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a number");
   if (!rest.empty())
-    throw InputError(where + ": " + what + ": " + quoted(text) + " has something behind the number (" + quoted(rest) +
-                     "); the unit is part of the key's name, write the number alone");
-  if (!std::isfinite(value)) throw InputError(where + ": " + what + ": " + quoted(text) + " is not a finite number");
+    throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " has something behind the number (" +
+                     in_apostrophes(rest) + "); the unit is part of the key's name, write the number alone");
+  if (!std::isfinite(value))
+    throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a finite number");
   return value;
 }
 
@@ -55,14 +57,14 @@ std::int64_t parse_integer(const std::string& text, const std::string& what, con
   std::int64_t value = 0;
   const std::string rest = parse_leading(text, value);
   if (text.empty() || !rest.empty())
-    throw InputError(where + ": " + what + ": " + quoted(text) + " is not a whole number");
+    throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a whole number");
   return value;
 }
 
 bool parse_flag(const std::string& text, const std::string& what, const std::string& where) {
   if (text == "true") return true;
   if (text == "false") return false;
-  throw InputError(where + ": " + what + ": " + quoted(text) + " is neither true nor false");
+  throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is neither true nor false");
 }
 
 std::string nearest_name(const std::string& name, const std::vector<std::string>& known) {
@@ -79,9 +81,10 @@ std::string nearest_name(const std::string& name, const std::vector<std::string>
 
 std::string unknown_key_message(const std::string& key, const std::string& section,
                                 const std::vector<std::string>& known) {
-  std::string message = "unknown key " + quoted(key) + (section.empty() ? "" : " in " + quoted(section)) + ";";
+  std::string message =
+      "unknown key " + in_apostrophes(key) + (section.empty() ? "" : " in " + in_apostrophes(section)) + ";";
   const std::string nearest = nearest_name(key, known);
-  if (!nearest.empty()) message += " did you mean " + quoted(nearest) + "?";
+  if (!nearest.empty()) message += " did you mean " + in_apostrophes(nearest) + "?";
   std::string list;
   for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
   return message + " known keys: " + (list.empty() ? "none" : list);
@@ -144,7 +147,8 @@ bool SettingsReader::choice(const std::string& key, const std::vector<std::strin
   if (found == choices.end()) {
     std::string list;
     for (const std::string& choice : choices) list += (list.empty() ? "" : ", ") + choice;
-    throw InputError(entry->where + ": " + section_ + "." + key + ": " + quoted(entry->value) + " is none of: " + list);
+    throw InputError(entry->where + ": " + section_ + "." + key + ": " + in_apostrophes(entry->value) +
+                     " is none of: " + list);
   }
   field = static_cast<int>(found - choices.begin());
   return true;

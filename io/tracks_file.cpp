@@ -9,12 +9,12 @@
 
 namespace megablock {
 
-namespace {
-
 // Where the delta coding of a file stands after the rows written so far.
-struct Coded {
+struct TrackCoding {
   std::int64_t last_id = 0, last_first_image = 0;
 };
+
+namespace {
 
 struct Columns {
   std::vector<std::int64_t> id_difference, observations, image_difference;
@@ -36,7 +36,7 @@ std::vector<std::int64_t> image_differences(const TrackSet& tracks, std::int64_t
   return values;
 }
 
-Columns encode(const TrackSet& tracks, Coded& coded) {
+Columns encode(const TrackSet& tracks, TrackCoding& coded) {
   Columns columns;
   columns.id_difference = differences(plain(tracks.id));
   if (!tracks.id.empty()) {
@@ -102,7 +102,7 @@ void check_order(const Hdf5Reader& file, const TrackSet& tracks, TrackIndex befo
 void write_tracks(const std::string& path, const TrackSet& tracks) {
   Hdf5Writer file(path, "tracks");
   make_groups(file);
-  Coded coded;
+  TrackCoding coded;
   const Columns columns = encode(tracks, coded);
   file.integers(kIds, columns.id_difference, note_of(kIds));
   file.integers(kCounts, columns.observations, note_of(kCounts));
@@ -131,7 +131,7 @@ std::vector<std::int32_t> narrow(const std::vector<std::int64_t>& values) {
 struct TrackWriter::File {
   explicit File(const std::string& path) : hdf5(path, "tracks", Hdf5Storage::kDisk) {}
   Hdf5Writer hdf5;
-  Coded coded;
+  TrackCoding coded;
 };
 
 TrackWriter::TrackWriter(const std::string& path) : file_(std::make_unique<File>(path)) {

@@ -4,12 +4,11 @@
 #include <algorithm>
 
 #include "geometry/rotation.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 MotionSums::Row row_of(const Eigen::Vector3d& c, const PoseIncrement& x) {
   const Eigen::Vector3d w = x.head<3>(), d = x.tail<3>();

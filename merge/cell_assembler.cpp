@@ -1,10 +1,10 @@
 #include "merge/cell_assembler.h"
 
+#include "merge/unknowns.h"
+
 namespace megablock {
 
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // C -= A B' with three columns each; leading dimensions n, lda, ldb. Numbers of rows are known when compiling, or 0.
 template <int kRows, int kColumns>

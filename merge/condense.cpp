@@ -6,12 +6,11 @@
 #include "geometry/decompositions.h"
 #include "merge/cell_assembler.h"
 #include "merge/point_equations.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                const PlanNode& node, PointEquations& equations, std::vector<double>& diagonal, Front& front) {

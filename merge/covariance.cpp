@@ -4,12 +4,11 @@
 
 #include "merge/condense.h"
 #include "merge/point_equations.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 ObservationKind image_kind(PointRole role) {
   return role == PointRole::kControl ? ObservationKind::kControlImage

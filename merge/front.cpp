@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "io/error.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
@@ -14,8 +15,6 @@ namespace {
 constexpr std::int64_t kPanel = 64;  // columns per step of the blocked factorisation
 
 int blas(std::int64_t n) { return static_cast<int>(n); }
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
-
 // First row of every unknown of `wanted` in `list` laid out as row_offsets(list).
 std::vector<std::int64_t> rows_in(const UnknownList& list, const UnknownList& wanted, const char* what) {
   const std::vector<std::int64_t> offsets = row_offsets(list);

@@ -5,6 +5,7 @@
 #include "adjust/disjoint_sets.h"
 #include "geometry/decompositions.h"
 #include "geometry/rotation.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
@@ -16,8 +17,6 @@ constexpr double kNullDirection = 1e-11;  // of the largest eigenvalue; the matr
 constexpr double kHeldDirection = 1e-6;   // of the largest singular value: what a frame can hold
 constexpr double kOnePlace = 1e-9;        // of the coordinates: extent of frames that are all at one place
 constexpr double kNoScale = 1e6;          // weight of a scale that moves nothing
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // All parts of one component.
 struct PartGroup {

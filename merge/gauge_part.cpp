@@ -4,12 +4,11 @@
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
 #include "merge/gauge.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 constexpr double kScaleGiven = 1e6;  // weight of the scale where held mounts give it
 

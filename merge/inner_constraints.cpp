@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "geometry/decompositions.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
@@ -33,8 +34,6 @@ InnerSums InnerSums::from_bytes(const Bytes& bytes) {
 }
 
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // Columns 1.. of an unknown's rows that belong to a component: [6 x defect].
 Eigen::Matrix<double, 6, Eigen::Dynamic> columns_of(const Step& unknowns, const UnknownId& id,

@@ -3,13 +3,9 @@
 #include <cmath>
 #include <map>
 
+#include "merge/unknowns.h"
+
 namespace megablock {
-
-namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan) {
   std::vector<ImageUnknowns> list;

@@ -5,23 +5,21 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 
 #include "adjust/linearise.h"
+#include "geometry/angles.h"
 #include "geometry/line_ratio.h"
 #include "io/error.h"
 #include "merge/rig_posterior.h"
 #include "merge/serial_runner.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kMinLineRatio = 0.02;  // of control points; below they lie on one line
 constexpr std::size_t kFewControl = 3;
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 BlockState state_of(const Block& block, const BlockState& start, const WholeBlock& whole) {
   BlockState state = start;

@@ -3,14 +3,9 @@
 #include "adjust/linearise.h"
 #include "io/error.h"
 #include "merge/point_refinement.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
-
-namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 SerialRunner::SerialRunner(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
                            MemoryOptions memory)

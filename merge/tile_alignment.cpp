@@ -90,7 +90,7 @@ struct StayResidual {
   }
 };
 
-struct Frame {  // of all tiles
+struct SharedFrame {  // of all tiles
   FrameIndex frame;
   std::int64_t observations;
   std::size_t tile, row;
@@ -122,18 +122,18 @@ class Aligner {
   }
 
  private:
-  Placed placed(const Frame& f) const {
+  Placed placed(const SharedFrame& f) const {
     const Pose& pose = tiles_[f.tile].poses[f.row];
     return {pose.centre - centroids_[f.tile], centroids_[f.tile], pose.rotation};
   }
 
   void find_common_frames() {
-    std::vector<Frame> all;
+    std::vector<SharedFrame> all;
     for (std::size_t t = 0; t < tiles_.size(); ++t)
       for (std::size_t row = 0; row < tiles_[t].frames.size(); ++row)
         if (tiles_[t].observations[row] >= kFewestObservations)
           all.push_back({tiles_[t].frames[row], tiles_[t].observations[row], t, row});
-    std::sort(all.begin(), all.end(), [](const Frame& a, const Frame& b) {
+    std::sort(all.begin(), all.end(), [](const SharedFrame& a, const SharedFrame& b) {
       if (a.frame != b.frame) return a.frame < b.frame;
       return a.observations != b.observations ? a.observations > b.observations : a.tile < b.tile;
     });

@@ -12,14 +12,14 @@ namespace megablock {
 namespace {
 
 // Which rows of the problem's tables a kept residual touches.
-struct Touched {
+struct TouchedRows {
   std::vector<std::uint8_t> frames, cameras, mounts;
 };
 
-Touched touched_rows(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
-  Touched touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
-                  std::vector<std::uint8_t>(problem.cameras.size(), 0),
-                  std::vector<std::uint8_t>(problem.mounts.size(), 0)};
+TouchedRows touched_rows(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
+  TouchedRows touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
+                      std::vector<std::uint8_t>(problem.cameras.size(), 0),
+                      std::vector<std::uint8_t>(problem.mounts.size(), 0)};
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
     if (!problem.active(p)) continue;
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
@@ -51,7 +51,8 @@ Unknown mount_unknown(const TileProblem& problem, std::size_t row) {
   return {{UnknownKind::kMount, problem.mounts[row].mount, problem.mounts[row].rig.value}, 6};
 }
 
-UnknownList listed(const TileProblem& problem, const Touched& touched, const std::vector<ParameterMask>& camera_free) {
+UnknownList listed(const TileProblem& problem, const TouchedRows& touched,
+                   const std::vector<ParameterMask>& camera_free) {
   UnknownList unknowns;
   for (std::size_t row = 0; row < touched.frames.size(); ++row)
     if (touched.frames[row]) unknowns.push_back(frame_unknown(problem, row));

@@ -3,11 +3,15 @@
 #pragma once
 
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 namespace megablock {
+
+// Rows and offsets are signed; the standard library wants them unsigned.
+inline std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 enum class UnknownKind : std::int32_t { kFrame = 0, kCamera = 1, kMount = 2 };
 

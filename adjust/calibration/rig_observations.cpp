@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "adjust/linearise.h"
+#include "geometry/angles.h"
 #include "geometry/median.h"
 #include "geometry/similarity.h"
 #include "io/error.h"
@@ -14,8 +14,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+const Eigen::Vector3d kNoPoint = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 void remove_datum(Block& block) {
   block.control_points.clear();
@@ -116,7 +115,7 @@ WholeBlock whole_block(const Block& block, const BlockState& state, const TrackS
   WholeBlock whole;
   whole.problem = make_tile_problem(block, state, single_tile(block), TileIndex(0), tracks, options);
   whole.state =
-      make_tile_state(whole.problem, state, std::vector<Eigen::Vector3d>(whole.problem.points.size(), kNowhere));
+      make_tile_state(whole.problem, state, std::vector<Eigen::Vector3d>(whole.problem.points.size(), kNoPoint));
   return whole;
 }
 

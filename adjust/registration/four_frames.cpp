@@ -3,13 +3,13 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <limits>
-#include <numbers>
+
+#include "geometry/angles.h"
 
 namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kHeldRotation = 1e-9, kHeldPosition = 1e-7;  // sigmas that hold a pair, rad and m
 constexpr double kFarthest = 500;                             // of a point from its frame, metres
 

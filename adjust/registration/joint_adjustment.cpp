@@ -9,16 +9,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "adjust/ceres_residuals.h"
+#include "geometry/angles.h"
 #include "io/error.h"
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 using residual::centre_of;
 using residual::rotation_of;
@@ -39,7 +37,7 @@ void store(const Matrix6& white, const Vector3<Scalar>& a, const Vector3<Scalar>
 }
 
 // `weight` points to a number that changes from round to round.
-struct RelativeResidual {
+struct LinkResidual {
   Pose pose;
   Matrix6 white;
   bool in_ground;
@@ -181,9 +179,9 @@ class JointProblem {
     }
   }
 
-  void add_relative(const RelativeResidual& r, FrameIndex from, FrameIndex to) {
+  void add_relative(const LinkResidual& r, FrameIndex from, FrameIndex to) {
     ceres_->AddResidualBlock(
-        new ceres::AutoDiffCostFunction<RelativeResidual, 6, kPoseBlock, kPoseBlock>(new RelativeResidual(r)), nullptr,
+        new ceres::AutoDiffCostFunction<LinkResidual, 6, kPoseBlock, kPoseBlock>(new LinkResidual(r)), nullptr,
         frame(from), frame(to));
   }
 
@@ -226,7 +224,7 @@ class JointProblem {
   double registration_squares(std::size_t i) {
     const RegistrationLink& link = input_.registrations[i];
     std::array<double, 6> r;
-    RelativeResidual{link.pose, registration_white_[i], false, &one_}(frame(link.from), frame(link.to), r.data());
+    LinkResidual{link.pose, registration_white_[i], false, &one_}(frame(link.from), frame(link.to), r.data());
     return Eigen::Map<const Eigen::Matrix<double, 6, 1>>(r.data()).squaredNorm();
   }
 

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <numbers>
 
 #include "adjust/registration/four_frames.h"
 #include "adjust/rig_resection.h"
+#include "geometry/angles.h"
 #include "geometry/median.h"
 #include "geometry/similarity.h"
 #include "io/error.h"
@@ -15,8 +15,6 @@
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 std::vector<FourFrameTrack> seen_by_enough(const std::vector<FourFrameTrack>& tracks, int min_frames) {
   std::vector<FourFrameTrack> result;

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 
 #include "adjust/linearise.h"
+#include "geometry/angles.h"
 #include "geometry/median.h"
 #include "io/error.h"
 
@@ -16,7 +16,6 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kHeldPosition = 1e-3, kHeldRotation = 1e-5;  // sigmas of the first frame of a window, m and rad
 
 std::size_t at(FrameIndex f) { return static_cast<std::size_t>(f.value); }

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <optional>
 
+#include "geometry/angles.h"
 #include "geometry/pose.h"
 #include "geometry/triangulation.h"
 #include "io/error.h"
@@ -16,7 +16,6 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFree = 1e6;        // sigma of a coordinate that is not known, metres
 constexpr double kSamePlace = 1e-3;  // metres
 

@@ -9,14 +9,15 @@ namespace megablock {
 
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 void append_control(BlockResult& result, const std::vector<TilePart>& parts) {
-  const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNaN);
+  const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kUnknown);
   for (const ControlPoint& point : result.block.control_points)
-    result.control.push_back({unknown, Eigen::Matrix3d::Constant(kNaN),
-                              std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kNaN)),
-                              std::vector<std::uint8_t>(point.measurements.size(), 0)});
+    result.control.push_back(
+        {unknown, Eigen::Matrix3d::Constant(kUnknown),
+         std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kUnknown)),
+         std::vector<std::uint8_t>(point.measurements.size(), 0)});
   for (const TilePart& part : parts)
     for (std::size_t i = 0; i < part.control.size(); ++i) {
       const BlockResult::ControlResult& from = part.control[i];

@@ -28,8 +28,6 @@ namespace megablock {
 
 namespace {
 
-constexpr const char* kResult = "result/block.h5";
-
 std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
   Hasher hasher;
   hasher.add(algorithm::kMerge);

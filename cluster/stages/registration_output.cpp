@@ -3,8 +3,8 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/pose_csv.h"
 #include "io/unit_files.h"
 
@@ -43,7 +43,6 @@ PoseTable pose_table(const Block& block, const std::vector<Pose>& poses) {
 }  // namespace
 
 Block registered_block(const Block& block, const RegisteredTrajectory& registered, const JointOptions& joint) {
-  constexpr double kDegree = std::numbers::pi / 180;
   const double neighbours = joint.position_neighbours;
   Block result = block;
   for (std::size_t f = 0; f < registered.frames.size(); ++f) {

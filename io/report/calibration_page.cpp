@@ -2,8 +2,8 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/calibration_report.h"
 #include "io/report/drawing.h"
 #include "io/report/html.h"
@@ -15,10 +15,9 @@ namespace {
 
 using namespace report;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::int64_t kFew = 4;  // measurements of a quadrant
 
-std::string pixels(double value) { return fixed(value, 3) + " px"; }
+std::string in_pixels(double value) { return fixed(value, 3) + " px"; }
 
 std::string quadrant_text(const MountCalibration& mount) {
   std::string text;
@@ -37,8 +36,8 @@ std::string mounts_table(const RigCalibration& c) {
     const bool determined = m.position_determined && m.rotation_determined;
     table.add({escape(m.name), m.held ? "held" : fixed(1e3 * (m.pose.centre - m.start.centre).norm(), 2),
                m.held ? "" : sigma_text(1e3 * m.position_sigma_m()),
-               m.held ? "held" : fixed(m.start.rotation.angularDistance(m.pose.rotation) * kDegrees, 4),
-               m.held ? "" : sigma_text(m.rotation_sigma_rad() * kDegrees), count(m.images),
+               m.held ? "held" : fixed(m.start.rotation.angularDistance(m.pose.rotation) * kDegreesPerRadian, 4),
+               m.held ? "" : sigma_text(m.rotation_sigma_rad() * kDegreesPerRadian), count(m.images),
                count(m.field.observations), fixed(m.before.rms_px(), 3), fixed(m.after.rms_px(), 3), quadrant_text(m)},
               determined && covered(m) ? "" : "look");
   }
@@ -61,17 +60,17 @@ void add_points(Table& table, const std::string& what, const std::optional<Point
 
 std::string comparison_table(const RigCalibration& c) {
   Table table({"", "rig at the start", "rig as calibrated"});
-  table.add({"residuals, rms per axis", pixels(c.before.images.rms_px()), pixels(c.after.images.rms_px())});
+  table.add({"residuals, rms per axis", in_pixels(c.before.images.rms_px()), in_pixels(c.after.images.rms_px())});
   table.add({"residuals, mean length ± deviation",
              fixed(c.before.images.mean_px(), 2) + " ± " + fixed(c.before.images.deviation_px(), 2) + " px",
              fixed(c.after.images.mean_px(), 2) + " ± " + fixed(c.after.images.deviation_px(), 2) + " px"});
   if (c.held_out > 0)
-    table.add(
-        {count(c.held_out) + " points held out, from the median", pixels(c.held_out_before_px), pixels(c.held_out_px)});
+    table.add({count(c.held_out) + " points held out, from the median", in_pixels(c.held_out_before_px),
+               in_pixels(c.held_out_px)});
   add_points(table, "check points", c.before.check_points, c.after.check_points);
   if (c.verification && c.verification_before) {
-    table.add({"verification site, rms per axis", pixels(c.verification_before->images.rms_px()),
-               pixels(c.verification->images.rms_px())});
+    table.add({"verification site, rms per axis", in_pixels(c.verification_before->images.rms_px()),
+               in_pixels(c.verification->images.rms_px())});
     add_points(table, "its check points", c.verification_before->check_points, c.verification->check_points);
   }
   return table.html();

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/feature_statistics.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
@@ -13,7 +13,6 @@ namespace megablock::report {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kSignificant = 2;  // sigmas
 
 // The value that a parameter has in a camera that does not need it: no distortion, principal point in the centre.
@@ -35,12 +34,12 @@ std::string with_digits(const CameraModel& model, int parameter, double value) {
 // Angle between the rays through the middles of opposite borders, degrees.
 double opening(const Camera& camera, const Intrinsics& k, const Eigen::Vector2d& half) {
   const Eigen::Vector2d centre(0.5 * camera.width, 0.5 * camera.height);
-  if (k.model().kind == CameraModelKind::kEquirectangular) return 2 * half.norm() / k[kFocal] * kDegrees;
-  if (k.model().kind != CameraModelKind::kFisheye) return 2 * std::atan(half.norm() / k[kFocal]) * kDegrees;
+  if (k.model().kind == CameraModelKind::kEquirectangular) return 2 * half.norm() / k[kFocal] * kDegreesPerRadian;
+  if (k.model().kind != CameraModelKind::kFisheye) return 2 * std::atan(half.norm() / k[kFocal]) * kDegreesPerRadian;
   double angle = 0;
   for (const double side : {-1.0, 1.0}) {
     const auto ray = viewing_ray(k, centre + side * half);
-    angle += ray ? std::acos(std::clamp(ray->z(), -1.0, 1.0)) * kDegrees : 180;
+    angle += ray ? std::acos(std::clamp(ray->z(), -1.0, 1.0)) * kDegreesPerRadian : 180;
   }
   return angle;
 }
@@ -108,7 +107,7 @@ std::string mounts_table(const BlockResult& result, RigIndex index) {
     const bool held = rig.mounts[m].held();
     table.add({count(static_cast<std::int64_t>(m)) + " " + escape(result.block.cameras[rig.mounts[m].camera].name),
                fixed(now.centre.x(), 4), fixed(now.centre.y(), 4), fixed(now.centre.z(), 4),
-               held ? "held" : fixed(start.rotation.angularDistance(now.rotation) * kDegrees, 4),
+               held ? "held" : fixed(start.rotation.angularDistance(now.rotation) * kDegreesPerRadian, 4),
                held ? "held" : fixed((now.centre - start.centre).norm() * 1000, 1)});
   }
   return table.html();

@@ -11,8 +11,8 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kListed = 200;        // points of a role
-constexpr std::size_t kMeasurements = 400;  // listed, worst first
+constexpr std::size_t kListedPoints = 200;        // points of a role
+constexpr std::size_t kListedMeasurements = 400;  // listed, worst first
 
 const char* name_of(PointRole role) { return role == PointRole::kCheck ? "check" : "control"; }
 
@@ -39,7 +39,7 @@ void add_points(const BlockResult& result, const Figures& f, PointRole role, con
     ratios.push_back(Eigen::Vector3d(r.difference.cwiseQuotient(r.sigma)));
     if (r.images) squares += r.rms_px * r.rms_px * r.images;
     images += r.images;
-    if (static_cast<std::size_t>(++points) <= kListed) add_point(point, r, unit, table);
+    if (static_cast<std::size_t>(++points) <= kListedPoints) add_point(point, r, unit, table);
   }
   if (points == 0) return;
   std::vector<std::string> cells = {fmt::format("rms of {}", count(points)), name_of(role)};
@@ -58,7 +58,7 @@ std::string measurements_table(const BlockResult& result, const Figures& f) {
   Table table({"point", "role", "image", "x [px]", "y [px]", "length [px]", "sigma [px]", "÷ sigma"}, 3);
   std::int64_t beyond = 0;
   for (const MeasurementResidual& r : f.measurements) beyond += r.ratio > kGrossRatio;
-  for (std::size_t i = 0; i < std::min(kMeasurements, f.measurements.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kListedMeasurements, f.measurements.size()); ++i) {
     const MeasurementResidual& r = f.measurements[i];
     const ControlPoint& point = result.block.control_points[r.point];
     const ImageMeasurement& measurement = point.measurements[r.measurement];
@@ -71,7 +71,7 @@ std::string measurements_table(const BlockResult& result, const Figures& f) {
       fmt::format("{} image measurements, {} beyond {} sigma", count(static_cast<std::int64_t>(f.measurements.size())),
                   count(beyond), fixed(kGrossRatio, 0));
   return details(summary, "<div class=tall>" + table.html("sortable small") + "</div>" +
-                              more(f.measurements.size(), kMeasurements));
+                              more(f.measurements.size(), kListedMeasurements));
 }
 
 }  // namespace

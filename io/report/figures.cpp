@@ -4,16 +4,15 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <set>
 
+#include "geometry/angles.h"
 #include "io/reliability.h"
 
 namespace megablock::report {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::int64_t kSampleLimit = 500000;  // values a median is taken from
 constexpr std::int64_t kRayLimit = 24;         // rays of a track compared for its intersection angle
 
@@ -205,7 +204,7 @@ class Gatherer {
     double least = 1;
     for (std::size_t i = 0; i < rays.size(); ++i)
       for (std::size_t j = i + 1; j < rays.size(); ++j) least = std::min(least, rays[i].dot(rays[j]));
-    if (rays.size() > 1) f_.intersection_deg.add(std::acos(std::clamp(least, -1.0, 1.0)) * kDegrees);
+    if (rays.size() > 1) f_.intersection_deg.add(std::acos(std::clamp(least, -1.0, 1.0)) * kDegreesPerRadian);
   }
 
   void positions() {

@@ -8,20 +8,20 @@ namespace megablock::report {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+OrderedJson number(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
 
-Json vector(const Eigen::Vector3d& v) { return Json{number(v.x()), number(v.y()), number(v.z())}; }
+OrderedJson vector(const Eigen::Vector3d& v) { return OrderedJson{number(v.x()), number(v.y()), number(v.z())}; }
 
-Json histogram(const Histogram& h) { return {{"low", h.low}, {"width", h.width}, {"counts", h.bins}}; }
+OrderedJson histogram(const Histogram& h) { return {{"low", h.low}, {"width", h.width}, {"counts", h.bins}}; }
 
-Json spread_of(const Spread& s) {
+OrderedJson spread_of(const Spread& s) {
   return {{"median", number(s.median)}, {"p95", number(s.p95)}, {"largest", number(s.largest)}};
 }
 
-Json stages(const BlockResult& result) {
-  Json list = Json::array();
+OrderedJson stages(const BlockResult& result) {
+  OrderedJson list = OrderedJson::array();
   for (const StageStatistics& stage : result.stages)
     list.push_back({{"name", stage.name},
                     {"seconds", number(stage.seconds)},
@@ -31,8 +31,8 @@ Json stages(const BlockResult& result) {
   return list;
 }
 
-Json points(const BlockResult& result, const Figures& f) {
-  Json list = Json::array();
+OrderedJson points(const BlockResult& result, const Figures& f) {
+  OrderedJson list = OrderedJson::array();
   for (const PointResidual& r : f.points) {
     const ControlPoint& point = result.block.control_points[r.point];
     list.push_back({{"name", point.name},
@@ -46,17 +46,17 @@ Json points(const BlockResult& result, const Figures& f) {
   return list;
 }
 
-Json failures(const BlockResult& result) {
-  Json list = Json::array();
+OrderedJson failures(const BlockResult& result) {
+  OrderedJson list = OrderedJson::array();
   for (const FailedUnit& failure : result.failures)
     list.push_back({{"stage", failure.stage}, {"unit", failure.unit}, {"reason", failure.reason}});
   return list;
 }
 
-Json cameras(const BlockResult& result) {
-  Json list = Json::array();
+OrderedJson cameras(const BlockResult& result) {
+  OrderedJson list = OrderedJson::array();
   for (CameraIndex c(0); result.block.cameras.contains(c); ++c.value) {
-    Json parameters;
+    OrderedJson parameters;
     const CameraModel& model = result.block.cameras[c].intrinsics.model();
     for (int k = 0; k < parameter_count(model); ++k) {
       const auto at = static_cast<std::size_t>(k);
@@ -75,46 +75,47 @@ Json cameras(const BlockResult& result) {
 std::string figures_json(const BlockResult& result, const Figures& f) {
   std::vector<Eigen::Vector3d> differences;
   for (const PositionResidual& r : f.positions) differences.push_back(r.difference);
-  Json json = {{"images", result.block.images.size()},
-               {"oriented", f.reprojection.oriented_images},
-               {"points", f.reprojection.points},
-               {"observations", f.reprojection.observations},
-               {"mean_reprojection_px", number(f.reprojection.mean_px)},
-               {"rms_reprojection_px", number(f.reprojection.rms_px)},
-               {"mean_track_length", number(f.reprojection.mean_track_length)},
-               {"chi2_per_dof", result.degrees_of_freedom > 0 ? number(result.variance_factor) : Json(nullptr)},
-               {"degrees_of_freedom", result.degrees_of_freedom},
-               {"image_sigma_px", result.image_sigma_px},
-               {"tiles", result.tiles.tile_count},
-               {"components", f.components},
-               {"boundary_frames", f.boundary_frames},
-               {"global_iterations", result.global_iterations},
-               {"newton_decrement", number(result.newton_decrement)},
-               {"newton_decrement_limit", result.decrement_limit > 0 ? number(result.decrement_limit) : Json(nullptr)},
-               {"program", result.provenance.program},
-               {"arithmetic", result.provenance.arithmetic},
-               {"parts", f.parts.size()},
-               {"ground_resolution_m", number(f.ground_resolution_m)},
-               {"gauge", result.gauge},
-               {"digest", result.digest},
-               {"gnss_frames", f.positions.size()},
-               {"gnss_rms_m", vector(root_mean_square(differences))},
-               {"sigma_east_m", spread_of(f.sigma_east)},
-               {"sigma_north_m", spread_of(f.sigma_north)},
-               {"sigma_up_m", spread_of(f.sigma_up)},
-               {"sigma_rotation_rad", spread_of(f.sigma_rotation)},
-               {"track_length", histogram(f.track_length)},
-               {"intersection_angle_deg", histogram(f.intersection_deg)},
-               {"residual_px", histogram(f.residual_px)},
-               {"control_points", points(result, f)},
-               {"control_points_unused", unused_points(result, PointRole::kControl).size()},
-               {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
-               {"cameras", cameras(result)},
-               {"failures", failures(result)},
-               {"stages", stages(result)},
-               {"notes", result.notes}};
+  OrderedJson json = {
+      {"images", result.block.images.size()},
+      {"oriented", f.reprojection.oriented_images},
+      {"points", f.reprojection.points},
+      {"observations", f.reprojection.observations},
+      {"mean_reprojection_px", number(f.reprojection.mean_px)},
+      {"rms_reprojection_px", number(f.reprojection.rms_px)},
+      {"mean_track_length", number(f.reprojection.mean_track_length)},
+      {"chi2_per_dof", result.degrees_of_freedom > 0 ? number(result.variance_factor) : OrderedJson(nullptr)},
+      {"degrees_of_freedom", result.degrees_of_freedom},
+      {"image_sigma_px", result.image_sigma_px},
+      {"tiles", result.tiles.tile_count},
+      {"components", f.components},
+      {"boundary_frames", f.boundary_frames},
+      {"global_iterations", result.global_iterations},
+      {"newton_decrement", number(result.newton_decrement)},
+      {"newton_decrement_limit", result.decrement_limit > 0 ? number(result.decrement_limit) : OrderedJson(nullptr)},
+      {"program", result.provenance.program},
+      {"arithmetic", result.provenance.arithmetic},
+      {"parts", f.parts.size()},
+      {"ground_resolution_m", number(f.ground_resolution_m)},
+      {"gauge", result.gauge},
+      {"digest", result.digest},
+      {"gnss_frames", f.positions.size()},
+      {"gnss_rms_m", vector(root_mean_square(differences))},
+      {"sigma_east_m", spread_of(f.sigma_east)},
+      {"sigma_north_m", spread_of(f.sigma_north)},
+      {"sigma_up_m", spread_of(f.sigma_up)},
+      {"sigma_rotation_rad", spread_of(f.sigma_rotation)},
+      {"track_length", histogram(f.track_length)},
+      {"intersection_angle_deg", histogram(f.intersection_deg)},
+      {"residual_px", histogram(f.residual_px)},
+      {"control_points", points(result, f)},
+      {"control_points_unused", unused_points(result, PointRole::kControl).size()},
+      {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
+      {"cameras", cameras(result)},
+      {"failures", failures(result)},
+      {"stages", stages(result)},
+      {"notes", result.notes}};
   // Names may hold anything: bytes that are no UTF-8 are replaced, and no text can end the script element.
-  const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = json.dump(1, ' ', false, OrderedJson::error_handler_t::replace);
   std::string safe;
   for (char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
   return safe;

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
 
@@ -12,9 +12,8 @@ namespace megablock::report {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr std::size_t kListed = 1500;  // images
-constexpr std::size_t kOpen = 40;      // a longer table is folded
+constexpr std::size_t kListedImages = 1500;  // images
+constexpr std::size_t kOpen = 40;            // a longer table is folded
 
 // Which of the optional columns say something in this block.
 struct Columns {
@@ -51,13 +50,13 @@ void add_pose(const BlockResult& result, ImageIndex image, std::vector<std::stri
   const Pose pose = image_pose(result, image);
   for (const double c : pose.centre) cells.push_back(fixed(c, 3));
   const OmegaPhiKappa angles = omega_phi_kappa(pose.rotation);
-  for (const double a : {angles.omega, angles.phi, angles.kappa}) cells.push_back(fixed(a * kDegrees, 4));
+  for (const double a : {angles.omega, angles.phi, angles.kappa}) cells.push_back(fixed(a * kDegreesPerRadian, 4));
 }
 
 void add_sigmas(const BlockResult& result, FrameIndex frame, const LengthUnit& unit, std::vector<std::string>& cells) {
   const auto variance = result.frame_covariance[frame].diagonal().cwiseMax(0).eval();
   sigma_cells(variance.tail<3>().cwiseSqrt(), unit, cells);
-  cells.push_back(sigma_text(std::sqrt(variance.head<3>().maxCoeff()) * kDegrees));
+  cells.push_back(sigma_text(std::sqrt(variance.head<3>().maxCoeff()) * kDegreesPerRadian));
 }
 
 void add_image(const BlockResult& result, const Figures& f, const Columns& columns, ImageIndex image, Table& table) {
@@ -87,13 +86,13 @@ std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& 
   std::vector<ImageIndex> images;
   for (ImageIndex image(0); result.block.images.contains(image); ++image.value)
     if (oriented(result, result.block.images[image].frame)) images.push_back(image);
-  if (images.size() <= kListed) return images;
+  if (images.size() <= kListedImages) return images;
   const auto rms = [&](ImageIndex image) {
     const double value = image_rms(f, image);
     return std::isfinite(value) ? value : -1;
   };
   std::stable_sort(images.begin(), images.end(), [&](ImageIndex a, ImageIndex b) { return rms(a) > rms(b); });
-  images.resize(kListed);
+  images.resize(kListedImages);
   return images;
 }
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/report/drawing.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
@@ -13,7 +13,6 @@ namespace megablock::report {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::size_t kWorst = 5;  // residuals listed
 
 void add_row(Table& table, const std::string& name, const Eigen::Vector3d& v, const LengthUnit& unit, bool sign) {
@@ -78,8 +77,8 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
   if (f.attitudes.empty()) return "";
   std::vector<Eigen::Vector3d> differences, sigmas, normalised;
   for (const AttitudeResidual& r : f.attitudes) {
-    differences.push_back(r.difference * kDegrees);
-    sigmas.push_back(r.sigma * kDegrees);
+    differences.push_back(r.difference * kDegreesPerRadian);
+    sigmas.push_back(r.sigma * kDegreesPerRadian);
     normalised.push_back(r.difference.cwiseQuotient(r.sigma));
   }
   Eigen::Vector3d mean = Eigen::Vector3d::Zero(), extreme = Eigen::Vector3d::Zero();
@@ -128,7 +127,7 @@ std::string accuracy_section(const BlockResult& result, const Figures& f) {
   add(in_unit("frames, east", unit), f.sigma_east, unit.factor);
   add(in_unit("frames, north", unit), f.sigma_north, unit.factor);
   add(in_unit("frames, up", unit), f.sigma_up, unit.factor);
-  add("frames, rotation [°]", f.sigma_rotation, kDegrees);
+  add("frames, rotation [°]", f.sigma_rotation, kDegreesPerRadian);
   add(in_unit("tie points, horizontal", unit), f.point_sigma_horizontal, unit.factor);
   add(in_unit("tie points, up", unit), f.point_sigma_up, unit.factor);
   return section(

@@ -13,7 +13,7 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kListed = 200;  // failures
+constexpr std::size_t kListedFailures = 200;  // failures
 
 std::string known(std::int64_t value) { return value < 0 ? kMissing : count(value); }
 
@@ -50,14 +50,14 @@ std::string failures_section(const BlockResult& result, const Figures& f) {
   for (const FailedUnit& failure : result.failures) {
     const auto image = by_name.find(failure.unit);
     told[failure.unit] = true;
-    if (++all <= kListed)
+    if (++all <= kListedFailures)
       add_failure(table, failure,
                   image == by_name.end() ? std::vector<std::string>{} : image_cells(result, f, image->second));
   }
   for (const ImageIndex image : f.not_oriented) {
     const std::string& name = result.block.images[image].name;
     if (told.contains(name)) continue;
-    if (++all <= kListed) add_failure(table, {"", name, "not oriented"}, image_cells(result, f, image));
+    if (++all <= kListedFailures) add_failure(table, {"", name, "not oriented"}, image_cells(result, f, image));
   }
   const std::string lost =
       f.not_oriented.empty()
@@ -66,7 +66,7 @@ std::string failures_section(const BlockResult& result, const Figures& f) {
                 fmt::format("{} {} not oriented. Observations: image measurements in tracks, whether kept or not.",
                             count(static_cast<std::int64_t>(f.not_oriented.size())),
                             f.not_oriented.size() == 1 ? "image is" : "images are"));
-  return section("failures", "What failed", lost + table.html("sortable") + more(all, kListed));
+  return section("failures", "What failed", lost + table.html("sortable") + more(all, kListedFailures));
 }
 
 std::string stages_section(const BlockResult& result) {

@@ -3,14 +3,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/angles.h"
 #include "io/simulate/scene.h"
 #include "io/simulate/terrain.h"
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 class AerialScene : public Scene {
  public:

@@ -1,16 +1,14 @@
 // Priors and given poses of a simulated block. Every stated sigma is the true one.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
+#include "geometry/angles.h"
 #include "io/simulate/scene.h"
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // Exactly round(share * frames) frames, at random.
 std::vector<std::uint8_t> frames_with_position(const SimulationOptions& options) {

@@ -14,7 +14,7 @@ namespace megablock {
 
 namespace {
 
-void require(bool condition, const std::string& message) {
+void require_option(bool condition, const std::string& message) {
   if (!condition) throw InputError("simulation: " + message);
 }
 
@@ -67,7 +67,7 @@ SimulationOptions SimulationOptions::of(Scene scene, Path path) {
 
 void SimulationOptions::use_published_camera(int number) {
   const auto count = static_cast<int>(published_cameras().size());
-  require(number >= 1 && number <= count, "published_camera must lie in [1, " + std::to_string(count) + "]");
+  require_option(number >= 1 && number <= count, "published_camera must lie in [1, " + std::to_string(count) + "]");
   const PublishedCamera& camera = published_cameras()[static_cast<std::size_t>(number - 1)];
   published_camera = number;
   image_width = camera.width;
@@ -76,57 +76,63 @@ void SimulationOptions::use_published_camera(int number) {
 }
 
 void SimulationOptions::check() const {
-  require(frames >= 2, "frames must be at least 2");
-  require(forward_overlap >= 0.3 && forward_overlap < 0.99, "forward_overlap must lie in [0.3, 0.99)");
-  require(side_overlap >= 0 && side_overlap < 0.99, "side_overlap must lie in [0, 0.99)");
-  require(height_m > 0, "height_m must be positive");
-  require(terrain_relief_m >= 0 && terrain_relief_m <= height_m, "terrain_relief_m must lie in [0, height_m]");
-  require(street_spacing_m >= 40, "street_spacing_m must be at least 40");
-  require(frame_distance_m > 0 && frame_distance_m <= 15, "frame_distance_m must lie in (0, 15]");
-  require(rig_cameras >= 1 && rig_cameras <= 16, "rig_cameras must lie in [1, 16]");
-  require(drives >= 1 && drives <= 100, "drives must lie in [1, 100]");
-  require(days >= 1 && days <= drives, "days must lie in [1, drives]");
-  require(scene != Scene::kStereopolis || frames >= 2 * drives, "frames must be at least 2 per drive");
-  require(gnss_masked_share >= 0 && gnss_masked_share < 1, "gnss_masked_share must lie in [0, 1)");
-  require(gnss_absent_share >= 0 && gnss_absent_share <= gnss_masked_share,
-          "gnss_absent_share must lie in [0, gnss_masked_share]");
-  require(gnss_masked_frames >= 1, "gnss_masked_frames must be at least 1");
-  require(drift_m >= 0, "drift_m must not be negative");
-  require(drift_per_frame_m > 0, "drift_per_frame_m must be positive");
-  require(control_zones >= 0, "control_zones must not be negative");
-  require(held_out_zone == -1 || (held_out_zone >= 0 && held_out_zone < control_zones),
-          "held_out_zone must be -1 or one of the control zones, counted from 0");
-  require(scene != Scene::kStereopolis || outlier_share <= 0.4, "outlier_share of this scene must lie in [0, 0.4]");
-  require(control_zones == 0 || scene == Scene::kStereopolis, "control_zones are those of the stereopolis scene");
-  require(mount_position_error_m >= 0 && mount_rotation_error_deg >= 0 && mount_rotation_error_deg < 10,
-          "mount errors must not be negative, mount_rotation_error_deg below 10");
-  require(panorama_radius_m > 0, "panorama_radius_m must be positive");
-  require(depth_spread >= 0 && depth_spread < 0.9, "depth_spread must lie in [0, 0.9)");
-  require(std::abs(off_centre_m) < 0.05 * panorama_radius_m, "off_centre_m must be below 5 % of panorama_radius_m");
-  require(start_focal > 0.2 && start_focal < 5, "start_focal must lie in (0.2, 5)");
-  require(published_camera == 0 || !has_vehicle(scene), "published_camera is not for scenes with the vehicle's rig");
-  require(repeated_facades >= 0 && repeated_facades <= 1, "repeated_facades must lie in [0, 1]");
-  require(!vehicle || scene == Scene::kStereopolis, "a vehicle is seen in the stereopolis scene only");
-  require(points_per_frame >= 10, "points_per_frame must be at least 10");
-  require(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");
-  require(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");
-  require(outlier_share >= 0 && outlier_share < 1, "outlier_share must lie in [0, 1)");
-  require(gps_share >= 0 && gps_share <= 1, "gps_share must lie in [0, 1]");
-  require(std::isfinite(gps_sigma_m) && std::isfinite(attitude_sigma_deg), "sigmas of priors must be finite");
-  require(relative_position_sigma_m <= 0 || relative_rotation_sigma_deg > 0,
-          "relative_rotation_sigma_deg must be positive with relative_position_sigma_m");
-  require(start_offset_m >= 0 && std::isfinite(start_offset_m), "start_offset_m (--start-offset) must not be negative");
-  require(
+  require_option(frames >= 2, "frames must be at least 2");
+  require_option(forward_overlap >= 0.3 && forward_overlap < 0.99, "forward_overlap must lie in [0.3, 0.99)");
+  require_option(side_overlap >= 0 && side_overlap < 0.99, "side_overlap must lie in [0, 0.99)");
+  require_option(height_m > 0, "height_m must be positive");
+  require_option(terrain_relief_m >= 0 && terrain_relief_m <= height_m, "terrain_relief_m must lie in [0, height_m]");
+  require_option(street_spacing_m >= 40, "street_spacing_m must be at least 40");
+  require_option(frame_distance_m > 0 && frame_distance_m <= 15, "frame_distance_m must lie in (0, 15]");
+  require_option(rig_cameras >= 1 && rig_cameras <= 16, "rig_cameras must lie in [1, 16]");
+  require_option(drives >= 1 && drives <= 100, "drives must lie in [1, 100]");
+  require_option(days >= 1 && days <= drives, "days must lie in [1, drives]");
+  require_option(scene != Scene::kStereopolis || frames >= 2 * drives, "frames must be at least 2 per drive");
+  require_option(gnss_masked_share >= 0 && gnss_masked_share < 1, "gnss_masked_share must lie in [0, 1)");
+  require_option(gnss_absent_share >= 0 && gnss_absent_share <= gnss_masked_share,
+                 "gnss_absent_share must lie in [0, gnss_masked_share]");
+  require_option(gnss_masked_frames >= 1, "gnss_masked_frames must be at least 1");
+  require_option(drift_m >= 0, "drift_m must not be negative");
+  require_option(drift_per_frame_m > 0, "drift_per_frame_m must be positive");
+  require_option(control_zones >= 0, "control_zones must not be negative");
+  require_option(held_out_zone == -1 || (held_out_zone >= 0 && held_out_zone < control_zones),
+                 "held_out_zone must be -1 or one of the control zones, counted from 0");
+  require_option(scene != Scene::kStereopolis || outlier_share <= 0.4,
+                 "outlier_share of this scene must lie in [0, 0.4]");
+  require_option(control_zones == 0 || scene == Scene::kStereopolis,
+                 "control_zones are those of the stereopolis scene");
+  require_option(mount_position_error_m >= 0 && mount_rotation_error_deg >= 0 && mount_rotation_error_deg < 10,
+                 "mount errors must not be negative, mount_rotation_error_deg below 10");
+  require_option(panorama_radius_m > 0, "panorama_radius_m must be positive");
+  require_option(depth_spread >= 0 && depth_spread < 0.9, "depth_spread must lie in [0, 0.9)");
+  require_option(std::abs(off_centre_m) < 0.05 * panorama_radius_m,
+                 "off_centre_m must be below 5 % of panorama_radius_m");
+  require_option(start_focal > 0.2 && start_focal < 5, "start_focal must lie in (0.2, 5)");
+  require_option(published_camera == 0 || !has_vehicle(scene),
+                 "published_camera is not for scenes with the vehicle's rig");
+  require_option(repeated_facades >= 0 && repeated_facades <= 1, "repeated_facades must lie in [0, 1]");
+  require_option(!vehicle || scene == Scene::kStereopolis, "a vehicle is seen in the stereopolis scene only");
+  require_option(points_per_frame >= 10, "points_per_frame must be at least 10");
+  require_option(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");
+  require_option(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");
+  require_option(outlier_share >= 0 && outlier_share < 1, "outlier_share must lie in [0, 1)");
+  require_option(gps_share >= 0 && gps_share <= 1, "gps_share must lie in [0, 1]");
+  require_option(std::isfinite(gps_sigma_m) && std::isfinite(attitude_sigma_deg), "sigmas of priors must be finite");
+  require_option(relative_position_sigma_m <= 0 || relative_rotation_sigma_deg > 0,
+                 "relative_rotation_sigma_deg must be positive with relative_position_sigma_m");
+  require_option(start_offset_m >= 0 && std::isfinite(start_offset_m),
+                 "start_offset_m (--start-offset) must not be negative");
+  require_option(
       start_offset_m == 0 || (relative_position_sigma_m > 0 && scene != Scene::kStereopolis),
       "start_offset_m (--start-offset) needs relative poses to integrate (--relative-position-sigma) and another scene "
       "than stereopolis");
-  require(start_chain_frames >= 2, "start_chain_frames (--start-chain) must be at least 2");
-  require(control_points >= 0 && check_points >= 0, "control_points and check_points must not be negative");
-  require(control_sigma_m > 0, "control_sigma_m must be positive");
-  require(image_width >= 64 && image_height >= 64, "images must have at least 64 x 64 pixels");
+  require_option(start_chain_frames >= 2, "start_chain_frames (--start-chain) must be at least 2");
+  require_option(control_points >= 0 && check_points >= 0, "control_points and check_points must not be negative");
+  require_option(control_sigma_m > 0, "control_sigma_m must be positive");
+  require_option(image_width >= 64 && image_height >= 64, "images must have at least 64 x 64 pixels");
   const auto model = find_model(camera_model);
-  require(model.has_value(), "camera_model '" + camera_model + "' is none of: " + model_list());
-  require(focal_px >= 0.3 * std::max(image_width, image_height), "focal_px must be at least 0.3 of the larger side");
+  require_option(model.has_value(), "camera_model '" + camera_model + "' is none of: " + model_list());
+  require_option(focal_px >= 0.3 * std::max(image_width, image_height),
+                 "focal_px must be at least 0.3 of the larger side");
 }
 
 CameraIndex add_single_camera_rig(const SimulationOptions& options, Layout& layout) {

@@ -5,8 +5,8 @@
 // y exchanged. The second street along x may pass over the second one along y on a bridge.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/simulate/bridge.h"
 #include "io/simulate/drive.h"
 #include "io/simulate/street_scene.h"
@@ -16,7 +16,6 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kSpeed = 8;                   // metres per second
 constexpr double kDay = 86400, kBreak = 1800;  // seconds; between two drives of a day
 constexpr double kRampGap = 15;                // from the end of a ramp to the next crossing, metres

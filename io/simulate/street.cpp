@@ -3,14 +3,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/angles.h"
 #include "io/simulate/drive.h"
 #include "io/simulate/street_scene.h"
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // Rig axes: x right, y down, z forward. Cameras look horizontally around the compass, the first one forward.
 Pose mount_pose(const SimulationOptions& options, int camera) {

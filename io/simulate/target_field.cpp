@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/angles.h"
 #include "io/simulate/drive.h"
 #include "io/simulate/vehicle.h"
 
@@ -12,7 +13,6 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kHalfLength = 30, kHalfWidth = 20;  // of the place, metres
 constexpr double kWallHeight = 24;  // the cameras that look up must see walls from the middle of the place
 using Path = SimulationOptions::Path;

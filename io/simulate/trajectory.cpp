@@ -5,11 +5,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/angles.h"
+
 namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kMemory_frames = 40;  // of the errors under a clear sky
 constexpr double kAnySpeed = 1e9;
 constexpr int kWaves = 4;                    // of a drift

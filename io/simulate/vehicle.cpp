@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "geometry/angles.h"
 
 namespace megablock {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 // Rig axes: x right, y down, z ahead; yaw to the right, pitch upwards.
-struct Place {
+struct Placing {
   int id;
   double yaw_deg, pitch_deg;
   Eigen::Vector3d centre;  // metres
@@ -23,9 +22,9 @@ Eigen::Vector3d on_head(double yaw_deg, double up) {
 }
 
 // In the order in which cameras are added as the rig grows.
-std::vector<Place> places() {
+std::vector<Placing> places() {
   const auto head = [](int id, double yaw, double pitch) {
-    return Place{id, yaw, pitch, on_head(yaw, pitch > 0 ? 0.15 : 0)};
+    return Placing{id, yaw, pitch, on_head(yaw, pitch > 0 ? 0.15 : 0)};
   };
   return {head(22, 0, 0),
           head(42, 180, 0),
@@ -45,7 +44,7 @@ std::vector<Place> places() {
           {62, 90, -20, {0.6, 0.5, 0}}};
 }
 
-Pose nominal_mount(const Place& place) {
+Pose nominal_mount(const Placing& place) {
   const double yaw = kDegree * place.yaw_deg, pitch = kDegree * place.pitch_deg;
   const Eigen::Vector3d right(std::cos(yaw), 0, -std::sin(yaw));
   const Eigen::Vector3d ahead(std::sin(yaw) * std::cos(pitch), -std::sin(pitch), std::cos(yaw) * std::cos(pitch));
@@ -93,13 +92,13 @@ CameraIndex add_camera(const SimulationOptions& options, const std::string& name
 }  // namespace
 
 void add_vehicle(const SimulationOptions& options, Layout& layout) {
-  std::vector<Place> chosen = places();
+  std::vector<Placing> chosen = places();
   chosen.resize(static_cast<std::size_t>(options.rig_cameras));
-  std::sort(chosen.begin(), chosen.end(), [](const Place& a, const Place& b) { return a.id < b.id; });
+  std::sort(chosen.begin(), chosen.end(), [](const Placing& a, const Placing& b) { return a.id < b.id; });
   Rig rig;
   rig.name = "stereopolis";
   std::vector<Pose> truth;
-  for (const Place& place : chosen) {
+  for (const Placing& place : chosen) {
     std::string name("c");
     name.append(std::to_string(place.id));
     Random random(options.vehicle_seed ? options.vehicle_seed : options.seed, Random::Purpose::kCamera,

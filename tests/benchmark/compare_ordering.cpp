@@ -11,9 +11,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
-#include <numbers>
 
 #include "adjust/registration/trajectory.h"
+#include "geometry/angles.h"
 #include "geometry/rotation.h"
 #include "io/error.h"
 #include "io/project.h"
@@ -73,7 +73,6 @@ void add_link(const Link& link, const std::vector<Pose>& frames, Normal& normal)
 }
 
 Normal normal_of(const Trajectory& trajectory, int spacing) {
-  constexpr double kDegree = std::numbers::pi / 180;
   const JointInput& input = trajectory.input;
   Normal normal;
   for (const ChainLink& link : input.chain) {

@@ -145,11 +145,11 @@ class RegistrationInput : public testing::Test {
 };
 
 // The block itself, for comparison with what follows.
-constexpr double kGood = 0.1;  // metres; the trajectory is off by metres
+constexpr double kGoodTrajectory = 0.1;  // metres; the trajectory is off by metres
 
 TEST_F(RegistrationInput, SoundBlock) {
   register_block(town());
-  EXPECT_LT(error_m(town()), kGood);
+  EXPECT_LT(error_m(town()), kGoodTrajectory);
 }
 
 TEST_F(RegistrationInput, MissingCameraImages) {
@@ -157,7 +157,7 @@ TEST_F(RegistrationInput, MissingCameraImages) {
   keep_frames(s, all_frames(), [](const Image& image) { return image.frame.value % 3 != 0 || image.mount % 2 == 0; });
   ASSERT_LT(s.block.images.size(), 9 * s.block.frames.size());
   register_block(s);
-  EXPECT_LT(error_m(s), kGood);
+  EXPECT_LT(error_m(s), kGoodTrajectory);
 }
 
 TEST_F(RegistrationInput, ClockThatRunsBackwards) {
@@ -176,7 +176,7 @@ TEST_F(RegistrationInput, GapsInTheTrajectory) {
   const std::string said = register_block(s);
   EXPECT_THAT(said, HasSubstr("look: gap of "));
   EXPECT_THAT(said, HasSubstr("between frames 'f000029' and 'f000050': not linked"));
-  EXPECT_LT(error_m(s), kGood);
+  EXPECT_LT(error_m(s), kGoodTrajectory);
 }
 
 TEST_F(RegistrationInput, FramesListedTwice) {
@@ -194,25 +194,25 @@ TEST_F(RegistrationInput, FramesListedTwice) {
   EXPECT_THAT(said,
               HasSubstr("look: frames 'f000040' and 'f000040_copy' have the same time and place: is one of them a "
                         "copy?"));
-  EXPECT_LT(error_m(s), kGood);
+  EXPECT_LT(error_m(s), kGoodTrajectory);
 }
 
 TEST_F(RegistrationInput, NumbersThatAreNone) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   SimulatedBlock s = town();
-  s.block.frames[FrameIndex(7)].given_pose->centre.y() = kNaN;
+  s.block.frames[FrameIndex(7)].given_pose->centre.y() = kUnknown;
   EXPECT_THAT(refusal(s), HasSubstr("frame 'f000007': position is not finite; leave the pose out"));
   s = town();
-  s.block.frames[FrameIndex(8)].given_pose->rotation.coeffs().setConstant(kNaN);
+  s.block.frames[FrameIndex(8)].given_pose->rotation.coeffs().setConstant(kUnknown);
   EXPECT_THAT(refusal(s), HasSubstr("frame 'f000008': rotation is not a unit quaternion"));
   s = town();
-  s.block.frames[FrameIndex(9)].position_prior->position.x() = kNaN;
+  s.block.frames[FrameIndex(9)].position_prior->position.x() = kUnknown;
   EXPECT_THAT(refusal(s), HasSubstr("frame 'f000009': position prior must be finite"));
   s = town();
-  s.block.frames[FrameIndex(10)].attitude_prior->rotation_cw.coeffs().setConstant(kNaN);
+  s.block.frames[FrameIndex(10)].attitude_prior->rotation_cw.coeffs().setConstant(kUnknown);
   EXPECT_THAT(refusal(s), HasSubstr("frame 'f000010': attitude prior must be a unit quaternion"));
   s = town();
-  s.block.relative_poses[11].pose.centre.z() = kNaN;
+  s.block.relative_poses[11].pose.centre.z() = kUnknown;
   EXPECT_THAT(refusal(s), HasSubstr("relative pose of frames 'f000011' and 'f000012': position is not finite"));
   // Left out, the pose is carried on from the frame before.
   s = town();
@@ -220,7 +220,7 @@ TEST_F(RegistrationInput, NumbersThatAreNone) {
   s.block.frames[FrameIndex(7)].position_prior.reset();
   s.block.frames[FrameIndex(7)].attitude_prior.reset();
   register_block(s);
-  EXPECT_LT(error_m(s), kGood);
+  EXPECT_LT(error_m(s), kGoodTrajectory);
   // Nothing to carry it on from.
   s.block.relative_poses.clear();
   EXPECT_THAT(refusal(s), HasSubstr("frame 'f000007' has no pose in the trajectory; give an approximate pose"));
@@ -255,7 +255,7 @@ TEST_F(RegistrationInput, CollinearControl) {
   const std::string said = register_block(s, settings);
   EXPECT_THAT(said, HasSubstr("resections            0\n"));
   EXPECT_THAT(said, HasSubstr("the points lie on one line, about which the rig could turn freely"));
-  EXPECT_LT(error_m(s), kGood);
+  EXPECT_LT(error_m(s), kGoodTrajectory);
 }
 
 // A pass listed against its times, its relative poses as they were measured.
@@ -265,7 +265,7 @@ TEST_F(RegistrationInput, PassListedBackwards) {
   std::reverse(order.begin() + kFrames / 2, order.end());
   keep_frames(s, order);
   EXPECT_THAT(register_block(s), HasSubstr("in a chain of " + std::to_string(kFrames - 2) + " links"));
-  EXPECT_LT(error_m(s), kGood);
+  EXPECT_LT(error_m(s), kGoodTrajectory);
 }
 
 // One camera ahead, one behind, cameras and mounts to be estimated: what ties them is the chain.
@@ -279,7 +279,7 @@ TEST_F(RegistrationInput, CamerasThatShareNoView) {
     return rotation_angle(block.rigs.front().mounts[1].pose.rotation, s.truth.mounts.front()[1].rotation);
   };
   EXPECT_LT(off(registered), 0.1 * off(s.block));
-  EXPECT_LT(error_m(s), 3 * kGood);
+  EXPECT_LT(error_m(s), 3 * kGoodTrajectory);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace megablock {
 namespace {
 
-using testing::real_data;
+using fixture::real_data;
 namespace fs = std::filesystem;
 
 // A project file in a folder of its own.

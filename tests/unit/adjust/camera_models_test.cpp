@@ -11,7 +11,7 @@
 namespace megablock {
 namespace {
 
-struct Image {
+struct MeasuredImage {
   residual::ImageMeasured image;
   template <typename Scalar>
   bool operator()(const Scalar* const* blocks, Scalar* result) const {
@@ -19,16 +19,16 @@ struct Image {
   }
 };
 
-struct Evaluated {
+struct EvaluatedImage {
   bool valid;
   Eigen::Vector2d residual;
   std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> jacobians;
 };
 
-Evaluated by_ceres(const residual::ImageMeasured& image, const std::vector<std::vector<double>>& blocks) {
-  ceres::DynamicAutoDiffCostFunction<Image, 8> cost(new Image{image});
+EvaluatedImage image_by_ceres(const residual::ImageMeasured& image, const std::vector<std::vector<double>>& blocks) {
+  ceres::DynamicAutoDiffCostFunction<MeasuredImage, 8> cost(new MeasuredImage{image});
   cost.SetNumResiduals(2);
-  Evaluated result;
+  EvaluatedImage result;
   std::vector<const double*> values;
   std::vector<double*> jacobians;
   for (const auto& block : blocks) {
@@ -41,7 +41,7 @@ Evaluated by_ceres(const residual::ImageMeasured& image, const std::vector<std::
   return result;
 }
 
-std::vector<double> block(const Pose& pose) {
+std::vector<double> pose_block(const Pose& pose) {
   std::vector<double> values(kPoseBlock);
   to_block(pose, values.data());
   return values;
@@ -49,11 +49,11 @@ std::vector<double> block(const Pose& pose) {
 
 Eigen::MatrixXd in_tangent(const Eigen::MatrixXd& ambient, const Pose& pose) {
   Eigen::Matrix<double, 7, 6, Eigen::RowMajor> plus;
-  PoseManifold().PlusJacobian(block(pose).data(), plus.data());
+  PoseManifold().PlusJacobian(pose_block(pose).data(), plus.data());
   return ambient * plus;
 }
 
-void expect_same(const Eigen::MatrixXd& ours, const Eigen::MatrixXd& reference, const char* what) {
+void expect_same_rows(const Eigen::MatrixXd& ours, const Eigen::MatrixXd& reference, const char* what) {
   for (Eigen::Index row = 0; row < ours.rows(); ++row)
     EXPECT_LE((ours.row(row) - reference.row(row)).cwiseAbs().maxCoeff(),
               1e-9 * reference.row(row).cwiseAbs().maxCoeff() + 1e-300)
@@ -79,15 +79,15 @@ TEST_P(CameraModels, LineariseAsAutomaticDifferentiation) {
     const Eigen::Vector2d measured = pixel + Eigen::Vector2d(unit(random), unit(random));
 
     const ImageResidual ours = linearise_image(frame, mount, k, point, measured, 2);
-    const Evaluated reference =
-        by_ceres({GetParam(), measured, 2},
-                 {block(frame), block(mount), {k.begin(), k.end()}, {point.x(), point.y(), point.z()}});
+    const EvaluatedImage reference =
+        image_by_ceres({GetParam(), measured, 2},
+                       {pose_block(frame), pose_block(mount), {k.begin(), k.end()}, {point.x(), point.y(), point.z()}});
     ASSERT_TRUE(ours.in_front);
     ASSERT_TRUE(reference.valid);
     EXPECT_LT((ours.residual - reference.residual).norm(), 1e-9);
-    expect_same(ours.by_frame, in_tangent(reference.jacobians[0], frame), "frame");
-    expect_same(ours.by_mount, in_tangent(reference.jacobians[1], mount), "mount");
-    expect_same(ours.by_point, reference.jacobians[3], "point");
+    expect_same_rows(ours.by_frame, in_tangent(reference.jacobians[0], frame), "frame");
+    expect_same_rows(ours.by_mount, in_tangent(reference.jacobians[1], mount), "mount");
+    expect_same_rows(ours.by_point, reference.jacobians[3], "point");
     ASSERT_EQ(ours.by_intrinsics.cols(), k.size());
     for (int p = 0; p < k.size(); ++p) {
       const bool size_of_image = is_fixed(GetParam(), p) && is_additive(GetParam());  // never an unknown
@@ -105,8 +105,9 @@ TEST_P(CameraModels, RefuseWhatTheyDoNotSee) {
   for (const Eigen::Vector3d& point : {Eigen::Vector3d(0, 0, -3), Eigen::Vector3d(0, 2, 0)}) {
     const bool sees = panorama ? point.z() < 0 : GetParam().kind == CameraModelKind::kFisheye && point.z() == 0;
     EXPECT_EQ(linearise_image({}, {}, k, point, {5, 5}, 1).in_front, sees) << point.transpose();
-    EXPECT_EQ(by_ceres({GetParam(), {5, 5}, 1},
-                       {block(Pose()), block(Pose()), {k.begin(), k.end()}, {point.x(), point.y(), point.z()}})
+    EXPECT_EQ(image_by_ceres(
+                  {GetParam(), {5, 5}, 1},
+                  {pose_block(Pose()), pose_block(Pose()), {k.begin(), k.end()}, {point.x(), point.y(), point.z()}})
                   .valid,
               sees)
         << point.transpose();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "adjust/registration/four_frames.h"
+#include "geometry/angles.h"
 #include "tests/unit/adjust/street_rig.h"
 
 namespace megablock {
@@ -30,7 +31,6 @@ struct Crossing {
 };
 
 inline Crossing make_crossing(std::uint64_t seed, const CrossingOptions& options) {
-  constexpr double kDegree = std::numbers::pi / 180;
   Noise noise(seed);
   Crossing crossing;
   // The second pass crosses, follows or meets the first.

@@ -4,19 +4,17 @@
 
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "adjust/orientation.h"
+#include "geometry/angles.h"
 #include "geometry/similarity.h"
 #include "io/simulate/simulate.h"
 
 namespace megablock::orientation_scene {
-
-inline constexpr double kDegree = std::numbers::pi / 180;
 
 struct SceneOptions {
   double noise_px = 0.5;

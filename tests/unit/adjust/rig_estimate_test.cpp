@@ -3,16 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "adjust/registration/four_frames.h"
 #include "adjust/registration/trajectory.h"
+#include "geometry/angles.h"
 #include "io/simulate/simulate.h"
 
 namespace megablock {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 SimulatedBlock make_block(bool calibrate) {
   SimulationOptions options = SimulationOptions::of(SimulationOptions::Scene::kStereopolis);

@@ -10,7 +10,6 @@
 namespace megablock {
 namespace {
 
-using orientation_scene::kDegree;
 using orientation_scene::normal_vector;
 
 struct Graph {

@@ -4,6 +4,7 @@
 
 #include "adjust/registration/four_frames.h"
 #include "adjust/registration/joint_adjustment.h"
+#include "geometry/angles.h"
 #include "tests/unit/adjust/street_rig.h"
 
 namespace megablock {
@@ -28,7 +29,6 @@ struct Town {
 };
 
 inline Town make_town(const TownOptions& options) {
-  constexpr double kDegree = std::numbers::pi / 180;
   Noise noise(options.seed);
   Town town;
   JointInput& input = town.input;

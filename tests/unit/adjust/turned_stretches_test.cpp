@@ -3,15 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
+#include "geometry/angles.h"
 #include "geometry/rotation.h"
 
 namespace megablock {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // A pass of 60 frames with exact relative poses; its initial orientation is off by about 0.3 degrees a frame.
 struct Pass {

@@ -10,8 +10,7 @@
 namespace megablock {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-const Eigen::Vector3d kEast(1, 0, 0), kNorth(0, 1, 0), kUp(0, 0, 1);
+const Eigen::Vector3d kEastward(1, 0, 0), kNorthward(0, 1, 0), kUpward(0, 0, 1);
 
 // World -> camera with these camera axes.
 Eigen::Quaterniond rotation_of(const Eigen::Vector3d& right, const Eigen::Vector3d& down, const Eigen::Vector3d& view) {
@@ -21,12 +20,12 @@ Eigen::Quaterniond rotation_of(const Eigen::Vector3d& right, const Eigen::Vector
 }
 
 TEST(BodyAttitude, NadirIsLevelAndItsTopGivesTheYaw) {
-  const BodyAttitude north = body_attitude(rotation_of(kEast, -kNorth, -kUp));
+  const BodyAttitude north = body_attitude(rotation_of(kEastward, -kNorthward, -kUpward));
   EXPECT_NEAR(north.yaw, 0, 1e-15);
   EXPECT_NEAR(north.pitch, 0, 1e-15);
   EXPECT_NEAR(north.roll, 0, 1e-15);
-  const BodyAttitude east = body_attitude(rotation_of(-kNorth, -kEast, -kUp));  // top to the east
-  EXPECT_NEAR(east.yaw, kPi / 2, 1e-15);
+  const BodyAttitude east = body_attitude(rotation_of(-kNorthward, -kEastward, -kUpward));  // top to the east
+  EXPECT_NEAR(east.yaw, std::numbers::pi / 2, 1e-15);
   EXPECT_NEAR(east.pitch, 0, 1e-15);
   EXPECT_NEAR(east.roll, 0, 1e-15);
 }
@@ -36,14 +35,14 @@ TEST(BodyAttitude, SignsOfTheAngles) {
     return Eigen::Vector3d(rotation_from(a).conjugate() * Eigen::Vector3d::UnitZ());
   };
   // Flying north: nose up looks ahead, the right wing down looks to the left.
-  EXPECT_NEAR(view({0, 0.2, 0}).dot(kNorth), std::sin(0.2), 1e-15);
-  EXPECT_NEAR(view({0, 0, 0.2}).dot(kEast), -std::sin(0.2), 1e-15);
+  EXPECT_NEAR(view({0, 0.2, 0}).dot(kNorthward), std::sin(0.2), 1e-15);
+  EXPECT_NEAR(view({0, 0, 0.2}).dot(kEastward), -std::sin(0.2), 1e-15);
   // An oblique photo 30 degrees off nadir to the east, the image's top ahead: pitch 30, yaw 90.
-  const BodyAttitude oblique =
-      body_attitude(rotation_of(-kNorth, -(kEast * std::cos(kPi / 6) + kUp * std::sin(kPi / 6)),
-                                kEast * std::sin(kPi / 6) - kUp * std::cos(kPi / 6)));
-  EXPECT_NEAR(oblique.yaw, kPi / 2, 1e-14);
-  EXPECT_NEAR(oblique.pitch, kPi / 6, 1e-14);
+  const BodyAttitude oblique = body_attitude(
+      rotation_of(-kNorthward, -(kEastward * std::cos(std::numbers::pi / 6) + kUpward * std::sin(std::numbers::pi / 6)),
+                  kEastward * std::sin(std::numbers::pi / 6) - kUpward * std::cos(std::numbers::pi / 6)));
+  EXPECT_NEAR(oblique.yaw, std::numbers::pi / 2, 1e-14);
+  EXPECT_NEAR(oblique.pitch, std::numbers::pi / 6, 1e-14);
   EXPECT_NEAR(oblique.roll, 0, 1e-14);
 }
 
@@ -51,13 +50,13 @@ TEST(BodyAttitude, GimbalOfADroneIsNinetyDegreesBelow) {
   for (const double yaw : {-2.0, 0.3, 1.7})
     for (const double pitch : {-0.4, 0.0, 0.5})
       EXPECT_LT(rotation_angle(rotation_from(BodyAttitude{yaw, pitch, 0}),
-                               rotation_from(YawPitchRoll{yaw, pitch - kPi / 2, 0})),
+                               rotation_from(YawPitchRoll{yaw, pitch - std::numbers::pi / 2, 0})),
                 1e-14);
 }
 
 TEST(BodyAttitude, RoundTrips) {
   std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> full(-kPi, kPi), half(-1.5, 1.5);
+  std::uniform_real_distribution<double> full(-std::numbers::pi, std::numbers::pi), half(-1.5, 1.5);
   for (int i = 0; i < 100; ++i) {
     const BodyAttitude a{full(random), half(random), full(random)}, b = body_attitude(rotation_from(a));
     EXPECT_NEAR(b.yaw, a.yaw, 1e-12);

@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include <numbers>
-
+#include "geometry/angles.h"
 #include "image_files.h"
 #include "io/error.h"
 #include "io/export.h"
@@ -14,16 +13,14 @@
 namespace megablock {
 namespace {
 
+using fixture::gps_tags;
+using fixture::message_of;
+using fixture::small_result;
+using fixture::TemporaryFolder;
+using fixture::write_file;
+using fixture::write_picture;
 using ::testing::ElementsAre;
-using testing::gps_tags;
 using ::testing::HasSubstr;
-using testing::message_of;
-using testing::small_result;
-using testing::TemporaryFolder;
-using testing::write_file;
-using testing::write_picture;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // What the export wrote comes back as given poses of the frames, rigs included.
 TEST(ApproximatePoses, ReadWhatTheExportWrites) {
@@ -48,7 +45,7 @@ TEST(ApproximatePoses, OfAnyImageOfARig) {
   TemporaryFolder folder;
   const BlockResult result = small_result();
   export_result(result, "csv", folder / "out");
-  std::istringstream lines(testing::read_file(folder / "out/images_local.csv"));
+  std::istringstream lines(fixture::read_file(folder / "out/images_local.csv"));
   std::string header, first, second;
   std::getline(lines, header);
   std::getline(lines, first);
@@ -102,9 +99,10 @@ TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
 // The same nadir photo, its top to the east, in the three kinds of angles.
 TEST(ApproximatePoses, AnglesOfBodyGimbalAndPhotoAgree) {
   TemporaryFolder folder;
-  const std::vector<std::string> tables = {"yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,90,0,0\n",
-                                           "gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg\nframe0/0.jpg,1,2,3,90,-90,0\n",
-                                           "omega_deg,phi_deg,kappa_deg\nframe0/0.jpg,1,2,3,0,0,-90\n"};
+  const std::vector<std::string> tables = {
+      "yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,90,0,0\n",
+      "gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg\nframe0/0.jpg,1,2,3,90,-90,0\n",
+      "omega_deg,phi_deg,kappa_deg\nframe0/0.jpg,1,2,3,0,0,-90\n"};
   for (const std::string& table : tables) {
     write_file(folder / "p.csv", "image,x_m,y_m,z_m," + table);
     Block block = small_result().block;

@@ -17,8 +17,8 @@
 namespace megablock {
 namespace {
 
+using fixture::message_of;
 using ::testing::HasSubstr;
-using testing::message_of;
 
 class CalibrationFile : public ::testing::Test {
  protected:

@@ -15,13 +15,13 @@
 namespace megablock {
 namespace {
 
+using fixture::message_of;
+using fixture::read_file;
+using fixture::small_result;
+using fixture::TemporaryFolder;
+using fixture::write_file;
+using fixture::write_picture;
 using ::testing::HasSubstr;
-using testing::message_of;
-using testing::read_file;
-using testing::small_result;
-using testing::TemporaryFolder;
-using testing::write_file;
-using testing::write_picture;
 
 Block every_camera() {
   Block block;

@@ -9,14 +9,14 @@
 namespace megablock {
 namespace {
 
+using fixture::gps_tags;
+using fixture::message_of;
+using fixture::TemporaryFolder;
+using fixture::write_file;
+using fixture::write_picture;
 using ::testing::ElementsAre;
-using testing::gps_tags;
 using ::testing::HasSubstr;
-using testing::message_of;
 using ::testing::SizeIs;
-using testing::TemporaryFolder;
-using testing::write_file;
-using testing::write_picture;
 
 // Three images of 200 x 100 pixels in zone 33, near 52.52 N 13.40 E, 40 m.
 class ControlFile : public ::testing::Test {
@@ -149,7 +149,7 @@ TEST_F(ControlFile, CsvInTheBlocksFrameAndItsWriterReturn) {
   };
   expect_right(block);
   write_control_csv(folder_ / "written.csv", block);
-  expect_right(read("again.csv", testing::read_file(folder_ / "written.csv")).block);
+  expect_right(read("again.csv", fixture::read_file(folder_ / "written.csv")).block);
 }
 
 TEST_F(ControlFile, CsvRefusals) {

@@ -3,15 +3,13 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <numbers>
 #include <thread>
 
+#include "geometry/angles.h"
 #include "io/error.h"
 
 namespace megablock {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // Geocentric coordinates from the defining formulas of the ellipsoid.
 Eigen::Vector3d geocentric(const Geodetic& p) {

@@ -5,8 +5,8 @@
 #include <Eigen/Cholesky>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/simulate/random.h"
@@ -29,8 +29,6 @@ TEST(EvaluationText, LeavesOutWhatIsNotKnown) {
   EXPECT_NE(to_text(evaluation).find("check points                2, rms 0.0123 m horizontal, 0.0456 m vertical"),
             std::string::npos);
 }
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // A result whose errors are drawn from the covariances it states.
 class EvaluateTest : public testing::Test {

@@ -21,12 +21,12 @@
 namespace megablock {
 namespace {
 
+using fixture::message_of;
+using fixture::read_file;
+using fixture::small_result;
+using fixture::TemporaryFolder;
+using fixture::write_file;
 using ::testing::HasSubstr;
-using testing::message_of;
-using testing::read_file;
-using testing::small_result;
-using testing::TemporaryFolder;
-using testing::write_file;
 
 // Lines of a text file without comments, split at blanks.
 std::vector<std::vector<std::string>> words_of(const std::string& path, char separator = ' ') {
@@ -51,7 +51,7 @@ Eigen::Vector2d colmap_project(const std::vector<double>& p, const Eigen::Vector
   return {p[0] * x + p[2], p[1] * y + p[3]};
 }
 
-struct ColmapModel {
+struct WrittenModel {
   struct Image {
     Eigen::Quaterniond rotation;
     Eigen::Vector3d translation;
@@ -70,8 +70,8 @@ struct ColmapModel {
   std::map<std::int64_t, Point> points;
 };
 
-ColmapModel read_colmap_text(const TemporaryFolder& folder) {
-  ColmapModel model;
+WrittenModel read_colmap_text(const TemporaryFolder& folder) {
+  WrittenModel model;
   for (const auto& w : words_of(folder / "model/cameras.txt")) {
     for (std::size_t i = 4; i < w.size(); ++i) model.cameras[std::stoll(w[0])].push_back(std::stod(w[i]));
     model.camera_models[std::stoll(w[0])] = w[1] + " " + w[2] + " " + w[3];
@@ -81,14 +81,14 @@ ColmapModel read_colmap_text(const TemporaryFolder& folder) {
     const auto& w = lines[i];
     std::vector<double> v;
     for (std::size_t k = 1; k < 8; ++k) v.push_back(std::stod(w[k]));
-    ColmapModel::Image image{{v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]}, std::stoll(w[8]), w[9], {}};
+    WrittenModel::Image image{{v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]}, std::stoll(w[8]), w[9], {}};
     for (std::size_t k = 0; k + 2 < lines[i + 1].size(); k += 3)
       image.observations.push_back(
           {{std::stod(lines[i + 1][k]), std::stod(lines[i + 1][k + 1])}, std::stoll(lines[i + 1][k + 2])});
     model.images[std::stoll(w[0])] = image;
   }
   for (const auto& w : words_of(folder / "model/points3D.txt")) {
-    ColmapModel::Point point{{std::stod(w[1]), std::stod(w[2]), std::stod(w[3])}, std::stod(w[7]), {}};
+    WrittenModel::Point point{{std::stod(w[1]), std::stod(w[2]), std::stod(w[3])}, std::stod(w[7]), {}};
     for (std::size_t k = 8; k + 1 < w.size(); k += 2) point.track.push_back({std::stoll(w[k]), std::stoll(w[k + 1])});
     model.points[std::stoll(w[0])] = point;
   }
@@ -119,8 +119,8 @@ class Bytes {
   std::size_t at_ = 0;
 };
 
-ColmapModel read_colmap_binary(const TemporaryFolder& folder) {
-  ColmapModel model;
+WrittenModel read_colmap_binary(const TemporaryFolder& folder) {
+  WrittenModel model;
   Bytes cameras(read_file(folder / "model/cameras.bin"));
   for (auto n = cameras.next<std::uint64_t>(); n > 0; --n) {
     const auto id = cameras.next<std::uint32_t>();
@@ -138,7 +138,7 @@ ColmapModel read_colmap_binary(const TemporaryFolder& folder) {
     const auto id = images.next<std::uint32_t>();
     double v[7];
     for (double& value : v) value = images.next<double>();
-    ColmapModel::Image image{{v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]}, images.next<std::uint32_t>(), "", {}};
+    WrittenModel::Image image{{v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]}, images.next<std::uint32_t>(), "", {}};
     image.name = images.text();
     for (auto k = images.next<std::uint64_t>(); k > 0; --k) {
       const double x = images.next<double>(), y = images.next<double>();
@@ -152,7 +152,7 @@ ColmapModel read_colmap_binary(const TemporaryFolder& folder) {
     const auto id = static_cast<std::int64_t>(points.next<std::uint64_t>());
     const double x = points.next<double>(), y = points.next<double>(), z = points.next<double>();
     for (int c = 0; c < 3; ++c) points.next<std::uint8_t>();
-    ColmapModel::Point point{{x, y, z}, points.next<double>(), {}};
+    WrittenModel::Point point{{x, y, z}, points.next<double>(), {}};
     for (auto k = points.next<std::uint64_t>(); k > 0; --k) {
       const auto image = points.next<std::uint32_t>();
       point.track.push_back({image, points.next<std::uint32_t>()});
@@ -164,7 +164,7 @@ ColmapModel read_colmap_binary(const TemporaryFolder& folder) {
 }
 
 // The model projects as we do, and says the same of who sees what.
-void expect_equals(const ColmapModel& model, const BlockResult& result) {
+void expect_equals(const WrittenModel& model, const BlockResult& result) {
   ASSERT_EQ(model.images.size(), 6u) << "frame2 is not oriented";
   std::int64_t observations = 0, points = 0;
   for (std::size_t t = 0; t < result.points.size(); ++t) {
@@ -213,7 +213,7 @@ TEST(Export, ColmapTextProjectsAsWeDo) {
   TemporaryFolder folder;
   const BlockResult result = small_result();
   export_result(result, "colmap-text", folder / "model");
-  const ColmapModel model = read_colmap_text(folder);
+  const WrittenModel model = read_colmap_text(folder);
   expect_equals(model, result);
   EXPECT_EQ(model.camera_models.at(1), "OPENCV 2000 1500");
   EXPECT_EQ(model.camera_models.at(2), "FULL_OPENCV 2000 1500");

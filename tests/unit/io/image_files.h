@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-namespace megablock::testing {
+namespace megablock::fixture {
 
 // A folder of its own for each test, removed at its end.
 class TemporaryFolder {
@@ -99,4 +99,4 @@ std::string message_of(const Action& action) {
   return "";
 }
 
-}  // namespace megablock::testing
+}  // namespace megablock::fixture

@@ -8,15 +8,15 @@
 namespace megablock {
 namespace {
 
-using testing::dms;
-using testing::gps_tags;
+using fixture::dms;
+using fixture::gps_tags;
+using fixture::joined;
+using fixture::message_of;
+using fixture::Tags;
+using fixture::TemporaryFolder;
+using fixture::write_file;
+using fixture::write_picture;
 using ::testing::HasSubstr;
-using testing::joined;
-using testing::message_of;
-using testing::Tags;
-using testing::TemporaryFolder;
-using testing::write_file;
-using testing::write_picture;
 
 TEST(ImageHeader, ReadsCameraTimeAndPosition) {
   TemporaryFolder folder;
@@ -121,7 +121,7 @@ TEST(ImageHeader, BadFilesGiveAReason) {
   write_file(folder / "empty.jpg", "");
   write_file(folder / "text.jpg", "this is no image, only words that go on for a while");
   write_picture(folder / "good.jpg", 400, 300, 7, gps_tags(1, 2, 3));
-  write_file(folder / "cut.jpg", testing::read_file(folder / "good.jpg").substr(0, 90));
+  write_file(folder / "cut.jpg", fixture::read_file(folder / "good.jpg").substr(0, 90));
   const auto reason = [&](const std::string& name) {
     return message_of<InputError>([&] { read_image_header(folder / name); });
   };

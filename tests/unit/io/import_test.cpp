@@ -13,12 +13,12 @@
 namespace megablock {
 namespace {
 
+using fixture::message_of;
+using fixture::read_file;
+using fixture::small_result;
+using fixture::TemporaryFolder;
+using fixture::write_file;
 using ::testing::HasSubstr;
-using testing::message_of;
-using testing::read_file;
-using testing::small_result;
-using testing::TemporaryFolder;
-using testing::write_file;
 
 // Residuals of an imported model are those of the result it was exported from, in the files' order.
 void expect_same_residuals(const ImportedBlock& imported, const BlockResult& result, double tolerance_px) {

@@ -31,16 +31,12 @@ using ::testing::Not;
 
 constexpr const char* kUnit = "tracks/000001.h5";
 
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 void put_bytes(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }
 
 template <typename Expected>
-std::string message_of(const std::function<void()>& action) {
+std::string what_of(const std::function<void()>& action) {
   try {
     action();
   } catch (const Expected& error) {
@@ -213,12 +209,12 @@ TEST_F(Store, AnotherFormatVersionIsSaid) {
   const std::uint64_t hash = hasher.value();
   std::memcpy(&trailer[56], &hash, sizeof hash);
   put_bytes(store_.path(kUnit), bytes.substr(0, bytes.size() - 64) + trailer);
-  EXPECT_THAT(message_of<StoreError>([&] { store_.verify(kUnit); }), HasSubstr("format version 77"));
+  EXPECT_THAT(what_of<StoreError>([&] { store_.verify(kUnit); }), HasSubstr("format version 77"));
   EXPECT_FALSE(store_.up_to_date(kUnit, 42));
 }
 
 TEST_F(Store, MissingUnitIsNamed) {
-  EXPECT_THAT(message_of<StoreError>([&] { store_.verify("tracks/000007.h5"); }),
+  EXPECT_THAT(what_of<StoreError>([&] { store_.verify("tracks/000007.h5"); }),
               HasSubstr("tracks/000007.h5: is missing"));
 }
 
@@ -274,14 +270,14 @@ TEST_F(Store, TextIsReplacedAtOnce) {
 TEST_F(Store, FileInTheWayOfTheJobIsNamed) {
   put_bytes(scratch_.path("blocked"), "a file");
   const JobStore blocked(scratch_.path("blocked/job"));
-  EXPECT_THAT(message_of<InputError>([&] { blocked.create(); }), HasSubstr("a file is where a directory is needed"));
-  EXPECT_THAT(message_of<InputError>([&] { blocked.write_text("job.json", ""); }),
+  EXPECT_THAT(what_of<InputError>([&] { blocked.create(); }), HasSubstr("a file is where a directory is needed"));
+  EXPECT_THAT(what_of<InputError>([&] { blocked.write_text("job.json", ""); }),
               HasSubstr("a file is where a directory is needed"));
 }
 
 TEST_F(Store, DirectoryInTheWayOfAUnitIsNamed) {
   fs::create_directories(store_.path("tracks/000001.h5/inside"));
-  const std::string message = message_of<InputError>([&] { write_example(); });
+  const std::string message = what_of<InputError>([&] { write_example(); });
   EXPECT_THAT(message, HasSubstr(store_.path(kUnit)));
   EXPECT_THAT(message, HasSubstr("a directory is where a file is needed"));
 }
@@ -292,7 +288,7 @@ TEST_F(Store, FileSizeLimitIsSaidAndTheProcessGoesOn) {
     ::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{1000, 1000};
     ::setrlimit(RLIMIT_FSIZE, &limit);
-    const std::string found = message_of<InputError>([&] { write_example(); });
+    const std::string found = what_of<InputError>([&] { write_example(); });
     if (found.find(store_.path(kUnit) + ": cannot be written: larger than the file size limit") == std::string::npos)
       ::_exit(1);
     if (files_in_tracks() != 0) ::_exit(2);
@@ -309,7 +305,7 @@ TEST_F(Store, FileSizeLimitIsSaidWhileTracksAreAppended) {
     ::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{20 << 20, 20 << 20};
     ::setrlimit(RLIMIT_FSIZE, &limit);
-    const std::string found = message_of<InputError>([&] {
+    const std::string found = what_of<InputError>([&] {
       TrackWriter writer(path);
       TrackSet batch;
       batch.begin = {0};
@@ -344,7 +340,7 @@ TEST_F(Store, FullDiskAndReadOnlyDiskAreSaid) {
   const JobStore store(mount_point + "/job");
   store.create();
   std::string full, read_only;
-  full = message_of<InputError>([&] {
+  full = what_of<InputError>([&] {
     store.write(kUnit, 1, [](const std::string& path) {
       write_tracks(path, example_tracks());
       Hdf5Writer file(path, "noise");
@@ -356,7 +352,7 @@ TEST_F(Store, FullDiskAndReadOnlyDiskAreSaid) {
   });
   const bool nothing_left = fs::is_empty(store.path("tracks"));
   ::mount("tmpfs", mount_point.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, "size=64k");
-  read_only = message_of<InputError>([&] { store.write_text("job.json", "{}"); });
+  read_only = what_of<InputError>([&] { store.write_text("job.json", "{}"); });
   ::umount(mount_point.c_str());
   EXPECT_THAT(full, HasSubstr("no space left on the device"));
   EXPECT_THAT(full, Not(HasSubstr(".tmp")));
@@ -369,7 +365,7 @@ TEST_F(Store, SecondLockIsRefusedNamingTheHolder) {
   const pid_t holder = ::getpid();
   const int status = in_child([&] {
     // Opens the lock file anew, so that the lock is not the one inherited.
-    const std::string message = message_of<InputError>([&] { const JobLock second(store_, 0.1); });
+    const std::string message = what_of<InputError>([&] { const JobLock second(store_, 0.1); });
     ::_exit(message.find("process " + std::to_string(holder) + " on ") == std::string::npos);
   });
   EXPECT_EQ(status, 0);
@@ -386,7 +382,7 @@ TEST_F(Store, LockIsFreeAfterItsHolderWasKilled) {
   }
   char byte;
   ASSERT_EQ(::read(ready[0], &byte, 1), 1);
-  EXPECT_THAT(message_of<InputError>([&] { const JobLock second(store_, 0); }),
+  EXPECT_THAT(what_of<InputError>([&] { const JobLock second(store_, 0); }),
               HasSubstr("process " + std::to_string(child)));
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);

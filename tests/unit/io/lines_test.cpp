@@ -25,8 +25,8 @@ class LinesFile : public ::testing::Test {
     return "";
   }
   Block read(const std::string& rows) {
-    testing::write_file(scratch_.path("lines.csv"),
-               "name,direction,image,column1_px,row1_px,column2_px,row2_px,sigma_px\n" + rows);
+    fixture::write_file(scratch_.path("lines.csv"),
+                        "name,direction,image,column1_px,row1_px,column2_px,row2_px,sigma_px\n" + rows);
     Block block = block_;
     read_lines(scratch_.path("lines.csv"), {"gone.jpg"}, block, warnings_);
     return block;

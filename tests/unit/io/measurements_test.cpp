@@ -22,7 +22,7 @@ using Row = std::tuple<std::int64_t, std::int64_t, std::int64_t, int, int, int>;
 
 constexpr int kFrames = 200, kImages = 2 * kFrames, kTiles = 5;
 
-std::string message_of(const std::function<void()>& action) {
+std::string complaint_of(const std::function<void()>& action) {
   try {
     action();
   } catch (const Error& error) {
@@ -163,8 +163,8 @@ TEST_F(MeasurementsByImage, NamesAreFound) {
   EXPECT_EQ(store.images_of_frames({"frame 199", "frame 3"}),
             (std::vector{ImageIndex(6), ImageIndex(7), ImageIndex(398), ImageIndex(399)}));
   EXPECT_EQ(store.names_of({ImageIndex(6), ImageIndex(398)}), (std::vector<std::string>{"frame 3/0", "frame 199/0"}));
-  EXPECT_THAT(message_of([&] { store.find_images({"frame 0/0", "frame 0"}); }), HasSubstr("no image 'frame 0'"));
-  EXPECT_THAT(message_of([&] { store.images_of_frames({"frame 200"}); }), HasSubstr("no frame 'frame 200'"));
+  EXPECT_THAT(complaint_of([&] { store.find_images({"frame 0/0", "frame 0"}); }), HasSubstr("no image 'frame 0'"));
+  EXPECT_THAT(complaint_of([&] { store.images_of_frames({"frame 200"}); }), HasSubstr("no frame 'frame 200'"));
 }
 
 TEST_F(MeasurementsByImage, FollowTheTilesWhenABlockGrows) {
@@ -181,11 +181,11 @@ TEST_F(MeasurementsByImage, FollowTheTilesWhenABlockGrows) {
 TEST_F(MeasurementsByImage, AStaleIndexIsRefusedAndMadeAgain) {
   tiles_[0] = tiles_[1];
   store_.write(unit_of(0), 77, [&](const std::string& path) { write_tracks(path, tiles_[0]); });  // killed thereafter
-  EXPECT_THAT(message_of([&] { asked({0}); }), HasSubstr("is newer than measurements.h5"));
-  EXPECT_THAT(message_of([&] { check_measurement_index(store_); }), HasSubstr("is not of the job's tracks"));
+  EXPECT_THAT(complaint_of([&] { asked({0}); }), HasSubstr("is newer than measurements.h5"));
+  EXPECT_THAT(complaint_of([&] { check_measurement_index(store_); }), HasSubstr("is not of the job's tracks"));
   write_list();
-  EXPECT_THAT(message_of([&] { asked({0}); }), HasSubstr("is older than the job's tracks"));
-  EXPECT_THAT(message_of([&] { check_measurement_index(store_); }), HasSubstr("is not of the job's tracks"));
+  EXPECT_THAT(complaint_of([&] { asked({0}); }), HasSubstr("is older than the job's tracks"));
+  EXPECT_THAT(complaint_of([&] { check_measurement_index(store_); }), HasSubstr("is not of the job's tracks"));
   update_measurement_index(store_, {unit_of(0), unit_of(1), unit_of(2), unit_of(3), unit_of(4)});
   check_measurement_index(store_);
   EXPECT_EQ(asked({100}), brute_force({100}));
@@ -201,7 +201,7 @@ TEST_F(MeasurementsByImage, TheIndexIsLeftAloneWhileItIsRightAndRepairedWhenItIs
     std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(500).put('\x5a');
   }
-  EXPECT_THAT(message_of([&] { asked({0}); }), HasSubstr("measurements.h5: is damaged"));
+  EXPECT_THAT(complaint_of([&] { asked({0}); }), HasSubstr("measurements.h5: is damaged"));
   update_measurement_index(store_, names);
   EXPECT_EQ(asked({100}), brute_force({100}));
 }
@@ -211,13 +211,13 @@ TEST_F(MeasurementsByImage, ADamagedTileIsNamed) {
   std::fstream file(store_.path(unit_of(1)), std::ios::in | std::ios::out | std::ios::binary);
   file.seekp(static_cast<std::streamoff>(size / 2)).put('\x5a').put('\x5b');
   file.close();
-  EXPECT_THAT(message_of([&] { asked({100}); }), HasSubstr("tracks/000001.h5: is damaged"));
+  EXPECT_THAT(complaint_of([&] { asked({100}); }), HasSubstr("tracks/000001.h5: is damaged"));
   EXPECT_EQ(asked({399}), brute_force({399}));  // of other tiles
 }
 
 TEST_F(MeasurementsByImage, AJobWithoutTracksSaysSo) {
   store_.remove("tracks/index.txt");
-  EXPECT_THAT(message_of([&] { asked({0}); }), HasSubstr("the job has no tracks yet"));
+  EXPECT_THAT(complaint_of([&] { asked({0}); }), HasSubstr("the job has no tracks yet"));
   EXPECT_THROW(MeasurementStore(scratch_.path("elsewhere")), InputError);
 }
 
@@ -307,7 +307,7 @@ TEST_F(MeasurementsByPlace, EqualASearchThroughAllPoints) {
 }
 
 TEST_F(MeasurementsByPlace, NeedAResult) {
-  EXPECT_THAT(message_of([&] {
+  EXPECT_THAT(complaint_of([&] {
                 MeasurementStore(scratch_.path()).near({{0, 0, 0}, 1});
               }),
               HasSubstr("the job has no result yet"));

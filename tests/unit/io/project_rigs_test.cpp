@@ -7,12 +7,12 @@
 namespace megablock {
 namespace {
 
-using testing::gps_tags;
+using fixture::gps_tags;
+using fixture::message_of;
+using fixture::TemporaryFolder;
+using fixture::write_file;
+using fixture::write_picture;
 using ::testing::HasSubstr;
-using testing::message_of;
-using testing::TemporaryFolder;
-using testing::write_file;
-using testing::write_picture;
 
 const char* const kCameras = R"({"right": {"rotation": [0, 1.5707963267948966, 0], "translation": [0.1, 0, 0.2]},
                                   "left": {"rotation": [0, 0, 0], "translation": [0, 0, 0]},

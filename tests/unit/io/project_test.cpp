@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include <numbers>
-
+#include "geometry/angles.h"
 #include "image_files.h"
 #include "io/crs.h"
 #include "io/error.h"
@@ -12,21 +11,20 @@
 namespace megablock {
 namespace {
 
+using fixture::gps_tags;
+using fixture::joined;
+using fixture::message_of;
+using fixture::read_file;
+using fixture::Tags;
+using fixture::TemporaryFolder;
+using fixture::write_file;
+using fixture::write_picture;
 using ::testing::Each;
 using ::testing::ElementsAre;
-using testing::gps_tags;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::joined;
-using testing::message_of;
-using testing::read_file;
 using ::testing::SizeIs;
-using testing::Tags;
-using testing::TemporaryFolder;
-using testing::write_file;
-using testing::write_picture;
 
-constexpr double kDegree = std::numbers::pi / 180;
 const Tags kDji = {{"Exif.Image.Make", "DJI"}, {"Exif.Image.Model", "FC300S"}, {"Exif.Photo.FocalLength", "361/100"}};
 
 // Five photos on a line to the east, about 76 m apart, at 46.84 N 91.99 W, 250 m.

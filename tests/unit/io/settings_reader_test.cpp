@@ -13,7 +13,7 @@ StageSettings settings_with(const std::string& key, const std::string& value) {
   return {{{"adjustment", key, value, "block.yaml:7"}, {"features", "max_features", "100", "block.yaml:3"}}};
 }
 
-std::string message_of(const auto& action) {
+std::string input_message_of(const auto& action) {
   try {
     action();
   } catch (const InputError& error) {
@@ -50,7 +50,7 @@ TEST(SettingsReader, AppliesEachKind) {
 
 TEST(SettingsReader, RefusesUnknownKeysWithLineAndKnownKeys) {
   const StageSettings settings = settings_with("max_resdual_px", "3");
-  const std::string message = message_of([&] {
+  const std::string message = input_message_of([&] {
     double value = 0;
     SettingsReader reader(settings, "adjustment");
     reader.number("max_residual_px", value);
@@ -68,7 +68,7 @@ TEST(SettingsReader, RefusesUnitsAndWrongKinds) {
   bool flag = false;
   const auto number_message = [&](const std::string& value) {
     const StageSettings settings = settings_with("d", value);
-    return message_of([&] { SettingsReader(settings, "adjustment").number("d", number); });
+    return input_message_of([&] { SettingsReader(settings, "adjustment").number("d", number); });
   };
   EXPECT_THAT(number_message("3 px"), HasSubstr("block.yaml:7: adjustment.d: '3 px' has something behind the number"));
   EXPECT_THAT(number_message("three"), HasSubstr("'three' is not a number"));
@@ -79,15 +79,15 @@ TEST(SettingsReader, RefusesUnitsAndWrongKinds) {
   EXPECT_EQ(number, 1.5);
   for (const std::string value : {"1.5", "x", "99999999999", "99999999999999999999999"}) {
     const StageSettings settings = settings_with("n", value);
-    EXPECT_THAT(message_of([&] { SettingsReader(settings, "adjustment").integer("n", integer); }),
+    EXPECT_THAT(input_message_of([&] { SettingsReader(settings, "adjustment").integer("n", integer); }),
                 HasSubstr("block.yaml:7: adjustment.n"))
         << value;
   }
   const StageSettings settings = settings_with("on", "yes");
-  EXPECT_THAT(message_of([&] { SettingsReader(settings, "adjustment").flag("on", flag); }),
+  EXPECT_THAT(input_message_of([&] { SettingsReader(settings, "adjustment").flag("on", flag); }),
               HasSubstr("'yes' is neither true nor false"));
   int choice = 0;
-  EXPECT_THAT(message_of([&] {
+  EXPECT_THAT(input_message_of([&] {
                 SettingsReader(settings, "adjustment").choice("on", {"a", "b"}, choice);
               }),
               HasSubstr("'yes' is none of: a, b"));

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "geometry/rotation.h"
 #include "io/error.h"
 
@@ -106,8 +106,6 @@ double rms(const std::vector<Eigen::Vector3d>& normalised) {
   for (const Eigen::Vector3d& v : normalised) sum += v.squaredNorm() / 3;
   return std::sqrt(sum / static_cast<double>(normalised.size()));
 }
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 TEST_P(SimulateTest, GivenPosesAreTheIntegratedRelativePosesWithOffsets) {
   SimulationOptions options = GetParam();

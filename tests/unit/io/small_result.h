@@ -7,7 +7,7 @@
 
 #include "io/result.h"
 
-namespace megablock::testing {
+namespace megablock::fixture {
 
 inline BlockResult small_result(bool full_distortion = true) {
   BlockResult result;
@@ -71,4 +71,4 @@ inline BlockResult small_result(bool full_distortion = true) {
   return result;
 }
 
-}  // namespace megablock::testing
+}  // namespace megablock::fixture

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <optional>
 #include <set>
 
+#include "geometry/angles.h"
 #include "geometry/rotation.h"
 #include "io/error.h"
 #include "io/project.h"
@@ -18,7 +18,6 @@
 namespace megablock {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 using Kind = SimulationOptions::Scene;
 using Path = SimulationOptions::Path;
 

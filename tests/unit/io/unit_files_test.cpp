@@ -113,11 +113,6 @@ void expect_equal(const TrackSet& a, const TrackSet& b) {
   EXPECT_EQ(a.feature, b.feature);
 }
 
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 class UnitFiles : public ::testing::Test {
  protected:
   ScratchDirectory scratch_;
@@ -187,7 +182,7 @@ TEST_F(UnitFiles, EqualContentsGiveEqualBytes) {
   EXPECT_EQ(bytes_of(scratch_.path("other name.h5")), first);
 }
 
-std::string message_of(const auto& action) {
+std::string store_message_of(const auto& action) {
   try {
     action();
   } catch (const StoreError& error) {
@@ -197,12 +192,12 @@ std::string message_of(const auto& action) {
 }
 
 TEST_F(UnitFiles, MissingFileIsNamed) {
-  EXPECT_THAT(message_of([&] { read_block(path_); }), HasSubstr(path_ + ": is missing"));
+  EXPECT_THAT(store_message_of([&] { read_block(path_); }), HasSubstr(path_ + ": is missing"));
 }
 
 TEST_F(UnitFiles, FileOfAnotherKindIsNamed) {
   write_block(path_, example_block());
-  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr(path_ + ": holds 'block', not 'tracks'"));
+  EXPECT_THAT(store_message_of([&] { read_tracks(path_); }), HasSubstr(path_ + ": holds 'block', not 'tracks'"));
 }
 
 TEST_F(UnitFiles, FileOfAnotherVersionIsNamed) {
@@ -213,19 +208,20 @@ TEST_F(UnitFiles, FileOfAnotherVersionIsNamed) {
   EXPECT_GE(H5Awrite(version, H5T_NATIVE_UINT32, &other), 0);
   H5Aclose(version);
   H5Fclose(file);
-  EXPECT_THAT(message_of([&] { read_block(path_); }),
+  EXPECT_THAT(store_message_of([&] { read_block(path_); }),
               HasSubstr(path_ + ": has format version " + std::to_string(other)));
 }
 
 TEST_F(UnitFiles, FileThatIsNoHdf5IsNamed) {
   std::ofstream(path_) << "some text";
-  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr(path_ + ": cannot be opened as HDF5"));
+  EXPECT_THAT(store_message_of([&] { read_tracks(path_); }), HasSubstr(path_ + ": cannot be opened as HDF5"));
 }
 
 TEST_F(UnitFiles, MissingDatasetIsNamed) {
   Hdf5Writer file(path_, "tracks");
   file.close();
-  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr(path_ + ": tracks/id_difference: cannot be read"));
+  EXPECT_THAT(store_message_of([&] { read_tracks(path_); }),
+              HasSubstr(path_ + ": tracks/id_difference: cannot be read"));
 }
 
 TEST_F(UnitFiles, ContradictingLengthsAreNamed) {
@@ -238,18 +234,18 @@ TEST_F(UnitFiles, ContradictingLengthsAreNamed) {
     file.vector(std::string("observations/") + name, std::vector<std::int32_t>(3));
   file.integers("observations/image_difference", {0, 0, 0});
   file.close();
-  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr("tracks/observations: adds up to 4 rows"));
+  EXPECT_THAT(store_message_of([&] { read_tracks(path_); }), HasSubstr("tracks/observations: adds up to 4 rows"));
 }
 
 TEST_F(UnitFiles, TracksOutOfOrderAreRefused) {
   TrackSet tracks = example_tracks();
   std::swap(tracks.image[0], tracks.image[1]);
   write_tracks(path_, tracks);
-  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr("the images of a track do not ascend"));
+  EXPECT_THAT(store_message_of([&] { read_tracks(path_); }), HasSubstr("the images of a track do not ascend"));
   tracks = example_tracks();
   std::swap(tracks.id[0], tracks.id[1]);
   write_tracks(path_, tracks);
-  EXPECT_THAT(message_of([&] { read_tracks(path_); }), HasSubstr("indices do not ascend"));
+  EXPECT_THAT(store_message_of([&] { read_tracks(path_); }), HasSubstr("indices do not ascend"));
 }
 
 }  // namespace

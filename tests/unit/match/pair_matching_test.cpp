@@ -28,7 +28,7 @@ SiftDescriptor random_descriptor(std::mt19937_64& generator) {
   return d;
 }
 
-struct Scene {
+struct TwoPictures {
   ImageFeatures a, b;
   Eigen::Quaterniond rotation;
   std::vector<std::pair<std::int32_t, std::int32_t>> true_matches;
@@ -36,10 +36,10 @@ struct Scene {
 
 // Row i of a is row i of b for the first kMatches; the rest are features of their own. The first hundred keypoints of
 // the matched ones are reported a second time, with another orientation.
-Scene make_scene() {
+TwoPictures make_scene() {
   std::mt19937_64 generator(3);
   std::uniform_real_distribution<double> unit(0, 1);
-  Scene scene;
+  TwoPictures scene;
   const Camera camera = make_camera();
   scene.rotation = rotation_exp<double>(Eigen::Vector3d(0.02, -0.1, 0.4));
   const Eigen::Vector3d t = -(scene.rotation * Eigen::Vector3d(0.2, 0.05, 0));
@@ -82,7 +82,7 @@ Scene make_scene() {
 }
 
 TEST(MatchPair, FindsOrientationAndInliers) {
-  const Scene scene = make_scene();
+  const TwoPictures scene = make_scene();
   const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
   EXPECT_EQ(pair.a, ImageIndex(4));
   EXPECT_EQ(pair.b, ImageIndex(9));
@@ -103,7 +103,7 @@ TEST(MatchPair, FindsOrientationAndInliers) {
 }
 
 TEST(MatchPair, NamesTheFirstOfTheRowsAtOnePlace) {
-  Scene scene = make_scene();
+  TwoPictures scene = make_scene();
   std::mt19937_64 generator(11);
   for (ImageFeatures* f : {&scene.a, &scene.b}) {  // row 0 is row 1 with another orientation, which nothing matches
     f->keypoints[0] = f->keypoints[1];
@@ -116,7 +116,7 @@ TEST(MatchPair, NamesTheFirstOfTheRowsAtOnePlace) {
 }
 
 TEST(MatchPair, IsRepeatable) {
-  const Scene scene = make_scene();
+  const TwoPictures scene = make_scene();
   const VerifiedPair first = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
   const VerifiedPair second = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
   EXPECT_EQ(first.feature_a, second.feature_a);
@@ -125,7 +125,7 @@ TEST(MatchPair, IsRepeatable) {
 }
 
 TEST(MatchPair, UnrelatedImagesAreNotVerified) {
-  Scene scene = make_scene();
+  TwoPictures scene = make_scene();
   std::mt19937_64 generator(8);
   for (auto& d : scene.b.descriptors) d = random_descriptor(generator);
   const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
@@ -134,17 +134,17 @@ TEST(MatchPair, UnrelatedImagesAreNotVerified) {
 }
 
 TEST(MatchPair, ImagesWithoutFeaturesAreNotVerified) {
-  const Scene scene = make_scene();
+  const TwoPictures scene = make_scene();
   ImageFeatures empty;
   empty.image = ImageIndex(20);
   EXPECT_EQ(match_pair(scene.a, empty, make_camera(), make_camera(), {}).model, PairModel::kNone);
 }
 
 // A facade 10 m away whose windows are all alike: every feature has a twin in each of the others, 3.4 m along and more.
-Scene make_facade(TrustedPair& pair) {
+TwoPictures make_facade(TrustedPair& pair) {
   std::mt19937_64 generator(5);
   std::uniform_real_distribution<double> unit(0, 1);
-  Scene scene;
+  TwoPictures scene;
   scene.a.image = ImageIndex(1);
   scene.b.image = ImageIndex(2);
   pair.b.centre = {1.2, 0.05, 0.1};
@@ -178,7 +178,7 @@ Scene make_facade(TrustedPair& pair) {
 
 TEST(MatchPair, TrustedOrientationTellsRepeatedWindowsApart) {
   TrustedPair pair;
-  const Scene scene = make_facade(pair);
+  const TwoPictures scene = make_facade(pair);
   const auto right = [&](const VerifiedPair& found) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < found.feature_a.size(); ++i)
@@ -200,7 +200,7 @@ TEST(MatchPair, TrustedOrientationTellsRepeatedWindowsApart) {
 
 // Where the trust is misplaced, the pair is matched as if there were none.
 TEST(MatchPair, AWrongTrustIsNoHarm) {
-  const Scene scene = make_scene();
+  const TwoPictures scene = make_scene();
   TrustedPair wrong;
   wrong.b = {rotation_exp<double>(Eigen::Vector3d(0.3, 0.2, -0.5)), {-1, 2, 0.5}};
   wrong.rotation_sigma_rad = 1e-3;
@@ -212,7 +212,7 @@ TEST(MatchPair, AWrongTrustIsNoHarm) {
 }
 
 TEST(MatchPair, BadInputIsRefused) {
-  const Scene scene = make_scene();
+  const TwoPictures scene = make_scene();
   EXPECT_THROW(match_pair(scene.b, scene.a, make_camera(), make_camera(), {}), InputError);
   MatchOptions options;
   options.ratio = 1.5;

@@ -4,22 +4,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 
+#include "geometry/angles.h"
 #include "geometry/rotation.h"
 #include "match/relative_pose.h"
 
 namespace megablock {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFocal = 1400, kWidth = 2000, kHeight = 1500;  // px
 
-enum class Scene { kGeneral, kPlane, kRotation };
+enum class Relief { kGeneral, kPlane, kRotation };
 
 struct Simulation {
-  Scene scene = Scene::kGeneral;
+  Relief scene = Relief::kGeneral;
   int matches = 800;
   double outlier_share = 0.5, noise_px = 0.5;
   double baseline = 0.15;  // of the distance
@@ -43,7 +42,7 @@ SimulatedPair simulate(const Simulation& s) {
   result.truth.rotation = rotation_exp<double>(s.rotation);
   const Eigen::Vector3d centre(s.baseline, 0.3 * s.baseline, 0.05 * s.baseline);
   const Eigen::Vector3d t =
-      s.scene == Scene::kRotation ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-(result.truth.rotation * centre));
+      s.scene == Relief::kRotation ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-(result.truth.rotation * centre));
   result.truth.translation = t.normalized();
   const auto random_point = [&] {
     return Eigen::Vector2d((unit(generator) - 0.5) * kWidth / kFocal, (unit(generator) - 0.5) * kHeight / kFocal);
@@ -51,7 +50,7 @@ SimulatedPair simulate(const Simulation& s) {
   const double scale = 1 / (1 + s.focal_error);
   while (result.points.size() < static_cast<std::size_t>(s.matches)) {
     const Eigen::Vector2d a = random_point();
-    const double depth = s.scene == Scene::kPlane ? 1 : 0.7 + 0.6 * unit(generator);
+    const double depth = s.scene == Relief::kPlane ? 1 : 0.7 + 0.6 * unit(generator);
     const Eigen::Vector3d in_b = result.truth.rotation * (depth * a.homogeneous()) + t;
     Eigen::Vector2d b = in_b.hnormalized();
     if (std::abs(b.x()) > 0.5 * kWidth / kFocal || std::abs(b.y()) > 0.5 * kHeight / kFocal) continue;
@@ -108,7 +107,7 @@ TEST_P(TwoViews, GeneralScene) {
 
 TEST_P(TwoViews, NadirPlane) {
   Simulation s;
-  s.scene = Scene::kPlane;
+  s.scene = Relief::kPlane;
   s.baseline = 0.3;
   s.seed = static_cast<std::uint64_t>(GetParam());
   const SimulatedPair pair = simulate(s);
@@ -121,7 +120,7 @@ TEST_P(TwoViews, NadirPlane) {
 
 TEST_P(TwoViews, PureRotation) {
   Simulation s;
-  s.scene = Scene::kRotation;
+  s.scene = Relief::kRotation;
   s.seed = static_cast<std::uint64_t>(GetParam());
   const SimulatedPair pair = simulate(s);
   const TwoView found = estimate_two_view(pair.points, options_for(s.seed));
@@ -136,7 +135,7 @@ TEST_P(TwoViews, PureRotation) {
 
 TEST_P(TwoViews, FocalLengthTenPerCentWrong) {
   for (const double error : {-0.1, 0.1}) {
-    for (const Scene scene : {Scene::kGeneral, Scene::kPlane}) {
+    for (const Relief scene : {Relief::kGeneral, Relief::kPlane}) {
       Simulation s;
       s.scene = scene;
       s.focal_error = error;

@@ -10,14 +10,14 @@
 namespace megablock {
 namespace {
 
-SimulationOptions aerial(std::int64_t frames) {
+SimulationOptions aerial_frames(std::int64_t frames) {
   SimulationOptions options;
   options.frames = frames;
   options.points_per_frame = 60;
   return options;
 }
 
-GlobalState adjust(SerialRunner& runner) {
+GlobalState adjusted(SerialRunner& runner) {
   GlobalOptions exact;
   exact.max_decrement = 1e-7;
   GlobalState state = start_global(exact);
@@ -58,7 +58,7 @@ void follow(TiledBlock& block) {
 
 TEST(BadTiles, TileWithoutObservations) {
   for (const bool priors : {true, false}) {
-    TiledBlock block(simulate_block(aerial(60)), 12, {}, 0.02);
+    TiledBlock block(simulate_block(aerial_frames(60)), 12, {}, 0.02);
     ASSERT_GE(block.tiles.tile_count, 4);
     constexpr std::size_t kEmpty = 1;
     reject_if(block, [](const TileProblem&, std::size_t, std::size_t tile) { return tile == kEmpty; });
@@ -77,7 +77,7 @@ TEST(BadTiles, TileWithoutObservations) {
     }
     follow(block);
     SerialRunner runner(block.tiles.tree, block.problems, block.states);
-    const GlobalState state = adjust(runner);
+    const GlobalState state = adjusted(runner);
     EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
     const TileState solution = solution_of(block, runner);
     const MonolithicSystem system = monolithic_system(block.whole, solution);
@@ -93,7 +93,7 @@ TEST(BadTiles, TileWithoutObservations) {
 // is held and said. Without the observation the frame is a part of its own, whose rotation is free.
 TEST(BadTiles, FrameSeenByOnePoint) {
   const auto solve = [](bool without, GlobalState& state, UpReport& up, std::int64_t& defect) {
-    TiledBlock block(simulate_block(aerial(60)), 12, {}, 0.005);
+    TiledBlock block(simulate_block(aerial_frames(60)), 12, {}, 0.005);
     const FrameIndex lonely(31);
     bool found = false;
     reject_if(block, [&](const TileProblem& problem, std::size_t o, std::size_t) {
@@ -102,7 +102,7 @@ TEST(BadTiles, FrameSeenByOnePoint) {
       return without || std::exchange(found, true);
     });
     SerialRunner runner(block.tiles.tree, block.problems, block.states);
-    state = adjust(runner);
+    state = adjusted(runner);
     up = runner.final_up();
     for (const TileCovariance& tile : runner.covariances())
       for (const auto& covariance : tile.frames) EXPECT_TRUE(covariance.allFinite());
@@ -135,7 +135,7 @@ TEST(BadTiles, FrameSeenByOnePoint) {
 
 // Tiles of one image each, without any prior: none has a datum of its own, the block has that of its inner constraints.
 TEST(BadTiles, SingularTilesOfOneImage) {
-  SimulationOptions options = aerial(8);
+  SimulationOptions options = aerial_frames(8);
   options.gps_sigma_m = 0;
   options.calibrate = false;
   const TiledBlock block(simulate_block(options), 2, {}, 0.01);
@@ -143,7 +143,7 @@ TEST(BadTiles, SingularTilesOfOneImage) {
     return problem.positions.empty() && problem.relatives.empty();
   }));
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
-  const GlobalState state = adjust(runner);
+  const GlobalState state = adjusted(runner);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
   const TileState solution = solution_of(block, runner);
   const MonolithicSystem system = monolithic_system(block.whole, solution);
@@ -154,13 +154,13 @@ TEST(BadTiles, SingularTilesOfOneImage) {
 
 // One image, no prior, no second one: every point is seen once and takes no part.
 TEST(BadTiles, BlockOfOneImageWithoutPriors) {
-  SimulationOptions options = aerial(20);
+  SimulationOptions options = aerial_frames(20);
   options.gps_sigma_m = 0;
   TiledBlock block(simulate_block(options), 30, {}, 0);
   ASSERT_EQ(block.problems.size(), 1u);
   reject_if(block, [](const TileProblem& problem, std::size_t o, std::size_t) { return problem.image[o].value != 0; });
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
-  const GlobalState state = adjust(runner);
+  const GlobalState state = adjusted(runner);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
   EXPECT_EQ(runner.final_up().sums.residuals, 0);
   EXPECT_EQ(runner.states().front().frames.front().centre, block.states.front().frames.front().centre);
@@ -168,7 +168,7 @@ TEST(BadTiles, BlockOfOneImageWithoutPriors) {
 
 TEST(BadTiles, NumbersThatAreNoneAreRefused) {
   for (const double wrong : {std::nan(""), std::numeric_limits<double>::infinity()}) {
-    TiledBlock block(simulate_block(aerial(20)), 10, {}, 0);
+    TiledBlock block(simulate_block(aerial_frames(20)), 10, {}, 0);
     TileProblem& problem = block.problems.back();
     problem.x[static_cast<std::size_t>(problem.begin[3])] = wrong;
     SerialRunner runner(block.tiles.tree, block.problems, block.states);

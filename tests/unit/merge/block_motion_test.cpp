@@ -10,7 +10,7 @@
 namespace megablock {
 namespace {
 
-SimulationOptions aerial() {
+SimulationOptions moving_block() {
   SimulationOptions o;
   o.frames = 60;
   o.points_per_frame = 60;
@@ -20,7 +20,8 @@ SimulationOptions aerial() {
 // Tile 0 of a block with its plan, and a step that is the tangent of a similarity of everything.
 class Motion : public testing::Test {
  protected:
-  Motion() : block_(simulate_block(aerial()), 12, {}, 0), runner_(block_.tiles.tree, block_.problems, block_.states) {
+  Motion()
+      : block_(simulate_block(moving_block()), 12, {}, 0), runner_(block_.tiles.tree, block_.problems, block_.states) {
     runner_.up(1e-3);
     runner_.down(1e-3);
     problem_ = runner_.problems().front();
@@ -100,7 +101,7 @@ TEST_F(Motion, IsTheStepToFirstOrder) {
 
 // Positions of metres, a start turned by some degrees: without the similarity this took more than 100 steps.
 TEST(GlobalAdjustment, TurnsAWeaklyPlacedBlockInFewSteps) {
-  SimulationOptions options = aerial();
+  SimulationOptions options = moving_block();
   options.gps_sigma_m = 3;
   TiledBlock block(simulate_block(options), 12, {}, 0.01);
   Similarity turned;

@@ -9,13 +9,13 @@
 namespace megablock {
 namespace {
 
-struct Scene {
+struct CovarianceCase {
   const char* name;
   SimulationOptions::Scene kind;
   bool calibrate = true, free_mounts = false;
 };
 
-class CeresCovariance : public testing::TestWithParam<Scene> {
+class CeresCovariance : public testing::TestWithParam<CovarianceCase> {
  protected:
   // Of two blocks of parameters, in their tangent spaces.
   Eigen::MatrixXd of(double* a, double* b) const {
@@ -117,10 +117,11 @@ TEST_P(CeresCovariance, EqualsOurs) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, CeresCovariance,
-                         testing::Values(Scene{"AerialSharedCamera", SimulationOptions::Scene::kAerial},
-                                         Scene{"AerialHeldCamera", SimulationOptions::Scene::kAerial, false},
-                                         Scene{"StreetSharedCameras", SimulationOptions::Scene::kStreet},
-                                         Scene{"StreetFreeMounts", SimulationOptions::Scene::kStreet, true, true}),
+                         testing::Values(CovarianceCase{"AerialSharedCamera", SimulationOptions::Scene::kAerial},
+                                         CovarianceCase{"AerialHeldCamera", SimulationOptions::Scene::kAerial, false},
+                                         CovarianceCase{"StreetSharedCameras", SimulationOptions::Scene::kStreet},
+                                         CovarianceCase{"StreetFreeMounts", SimulationOptions::Scene::kStreet, true,
+                                                        true}),
                          [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 
 using enum ObservationKind;
 
-SimulationOptions small(SimulationOptions::Scene kind, std::int64_t frames, int points) {
+SimulationOptions small_controlled(SimulationOptions::Scene kind, std::int64_t frames, int points) {
   SimulationOptions o;
   o.scene = kind;
   o.frames = frames;
@@ -60,7 +60,7 @@ struct Expected {
 class Redundancy : public testing::TestWithParam<SimulationOptions::Scene> {};
 
 TEST_P(Redundancy, EqualsTheDenseSystem) {
-  const TiledBlock block(simulate_block(small(GetParam(), 24, 24)), 8, {}, 0.02);
+  const TiledBlock block(simulate_block(small_controlled(GetParam(), 24, 24)), 8, {}, 0.02);
   ASSERT_GE(block.tiles.tile_count, 3);
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
   const UpReport up = runner.final_up();
@@ -91,7 +91,7 @@ TEST_P(Redundancy, EqualsTheDenseSystem) {
 }
 
 TEST_P(Redundancy, DoesNotDependOnTheDatum) {
-  SimulationOptions options = small(GetParam(), 16, 20);
+  SimulationOptions options = small_controlled(GetParam(), 16, 20);
   options.gps_sigma_m = 0;
   options.control_points = 0;
   options.calibrate = false;
@@ -108,7 +108,7 @@ TEST_P(Redundancy, DoesNotDependOnTheDatum) {
 TEST_P(Redundancy, OfEveryImageObservationEqualsTheDenseSystem) {
   for (const bool calibrate : {false, true}) {
     for (const bool free : {false, true}) {
-      SimulationOptions options = small(GetParam(), 16, 20);
+      SimulationOptions options = small_controlled(GetParam(), 16, 20);
       options.calibrate = calibrate;
       if (free) options.gps_sigma_m = options.control_points = 0;
       TiledBlock block(simulate_block(options), 6, {}, free ? 0 : 0.02);
@@ -171,7 +171,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Redundancy,
 // Everything is twice as noisy as stated. (Where only some is, the weights are wrong and estimates at these weights
 // biased: merge.estimate_sigmas repeats them.)
 TEST(SigmaFactor, ShowsTheTrueNoise) {
-  SimulationOptions simulation = small(SimulationOptions::Scene::kAerial, 150, 60);
+  SimulationOptions simulation = small_controlled(SimulationOptions::Scene::kAerial, 150, 60);
   simulation.image_noise_px = 1;
   simulation.gps_sigma_m = 0.3;
   SimulatedBlock simulated = simulate_block(simulation);

@@ -11,7 +11,7 @@
 namespace megablock {
 namespace {
 
-SimulationOptions scene() {
+SimulationOptions clean_scene() {
   SimulationOptions o;
   o.frames = 60;
   o.points_per_frame = 60;
@@ -39,7 +39,7 @@ void adjust(SerialRunner& runner) {
 TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
   double statistic = 0, degrees = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    SimulationOptions options = scene();
+    SimulationOptions options = clean_scene();
     options.seed = seed;
     const TiledBlock block(simulate_block(options), 12, without_loss(), 0.02);
     SerialRunner runner(block.tiles.tree, block.problems, block.states);
@@ -58,7 +58,7 @@ TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
 }
 
 TEST(SeamCheck, NamesTheTileThatWasShifted) {
-  TiledBlock block(simulate_block(scene()), 12, without_loss(), 0.02);
+  TiledBlock block(simulate_block(clean_scene()), 12, without_loss(), 0.02);
   constexpr std::size_t kWrong = 2;
   // All positions that this tile observes are 1.5 m off.
   for (auto& term : block.problems[kWrong].positions) term.prior.position.x() += 1.5;
@@ -74,7 +74,7 @@ TEST(SeamCheck, NamesTheTileThatWasShifted) {
 
 // A clean block of 200 tiles: at 1e-3 for the whole block no seam may raise an alarm.
 TEST(SeamCheck, IsSilentOnACleanBlockOf200Tiles) {
-  SimulationOptions options = scene();
+  SimulationOptions options = clean_scene();
   options.frames = 2400;
   options.seed = 21;
   const TiledBlock block(simulate_block(options), 12, without_loss(), 0.02);
@@ -89,7 +89,7 @@ TEST(SeamCheck, IsSilentOnACleanBlockOf200Tiles) {
 // what any test that is silent on 200 clean tiles can tell from chance (docs/benchmarks.md). The same with 0.25 px, or
 // with 1 200 measurements, can be told.
 SimulationOptions dense_street() {
-  SimulationOptions options = scene();
+  SimulationOptions options = clean_scene();
   options.scene = SimulationOptions::Scene::kStreet;
   options.rig_cameras = 4;
   options.frames = 60;

@@ -10,7 +10,7 @@
 namespace megablock {
 namespace {
 
-struct Scene {
+struct StepCase {
   const char* name;
   SimulationOptions simulation;
   ObservationOptions observations;
@@ -18,15 +18,15 @@ struct Scene {
   bool lines = false;
 };
 
-SimulationOptions aerial() {
+SimulationOptions aerial_steps() {
   SimulationOptions o;
   o.frames = 90;
   o.points_per_frame = 60;
   return o;
 }
 
-SimulationOptions street() {
-  SimulationOptions o = aerial();
+SimulationOptions street_steps() {
+  SimulationOptions o = aerial_steps();
   o.scene = SimulationOptions::Scene::kStreet;
   o.frames = 100;
   o.rig_cameras = 2;
@@ -34,34 +34,34 @@ SimulationOptions street() {
   return o;
 }
 
-std::vector<Scene> scenes() {
-  std::vector<Scene> list;
+std::vector<StepCase> scenes() {
+  std::vector<StepCase> list;
   ObservationOptions plain, cauchy;
   plain.image_loss.kind = RobustLoss::Kind::kNone;
   plain.position_loss.kind = RobustLoss::Kind::kNone;
   cauchy.image_loss = {RobustLoss::Kind::kCauchy, 1.5};
   cauchy.relative_loss = {RobustLoss::Kind::kHuber, 0.5};
-  list.push_back({"AerialCalibrated", aerial(), plain});
-  SimulationOptions held = aerial();
+  list.push_back({"AerialCalibrated", aerial_steps(), plain});
+  SimulationOptions held = aerial_steps();
   held.calibrate = false;
   list.push_back({"AerialHeldCamera", held, {}});
-  SimulationOptions control = aerial();
+  SimulationOptions control = aerial_steps();
   control.control_points = 8;
   control.check_points = 4;
   control.gps_share = 0.3;
   control.outlier_share = 0.02;
   list.push_back({"AerialControlRobust", control, cauchy});
-  SimulationOptions relative = street();
+  SimulationOptions relative = street_steps();
   relative.relative_position_sigma_m = 0.02;
   relative.attitude_sigma_deg = 0.5;
   relative.gps_share = 0.2;
   list.push_back({"StreetRelative", relative, cauchy});
-  list.push_back({"StreetFreeMounts", street(), {}, true});
-  list.push_back({"StreetLines", street(), cauchy, false, true});
+  list.push_back({"StreetFreeMounts", street_steps(), {}, true});
+  list.push_back({"StreetLines", street_steps(), cauchy, false, true});
   return list;
 }
 
-SimulatedBlock simulated(const Scene& scene) {
+SimulatedBlock simulated(const StepCase& scene) {
   SimulatedBlock block = simulate_block(scene.simulation);
   if (scene.lines) add_known_lines(block, 20, 1);
   if (scene.free_mounts)
@@ -73,7 +73,7 @@ SimulatedBlock simulated(const Scene& scene) {
   return block;
 }
 
-class StepEquality : public testing::TestWithParam<Scene> {};
+class StepEquality : public testing::TestWithParam<StepCase> {};
 
 // Largest difference between the tiles' step and the monolithic one, in units of `sigma` [columns].
 double difference(const TiledBlock& block, const SerialRunner& runner, const MonolithicSystem& system,

@@ -13,7 +13,7 @@ namespace {
 
 constexpr SolveOptions kTight{300, 1e-15, {}};
 
-SimulationOptions scene(SimulationOptions::Scene kind, std::uint64_t seed) {
+SimulationOptions tile_scene(SimulationOptions::Scene kind, std::uint64_t seed) {
   SimulationOptions options;
   options.scene = kind;
   options.frames = 30;
@@ -23,8 +23,8 @@ SimulationOptions scene(SimulationOptions::Scene kind, std::uint64_t seed) {
   options.start_rotation_error_deg = 1;
   return options;
 }
-SimulationOptions aerial(std::uint64_t seed) { return scene(SimulationOptions::Scene::kAerial, seed); }
-SimulationOptions street(std::uint64_t seed) { return scene(SimulationOptions::Scene::kStreet, seed); }
+SimulationOptions aerial_tile(std::uint64_t seed) { return tile_scene(SimulationOptions::Scene::kAerial, seed); }
+SimulationOptions street_tile(std::uint64_t seed) { return tile_scene(SimulationOptions::Scene::kStreet, seed); }
 
 // A tile with its points intersected at the poor poses, ready to be solved.
 struct Start : SingleTile {
@@ -67,16 +67,16 @@ void expect_optimum_of_ceres(const Start& start, const SolveOptions& options = k
   EXPECT_LT(max_pose_difference_sigmas(problem, ours, gauge, plan), 1e-3) << summary.text;
 }
 
-TEST(TileSolver, AerialWithItsCamera) { expect_optimum_of_ceres(Start(aerial(1))); }
+TEST(TileSolver, AerialWithItsCamera) { expect_optimum_of_ceres(Start(aerial_tile(1))); }
 
 TEST(TileSolver, StreetWithItsRigHeld) {
-  SimulationOptions simulation = street(2);
+  SimulationOptions simulation = street_tile(2);
   simulation.calibrate = false;
   expect_optimum_of_ceres(Start(simulation));
 }
 
 TEST(TileSolver, StreetWithFreeMounts) {
-  SimulationOptions simulation = street(3);
+  SimulationOptions simulation = street_tile(3);
   simulation.start_position_error_m = 1;  // farther away lie other minima of a narrow loss, for Ceres as for us
   simulation.start_rotation_error_deg = 0.5;
   Start start(simulation);
@@ -85,7 +85,7 @@ TEST(TileSolver, StreetWithFreeMounts) {
 }
 
 TEST(TileSolver, PriorsOfAllKinds) {
-  SimulationOptions simulation = street(4);
+  SimulationOptions simulation = street_tile(4);
   simulation.gps_share = 0.5;
   simulation.attitude_sigma_deg = 0.1;
   simulation.relative_position_sigma_m = 0.02;
@@ -116,7 +116,7 @@ TEST(TileSolver, PriorsOfAllKinds) {
 
 TEST(TileSolver, FreeDatum) {
   for (const bool rig : {false, true}) {
-    SimulationOptions simulation = rig ? street(5) : aerial(5);
+    SimulationOptions simulation = rig ? street_tile(5) : aerial_tile(5);
     simulation.gps_sigma_m = 0;
     simulation.calibrate = false;
     simulation.start_position_error_m = 0.5;
@@ -131,7 +131,7 @@ TEST(TileSolver, FreeDatum) {
 
 TEST(TileSolver, LossesOfAllKinds) {
   for (const RobustLoss& loss : {RobustLoss{}, RobustLoss{RobustLoss::Kind::kCauchy, 3}}) {
-    Start start(aerial(6));
+    Start start(aerial_tile(6));
     start.problem.image_loss = loss;
     expect_optimum_of_ceres(start);
   }
@@ -139,7 +139,7 @@ TEST(TileSolver, LossesOfAllKinds) {
 
 // The tile's own adjustment estimates fewer intrinsics than the block.
 TEST(TileSolver, MasksOfIntrinsics) {
-  const Start start(aerial(7));
+  const Start start(aerial_tile(7));
   SolveOptions options = kTight;
   options.camera_free = {start.problem.camera_free.front() & ParameterMask{3}};
   ASSERT_NE(options.camera_free.front(), start.problem.camera_free.front());
@@ -155,7 +155,7 @@ TEST(TileSolver, MasksOfIntrinsics) {
 }
 
 TEST(TileSolver, LeavesPointsThatTakeNoPart) {
-  Start start(street(8));
+  Start start(street_tile(8));
   constexpr std::int64_t kHeldOut = 5;
   for (std::int64_t row = start.problem.begin[kHeldOut]; row < start.problem.begin[kHeldOut + 1]; ++row)
     start.problem.kept[row] = 0;
@@ -164,7 +164,7 @@ TEST(TileSolver, LeavesPointsThatTakeNoPart) {
 }
 
 TEST(TileSolver, OneFrameOnControlPoints) {
-  SimulationOptions simulation = aerial(9);
+  SimulationOptions simulation = aerial_tile(9);
   simulation.control_points = 12;
   simulation.calibrate = false;
   Start start(simulation);
@@ -194,7 +194,7 @@ TEST(TileSolver, OneFrameOnControlPoints) {
 }
 
 TEST(TileSolver, SaysWhenAPointLiesBehindItsCamera) {
-  Start start(aerial(10));
+  Start start(aerial_tile(10));
   start.state.points[0].z() += 500;
   const TileState before = start.state;
   const AdjustSummary summary = solve_by_condensation(start.problem, start.state, {});
@@ -205,7 +205,7 @@ TEST(TileSolver, SaysWhenAPointLiesBehindItsCamera) {
 }
 
 TEST(TileSolver, RefusesNothing) {
-  Start start(aerial(11));
+  Start start(aerial_tile(11));
   start.problem.kept.assign(start.problem.kept.size(), 0);
   start.problem.positions.clear();
   start.problem.intrinsic_priors.clear();
@@ -214,7 +214,7 @@ TEST(TileSolver, RefusesNothing) {
 }
 
 TEST(TileSolver, EndsWhenTheCostHardlyFalls) {
-  const Start start(aerial(13));
+  const Start start(aerial_tile(13));
   TileState rough = start.state, fine = start.state;
   const AdjustSummary few = solve_by_condensation(start.problem, rough, {300, 1e-2, {}});
   const AdjustSummary many = solve_by_condensation(start.problem, fine, kTight);
@@ -227,7 +227,7 @@ TEST(TileSolver, EndsWhenTheCostHardlyFalls) {
 
 // Points are behind cameras after many of the first steps.
 TEST(TileSolver, WholeAdjustmentFromAPoorStart) {
-  for (SimulationOptions simulation : {aerial(12), street(12)}) {
+  for (SimulationOptions simulation : {aerial_tile(12), street_tile(12)}) {
     simulation.start_position_error_m = 3;
     simulation.start_rotation_error_deg = 3;
     simulation.outlier_share = 0.1;
@@ -252,7 +252,7 @@ TEST(TileSolver, WholeAdjustmentFromAPoorStart) {
 // Passes of a street that start up to 2 m apart, seen by many short and some common tracks: the tile is brought as near
 // as a start for its block has to be, with the ties between the passes kept.
 TEST(TileSolver, DenseTileAsAStart) {
-  SimulationOptions simulation = street(14);
+  SimulationOptions simulation = street_tile(14);
   simulation.frames = 60;
   simulation.points_per_frame = 1000;
   simulation.calibrate = false;

@@ -5,10 +5,10 @@
 #include <chrono>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <random>
 #include <set>
 
+#include "geometry/angles.h"
 #include "io/error.h"
 #include "partition/cells.h"
 #include "partition/disjoint_sets.h"
@@ -16,8 +16,6 @@
 
 namespace megablock {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 Camera camera() {
   Camera c;
