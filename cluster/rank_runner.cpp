@@ -212,11 +212,11 @@ UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
 }
 
 // The eliminated columns, and the rest once whole and once as a triangle; of the covariances as much. A seam's check
-// works on two copies of the rest.
+// works on a copy of the rest.
 std::int64_t RankRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
-  const std::int64_t rests = check_seams_ ? 3 : 1;
+  const std::int64_t rests = check_seams_ ? 2 : 1;
   return static_cast<std::int64_t>(sizeof(double)) * ((e + p) * e + rests * p * p + p * p / 2);
 }
 

@@ -1,5 +1,7 @@
 #include "merge/seam_check.h"
 
+#include <cblas.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -38,32 +40,14 @@ Quadratic unpacked(const UpdateMatrix& update) {
   return q;
 }
 
-// By Cholesky factorisation of the scaled matrix (the scale leaves rank and minimum as they are): without pivoting,
-// which is several times as fast, where no pivot comes near to vanishing; else with it, P'SP = LL' to its rank. b lies
-// in the range, so that the leading rows alone give b'S^+ b = |L_11^-1 b_1|^2.
-LeastSquares minimum(const Eigen::MatrixXd& s, const Eigen::VectorXd& b, const Eigen::VectorXd& scale) {
-  constexpr double kPlainlyThere = 1e-7;  // pivot, of a unit diagonal
-  const int n = static_cast<int>(b.size());
-  if (n == 0 || s.diagonal().maxCoeff() <= 0) return {};
-  const auto scaled = [&]() -> Eigen::MatrixXd { return scale.asDiagonal() * s * scale.asDiagonal(); };
-  Eigen::MatrixXd factor = scaled();
-  Eigen::VectorXd z = scale.cwiseProduct(b);
-  int info = 0;
-  dpotrf_("L", &n, factor.data(), &n, &info);
-  if (info == 0 && factor.diagonal().minCoeff() > std::sqrt(kPlainlyThere)) {
-    factor.triangularView<Eigen::Lower>().solveInPlace(z);
-    return {z.squaredNorm(), n};
-  }
-  factor = scaled();
-  const double tolerance = kRankTolerance * factor.diagonal().maxCoeff();
-  std::vector<int> pivots(static_cast<std::size_t>(n));
-  std::vector<double> work(2 * static_cast<std::size_t>(n));
-  int rank = 0;
-  dpstrf_("L", &n, factor.data(), &n, pivots.data(), &rank, &tolerance, work.data(), &info);
-  Eigen::VectorXd leading(rank);
-  for (int i = 0; i < rank; ++i) leading[i] = z[pivots[static_cast<std::size_t>(i)] - 1];
-  factor.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
-  return {leading.squaredNorm(), rank};
+// The lower triangle of D S D.
+Eigen::MatrixXd scaled(const UpdateMatrix& update, const Eigen::VectorXd& scale) {
+  const Eigen::Index n = scale.size();
+  Eigen::MatrixXd matrix(n, n);
+  const double* value = update.matrix.data();
+  for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index i = j; i < n; ++i) matrix(i, j) = *value++ * scale[i] * scale[j];
+  return matrix;
 }
 
 template <typename Matrix>
@@ -180,9 +164,37 @@ std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
 
 }  // namespace
 
+// By Cholesky factorisation of the matrix scaled to a unit diagonal (the scale leaves rank and minimum as they are):
+// without pivoting, which is several times as fast, where no pivot comes near to vanishing; else with it, P'SP = LL' to
+// its rank. b lies in the range, so that the leading rows alone give b'S^+ b = |L_11^-1 b_1|^2.
 LeastSquares least_squares(const UpdateMatrix& condensed) {
-  const Quadratic q = unpacked(condensed);
-  return minimum(q.s, q.b, scale_of(q.s));
+  constexpr double kPlainlyThere = 1e-7;  // pivot, of a unit diagonal
+  const int n = static_cast<int>(total_dimension(condensed.unknowns));
+  Eigen::VectorXd scale(n);
+  std::int64_t entry = 0;  // of the diagonal
+  for (int k = 0; k < n; entry += n - k++) {
+    const double diagonal = condensed.matrix[static_cast<std::size_t>(entry)];
+    scale[k] = diagonal > 0 ? 1 / std::sqrt(diagonal) : 0;
+  }
+  if (n == 0 || scale.maxCoeff() == 0) return {};
+  const Eigen::VectorXd b = scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(condensed.rhs.data(), n));
+  Eigen::MatrixXd factor = scaled(condensed, scale);
+  int info = 0;
+  dpotrf_("L", &n, factor.data(), &n, &info);
+  if (info == 0 && factor.diagonal().minCoeff() > std::sqrt(kPlainlyThere))
+    return {factor.triangularView<Eigen::Lower>().solve(b).squaredNorm(), n};
+
+  factor = Eigen::MatrixXd();  // makes room first
+  factor = scaled(condensed, scale);
+  const double tolerance = kRankTolerance;
+  std::vector<int> pivots(static_cast<std::size_t>(n));
+  std::vector<double> work(2 * static_cast<std::size_t>(n));
+  int rank = 0;
+  dpstrf_("L", &n, factor.data(), &n, pivots.data(), &rank, &tolerance, work.data(), &info);
+  Eigen::VectorXd leading(rank);
+  for (int i = 0; i < rank; ++i) leading[i] = b[pivots[static_cast<std::size_t>(i)] - 1];
+  factor.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
+  return {leading.squaredNorm(), rank};
 }
 
 SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSquares& right,
@@ -206,8 +218,7 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   TileCheck check;
   check.tile = tile;
   const Quadratic own = unpacked(condensed);
-  const Eigen::VectorXd scale = scale_of(own.s);
-  const LeastSquares alone = minimum(own.s, own.b, scale);
+  const LeastSquares alone = least_squares(condensed);
   const SubtreeSums& sums = condensed.sums;
   check.own_chi2 = (sums.weighted_squares - sums.decrement_squared - alone.value) / variance_factor;
   check.own_degrees =
@@ -218,7 +229,10 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   const Eigen::Index n = own.b.size();
   if (n == 0) return check;
   const Eigen::Map<const Eigen::MatrixXd> covariance(c.matrix.data(), n, n);
-  const Eigen::MatrixXd product = covariance * own.s;
+  Eigen::MatrixXd product(n, n);
+  const int size = static_cast<int>(n);
+  cblas_dsymm(CblasColMajor, CblasLeft, CblasLower, size, size, 1, c.matrix.data(), size, own.s.data(), size, 0,
+              product.data(), size);
   const Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n) - product;
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
   solver.setThreshold(kRankTolerance);
