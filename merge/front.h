@@ -45,7 +45,7 @@ struct SubtreeSums {
   void add(const SubtreeSums& other);  // in the order of the calls
 };
 
-// The least value of a quadratic form x'Sx - 2 b'x, negative: b'S^+ b, and the rank of S.
+// What x'Sx - 2 b'x can be lowered by from x = 0, b'S^+ b, and the rank of S.
 struct LeastSquares {
   double value = 0;
   std::int64_t rank = 0;
