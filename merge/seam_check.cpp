@@ -50,10 +50,83 @@ Eigen::MatrixXd scaled(const UpdateMatrix& update, const Eigen::VectorXd& scale)
   return matrix;
 }
 
+// P'AP = LL' of a positive semidefinite A, to its rank; L is the lower trapezoid of `lower`.
+struct SemidefiniteFactor {
+  Eigen::MatrixXd lower;
+  std::vector<int> pivots;  // row i of P'A is row pivots[i] - 1 of A; empty: P = I
+  int rank = 0;
+
+  Eigen::MatrixXd permuted(const Eigen::MatrixXd& m) const {  // P'm
+    Eigen::MatrixXd result = m;
+    for (std::size_t i = 0; i < pivots.size(); ++i) result.row(static_cast<Eigen::Index>(i)) = m.row(pivots[i] - 1);
+    return result;
+  }
+  // b'A^+ b of a b in the range, so that the leading rows alone give it: |L_11^-1 b_1|^2.
+  double least_squares(const Eigen::VectorXd& b) const {
+    Eigen::VectorXd leading = permuted(b).topRows(rank);
+    lower.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
+    return leading.squaredNorm();
+  }
+};
+
+// Of the lower triangle that `matrix()` returns, with a diagonal of about one: without pivoting, which is several times
+// as fast, where no pivot comes near to vanishing.
+template <typename Make>
+SemidefiniteFactor semidefinite_factor(const Make& matrix) {
+  constexpr double kPlainlyThere = 1e-7;  // pivot
+  SemidefiniteFactor factor{matrix(), {}, 0};
+  const int n = factor.rank = static_cast<int>(factor.lower.rows());
+  int info = 0;
+  dpotrf_("L", &n, factor.lower.data(), &n, &info);
+  if (info == 0 && (n == 0 || factor.lower.diagonal().minCoeff() > std::sqrt(kPlainlyThere))) return factor;
+
+  factor.lower = Eigen::MatrixXd();  // makes room first
+  factor.lower = matrix();
+  factor.pivots.resize(static_cast<std::size_t>(n));
+  std::vector<double> work(2 * static_cast<std::size_t>(n));
+  dpstrf_("L", &n, factor.lower.data(), &n, factor.pivots.data(), &factor.rank, &kRankTolerance, work.data(), &info);
+  return factor;
+}
+
 template <typename Matrix>
 Eigen::Matrix<double, Matrix::RowsAtCompileTime, 1> scale_of(const Matrix& s) {
   return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
 }
+
+// F of a covariance matrix C = FF': scaled to a unit diagonal and factorised, F = D P L; held unknowns leave columns of
+// L zero.
+class CovarianceRoot {
+ public:
+  explicit CovarianceRoot(const CovarianceMatrix& c) {
+    const Eigen::Index n = total_dimension(c.unknowns);
+    const Eigen::Map<const Eigen::MatrixXd> matrix(c.matrix.data(), n, n);
+    scale_ = matrix.diagonal().cwiseMax(0).cwiseSqrt();
+    const Eigen::VectorXd inverse = scale_of(matrix);
+    factor_ =
+        semidefinite_factor([&]() -> Eigen::MatrixXd { return inverse.asDiagonal() * matrix * inverse.asDiagonal(); });
+    factor_.lower.triangularView<Eigen::StrictlyUpper>().setZero();
+    factor_.lower.rightCols(n - factor_.rank).setZero();
+  }
+  Eigen::MatrixXd transposed_times(const Eigen::MatrixXd& m) const {  // F'm
+    Eigen::MatrixXd result = factor_.permuted(scale_.asDiagonal() * m);
+    multiply(CblasLeft, CblasTrans, result);
+    return result;
+  }
+  Eigen::MatrixXd times(const Eigen::MatrixXd& m) const {  // mF
+    Eigen::MatrixXd result = factor_.permuted(scale_.asDiagonal() * m.transpose()).transpose();
+    multiply(CblasRight, CblasNoTrans, result);
+    return result;
+  }
+
+ private:
+  void multiply(CBLAS_SIDE side, CBLAS_TRANSPOSE transpose, Eigen::MatrixXd& m) const {
+    const auto n = static_cast<int>(scale_.size());
+    cblas_dtrmm(CblasColMajor, side, CblasLower, transpose, CblasNonUnit, static_cast<int>(m.rows()),
+                static_cast<int>(m.cols()), 1, factor_.lower.data(), n, m.data(), static_cast<int>(m.rows()));
+  }
+  Eigen::VectorXd scale_;
+  SemidefiniteFactor factor_;
+};
 
 // Quantiles of one alarm probability.
 class Limits {
@@ -90,8 +163,8 @@ UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eige
   return check;
 }
 
-// All checks of a tile. product: covariance times tile.s.
-std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::MatrixXd& product,
+// All checks of a tile. seen: F'S with C = FF', so that seen'seen = S C S.
+std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::MatrixXd& seen,
                                          const UnknownList& unknowns, double probability, double variance_factor) {
   constexpr int kKinds = 3, kTurn = 3;  // a frame's first three scalar unknowns are its rotation
   const std::vector<std::int64_t> rows = row_offsets(unknowns);
@@ -115,7 +188,7 @@ std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::Mat
   for (std::size_t u = 0; u < unknowns.size(); ++u) {
     const Eigen::Index row = rows[u], n = unknowns[u].dimension;
     const Eigen::MatrixXd own = tile.s.block(row, row, n, n);
-    const Eigen::MatrixXd left = own - tile.s.middleRows(row, n) * product.middleCols(row, n);
+    const Eigen::MatrixXd left = own - seen.middleCols(row, n).transpose() * seen.middleCols(row, n);
     add(check_score<Eigen::Dynamic>(tile.b.segment(row, n), own, left, variance_factor, wholes), unknowns[u].id, {},
         false);
     if (unknowns[u].id.kind != UnknownKind::kFrame) continue;
@@ -129,7 +202,11 @@ std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::Mat
     for (Eigen::Index k = 0; k < kTurn; ++k) wanted.push_back(turn.row + k);
   const Eigen::VectorXd score = tile.b(wanted);
   const Eigen::MatrixXd own = tile.s(wanted, wanted);
-  const Eigen::MatrixXd left = own - tile.s(wanted, Eigen::all) * product(Eigen::all, wanted);
+  const Eigen::MatrixXd seen_turns = seen(Eigen::all, wanted);
+  Eigen::MatrixXd left = own;
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, static_cast<int>(own.rows()), static_cast<int>(seen.rows()), -1,
+              seen_turns.data(), static_cast<int>(seen.rows()), 1, left.data(), static_cast<int>(own.rows()));
+  left.triangularView<Eigen::StrictlyUpper>() = left.transpose();
   const auto count = static_cast<double>(turns.size());
   Limits singles(probability / kKinds / count), pairs(probability / kKinds / (0.5 * count * (count - 1)));
   std::array<Eigen::Index, 2 * kTurn> both;
@@ -164,37 +241,18 @@ std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
 
 }  // namespace
 
-// By Cholesky factorisation of the matrix scaled to a unit diagonal (the scale leaves rank and minimum as they are):
-// without pivoting, which is several times as fast, where no pivot comes near to vanishing; else with it, P'SP = LL' to
-// its rank. b lies in the range, so that the leading rows alone give b'S^+ b = |L_11^-1 b_1|^2.
 LeastSquares least_squares(const UpdateMatrix& condensed) {
-  constexpr double kPlainlyThere = 1e-7;  // pivot, of a unit diagonal
-  const int n = static_cast<int>(total_dimension(condensed.unknowns));
+  const Eigen::Index n = total_dimension(condensed.unknowns);
   Eigen::VectorXd scale(n);
   std::int64_t entry = 0;  // of the diagonal
-  for (int k = 0; k < n; entry += n - k++) {
+  for (Eigen::Index k = 0; k < n; entry += n - k++) {
     const double diagonal = condensed.matrix[static_cast<std::size_t>(entry)];
     scale[k] = diagonal > 0 ? 1 / std::sqrt(diagonal) : 0;
   }
   if (n == 0 || scale.maxCoeff() == 0) return {};
-  const Eigen::VectorXd b = scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(condensed.rhs.data(), n));
-  Eigen::MatrixXd factor = scaled(condensed, scale);
-  int info = 0;
-  dpotrf_("L", &n, factor.data(), &n, &info);
-  if (info == 0 && factor.diagonal().minCoeff() > std::sqrt(kPlainlyThere))
-    return {factor.triangularView<Eigen::Lower>().solve(b).squaredNorm(), n};
-
-  factor = Eigen::MatrixXd();  // makes room first
-  factor = scaled(condensed, scale);
-  const double tolerance = kRankTolerance;
-  std::vector<int> pivots(static_cast<std::size_t>(n));
-  std::vector<double> work(2 * static_cast<std::size_t>(n));
-  int rank = 0;
-  dpstrf_("L", &n, factor.data(), &n, pivots.data(), &rank, &tolerance, work.data(), &info);
-  Eigen::VectorXd leading(rank);
-  for (int i = 0; i < rank; ++i) leading[i] = b[pivots[static_cast<std::size_t>(i)] - 1];
-  factor.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
-  return {leading.squaredNorm(), rank};
+  const SemidefiniteFactor factor = semidefinite_factor([&] { return scaled(condensed, scale); });
+  return {factor.least_squares(scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(condensed.rhs.data(), n))),
+          factor.rank};
 }
 
 SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSquares& right,
@@ -224,25 +282,19 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   check.own_degrees =
       sums.residuals - (sums.unknowns - static_cast<std::int64_t>(sums.held.size()) - sums.held_points) - alone.rank;
 
-  // The rest's normal equations on the boundary: C^-1 - S, so (C^-1 - S)^-1 s = (I - C S)^-1 C s.
-  const CovarianceMatrix c = boundary.restricted_to(condensed.unknowns);
   const Eigen::Index n = own.b.size();
   if (n == 0) return check;
-  const Eigen::Map<const Eigen::MatrixXd> covariance(c.matrix.data(), n, n);
-  Eigen::MatrixXd product(n, n);
-  const int size = static_cast<int>(n);
-  cblas_dsymm(CblasColMajor, CblasLeft, CblasLower, size, size, 1, c.matrix.data(), size, own.s.data(), size, 0,
-              product.data(), size);
-  const Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n) - product;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-  solver.setThreshold(kRankTolerance);
-  solver.compute(system);
-  const Eigen::VectorXd moved = solver.solve(covariance * own.b);
-  check.degrees = alone.rank - (n - solver.rank());
-  check.statistic = std::max(0.0, alone.value + own.b.dot(moved)) / variance_factor;
+  const CovarianceRoot root(boundary.restricted_to(condensed.unknowns));
+  const Eigen::MatrixXd seen = root.transposed_times(own.s);
+  // The rest's normal equations on the boundary are C^-1 - S. With C = FF' and W = I - F'SF, which has their nullity,
+  // s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
+  Eigen::MatrixXd w = Eigen::MatrixXd::Identity(n, n) - root.times(seen);
+  const SemidefiniteFactor rest = semidefinite_factor([&] { return w; });
+  check.degrees = alone.rank - (n - rest.rank);
+  check.statistic = std::max(0.0, alone.value + rest.least_squares(root.transposed_times(own.b))) / variance_factor;
   if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
 
-  check.worst = worst_of(check_unknowns(own, product, condensed.unknowns, probability, variance_factor));
+  check.worst = worst_of(check_unknowns(own, seen, condensed.unknowns, probability, variance_factor));
   return check;
 }
 

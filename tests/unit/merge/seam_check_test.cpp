@@ -57,6 +57,24 @@ TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
   EXPECT_NEAR(statistic, degrees, 5 * std::sqrt(2 * degrees));
 }
 
+// Of two tiles, each against the rest is the seam between them; also where one has no datum of its own.
+TEST(SeamCheck, ComparesEachOfTwoTilesWithTheOtherAsTheirSeamDoes) {
+  for (const bool free : {false, true}) {
+    TiledBlock block(simulate_block(clean_scene()), 32, without_loss(), 0.02);
+    ASSERT_EQ(block.problems.size(), 2u);
+    if (free) block.problems[1].positions.clear();
+    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    adjust(runner);
+    ASSERT_EQ(runner.seams().size(), 1u);
+    const SeamReport& seam = runner.seams().front();
+    EXPECT_GT(seam.degrees, 20);
+    for (const TileCheck& check : runner.tile_checks()) {
+      EXPECT_EQ(check.degrees, seam.degrees) << "free " << free;
+      EXPECT_NEAR(check.statistic, seam.statistic, 1e-6 * seam.statistic) << "free " << free;
+    }
+  }
+}
+
 TEST(SeamCheck, NamesTheTileThatWasShifted) {
   TiledBlock block(simulate_block(clean_scene()), 12, without_loss(), 0.02);
   constexpr std::size_t kWrong = 2;
