@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "adjust/tile_problem.h"
 #include "geometry/rotation.h"
 
 namespace megablock {
@@ -71,8 +72,7 @@ std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& stat
       if (!state.oriented[frame] || !tiles.tile_of_frame[frame].valid()) continue;
       const auto segment = segment_of(block, measured);
       if (!segment) continue;
-      TileIndex owner = tiles.tile_of_frame[frame];
-      if (!vertical && before) owner = std::min(owner, tiles.tile_of_frame[before_frame]);
+      const TileIndex owner = owner_tile(tiles, frame, !vertical && before ? before_frame : frame);
       if (owner == tile && (vertical || (before && before_frame != frame))) {
         BlockLineTerm& added = terms.emplace_back();
         added.frame = frame;

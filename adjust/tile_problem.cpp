@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "adjust/line_terms.h"
+#include "adjust/owner.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -48,23 +49,22 @@ void ObservationOptions::check() const {
 }
 
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end) {
-  std::vector<TileIndex> seen;
+  std::vector<OwnerCandidate> candidates;
+  candidates.reserve(static_cast<std::size_t>(end - begin));
   for (const ImageIndex* image = begin; image != end; ++image) {
-    const TileIndex tile = tiles.tile_of_frame[block.images[*image].frame];
-    if (tile.valid()) seen.push_back(tile);
+    const FrameIndex frame = block.images[*image].frame;
+    const TileIndex tile = tiles.tile_of_frame[frame];
+    if (tile.valid()) candidates.push_back({tile.value, tiles.depth_of(frame)});
   }
-  std::sort(seen.begin(), seen.end());
-  TileIndex best;
-  std::ptrdiff_t most = 0;
-  for (auto run = seen.begin(); run != seen.end();) {
-    const auto next = std::upper_bound(run, seen.end(), *run);
-    if (next - run > most) {
-      most = next - run;
-      best = *run;
-    }
-    run = next;
-  }
-  return best;
+  return TileIndex(owner_part(candidates));
+}
+
+TileIndex owner_tile(const Tiles& tiles, FrameIndex first, FrameIndex second) {
+  std::vector<OwnerCandidate> candidates;
+  for (const FrameIndex frame : {first, second})
+    if (tiles.tile_of_frame[frame].valid())
+      candidates.push_back({tiles.tile_of_frame[frame].value, tiles.depth_of(frame)});
+  return TileIndex(owner_part(candidates));
 }
 
 namespace {
@@ -140,8 +140,7 @@ class TileBuilder {
     for (std::size_t row = 0; row < block_.relative_poses.size(); ++row) {
       const RelativePose& relative = block_.relative_poses[row];
       if (!oriented(relative.from) || !oriented(relative.to)) continue;
-      if (std::min(tiles_.tile_of_frame[relative.from], tiles_.tile_of_frame[relative.to]) == tile_)
-        relative_poses_.push_back(row);
+      if (owner_tile(tiles_, relative.from, relative.to) == tile_) relative_poses_.push_back(row);
     }
   }
 

@@ -10,7 +10,8 @@
 //   intrinsics prior k - k_0                               (per parameter with finite sigma)             [1 each]
 //   mount prior      Log(R R_0'), C - C_0                                                                [6]
 //   line             off the vertical, or the horizontal (line_terms.h)                                 [1]
-// Robust losses act on image residuals (all), position and attitude priors, relative poses and lines (their own option).
+// Robust losses act on image residuals (all), position and attitude priors, relative poses and lines (their own
+// option).
 //
 // Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3).
 // Every table is ascending by global index; a local index is a row of its table.
@@ -151,16 +152,17 @@ struct ObservationOptions {
   void check() const;  // throws InputError
 };
 
-// Which tile owns what (merge.md, "Unknowns and ownership").
-// Tracks: the tile with most of its observations' frames, ties to the lower tile number.
+// Which tile owns what (merge.md, "Unknowns and ownership"; owner.h): a track, by its images; a relative pose or a
+// line, by its frames. Invalid where none lies in a tile.
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end);
+TileIndex owner_tile(const Tiles& tiles, FrameIndex first, FrameIndex second);
 
 // The whole block as one tile.
 Tiles single_tile(const Block& block);
 
 // Builds a tile's problem: all rows of `owned` (the tile's track file) whose images belong to oriented frames, the
 // control points, priors and relative poses that the tile owns (a frame's priors: the frame's tile; a camera's prior:
-// the tile of the first oriented image that uses it; a relative pose: lower tile number of its two frames).
+// the tile of the first oriented image that uses it; a relative pose: as a track of its two frames).
 // Every observation starts kept. Observations of images without pose are left out of `kept` (0), not out of the rows,
 // so that rows stay aligned with the track file; then the control points' measurements follow.
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,

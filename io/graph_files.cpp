@@ -116,6 +116,10 @@ void put_tiles(Hdf5Writer& file, const Tiles& tiles) {
   file.attribute("tiles", "count", tiles.tile_count);
   file.integers("tiles/tile_of_frame", plain(tiles.tile_of_frame), {"", "-1: frame without any verified link"});
   file.vector("tiles/component_of_frame", tiles.component, {"", "connected component, 0: largest, -1: none"});
+  std::vector<std::int64_t> depths;
+  for (FrameIndex f(0); f < tiles.tile_of_frame.next_index(); ++f.value) depths.push_back(tiles.depth_of(f));
+  file.integers("tiles/separator_depth", depths,
+                {"", "depth in the merge tree of the node whose halves the frame separates, 0: root, -1: none"});
   file.group("tiles/tree", "merge tree, children before parents; -1: none");
   file.integers("tiles/tree/left", column(nodes, [](const Node& n) { return n.left; }));
   file.integers("tiles/tree/right", column(nodes, [](const Node& n) { return n.right; }));
@@ -139,6 +143,9 @@ Tiles get_tiles(const Hdf5Reader& file) {
     if (tile.value < -1 || tile.value >= tiles.tile_count) file.fail("tiles/tile_of_frame", "names no tile");
   tiles.component = IndexedVector<FrameIndex, std::int32_t>(
       file.vector<std::int32_t>("tiles/component_of_frame", static_cast<std::int64_t>(tiles.tile_of_frame.size())));
+  if (file.has("tiles/separator_depth"))  // earlier programs knew none
+    tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(
+        file.vector<std::int32_t>("tiles/separator_depth", static_cast<std::int64_t>(tiles.tile_of_frame.size())));
   const auto left = file.vector<std::int64_t>("tiles/tree/left");
   const auto count = static_cast<std::int64_t>(left.size());
   const auto right = file.vector<std::int64_t>("tiles/tree/right", count);

@@ -16,9 +16,9 @@ struct ImagePair {
 
 // Candidate pairs and the spatial cells that are the units of matching.
 struct CandidateGraph {
-  std::vector<ImagePair> pairs;           // ascending by (a, b), distinct
-  std::vector<std::int64_t> cell_begin;   // [cells + 1] into cell_pairs
-  std::vector<std::int64_t> cell_pairs;   // rows of `pairs`, ascending within a cell; every pair in exactly one cell
+  std::vector<ImagePair> pairs;          // ascending by (a, b), distinct
+  std::vector<std::int64_t> cell_begin;  // [cells + 1] into cell_pairs
+  std::vector<std::int64_t> cell_pairs;  // rows of `pairs`, ascending within a cell; every pair in exactly one cell
 };
 
 // Undirected weighted graph of frames: edges (a < b) with the number of verified tracks (or matches) across.
@@ -39,18 +39,24 @@ struct FrameGraph {
 struct MergeTree {
   struct Node {
     std::int64_t left = -1, right = -1, parent = -1;  // -1: none
-    TileIndex tile;                                    // valid for leaves only
-    std::int32_t level = 0;                            // leaves 0; else 1 + max(children)
+    TileIndex tile;                                   // valid for leaves only
+    std::int32_t level = 0;                           // leaves 0; else 1 + max(children)
   };
   std::vector<Node> nodes;
 };
 
 struct Tiles {
   std::int64_t tile_count = 0;
-  IndexedVector<FrameIndex, TileIndex> tile_of_frame;   // invalid: frame without any verified link (not oriented)
-  IndexedVector<FrameIndex, std::int32_t> component;    // connected component, -1: none; 0 is the largest
+  IndexedVector<FrameIndex, TileIndex> tile_of_frame;  // invalid: frame without any verified link (not oriented)
+  IndexedVector<FrameIndex, std::int32_t> component;   // connected component, -1: none; 0 is the largest
   MergeTree tree;
-  std::vector<FrameEdge> dropped_links;                 // weak links between tiles, dropped before the tree was fixed
+  // Depth in the tree (0: root) of the node whose halves a frame separates (partition/separators.h); -1: none. A point
+  // belongs to one of its frames that separate the least (adjust/owner.h).
+  IndexedVector<FrameIndex, std::int32_t> separator_depth;  // [frames]; none: all -1
+  std::int32_t depth_of(FrameIndex frame) const {
+    return separator_depth.contains(frame) ? separator_depth[frame] : -1;
+  }
+  std::vector<FrameEdge> dropped_links;  // weak links between tiles, dropped before the tree was fixed
 };
 
 }  // namespace megablock

@@ -4,7 +4,9 @@
 #include <utility>
 
 #include "adjust/disjoint_sets.h"
+#include "adjust/owner.h"
 #include "merge/condense.h"
+#include "partition/separators.h"
 #include "partition/tiles.h"
 
 namespace megablock {
@@ -126,31 +128,12 @@ void number_parts(const FrameGraph& graph, TilePlan& plan) {
   }
 }
 
-// The cell with most of a point's observations, ties to the lower cell.
-std::size_t owner_cell(const std::vector<std::int32_t>& frames, const std::vector<std::int32_t>& cell_of_frame,
-                       std::vector<std::int32_t>& cells) {
-  cells.clear();
-  for (std::int32_t frame : frames) cells.push_back(cell_of_frame[static_cast<std::size_t>(frame)]);
-  std::sort(cells.begin(), cells.end());
-  std::int32_t best = cells.front();
-  std::ptrdiff_t most = 0;
-  for (auto run = cells.begin(); run != cells.end();) {
-    const auto next = std::upper_bound(run, cells.end(), *run);
-    if (next - run > most) {
-      most = next - run;
-      best = *run;
-    }
-    run = next;
-  }
-  return static_cast<std::size_t>(best);
-}
-
 // Shares out points and the observations without a point, and notes which unknowns each cell touches.
 class CellPlanner {
  public:
   CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
-              std::size_t cells)
-      : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame) {
+              const std::vector<std::int32_t>& depth_of_frame, std::size_t cells)
+      : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame), depth_of_frame_(depth_of_frame) {
     for (auto* list : {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.lines,
                        &plan.intrinsic_priors, &plan.mount_priors})
       list->resize(cells);
@@ -174,13 +157,22 @@ class CellPlanner {
   std::size_t cell_of(LocalFrame frame) const {
     return static_cast<std::size_t>(cell_of_frame_[static_cast<std::size_t>(frame.value)]);
   }
+  // Of frame rows, which may come several times.
+  std::size_t owner_of(const std::vector<std::int32_t>& frames) {
+    candidates_.clear();
+    for (const std::int32_t frame : frames) {
+      const auto row = static_cast<std::size_t>(frame);
+      candidates_.push_back({cell_of_frame_[row], depth_of_frame_[row]});
+    }
+    return static_cast<std::size_t>(owner_part(candidates_));
+  }
 
   void share_points() {
-    std::vector<std::int32_t> frames, scratch;
+    std::vector<std::int32_t> frames;
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
       if (!problem_.active(p)) continue;
       frames_of_point(problem_, p, frames);
-      const std::size_t cell = owner_cell(frames, cell_of_frame_, scratch);
+      const std::size_t cell = owner_of(frames);
       plan_.points[cell].push_back(p);
       for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
         if (!problem_.kept[row]) continue;
@@ -205,14 +197,14 @@ class CellPlanner {
     }
     for (std::size_t i = 0; i < problem_.relatives.size(); ++i) {
       const auto& term = problem_.relatives[i];
-      const std::size_t cell = cell_of(std::min(term.from, term.to));
+      const std::size_t cell = owner_of({term.from.value, term.to.value});
       plan_.relatives[cell].push_back(static_cast<std::int64_t>(i));
       touch(cell, plan_.unknown_of_frame[term.from.value]);
       touch(cell, plan_.unknown_of_frame[term.to.value]);
     }
     for (std::size_t i = 0; i < problem_.lines.size(); ++i) {
       const auto& term = problem_.lines[i];
-      const std::size_t cell = cell_of(std::min(term.frame, term.seen_by()));
+      const std::size_t cell = owner_of({term.frame.value, term.seen_by().value});
       plan_.lines[cell].push_back(static_cast<std::int64_t>(i));
       touch(cell, plan_.unknown_of_frame[term.frame.value]);
       touch(cell, plan_.unknown_of_frame[term.seen_by().value]);
@@ -235,7 +227,8 @@ class CellPlanner {
 
   const TileProblem& problem_;
   TilePlan& plan_;
-  const std::vector<std::int32_t>& cell_of_frame_;
+  const std::vector<std::int32_t>&cell_of_frame_, &depth_of_frame_;
+  std::vector<OwnerCandidate> candidates_;
   std::vector<std::vector<std::uint8_t>> touched_;
 };
 
@@ -281,7 +274,14 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
   }
   std::size_t cell_count = 0;
   for (const MergeTree::Node& n : cells.tree.nodes) cell_count += n.left < 0 && n.right < 0;
-  const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, cell_count).run();
+  // What the tile passes on is cut off already, above the root of its cells.
+  std::vector<std::uint8_t> passed(problem.frames.size(), 0);
+  for (std::size_t row = 0; row < passed.size(); ++row)
+    passed[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
+  std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, 1, passed);
+  for (std::size_t row = 0; row < passed.size(); ++row)
+    if (passed[row] || depth[row] >= 0) ++depth[row];
+  const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();
   plan.cells = make_plan(cells.tree, lists, plan.boundary);
   return plan;
 }

@@ -7,6 +7,7 @@
 
 #include "io/error.h"
 #include "partition/disjoint_sets.h"
+#include "partition/separators.h"
 
 namespace megablock {
 
@@ -185,6 +186,8 @@ class TileExtender {
     result_.tile_of_frame = previous.tile_of_frame;
     result_.tile_of_frame.resize(static_cast<std::size_t>(graph.frame_count));
     result_.component.assign(static_cast<std::size_t>(graph.frame_count), -1);
+    result_.separator_depth = previous.separator_depth;
+    result_.separator_depth.resize(static_cast<std::size_t>(graph.frame_count), -1);
     subtree_of_tile_.resize(static_cast<std::size_t>(previous.tile_count));
   }
 
@@ -256,12 +259,32 @@ class TileExtender {
     for (std::size_t t = 0; t < members.size(); ++t) {
       const Frames& frames = members[t];
       if (static_cast<std::int64_t>(frames.size()) <= options_.tile_max_frames) continue;
-      const BisectionTree cut = bisect(graph_of(graph_, frames, position), options_.tile_max_frames);
+      const FrameGraph part = graph_of(graph_, frames, position);
+      const BisectionTree cut = bisect(part, options_.tile_max_frames);
+      separate_parts(part, cut, frames, TileIndex(static_cast<std::int64_t>(t)));
       const std::vector<TileIndex> numbers = numbers_of_parts(cut, frames, TileIndex(static_cast<std::int64_t>(t)));
       for (std::size_t i = 0; i < frames.size(); ++i)
         tile_of(frames[i].value) = numbers[static_cast<std::size_t>(cut.leaf_of_node[i])];
       append(subtree_of_tile_[t], cut.tree, numbers);
     }
+  }
+
+  // Below what separates the tile from others; the former frames keep their separators, so that points stay where they
+  // are.
+  void separate_parts(const FrameGraph& part, const BisectionTree& cut, const Frames& frames, TileIndex tile) {
+    std::vector<std::uint8_t> apart;
+    for (const FrameIndex frame : frames) apart.push_back(result_.separator_depth[frame] >= 0);
+    const std::vector<std::int32_t> below =
+        separator_depths(part, cut.leaf_of_node, cut.tree, options_.weak_link_tracks, apart);
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      if (below[i] >= 0) result_.separator_depth[frames[i]] = depth_of_tile(tile) + below[i];
+  }
+  std::int32_t depth_of_tile(TileIndex tile) const {
+    const std::vector<MergeTree::Node>& nodes = previous_.tree.nodes;
+    const std::vector<std::int32_t> depth = depths(previous_.tree);
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+      if (nodes[n].tile == tile) return depth[n];
+    return 0;
   }
 
   std::vector<TileIndex> numbers_of_parts(const BisectionTree& cut, const Frames& frames, TileIndex tile) {
@@ -413,6 +436,11 @@ Tiles make_tiles(const FrameGraph& graph, const TileOptions& options) {
   }
   join_all(tiles.tree, std::move(roots));
   list_dropped(tiles, graph, options);
+  std::vector<std::int32_t> leaf_of_frame;
+  leaf_of_frame.reserve(tiles.tile_of_frame.size());
+  for (const TileIndex tile : tiles.tile_of_frame) leaf_of_frame.push_back(static_cast<std::int32_t>(tile.value));
+  tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(
+      separator_depths(graph, leaf_of_frame, tiles.tree, options.weak_link_tracks));
   return tiles;
 }
 

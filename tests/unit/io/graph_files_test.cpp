@@ -144,6 +144,7 @@ TEST_F(GraphFiles, TilesComeBack) {
   tiles.tile_of_frame = IndexedVector<FrameIndex, TileIndex>(
       std::vector<TileIndex>{TileIndex(0), TileIndex(1), TileIndex(), TileIndex(1)});
   tiles.component = IndexedVector<FrameIndex, std::int32_t>(std::vector<std::int32_t>{0, 0, -1, 0});
+  tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(std::vector<std::int32_t>{0, -1, -1, 3});
   tiles.tree.nodes = {{-1, -1, 2, TileIndex(0), 0}, {-1, -1, 2, TileIndex(1), 0}, {0, 1, -1, TileIndex(), 1}};
   tiles.dropped_links = {{FrameIndex(0), FrameIndex(3), 5}};
   write_tiles(path_, tiles);
@@ -151,6 +152,7 @@ TEST_F(GraphFiles, TilesComeBack) {
   EXPECT_EQ(back.tile_count, 2);
   EXPECT_EQ(back.tile_of_frame, tiles.tile_of_frame);
   EXPECT_EQ(back.component, tiles.component);
+  EXPECT_EQ(back.separator_depth, tiles.separator_depth);
   EXPECT_EQ(back.dropped_links, tiles.dropped_links);
   ASSERT_EQ(back.tree.nodes.size(), 3u);
   for (std::size_t n = 0; n < 3; ++n) {

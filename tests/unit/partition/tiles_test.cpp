@@ -423,6 +423,30 @@ TEST(ExtendTiles, BisectsATileOverTheLimit) {
   EXPECT_LT(moved, 60);  // tiles away from the new frames keep all of theirs
 }
 
+TEST(ExtendTiles, SeparatorsOfFormerFramesStayAndBisectedTilesGetTheirs) {
+  TileOptions options;
+  options.tile_max_frames = 60;
+  std::vector<FrameEdge> edges = grid(12, 20);
+  const Tiles previous = make_tiles(sorted(240, edges), options);
+  const auto separating = [](const Tiles& tiles) {
+    return std::count_if(tiles.separator_depth.begin(), tiles.separator_depth.end(), [](auto d) { return d >= 0; });
+  };
+  ASSERT_GT(separating(previous), 12);
+  options.tile_max_frames = 30;
+  const Tiles tiles = extend_tiles(sorted(240, edges), previous, options);
+  ASSERT_GT(tiles.tile_count, previous.tile_count);
+  for (std::int64_t f = 0; f < 240; ++f)
+    if (const std::int32_t former = previous.depth_of(FrameIndex(f)); former >= 0) {
+      EXPECT_EQ(tiles.depth_of(FrameIndex(f)), former);
+    }
+  EXPECT_GT(separating(tiles), separating(previous));
+  for (const FrameEdge& edge : edges) {
+    if (previous.tile_of_frame[edge.a] != previous.tile_of_frame[edge.b]) continue;
+    if (tiles.tile_of_frame[edge.a] == tiles.tile_of_frame[edge.b]) continue;
+    EXPECT_TRUE(tiles.depth_of(edge.a) >= 0 || tiles.depth_of(edge.b) >= 0);
+  }
+}
+
 TEST(ExtendTiles, NewSetsAndJoinedComponents) {
   TileOptions options;
   std::vector<FrameEdge> edges = grid(5, 8, 0);
