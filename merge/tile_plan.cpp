@@ -278,7 +278,7 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
   std::vector<std::uint8_t> passed(problem.frames.size(), 0);
   for (std::size_t row = 0; row < passed.size(); ++row)
     passed[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
-  std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, 1, passed);
+  std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, passed);
   for (std::size_t row = 0; row < passed.size(); ++row)
     if (passed[row] || depth[row] >= 0) ++depth[row];
   const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();

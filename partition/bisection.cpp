@@ -2,7 +2,8 @@
 // set in two with METIS_PartGraphRecursive, one fixed seed, so that the tree of splits is the elimination tree of
 // merge/.
 //
-// A half may come out in several fragments. A fragment is moved to the other half where that cuts fewer links (a tile
+// A half may come out in several fragments. Then METIS's other routine is asked, which can leave both in one piece;
+// where it does not, a fragment is moved to the other half where that cuts fewer links (a tile
 // in one piece can be adjusted on its own), as long as each half keeps a quarter of the nodes.
 #include <metis.h>
 
@@ -150,23 +151,37 @@ void join_fragments(const Adjacency& graph, std::vector<idx_t>& side) {
     if (move[static_cast<std::size_t>(fragments.of_node[v])]) side[v] = 1 - side[v];
 }
 
-// Side (0 or 1) of every node; the first half gets `left_share` of them.
-std::vector<idx_t> split(Adjacency& graph, double left_share) {
+// Side (0 or 1) of every node; `partition`: METIS_PartGraphRecursive or METIS_PartGraphKway.
+template <typename Partition>
+std::vector<idx_t> metis_split(Adjacency& graph, double left_share, const Partition& partition, idx_t contiguous) {
   idx_t nodes = graph.size(), constraints = 1, parts = 2, cut = 0;
   std::vector<idx_t> side(static_cast<std::size_t>(nodes), 0);
+  std::array<idx_t, METIS_NOPTIONS> options;
+  METIS_SetDefaultOptions(options.data());
+  options[METIS_OPTION_SEED] = kSeed;
+  options[METIS_OPTION_NITER] = 10;
+  options[METIS_OPTION_NCUTS] = 2;
+  options[METIS_OPTION_UFACTOR] = kImbalance;
+  options[METIS_OPTION_CONTIG] = contiguous;
+  std::array<real_t, 2> shares = {static_cast<real_t>(left_share), static_cast<real_t>(1 - left_share)};
+  const int status = partition(&nodes, &constraints, graph.begin.data(), graph.neighbour.data(), nullptr, nullptr,
+                               graph.weight.data(), &parts, shares.data(), nullptr, options.data(), &cut, side.data());
+  if (status != METIS_OK) throw ComputeError("METIS could not bisect a graph of " + std::to_string(nodes) + " frames");
+  return side;
+}
+
+// The first half gets `left_share` of the nodes.
+std::vector<idx_t> split(Adjacency& graph, double left_share) {
+  const idx_t nodes = graph.size();
+  std::vector<idx_t> side(static_cast<std::size_t>(nodes), 0);
   if (!graph.neighbour.empty() && nodes > 2) {
-    std::array<idx_t, METIS_NOPTIONS> options;
-    METIS_SetDefaultOptions(options.data());
-    options[METIS_OPTION_SEED] = kSeed;
-    options[METIS_OPTION_NITER] = 10;
-    options[METIS_OPTION_NCUTS] = 2;
-    options[METIS_OPTION_UFACTOR] = kImbalance;
-    std::array<real_t, 2> shares = {static_cast<real_t>(left_share), static_cast<real_t>(1 - left_share)};
-    const int status = METIS_PartGraphRecursive(&nodes, &constraints, graph.begin.data(), graph.neighbour.data(),
-                                                nullptr, nullptr, graph.weight.data(), &parts, shares.data(), nullptr,
-                                                options.data(), &cut, side.data());
-    if (status != METIS_OK)
-      throw ComputeError("METIS could not bisect a graph of " + std::to_string(nodes) + " frames");
+    side = metis_split(graph, left_share, METIS_PartGraphRecursive, 0);
+    // METIS asks for a graph in one piece where it is to leave the halves in one piece.
+    const auto pieces = [&](const std::vector<idx_t>& of) { return fragments_of(graph, of).size.size(); };
+    if (pieces(side) > 2 && pieces(std::vector<idx_t>(side.size(), 0)) == 1) {
+      std::vector<idx_t> whole = metis_split(graph, left_share, METIS_PartGraphKway, 1);
+      if (pieces(whole) == 2) side = std::move(whole);
+    }
     join_fragments(graph, side);
   }
   const auto left = std::count(side.begin(), side.end(), 0);

@@ -31,15 +31,13 @@ class Parting {
     }
   }
 
-  LinksOfNodes run(const FrameGraph& graph, std::int64_t least_weight, const std::vector<std::uint8_t>& apart) const {
+  LinksOfNodes run(const FrameGraph& graph, const std::vector<std::uint8_t>& apart) const {
     LinksOfNodes result;
     result.begin.assign(tree_.nodes.size() + 1, 0);
     const auto visit = [&](const auto& take) {
       for (const FrameEdge& edge : graph.edges) {
         const auto a = static_cast<std::size_t>(edge.a.value), b = static_cast<std::size_t>(edge.b.value);
-        if (edge.weight < least_weight || leaf_of_frame_[a] < 0 || leaf_of_frame_[b] < 0 ||
-            leaf_of_frame_[a] == leaf_of_frame_[b])
-          continue;
+        if (leaf_of_frame_[a] < 0 || leaf_of_frame_[b] < 0 || leaf_of_frame_[a] == leaf_of_frame_[b]) continue;
         if (!apart.empty() && (apart[a] || apart[b])) continue;
         part(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), take);
       }
@@ -204,10 +202,9 @@ std::vector<std::int32_t> depths(const MergeTree& tree) {
 }
 
 std::vector<std::int32_t> separator_depths(const FrameGraph& graph, const std::vector<std::int32_t>& leaf_of_frame,
-                                           const MergeTree& tree, std::int64_t least_weight,
-                                           const std::vector<std::uint8_t>& apart) {
+                                           const MergeTree& tree, const std::vector<std::uint8_t>& apart) {
   const Parting parting(leaf_of_frame, tree);
-  const LinksOfNodes parted = parting.run(graph, least_weight, apart);
+  const LinksOfNodes parted = parting.run(graph, apart);
   std::vector<std::int32_t> depth(leaf_of_frame.size(), -1), number(leaf_of_frame.size(), -1);
   std::vector<Link> open;
   for (std::size_t node = tree.nodes.size(); node-- > 0;) {

@@ -13,11 +13,10 @@
 namespace megablock {
 
 // Depth (root 0) of the node whose halves a frame separates; -1: none. leaf_of_frame: TileIndex of the tree's leaf, -1:
-// none. Links between leaves count from `least_weight` tracks on. `apart` (not 0): frames that are cut off from the
-// outset; they get -1. Empty: none.
+// none. Links of any weight count: where a link was dropped as weak, tracks may still hold both frames, by way of
+// others. `apart` (not 0): frames that are cut off from the outset; they get -1. Empty: none.
 std::vector<std::int32_t> separator_depths(const FrameGraph& graph, const std::vector<std::int32_t>& leaf_of_frame,
-                                           const MergeTree& tree, std::int64_t least_weight = 1,
-                                           const std::vector<std::uint8_t>& apart = {});
+                                           const MergeTree& tree, const std::vector<std::uint8_t>& apart = {});
 
 // Depth of every node.
 std::vector<std::int32_t> depths(const MergeTree& tree);

@@ -274,8 +274,7 @@ class TileExtender {
   void separate_parts(const FrameGraph& part, const BisectionTree& cut, const Frames& frames, TileIndex tile) {
     std::vector<std::uint8_t> apart;
     for (const FrameIndex frame : frames) apart.push_back(result_.separator_depth[frame] >= 0);
-    const std::vector<std::int32_t> below =
-        separator_depths(part, cut.leaf_of_node, cut.tree, options_.weak_link_tracks, apart);
+    const std::vector<std::int32_t> below = separator_depths(part, cut.leaf_of_node, cut.tree, apart);
     for (std::size_t i = 0; i < frames.size(); ++i)
       if (below[i] >= 0) result_.separator_depth[frames[i]] = depth_of_tile(tile) + below[i];
   }
@@ -439,8 +438,7 @@ Tiles make_tiles(const FrameGraph& graph, const TileOptions& options) {
   std::vector<std::int32_t> leaf_of_frame;
   leaf_of_frame.reserve(tiles.tile_of_frame.size());
   for (const TileIndex tile : tiles.tile_of_frame) leaf_of_frame.push_back(static_cast<std::int32_t>(tile.value));
-  tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(
-      separator_depths(graph, leaf_of_frame, tiles.tree, options.weak_link_tracks));
+  tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(separator_depths(graph, leaf_of_frame, tiles.tree));
   return tiles;
 }
 

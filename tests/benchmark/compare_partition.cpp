@@ -5,7 +5,7 @@
 // aerial: a square of rows with 80 % overlap along and 60 % across; a link weighs 300 tracks times the area that two
 // images share. street: a grid of streets 100 m apart, driven twice, a frame each 4 m; frames are linked up to 20 m and
 // to those of the other drive and of crossing streets that near. Prints time, peak memory, tiles and their balance, and
-// the share of frames with links to another tile.
+// the shares of frames with links to another tile and in separators.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -92,18 +92,22 @@ void measure(const FrameGraph& graph, const TileOptions& options) {
   for (const FrameEdge& edge : graph.edges)
     if (tiles.tile_of_frame[edge.a] != tiles.tile_of_frame[edge.b])
       boundary[static_cast<std::size_t>(edge.a.value)] = boundary[static_cast<std::size_t>(edge.b.value)] = 1;
+  const auto separating = std::count_if(tiles.separator_depth.begin(), tiles.separator_depth.end(),
+                                        [](std::int32_t depth) { return depth >= 0; });
   const double mean = static_cast<double>(graph.frame_count) / static_cast<double>(tiles.tile_count);
   std::printf(
-      "%lld frames, %zu links: %lld tiles of %lld to %lld frames (%.0f in the mean, the largest %.1f %% above), %.1f "
-      "%% "
-      "of the frames have links to another tile; %.1f s of processor time, %.0f MiB, of which the links %.0f\n",
+      "%lld frames, %zu links: %lld tiles of %lld to %lld frames (%.0f in the mean, the largest %.1f %% above); %.1f "
+      "%% of the frames have links to another tile, %.1f %% separate halves of the tree, %lld those of the root; %.1f "
+      "s of processor time, %.0f MiB, of which the links %.0f\n",
       static_cast<long long>(graph.frame_count), graph.edges.size(), static_cast<long long>(tiles.tile_count),
       static_cast<long long>(*std::min_element(size.begin(), size.end())),
       static_cast<long long>(*std::max_element(size.begin(), size.end())), mean,
       100 * (static_cast<double>(*std::max_element(size.begin(), size.end())) / mean - 1),
       100.0 * static_cast<double>(std::count(boundary.begin(), boundary.end(), 1)) /
           static_cast<double>(graph.frame_count),
-      seconds, peak_rss_mib(), held);
+      100.0 * static_cast<double>(separating) / static_cast<double>(graph.frame_count),
+      static_cast<long long>(std::count(tiles.separator_depth.begin(), tiles.separator_depth.end(), 0)), seconds,
+      peak_rss_mib(), held);
 }
 
 }  // namespace
