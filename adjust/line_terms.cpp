@@ -4,7 +4,6 @@
 #include <cmath>
 #include <optional>
 
-#include "adjust/tile_problem.h"
 #include "geometry/rotation.h"
 
 namespace megablock {

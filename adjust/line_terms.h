@@ -18,7 +18,7 @@
 
 namespace megablock {
 
-// Terms of the lines whose frames have poses and whose (lower) tile is `tile`. Frames are global indices here.
+// Terms of the lines whose frames have poses and that `tile` owns (owner_tile of their frames). Frames are global indices here.
 struct BlockLineTerm {
   FrameIndex frame, other;  // other: invalid for vertical lines
   TileProblem::LineTerm term;

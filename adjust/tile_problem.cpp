@@ -60,10 +60,9 @@ TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* b
 }
 
 TileIndex owner_tile(const Tiles& tiles, FrameIndex first, FrameIndex second) {
-  std::vector<OwnerCandidate> candidates;
-  for (const FrameIndex frame : {first, second})
-    if (tiles.tile_of_frame[frame].valid())
-      candidates.push_back({tiles.tile_of_frame[frame].value, tiles.depth_of(frame)});
+  const TileIndex a = tiles.tile_of_frame[first], b = tiles.tile_of_frame[second];
+  if (!a.valid() || !b.valid()) return TileIndex();
+  std::vector<OwnerCandidate> candidates = {{a.value, tiles.depth_of(first)}, {b.value, tiles.depth_of(second)}};
   return TileIndex(owner_part(candidates));
 }
 

@@ -25,8 +25,8 @@ constexpr Setting kSettings[] = {
     // Ceres' own remarks on standard error; a unit that fails is reported with its reason by us.
     {"GLOG_minloglevel", "3"},
     // Large images: keep malloc from returning and re-faulting pages between features of one image and the next. Huge
-    // pages: a merge maps its fronts anew (use_memory_sparingly), and by pages of 4 KiB a third of its time is the
-    // system's.
+    // pages, where the system offers them (glibc 2.35, transparent huge pages at "madvise"): a merge maps its fronts
+    // anew (use_memory_sparingly), and by pages of 4 KiB a third of its time is the system's.
     {"GLIBC_TUNABLES",
      "glibc.malloc.mmap_threshold=1073741824:glibc.malloc.trim_threshold=2147483648:glibc.malloc.hugetlb=1"},
 };

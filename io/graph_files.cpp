@@ -146,6 +146,8 @@ Tiles get_tiles(const Hdf5Reader& file) {
   if (file.has("tiles/separator_depth"))  // earlier programs knew none
     tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(
         file.vector<std::int32_t>("tiles/separator_depth", static_cast<std::int64_t>(tiles.tile_of_frame.size())));
+  for (const std::int32_t depth : tiles.separator_depth)
+    if (depth < -1) file.fail("tiles/separator_depth", "is below -1");
   const auto left = file.vector<std::int64_t>("tiles/tree/left");
   const auto count = static_cast<std::int64_t>(left.size());
   const auto right = file.vector<std::int64_t>("tiles/tree/right", count);

@@ -50,8 +50,9 @@ struct Tiles {
   IndexedVector<FrameIndex, TileIndex> tile_of_frame;  // invalid: frame without any verified link (not oriented)
   IndexedVector<FrameIndex, std::int32_t> component;   // connected component, -1: none; 0 is the largest
   MergeTree tree;
-  // Depth in the tree (0: root) of the node whose halves a frame separates (partition/separators.h); -1: none. A point
-  // belongs to one of its frames that separate the least (adjust/owner.h).
+  // Depth in the tree (0: root) of the node whose halves a frame separates (partition/separators.h); -1: none. In a
+  // block that grew only the order of depths along the tree has a meaning. They decide which tile a point belongs to
+  // (adjust/owner.h).
   IndexedVector<FrameIndex, std::int32_t> separator_depth;  // [frames]; none: all -1
   std::int32_t depth_of(FrameIndex frame) const {
     return separator_depth.contains(frame) ? separator_depth[frame] : -1;

@@ -250,11 +250,11 @@ GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge, const 
   GaugeReport report;
   report.defect = gauge.defect();
   for (const HeldUnknown& held : root.held) {
-    // Without BlockGauge a free datum shows as vanished pivots.
-    const bool datum = !gauge.free() && held.ratio != 0;
+    // Without a BlockGauge a free datum shows as vanished pivots.
+    const bool datum = gauge.components.empty() && held.ratio != 0;
     (datum ? report.defect : report.undetermined) += 1;
   }
-  if (!gauge.free() && report.defect > 0)
+  if (gauge.components.empty() && report.defect > 0)
     report.text = "free: defect " + std::to_string(report.defect) + ", held at " + name(root.held.back().id);
   if (gauge.free()) {
     report.text = "free, inner constraints:";

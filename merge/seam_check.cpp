@@ -22,7 +22,10 @@ namespace megablock {
 
 namespace {
 
-constexpr double kRankTolerance = 1e-10;  // of the scaled matrix (unit diagonal)
+constexpr double kRankTolerance = 1e-10;  // pivot, of a matrix scaled to a unit diagonal
+// Of what is known of a direction, the share that is known on the other side: below, nothing is left to test, and the
+// share is lost in the rounding of the whole.
+constexpr double kShared = 1e-6;
 // Information about a frame's turn, of the most there is of any in the tile: below, its turn is not asked for.
 constexpr double kVisibleTurn = 0.25;
 
@@ -69,22 +72,22 @@ struct SemidefiniteFactor {
   }
 };
 
-// Of the lower triangle that `matrix()` returns, with a diagonal of about one: without pivoting, which is several times
-// as fast, where no pivot comes near to vanishing.
+// Of the lower triangle that `matrix()` returns, with a diagonal of at most about one; its rank is that of the pivots
+// above `tolerance`. Without pivoting, which is several times as fast, where no pivot comes near to vanishing.
 template <typename Make>
-SemidefiniteFactor semidefinite_factor(const Make& matrix) {
-  constexpr double kPlainlyThere = 1e-7;  // pivot
+SemidefiniteFactor semidefinite_factor(const Make& matrix, double tolerance = kRankTolerance) {
+  const double plainly_there = std::max(1e-7, tolerance);
   SemidefiniteFactor factor{matrix(), {}, 0};
   const int n = factor.rank = static_cast<int>(factor.lower.rows());
   int info = 0;
   dpotrf_("L", &n, factor.lower.data(), &n, &info);
-  if (info == 0 && (n == 0 || factor.lower.diagonal().minCoeff() > std::sqrt(kPlainlyThere))) return factor;
+  if (info == 0 && (n == 0 || factor.lower.diagonal().minCoeff() > std::sqrt(plainly_there))) return factor;
 
   factor.lower = Eigen::MatrixXd();  // makes room first
   factor.lower = matrix();
   factor.pivots.resize(static_cast<std::size_t>(n));
   std::vector<double> work(2 * static_cast<std::size_t>(n));
-  dpstrf_("L", &n, factor.lower.data(), &n, factor.pivots.data(), &factor.rank, &kRankTolerance, work.data(), &info);
+  dpstrf_("L", &n, factor.lower.data(), &n, factor.pivots.data(), &factor.rank, &tolerance, work.data(), &info);
   return factor;
 }
 
@@ -93,8 +96,8 @@ Eigen::Matrix<double, Matrix::RowsAtCompileTime, 1> scale_of(const Matrix& s) {
   return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
 }
 
-// F of a covariance matrix C = FF': scaled to a unit diagonal and factorised, F = D P L; held unknowns leave columns of
-// L zero.
+// F of a covariance matrix C = FF': scaled to a unit diagonal and factorised, F = D P L; what is held, or no more known
+// than rounding lets one see, leaves columns of L zero.
 class CovarianceRoot {
  public:
   explicit CovarianceRoot(const CovarianceMatrix& c) {
@@ -104,7 +107,6 @@ class CovarianceRoot {
     const Eigen::VectorXd inverse = scale_of(matrix);
     factor_ =
         semidefinite_factor([&]() -> Eigen::MatrixXd { return inverse.asDiagonal() * matrix * inverse.asDiagonal(); });
-    factor_.lower.triangularView<Eigen::StrictlyUpper>().setZero();
     factor_.lower.rightCols(n - factor_.rank).setZero();
   }
   Eigen::MatrixXd transposed_times(const Eigen::MatrixXd& m) const {  // F'm
@@ -148,8 +150,7 @@ template <int Size>
 UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eigen::Matrix<double, Size, Size>& own,
                          const Eigen::Matrix<double, Size, Size>& left, double variance_factor, Limits& limits) {
   UnknownCheck check;
-  // In units of what the tile knows; directions that it alone knows leave nothing to test.
-  constexpr double kShared = 1e-6;
+  // In units of what the tile knows.
   const Eigen::Matrix<double, Size, 1> scale = scale_of(own);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, Size, Size>> eigen(scale.asDiagonal() * left *
                                                                                scale.asDiagonal());
@@ -196,6 +197,7 @@ std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::Mat
     most = std::max(most, turns.back().information);
   }
   std::erase_if(turns, [&](const Turn& t) { return t.information < kVisibleTurn * most; });
+  if (turns.empty()) return checks;
 
   std::vector<Eigen::Index> wanted;
   for (const Turn& turn : turns)
@@ -241,6 +243,7 @@ std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
 
 }  // namespace
 
+// The scale leaves rank and minimum as they are.
 LeastSquares least_squares(const UpdateMatrix& condensed) {
   const Eigen::Index n = total_dimension(condensed.unknowns);
   Eigen::VectorXd scale(n);
@@ -289,7 +292,7 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   // The rest's normal equations on the boundary are C^-1 - S. With C = FF' and W = I - F'SF, which has their nullity,
   // s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
   Eigen::MatrixXd w = Eigen::MatrixXd::Identity(n, n) - root.times(seen);
-  const SemidefiniteFactor rest = semidefinite_factor([&] { return w; });
+  const SemidefiniteFactor rest = semidefinite_factor([&] { return w; }, kShared);
   check.degrees = alone.rank - (n - rest.rank);
   check.statistic = std::max(0.0, alone.value + rest.least_squares(root.transposed_times(own.b))) / variance_factor;
   if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);

@@ -31,6 +31,7 @@ struct SeamReport {
   bool alarm() const { return degrees > 0 && statistic > threshold; }
 };
 
+// Of condensed normal equations by themselves; their right-hand side lies in the range of their matrix.
 LeastSquares least_squares(const UpdateMatrix& condensed);
 
 // `left`, `right`: of the halves alone; `together`: the front of their sum, its update matrix with what it is alone.

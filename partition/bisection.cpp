@@ -2,9 +2,10 @@
 // set in two with METIS_PartGraphRecursive, one fixed seed, so that the tree of splits is the elimination tree of
 // merge/.
 //
-// A half may come out in several fragments. Then METIS's other routine is asked, which can leave both in one piece;
-// where it does not, a fragment is moved to the other half where that cuts fewer links (a tile
-// in one piece can be adjusted on its own), as long as each half keeps a quarter of the nodes.
+// A half may come out in several fragments (a tile in one piece can be adjusted on its own). Then METIS_PartGraphKway
+// is asked, which can leave both halves in one piece, but not always of the sizes that are wanted. Where it does not do
+// both, a fragment is moved to the other half where that cuts fewer links, as long as each keeps a quarter of the
+// nodes.
 #include <metis.h>
 
 #include <algorithm>
@@ -22,7 +23,8 @@ namespace megablock {
 namespace {
 
 constexpr idx_t kSeed = 20260;
-constexpr idx_t kImbalance = 20;  // per mille above the ideal half, per level
+constexpr idx_t kImbalance = 20;          // per mille above the ideal half, per level
+constexpr double kWorstImbalance = 0.05;  // of all nodes, for halves in one piece
 // Leaves are planned 5 % below the limit, and later splits get one more where they came out so large that METIS's
 // imbalance would take a leaf above it.
 constexpr double kPlanMargin = 1.05, kSplitMargin = 1.02;
@@ -180,7 +182,9 @@ std::vector<idx_t> split(Adjacency& graph, double left_share) {
     const auto pieces = [&](const std::vector<idx_t>& of) { return fragments_of(graph, of).size.size(); };
     if (pieces(side) > 2 && pieces(std::vector<idx_t>(side.size(), 0)) == 1) {
       std::vector<idx_t> whole = metis_split(graph, left_share, METIS_PartGraphKway, 1);
-      if (pieces(whole) == 2) side = std::move(whole);
+      const auto first = static_cast<double>(std::count(whole.begin(), whole.end(), 0));
+      if (pieces(whole) == 2 && std::abs(first - left_share * nodes) <= kWorstImbalance * nodes)
+        side = std::move(whole);
     }
     join_fragments(graph, side);
   }

@@ -188,6 +188,7 @@ class TileExtender {
     result_.component.assign(static_cast<std::size_t>(graph.frame_count), -1);
     result_.separator_depth = previous.separator_depth;
     result_.separator_depth.resize(static_cast<std::size_t>(graph.frame_count), -1);
+    for (const std::int32_t depth : previous.separator_depth) below_ = std::max(below_, depth + 1);
     subtree_of_tile_.resize(static_cast<std::size_t>(previous.tile_count));
   }
 
@@ -195,6 +196,7 @@ class TileExtender {
     join_strongest();
     add_new_sets();
     split_large_tiles();
+    leave_points_to_former_frames();
     assemble();
     list_dropped(result_, graph_, options_);
     return std::move(result_);
@@ -242,9 +244,11 @@ class TileExtender {
     options.min_tiles = 1;
     const FrameGraph part = graph_of(graph_, rest, position);
     for (Component& component : TileMaker(part, options).components()) {
-      for (std::size_t i = 0; i < component.frames.size(); ++i)
-        tile_of(rest[static_cast<std::size_t>(component.frames[i].value)].value) =
-            TileIndex(result_.tile_count + component.cut.leaf_of_node[i]);
+      Frames members;
+      for (const FrameIndex frame : component.frames) members.push_back(rest[static_cast<std::size_t>(frame.value)]);
+      for (std::size_t i = 0; i < members.size(); ++i)
+        tile_of(members[i].value) = TileIndex(result_.tile_count + component.cut.leaf_of_node[i]);
+      separate_parts(graph_of(graph_, members, position), component.cut, members);
       new_trees_.push_back({std::move(component.cut.tree), result_.tile_count});
       for (const MergeTree::Node& node : new_trees_.back().first.nodes) result_.tile_count += node.tile.valid();
     }
@@ -261,7 +265,7 @@ class TileExtender {
       if (static_cast<std::int64_t>(frames.size()) <= options_.tile_max_frames) continue;
       const FrameGraph part = graph_of(graph_, frames, position);
       const BisectionTree cut = bisect(part, options_.tile_max_frames);
-      separate_parts(part, cut, frames, TileIndex(static_cast<std::int64_t>(t)));
+      separate_parts(part, cut, frames);
       const std::vector<TileIndex> numbers = numbers_of_parts(cut, frames, TileIndex(static_cast<std::int64_t>(t)));
       for (std::size_t i = 0; i < frames.size(); ++i)
         tile_of(frames[i].value) = numbers[static_cast<std::size_t>(cut.leaf_of_node[i])];
@@ -269,21 +273,23 @@ class TileExtender {
     }
   }
 
-  // Below what separates the tile from others; the former frames keep their separators, so that points stay where they
-  // are.
-  void separate_parts(const FrameGraph& part, const BisectionTree& cut, const Frames& frames, TileIndex tile) {
+  // New frames in tiles that stay whole separate the most, so that points which they see, too, stay where they are.
+  void leave_points_to_former_frames() {
+    for (auto f = static_cast<std::int64_t>(previous_.tile_of_frame.size()); f < graph_.frame_count; ++f) {
+      const TileIndex tile = tile_of(f);
+      const bool former = tile.valid() && tile.value < previous_.tile_count;
+      if (former && subtree_of_tile_[static_cast<std::size_t>(tile.value)].nodes.empty())
+        result_.separator_depth[FrameIndex(f)] = 0;
+    }
+  }
+
+  // Of frames cut anew, below everything that separates former frames; marks of former ones stay.
+  void separate_parts(const FrameGraph& part, const BisectionTree& cut, const Frames& frames) {
     std::vector<std::uint8_t> apart;
     for (const FrameIndex frame : frames) apart.push_back(result_.separator_depth[frame] >= 0);
-    const std::vector<std::int32_t> below = separator_depths(part, cut.leaf_of_node, cut.tree, apart);
+    const std::vector<std::int32_t> depth = separator_depths(part, cut.leaf_of_node, cut.tree, apart);
     for (std::size_t i = 0; i < frames.size(); ++i)
-      if (below[i] >= 0) result_.separator_depth[frames[i]] = depth_of_tile(tile) + below[i];
-  }
-  std::int32_t depth_of_tile(TileIndex tile) const {
-    const std::vector<MergeTree::Node>& nodes = previous_.tree.nodes;
-    const std::vector<std::int32_t> depth = depths(previous_.tree);
-    for (std::size_t n = 0; n < nodes.size(); ++n)
-      if (nodes[n].tile == tile) return depth[n];
-    return 0;
+      if (depth[i] >= 0) result_.separator_depth[frames[i]] = below_ + depth[i];
   }
 
   std::vector<TileIndex> numbers_of_parts(const BisectionTree& cut, const Frames& frames, TileIndex tile) {
@@ -400,6 +406,7 @@ class TileExtender {
   const Tiles& previous_;
   const TileOptions& options_;
   Tiles result_;
+  std::int32_t below_ = 0;                                     // deeper than all separators of `previous`
   std::vector<MergeTree> subtree_of_tile_;                     // of bisected former tiles, final tile numbers
   std::vector<std::pair<MergeTree, std::int64_t>> new_trees_;  // of new sets; number of their first tile
   std::vector<std::int32_t> component_of_tile_;

@@ -19,15 +19,15 @@ struct TileOptions {
 // draws from one global generator).
 //
 // Sets of frames that hang together by fewer than weak_link_tracks tracks in total are components of their own; a frame
-// left alone gets no tile. What separates the halves of each node follows from the links (separators.h). Weak links
-// between tiles are dropped; where that separates a component, its parts are
-// components and are cut anew, so that every component stays connected without the dropped links.
+// left alone gets no tile. Weak links between tiles are dropped; where that separates a component, its parts are
+// components and are cut anew, so that every component stays connected without the dropped links. What separates the
+// halves of each node follows from the links (separators.h).
 Tiles make_tiles(const FrameGraph& graph, const TileOptions& options);
 
 // Keeps the assignment of frames known to `previous` (same indices; new frames may follow them); new frames join the
 // tile with most tracks, new sets of frames without a link to any tile become tiles of their own. A tile over the limit
-// is bisected: the part with most of its former frames keeps its number, other parts get new numbers. Separators stay,
-// and those of bisected tiles are added.
+// is bisected: the part with most of its former frames keeps its number, other parts get new numbers. What
+// separates former frames stays; what separates the parts of bisected tiles and new sets comes below it.
 Tiles extend_tiles(const FrameGraph& graph, const Tiles& previous, const TileOptions& options);
 
 // One bisection tree of any node set: assignment of each node to a leaf of at most max_leaf nodes, at least min_leaves

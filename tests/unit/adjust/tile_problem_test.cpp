@@ -84,10 +84,17 @@ TEST_F(TwoTiles, MostFramesOwnATrackAndTiesGoToTheLowerTile) {
   EXPECT_EQ(owner({0, 1, 3}), TileIndex(0));
   EXPECT_EQ(owner({0, 3, 4}), TileIndex(1));
   EXPECT_EQ(owner({3, 2}), TileIndex(0));
+  EXPECT_EQ(owner_tile(tiles_, FrameIndex(2), FrameIndex(3)), TileIndex(0));
+  tiles_.separator_depth.assign(tiles_.tile_of_frame.size(), -1);
+  tiles_.separator_depth[FrameIndex(2)] = 0;
+  EXPECT_EQ(owner({3, 2}), TileIndex(1));
+  EXPECT_EQ(owner_tile(tiles_, FrameIndex(2), FrameIndex(3)), TileIndex(1));
+  tiles_.separator_depth.clear();
   tiles_.tile_of_frame[FrameIndex(0)] = tiles_.tile_of_frame[FrameIndex(1)] = TileIndex();
   EXPECT_EQ(owner({0, 1, 3}), TileIndex(1));
   EXPECT_FALSE(owner({0, 1}).valid());
   EXPECT_FALSE(owner({}).valid());
+  EXPECT_FALSE(owner_tile(tiles_, FrameIndex(1), FrameIndex(3)).valid());
 }
 
 TEST_F(TwoTiles, TablesHoldTheFramesThatOwnedRowsTouch) {

@@ -75,6 +75,27 @@ TEST(SeamCheck, ComparesEachOfTwoTilesWithTheOtherAsTheirSeamDoes) {
   }
 }
 
+// By hand, where a camera is all that a tile has in common with the rest, which knows R of it, or one direction only.
+TEST(SeamCheck, ComparesATileThatSharesNoFrames) {
+  const UnknownList camera = {{{UnknownKind::kCamera, 0, 3}, 2}};
+  const Eigen::Matrix2d own{{4, 1}, {1, 3}};
+  const Eigen::Vector2d score(1, -2);
+  UpdateMatrix condensed{camera, 1, {4, 1, 3}, {score[0], score[1]}, {4, 3}, {}, {}};
+  for (const Eigen::Matrix2d& rest : {Eigen::Matrix2d{{2, 0}, {0, 5}}, Eigen::Matrix2d{{2, 0}, {0, 0}}}) {
+    const Eigen::Matrix2d covariance = (own + rest).inverse();
+    const bool whole = rest(1, 1) > 0;
+    const Eigen::Vector2d seen = whole ? score : Eigen::Vector2d(1, 0);  // a score that both sides can have
+    condensed.rhs = {seen[0], seen[1]};
+    const TileCheck check =
+        check_tile(0, condensed, {camera, {covariance.data(), covariance.data() + 4}}, kSeamAlarmProbability);
+    const double expected =
+        seen.dot(own.inverse() * seen) + (whole ? seen.dot(rest.inverse() * seen) : seen[0] * seen[0] / rest(0, 0));
+    EXPECT_EQ(check.degrees, whole ? 2 : 1);
+    EXPECT_NEAR(check.statistic, expected, 1e-12);
+    EXPECT_EQ(check.worst[0].id, camera[0].id);
+  }
+}
+
 TEST(SeamCheck, NamesTheTileThatWasShifted) {
   TiledBlock block(simulate_block(clean_scene()), 12, without_loss(), 0.02);
   constexpr std::size_t kWrong = 2;

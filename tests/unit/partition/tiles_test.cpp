@@ -174,6 +174,21 @@ TEST(Bisect, GraphsWithoutLinksStarsAndEmptyOnes) {
   EXPECT_LT(size.size(), 40u);
 }
 
+// Halves in one piece would be one arm against two.
+TEST(Bisect, ThreeArmsAtAHubStayBalanced) {
+  constexpr std::int64_t kArm = 100;
+  std::vector<FrameEdge> edges;
+  for (std::int64_t arm = 0; arm < 3; ++arm) {
+    const std::int64_t first = 1 + arm * kArm;
+    add(edges, 0, first, 100);
+    for (std::int64_t f = first; f + 1 < first + kArm; ++f) add(edges, f, f + 1, 100);
+  }
+  const BisectionTree cut = bisect(sorted(1 + 3 * kArm, edges), 160);
+  std::map<std::int32_t, int> size;
+  for (const std::int32_t leaf : cut.leaf_of_node) ++size[leaf];
+  for (const auto& [leaf, frames] : size) EXPECT_GE(frames, 75) << leaf;
+}
+
 TEST(Bisect, RefusesWhatMetisCannotNumber) {
   EXPECT_THROW(bisect({std::int64_t{1} << 31, {}}, 500), ComputeError);
   EXPECT_THROW(bisect({10, {}}, 0), InputError);
@@ -433,15 +448,17 @@ TEST(ExtendTiles, SeparatorsOfFormerFramesStayAndBisectedTilesGetTheirs) {
   };
   ASSERT_GT(separating(previous), 12);
   options.tile_max_frames = 30;
-  const Tiles tiles = extend_tiles(sorted(240, edges), previous, options);
-  ASSERT_GT(tiles.tile_count, previous.tile_count);
+  for (const FrameEdge& edge : grid(12, 20, 240)) edges.push_back(edge);  // a set of its own
+  const Tiles tiles = extend_tiles(sorted(480, edges), previous, options);
+  ASSERT_GT(tiles.tile_count, previous.tile_count + 8);
   for (std::int64_t f = 0; f < 240; ++f)
     if (const std::int32_t former = previous.depth_of(FrameIndex(f)); former >= 0) {
       EXPECT_EQ(tiles.depth_of(FrameIndex(f)), former);
     }
   EXPECT_GT(separating(tiles), separating(previous));
   for (const FrameEdge& edge : edges) {
-    if (previous.tile_of_frame[edge.a] != previous.tile_of_frame[edge.b]) continue;
+    const bool former = edge.b.value < 240;
+    if (former && previous.tile_of_frame[edge.a] != previous.tile_of_frame[edge.b]) continue;
     if (tiles.tile_of_frame[edge.a] == tiles.tile_of_frame[edge.b]) continue;
     EXPECT_TRUE(tiles.depth_of(edge.a) >= 0 || tiles.depth_of(edge.b) >= 0);
   }
