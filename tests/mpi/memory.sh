@@ -32,7 +32,8 @@ run recomputed_3 3 '^0 of .* 0 spilled .* [1-9][0-9]* subtrees' --memory 0.2 --s
 run both_2 2 ' [1-9][0-9]* spilled .* [1-9][0-9]* subtrees' --memory 0.2 --scratch 1
 "$megablock" adjust "$work/block/block.yaml" -j "$work/full" --quiet >/dev/null
 mkdir -p "$work/full/scratch"
-if mount -t tmpfs -o size=1200k tmpfs "$work/full/scratch" 2>/dev/null; then
+# Room for the tiles and a third of the factors.
+if mount -t tmpfs -o size=2500k tmpfs "$work/full/scratch" 2>/dev/null; then
   run full 2 ' [1-9][0-9]* spilled .* [1-9][0-9]* subtrees' --memory 0.2
 else
   echo "full: skipped, needs the right to mount a tmpfs"
