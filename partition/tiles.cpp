@@ -248,7 +248,8 @@ class TileExtender {
       for (const FrameIndex frame : component.frames) members.push_back(rest[static_cast<std::size_t>(frame.value)]);
       for (std::size_t i = 0; i < members.size(); ++i)
         tile_of(members[i].value) = TileIndex(result_.tile_count + component.cut.leaf_of_node[i]);
-      separate_parts(graph_of(graph_, members, position), component.cut, members);
+      if (component.cut.tree.nodes.size() > 1)  // of more than one tile
+        separate_parts(graph_of(part, component.frames, position), component.cut, members);
       new_trees_.push_back({std::move(component.cut.tree), result_.tile_count});
       for (const MergeTree::Node& node : new_trees_.back().first.nodes) result_.tile_count += node.tile.valid();
     }
