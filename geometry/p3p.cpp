@@ -13,13 +13,13 @@ namespace {
 // Newton on s_i^2 + s_j^2 - 2 s_i s_j cos_ij = side_ij^2 for (i, j) = (1,2), (0,2), (0,1); false when it ends
 // elsewhere.
 bool polish(const Eigen::Vector3d& cosine, const Eigen::Vector3d& side_squared, Eigen::Vector3d& s) {
-  constexpr int kFirst[3] = {1, 0, 0}, kSecond[3] = {2, 2, 1};
+  constexpr int kOneEnd[3] = {1, 0, 0}, kOtherEnd[3] = {2, 2, 1};
   double error = 0;
   for (int iteration = 0; iteration < 6; ++iteration) {
     Eigen::Vector3d f;
     Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
     for (int k = 0; k < 3; ++k) {
-      const int i = kFirst[k], j = kSecond[k];
+      const int i = kOneEnd[k], j = kOtherEnd[k];
       f[k] = s[i] * s[i] + s[j] * s[j] - 2 * s[i] * s[j] * cosine[k] - side_squared[k];
       jacobian(k, i) = 2 * (s[i] - s[j] * cosine[k]);
       jacobian(k, j) = 2 * (s[j] - s[i] * cosine[k]);
