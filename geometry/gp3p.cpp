@@ -13,7 +13,7 @@ namespace megablock {
 namespace {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
-constexpr std::size_t kFirst[3] = {0, 0, 1}, kSecond[3] = {1, 2, 2};
+constexpr std::size_t kSideFirst[3] = {0, 0, 1}, kSideSecond[3] = {1, 2, 2};
 
 Corners corners_at(const Corners& origins, const Corners& directions, const Eigen::Vector3d& s) {
   return {origins[0] + s[0] * directions[0], origins[1] + s[1] * directions[1], origins[2] + s[2] * directions[2]};
@@ -28,7 +28,7 @@ bool polish(const Corners& origins, const Corners& directions, const Eigen::Vect
     Eigen::Vector3d f;
     Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
     for (int k = 0; k < 3; ++k) {
-      const std::size_t i = kFirst[k], j = kSecond[k];
+      const std::size_t i = kSideFirst[k], j = kSideSecond[k];
       const Eigen::Vector3d side = p[i] - p[j];
       f[k] = side.squaredNorm() - side_squared[k];
       jacobian(k, static_cast<int>(i)) = 2 * side.dot(directions[i]);
@@ -81,14 +81,14 @@ Elimination eliminate(const Corners& o, const Corners& d, const Eigen::Vector3d&
 
 }  // namespace
 
-std::vector<Pose> solve_gp3p(const Corners& origins, const Corners& directions, const Corners& points) {
+Solutions<Pose, 8> solve_gp3p(const Corners& origins, const Corners& directions, const Corners& points) {
   const Eigen::Vector3d sides((points[0] - points[1]).squaredNorm(), (points[0] - points[2]).squaredNorm(),
                               (points[1] - points[2]).squaredNorm());
   const double area = (points[1] - points[0]).cross(points[2] - points[0]).norm();
   if (!(area > kMinTriangleArea * sides.sum())) return {};
   const double scale = std::sqrt(sides.maxCoeff());  // lengths of about one keep the coefficients comparable
   const double spread = std::max((origins[0] - origins[1]).norm(), (origins[0] - origins[2]).norm());
-  std::vector<Pose> poses;
+  Solutions<Pose, 8> poses;
   if (spread < 1e-9 * scale) {
     for (const Pose& camera : solve_p3p(directions, points))
       poses.push_back({camera.rotation, camera.centre - camera.rotation.conjugate() * origins[0]});

@@ -13,17 +13,17 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <vector>
 
 #include "geometry/pose.h"
+#include "geometry/solutions.h"
 
 namespace megablock {
 
 // `origins` [m], unit `directions`: in the rig; `points`: in the ground frame, metres, same order. Poses ground -> rig
 // with all points in front of their cameras. Rays from one centre are left to solve_p3p. Empty for points on one line
 // or where there is no solution.
-std::vector<Pose> solve_gp3p(const std::array<Eigen::Vector3d, 3>& origins,
-                             const std::array<Eigen::Vector3d, 3>& directions,
-                             const std::array<Eigen::Vector3d, 3>& points);
+Solutions<Pose, 8> solve_gp3p(const std::array<Eigen::Vector3d, 3>& origins,
+                              const std::array<Eigen::Vector3d, 3>& directions,
+                              const std::array<Eigen::Vector3d, 3>& points);
 
 }  // namespace megablock

@@ -35,7 +35,7 @@ bool polish(const Eigen::Vector3d& cosine, const Eigen::Vector3d& side_squared, 
 
 }  // namespace
 
-std::vector<Pose> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const std::array<Eigen::Vector3d, 3>& points) {
+Solutions<Pose, 4> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const std::array<Eigen::Vector3d, 3>& points) {
   const Eigen::Vector3d cosine(rays[1].dot(rays[2]), rays[0].dot(rays[2]), rays[0].dot(rays[1]));
   const Eigen::Vector3d side_squared((points[1] - points[2]).squaredNorm(), (points[0] - points[2]).squaredNorm(),
                                      (points[0] - points[1]).squaredNorm());
@@ -49,7 +49,7 @@ std::vector<Pose> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const st
       2 * (d * d - 1 + 2 * d * d * cb * cb + 2 * (1 - c) * ca * ca - 4 * e * ca * cb * cg + 2 * (1 - a) * cg * cg),
       4 * (d * (1 - d) * cb - (1 - e) * ca * cg + 2 * c * ca * ca * cb), (d - 1) * (d - 1) - 4 * c * ca * ca};
 
-  std::vector<Pose> poses;
+  Solutions<Pose, 4> poses;
   for (const double v : real_roots(quartic)) {
     const double divisor = 2 * (cg - v * ca);
     const double first_squared = side_squared[1] / (1 + v * v - 2 * v * cb);

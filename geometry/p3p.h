@@ -7,14 +7,14 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <vector>
 
 #include "geometry/pose.h"
+#include "geometry/solutions.h"
 
 namespace megablock {
 
 // `rays`: unit viewing directions in camera axes; `points`: in the ground frame, same order. Poses ground -> camera.
 // Empty for points on one line or where the quartic has no valid root.
-std::vector<Pose> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const std::array<Eigen::Vector3d, 3>& points);
+Solutions<Pose, 4> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const std::array<Eigen::Vector3d, 3>& points);
 
 }  // namespace megablock

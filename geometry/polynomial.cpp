@@ -1,13 +1,10 @@
 #include "geometry/polynomial.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace megablock {
 
 namespace {
-
-constexpr double kDoubleRoot = 1e-9;
 
 struct Value {
   double f = 0, slope = 0, magnitude = 0;  // magnitude: sum of the terms' absolute values
@@ -24,14 +21,17 @@ Value value_of(std::span<const double> c, double x) {
 }
 
 // The root between two places of different sign.
-double root_between(std::span<const double> c, double low, double high) {
-  const bool rising = value_of(c, high).f > 0;
+double root_between(std::span<const double> c, double low, double high, bool rising) {
   double x = 0.5 * (low + high);
   for (int iteration = 0; iteration < 200; ++iteration) {
-    const Value v = value_of(c, x);
-    if (v.f == 0) return x;
-    ((v.f > 0) == rising ? high : low) = x;
-    double next = x - v.f / v.slope;
+    double f = 0, slope = 0;
+    for (std::size_t i = c.size(); i-- > 0;) {
+      slope = slope * x + f;
+      f = f * x + c[i];
+    }
+    if (f == 0) return x;
+    ((f > 0) == rising ? high : low) = x;
+    double next = x - f / slope;
     if (!(next > low && next < high)) next = 0.5 * (low + high);
     if (std::abs(next - x) <= 1e-16 * std::abs(x) || next == low || next == high) return next;
     x = next;
@@ -39,32 +39,49 @@ double root_between(std::span<const double> c, double low, double high) {
   return x;
 }
 
+using Binomials = std::array<std::array<double, detail::kMaxDegree + 1>, detail::kMaxDegree + 1>;
+constexpr Binomials kBinomials = [] {
+  Binomials b{};
+  for (std::size_t n = 0; n <= detail::kMaxDegree; ++n) {
+    b[n][0] = 1;
+    for (std::size_t k = 1; k <= n; ++k) b[n][k] = b[n - 1][k - 1] + (k < n ? b[n - 1][k] : 0);
+  }
+  return b;
+}();
+
 }  // namespace
 
 double evaluate_polynomial(std::span<const double> c, double x) { return value_of(c, x).f; }
 
-std::vector<double> real_roots(std::span<const double> c) {
+std::size_t detail::roots_within(std::span<const double> c, double low, double high, double double_root,
+                                 double* roots) {
   const std::size_t degree = c.size() - 1;
-  double largest = 0;
-  for (const double value : c) largest = std::max(largest, std::abs(value));
-  if (degree == 0 || !std::isfinite(largest) || !(std::abs(c[degree]) > 1e-12 * largest)) return {};
-  if (degree == 1) return {-c[0] / c[1]};
-  std::vector<double> derivative(degree);
-  for (std::size_t i = 1; i <= degree; ++i) derivative[i - 1] = static_cast<double>(i) * c[i];
-  std::vector<double> places = real_roots(derivative);
-  const double bound = 1 + largest / std::abs(c[degree]);  // Cauchy's
-  places.insert(places.begin(), -bound);
-  places.push_back(bound);
-  std::vector<double> roots;
-  bool crossed = false;  // the sign changed in the interval before
-  for (std::size_t i = 0; i + 1 < places.size(); ++i) {
-    const Value left = value_of(c, places[i]), right = value_of(c, places[i + 1]);
-    const bool crosses = (left.f < 0) != (right.f < 0);
-    if (i > 0 && !crossed && !crosses && std::abs(left.f) < kDoubleRoot * left.magnitude) roots.push_back(places[i]);
-    if (crosses) roots.push_back(root_between(c, places[i], places[i + 1]));
-    crossed = crosses;
+  std::array<double, kMaxDegree + 1> derivative;  // of order m, divided by m!
+  std::array<double, kMaxDegree + 1> places;      // its extrema between the ends
+  std::size_t count = 0;
+  for (std::size_t k = 1; k <= degree; ++k) {
+    const std::size_t order = degree - k;
+    for (std::size_t i = 0; i <= k; ++i) derivative[i] = kBinomials[i + order][order] * c[i + order];
+    const std::span<const double> d(derivative.data(), k + 1);
+    for (std::size_t i = 0; i < count; ++i) places[i] = roots[i];
+    places[count] = high;
+    const std::size_t intervals = count + 1;
+    const double tolerance = k == degree ? double_root : kDoubleRoot;
+    count = 0;
+    bool crossed = false;  // the sign changed in the interval before
+    double start = low;
+    Value left = value_of(d, low);
+    for (std::size_t i = 0; i < intervals; ++i) {
+      const Value right = value_of(d, places[i]);
+      const bool crosses = (left.f < 0) != (right.f < 0);
+      if (i > 0 && !crossed && !crosses && std::abs(left.f) < tolerance * left.magnitude) roots[count++] = start;
+      if (crosses) roots[count++] = root_between(d, start, places[i], left.f < 0);
+      crossed = crosses;
+      start = places[i];
+      left = right;
+    }
   }
-  return roots;
+  return count;
 }
 
 }  // namespace megablock

@@ -31,7 +31,7 @@ Case make_case(std::mt19937_64& random, double baseline) {
   return c;
 }
 
-double distance_to_truth(const Case& c, const std::vector<Pose>& poses) {
+double distance_to_truth(const Case& c, const Solutions<Pose, 8>& poses) {
   double nearest = 1e9;
   for (const Pose& pose : poses)
     nearest =
@@ -46,7 +46,7 @@ TEST(Gp3p, FindsTheTruthAmongSolutionsThatMeetTheRays) {
     constexpr int kTrials = 1000;
     for (int trial = 0; trial < kTrials; ++trial) {
       const Case c = make_case(random, baseline);
-      const std::vector<Pose> poses = solve_gp3p(c.origins, c.directions, c.points);
+      const Solutions<Pose, 8> poses = solve_gp3p(c.origins, c.directions, c.points);
       EXPECT_LE(poses.size(), 8u);
       for (const Pose& pose : poses)
         for (std::size_t k = 0; k < 3; ++k)
@@ -61,8 +61,8 @@ TEST(Gp3p, RaysFromOneCentreAreTheCentralProblem) {
   std::mt19937_64 random(6);
   for (int trial = 0; trial < 200; ++trial) {
     const Case c = make_case(random, 0);
-    const std::vector<Pose> rig = solve_gp3p(c.origins, c.directions, c.points);
-    const std::vector<Pose> camera = solve_p3p(c.directions, c.points);
+    const Solutions<Pose, 8> rig = solve_gp3p(c.origins, c.directions, c.points);
+    const Solutions<Pose, 4> camera = solve_p3p(c.directions, c.points);
     ASSERT_EQ(rig.size(), camera.size());
     for (std::size_t i = 0; i < rig.size(); ++i) {
       const Eigen::Vector3d centre = rig[i].centre + rig[i].rotation.conjugate() * c.origins[0];

@@ -1,0 +1,32 @@
+// The solutions of a minimal problem, a list of at most Capacity entries held in place: solvers run millions of times
+// and must not allocate.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace megablock {
+
+template <typename T, std::size_t Capacity>
+class Solutions {
+ public:
+  using value_type = T;
+  using const_iterator = const T*;
+
+  // What exceeds the capacity is dropped: no solver finds more than its problem has.
+  void push_back(const T& solution) {
+    if (count_ < Capacity) entries_[count_++] = solution;
+  }
+  std::size_t size() const { return count_; }
+  bool empty() const { return count_ == 0; }
+  const T& operator[](std::size_t i) const { return entries_[i]; }
+  const T& front() const { return entries_[0]; }
+  const T* begin() const { return entries_.data(); }
+  const T* end() const { return entries_.data() + count_; }
+
+ private:
+  std::array<T, Capacity> entries_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace megablock
