@@ -1,0 +1,66 @@
+#include "geometry/vertical_pair.h"
+
+#include <gtest/gtest.h>
+
+#include "pair_scene.h"
+
+namespace megablock {
+namespace {
+
+using ThreeRays = std::array<Eigen::Vector3d, 3>;
+const Eigen::Vector3d kDown = Eigen::Vector3d::UnitY();
+
+TEST(VerticalPair, FindsAnyOrientationOfTiltedImages) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 500; ++trial) {
+    PairSceneOptions options;
+    options.rotation = rotation_exp<double>(3.1 * uniform(random) * random_direction(random));
+    options.base = 0.3 * random_direction(random);
+    const PairScene scene(options, 3, random);
+    const Eigen::Vector3d vertical = random_direction(random);  // as good as any
+    const auto found =
+        solve_vertical_pair(scene.first<3>(scene.a), scene.first<3>(scene.b), vertical, options.rotation * vertical);
+    EXPECT_LE(found.size(), 4u);
+    EXPECT_LT(nearest_error_deg(found, scene.truth), 1e-5);
+    for (const RelativeOrientation& o : found) {
+      EXPECT_LT((o.rotation * vertical - options.rotation * vertical).norm(), 1e-12);
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_LT(std::abs(scene.b[i].dot(essential_from(o) * scene.a[i])), 1e-10);
+      EXPECT_TRUE(all_in_front(o, scene.first<3>(scene.a), scene.first<3>(scene.b)));
+    }
+  }
+}
+
+TEST(VerticalPair, ThreePointsOnOneLineAreEnough) {
+  PairSceneOptions options;
+  options.rotation = Eigen::AngleAxisd(0.4, kDown);
+  ThreeRays a, b;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3d point(-0.4 + 0.3 * static_cast<double>(i), 0.1 + 0.2 * static_cast<double>(i), 2);
+    a[i] = point.normalized();
+    b[i] = (options.rotation * point + options.base).normalized();
+  }
+  const RelativeOrientation truth{options.rotation, options.base.normalized()};
+  EXPECT_LT(nearest_error_deg(solve_vertical_pair(a, b, kDown, kDown), truth), 1e-6);
+}
+
+TEST(VerticalPair, NothingForBadPoints) {
+  std::mt19937_64 random(3);
+  const PairScene scene({}, 3, random);
+  const ThreeRays a = scene.first<3>(scene.a), b = scene.first<3>(scene.b);
+  ThreeRays bad = a;
+  bad[1].x() = std::nan("");
+  EXPECT_TRUE(solve_vertical_pair(bad, b, kDown, kDown).empty());
+  EXPECT_TRUE(solve_vertical_pair(a, b, Eigen::Vector3d::Constant(std::nan("")), kDown).empty());
+  bad = a;
+  bad[2] = bad[0];
+  EXPECT_TRUE(solve_vertical_pair(bad, b, kDown, kDown).empty()) << "two points are one";
+  EXPECT_TRUE(solve_vertical_pair(a, a, kDown, kDown).empty()) << "no base";
+  ThreeRays behind = b;
+  behind[0] = -behind[0];
+  for (const RelativeOrientation& o : solve_vertical_pair(a, behind, kDown, kDown))
+    EXPECT_GT(rotation_error_deg(o, scene.truth) + base_error_deg(o, scene.truth), 1e-3) << "a point behind";
+}
+
+}  // namespace
+}  // namespace megablock
