@@ -39,6 +39,9 @@ double root_between(std::span<const double> c, double low, double high, bool ris
   return x;
 }
 
+// Of the coefficients, against the largest of them: a double root at zero leaves nothing else.
+constexpr double kRounding = 1e-14;
+
 using Binomials = std::array<std::array<double, detail::kMaxDegree + 1>, detail::kMaxDegree + 1>;
 constexpr Binomials kBinomials = [] {
   Binomials b{};
@@ -61,7 +64,11 @@ std::size_t detail::roots_within(std::span<const double> c, double low, double h
   std::size_t count = 0;
   for (std::size_t k = 1; k <= degree; ++k) {
     const std::size_t order = degree - k;
-    for (std::size_t i = 0; i <= k; ++i) derivative[i] = kBinomials[i + order][order] * c[i + order];
+    double largest = 0;
+    for (std::size_t i = 0; i <= k; ++i) {
+      derivative[i] = kBinomials[i + order][order] * c[i + order];
+      largest = std::max(largest, std::abs(derivative[i]));
+    }
     const std::span<const double> d(derivative.data(), k + 1);
     for (std::size_t i = 0; i < count; ++i) places[i] = roots[i];
     places[count] = high;
@@ -74,7 +81,8 @@ std::size_t detail::roots_within(std::span<const double> c, double low, double h
     for (std::size_t i = 0; i < intervals; ++i) {
       const Value right = value_of(d, places[i]);
       const bool crosses = (left.f < 0) != (right.f < 0);
-      if (i > 0 && !crossed && !crosses && std::abs(left.f) < tolerance * left.magnitude) roots[count++] = start;
+      if (i > 0 && !crossed && !crosses && std::abs(left.f) < tolerance * left.magnitude + kRounding * largest)
+        roots[count++] = start;
       if (crosses) roots[count++] = root_between(d, start, places[i], left.f < 0);
       crossed = crosses;
       start = places[i];

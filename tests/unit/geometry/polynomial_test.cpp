@@ -60,6 +60,10 @@ TEST(Polynomial, RootsFarOutAndAtInfinityAreFound) {
   EXPECT_TRUE(infinite);
 }
 
+TEST(Polynomial, DoubleRootAtZeroThatRoundingHasBlurred) {
+  EXPECT_THAT(real_roots(Polynomial<4>{3e-20, -4e-19, -2e-4, -0.01, 2e-4}), testing::Contains(DoubleNear(0, 1e-6)));
+}
+
 TEST(Polynomial, NothingOfWhatIsNoNumber) {
   EXPECT_TRUE(real_roots(Polynomial<3>{1, std::nan(""), 2, 1}).empty());
   EXPECT_TRUE(real_roots(Polynomial<3>{}).empty());

@@ -44,6 +44,18 @@ TEST(VerticalPair, ThreePointsOnOneLineAreEnough) {
   EXPECT_LT(nearest_error_deg(solve_vertical_pair(a, b, kDown, kDown), truth), 1e-6);
 }
 
+TEST(VerticalPair, PlaneSeenAlongItsNormalIsADoubleRoot) {
+  std::mt19937_64 random(4);
+  for (int trial = 0; trial < 200; ++trial) {
+    PairSceneOptions options;
+    options.base = {0, 0, 0.3};
+    options.plane = true;
+    const PairScene scene(options, 3, random);
+    const auto found = solve_vertical_pair(scene.first<3>(scene.a), scene.first<3>(scene.b), kDown, kDown);
+    EXPECT_LT(nearest_error_deg(found, scene.truth), 1e-2);
+  }
+}
+
 TEST(VerticalPair, NothingForBadPoints) {
   std::mt19937_64 random(3);
   const PairScene scene({}, 3, random);
