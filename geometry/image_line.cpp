@@ -1,5 +1,7 @@
 #include "geometry/image_line.h"
 
+#include <algorithm>
+
 #include "geometry/gauss_helmert.h"
 
 namespace megablock {
@@ -35,6 +37,15 @@ ImageLine line_about(const ImageLine& line, const Eigen::Vector2d& origin) {
   Eigen::Matrix2d j;
   j << 1, 0, line.along().dot(origin), 1;
   return {line.theta, line.rho - line.across().dot(origin), propagated(j, line.covariance)};
+}
+
+LinePoints independent_points(const ImageLine& line) {
+  const Eigen::Matrix2d& c = line.covariance;
+  // The place where the line is known best, and the distance from it at which the turn doubles the variance.
+  const double middle = -c(0, 1) / c(0, 0), variance = std::max(0.0, c(1, 1) - c(0, 1) * c(0, 1) / c(0, 0));
+  const double half = std::sqrt(variance / c(0, 0));
+  const Eigen::Vector2d foot = line.rho * line.across();
+  return {foot + (middle - half) * line.along(), foot + (middle + half) * line.along(), std::sqrt(2 * variance)};
 }
 
 LineFoot foot_of(const ImageLine& line) {

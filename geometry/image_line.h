@@ -39,4 +39,13 @@ struct LineFoot {
 };
 LineFoot foot_of(const ImageLine& line);
 
+// Two points of the line that carry its whole covariance: their errors are independent, sigma in each coordinate.
+// For an edge measured all along they lie 1 / sqrt(12) of its length to either side of the middle, which is where the
+// line that is fitted to an arc meets it: to an edge bent by distortion they belong all the same.
+struct LinePoints {
+  Eigen::Vector2d first, second;
+  double sigma_px = 0;
+};
+LinePoints independent_points(const ImageLine& line);
+
 }  // namespace megablock

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "geometry/camera.h"
 #include "geometry/gauss_helmert.h"
 #include "geometry/rotation.h"
 
@@ -45,6 +46,14 @@ std::optional<InterpretationPlane> interpretation_plane(const Eigen::Vector3d& a
   const Eigen::Matrix3d by_a = -skew(b), by_b = skew(a);
   const AxisDirection unit = unit_axis(normal, propagated(by_a, a_covariance) + propagated(by_b, b_covariance));
   return InterpretationPlane{unit.direction, unit.covariance};
+}
+
+std::optional<InterpretationPlane> interpretation_plane(const ImageLine& line, const Intrinsics& camera) {
+  const LinePoints points = independent_points(line);
+  const RayJacobian a = ray_with_jacobian(camera, points.first), b = ray_with_jacobian(camera, points.second);
+  if (!a.valid || !b.valid) return std::nullopt;
+  const Eigen::Matrix2d covariance = points.sigma_px * points.sigma_px * Eigen::Matrix2d::Identity();
+  return interpretation_plane(a.ray, propagated(a.by_pixel, covariance), b.ray, propagated(b.by_pixel, covariance));
 }
 
 AxisDirection seen_from(const AxisDirection& axis, const PerspectiveCentre& from, const PerspectiveCentre& to) {

@@ -20,6 +20,7 @@
 #include <optional>
 
 #include "geometry/image_line.h"
+#include "geometry/intrinsics.h"
 
 namespace megablock {
 
@@ -42,6 +43,9 @@ InterpretationPlane interpretation_plane(const ImageLine& line, const Perspectiv
 // Of the rays to two points, with their covariances (geometry/camera.h: RayJacobian). Empty for one and the same ray.
 std::optional<InterpretationPlane> interpretation_plane(const Eigen::Vector3d& a, const Eigen::Matrix3d& a_covariance,
                                                         const Eigen::Vector3d& b, const Eigen::Matrix3d& b_covariance);
+
+// Of a line in an image of this camera, by its independent points. Empty where the model has no rays.
+std::optional<InterpretationPlane> interpretation_plane(const ImageLine& line, const Intrinsics& camera);
 
 // A unit vector, or its negative: what lines of one direction have in common.
 struct AxisDirection {

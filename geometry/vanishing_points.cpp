@@ -92,9 +92,11 @@ class AxisSearch {
           log10_binomial_tail(static_cast<std::int64_t>(x_.size()) - 2, captured - 2, std::sin(result_.tolerance));
       if (!(captured >= static_cast<std::int64_t>(kFewestLines) && log10_nfa < options_.max_log10_nfa)) break;
       refine(axis);
+      const bool is_new = is_no_tail(axis);
       if (!remove(axis)) break;
+      if (!is_new) continue;
       axes_.push_back(axis);
-      nfa_.push_back(log10_nfa);
+      lines_then_.push_back(static_cast<std::int64_t>(x_.size()));
     }
     deal_out();
     return std::move(result_);
@@ -102,7 +104,10 @@ class AxisSearch {
 
  private:
   static constexpr std::size_t kFewestLines = 4;
-  static constexpr double kSameSigmas = 4;  // within which two lines may be one
+  static constexpr double kSameSigmas = 4;      // within which two lines may be one
+  static constexpr double kOwnSigmas = 5;       // within which a line may belong to an axis
+  static constexpr double kTailLog10 = -2;      // of the probability with which strays look like an axis
+  static constexpr double kNear = 5 * kDegree;  // within which an axis may be made of another one's strays
 
   const InterpretationPlane& plane(int i) const { return planes_[static_cast<std::size_t>(i)]; }
 
@@ -188,6 +193,33 @@ class AxisSearch {
     return best;
   }
 
+  static double log10_nfa(std::int64_t lines, std::int64_t captured, double p) {
+    const auto n = static_cast<double>(lines);
+    return std::log10(n * (n - 1) / 2) + log10_binomial_tail(lines - 2, captured - 2, p);
+  }
+  bool is_no_accident(std::int64_t lines, std::int64_t captured, double p) const {
+    return captured >= static_cast<std::int64_t>(kFewestLines) &&
+           log10_nfa(lines, captured, p) < options_.max_log10_nfa;
+  }
+
+  // Against the mirror image of the axis in each one nearby.
+  bool is_no_tail(const Eigen::Vector3d& axis) const {
+    for (const Eigen::Vector3d& other : axes_) {
+      if (axis.cross(other).norm() > std::sin(kNear)) continue;
+      const Eigen::Vector3d mirrored = 2 * other.dot(axis) * other - axis;
+      std::int64_t own = 0, opposite = 0;
+      for (const int i : left_) {
+        if (!represents_[static_cast<std::size_t>(i)]) continue;
+        const bool here = std::abs(axis.dot(plane(i).normal)) <= reach(axis, i);
+        const bool there = std::abs(mirrored.dot(plane(i).normal)) <= reach(mirrored, i);
+        own += here && !there;
+        opposite += there && !here;
+      }
+      if (log10_binomial_tail(own + opposite, own, 0.5) > kTailLog10) return false;
+    }
+    return true;
+  }
+
   void refine(Eigen::Vector3d& axis) const {
     const double sine = std::sin(2 * result_.tolerance);
     for (int round = 0; round < 3; ++round) {
@@ -222,7 +254,7 @@ class AxisSearch {
           const double off = std::abs(axes_[a].dot(plane(i).normal));
           if (off > reach(axes_[a], i)) continue;
           const double sigmas = off / std::sqrt(axes_[a].dot(plane(i).covariance * axes_[a]));
-          if (owner >= 0 && sigmas >= least) continue;
+          if (sigmas > kOwnSigmas || (owner >= 0 && sigmas >= least)) continue;
           owner = static_cast<int>(a);
           least = sigmas;
         }
@@ -238,11 +270,17 @@ class AxisSearch {
     std::vector<InterpretationPlane> own;
     for (std::size_t a = 0; a < axes_.size(); ++a) {
       own.clear();
-      for (const int i : lines[a]) own.push_back(plane(i));
-      const auto fit = own.size() < kFewestLines ? std::nullopt : fit_axis(own);
+      std::int64_t different = 0;
+      for (const int i : lines[a]) {
+        own.push_back(plane(i));
+        different += represents_[static_cast<std::size_t>(i)];
+      }
+      if (!is_no_accident(std::max(lines_then_[a], different), different, std::sin(result_.tolerance))) continue;
+      const auto fit = fit_axis(own);
       if (!fit || largest_sigma(fit->axis.covariance) > options_.max_axis_sigma) continue;
       number[a] = static_cast<int>(result_.points.size());
-      result_.points.push_back({fit->axis, nfa_[a], fit->weighted_squares, fit->redundancy, lines[a]});
+      const double nfa = log10_nfa(std::max(lines_then_[a], different), different, std::sin(result_.tolerance));
+      result_.points.push_back({fit->axis, nfa, fit->weighted_squares, fit->redundancy, lines[a]});
     }
     for (int& owner : result_.point_of)
       if (owner >= 0) owner = number[static_cast<std::size_t>(owner)];
@@ -256,7 +294,7 @@ class AxisSearch {
   std::vector<bool> represents_;
   std::vector<double> x_, y_, z_;  // normals of the lines left that count
   std::vector<Eigen::Vector3d> axes_;
-  std::vector<double> nfa_;
+  std::vector<std::int64_t> lines_then_;  // that were left when an axis was found
 };
 
 }  // namespace

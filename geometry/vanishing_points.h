@@ -15,10 +15,16 @@
 //   refinement  the V that makes sum (V'N)^2 / (V' S_N V) least over normals within 2 t, three times.
 //   removal     of all normals within max(2 t, 3 sigma) of the circle.
 //
+//   strays      lines of a family whose errors are larger than stated, bent by the lens above all, are left by the
+//   removal.
+//               They lie on either side of its circle alike: as many on a circle nearby as on its mirror image. An
+//               axis within 5 degrees of one before is none if its lines are not more than those of its mirror image,
+//               at a level of 1 %.
+//
 // Where two families are nearly parallel, the first takes lines of the second. So all lines are dealt out again at the
-// end, each to the axis that it is nearest to in sigmas. What the pieces of one broken edge have in common is no
-// evidence for a vanishing point: lines that may be one and the same, by their covariances, count once in search and
-// stop, all in the fit.
+// end, each to the axis that it is nearest to in sigmas, if within five; what then has too few for its NFA is dropped.
+// What the pieces of one broken edge have in common is no evidence for a vanishing point: lines that may be one and the
+// same, by their covariances, count once in search and stop, all in the fit.
 //
 // The direction and its covariance are those of the Gauss-Helmert fit (gauss_helmert.h) with the equation V'N = 0, V
 // moving in its tangent plane: unit length is kept instead of being bordered, and normals bring their covariances of

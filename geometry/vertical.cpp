@@ -14,6 +14,9 @@ namespace megablock {
 
 namespace {
 
+constexpr double kNearlyParallel = 10 * kDegree;
+constexpr double kMostCost = 16;
+
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
@@ -74,6 +77,7 @@ std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, co
   for (const VanishingPoint& p : points) most = std::max(most, static_cast<double>(p.lines.size()));
   const double not_orthogonal = 2 * std::log(0.95 / 0.05);
   std::optional<Vertical> best;
+  std::vector<Vertical> candidates;
   double least = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     AxisDirection down = points[i].axis;
@@ -82,20 +86,37 @@ std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, co
     const Eigen::Vector2d turn = roll_and_pitch(prior.down, down.direction);
     const double roll = turn.x() / prior.roll_sigma, pitch = turn.y() / prior.pitch_sigma;
     if (!(std::abs(roll) <= 3 && std::abs(pitch) <= 3)) continue;
-    double others = 0, oblique = 0;
+    double oblique = 0;
     for (std::size_t j = 0; j < points.size(); ++j) {
-      if (j == i) continue;
-      const double weight = static_cast<double>(points[j].lines.size()) / std::max(1.0, most);
-      others += weight;
-      if (!are_orthogonal(down, points[j].axis, prior.orthogonal_within)) oblique += weight;
+      const AxisDirection& other = points[j].axis;
+      if (j == i || down.direction.cross(other.direction).norm() < std::sin(kNearlyParallel)) continue;
+      if (!are_orthogonal(down, other, prior.orthogonal_within))
+        oblique += static_cast<double>(points[j].lines.size()) / std::max(1.0, most);
     }
-    if (oblique > 0.5 * others) continue;
     const double cost = roll * roll + pitch * pitch + not_orthogonal * oblique;
-    if (best && cost >= least) continue;
+    if (!(cost <= kMostCost)) continue;
+    candidates.push_back({static_cast<int>(i), down});
+    if (candidates.size() > 1 && cost >= least) continue;
     least = cost;
-    best = Vertical{static_cast<int>(i), down};
+    best = candidates.back();
   }
+  if (!best) return best;
+  const AxisDirection upright = best->down;
+  for (const Vertical& other : candidates)
+    if (points[static_cast<std::size_t>(other.point)].lines.size() >
+            points[static_cast<std::size_t>(best->point)].lines.size() &&
+        upright.direction.cross(other.down.direction).norm() < std::sin(kNearlyParallel))
+      best = other;
   return best;
+}
+
+RollPitch roll_pitch_of(const AxisDirection& down) {
+  const Eigen::Vector3d& v = down.direction;
+  const double level = std::hypot(v.x(), v.y());
+  Eigen::Matrix<double, 2, 3> j;
+  j << v.y() / (level * level), -v.x() / (level * level), 0,  //
+      v.z() * v.x() / level, v.z() * v.y() / level, -level;
+  return {std::atan2(v.x(), v.y()), std::atan2(-v.z(), level), propagated(j, down.covariance)};
 }
 
 Eigen::Matrix3d levelling_rotation(const Eigen::Vector3d& down) {

@@ -10,9 +10,9 @@
 //     (roll / sigma_roll)^2 + (pitch / sigma_pitch)^2 + 2 ln((1 - q) / q) sum_j w_j [V_j not orthogonal to V]
 //
 // with q = 0.05 for roofs, stairs and accidents among the other vanishing points, w_j their lines over the most lines
-// of any; the least cost wins. Candidates beyond three sigmas of roll or pitch, or orthogonal to less than half of the
-// others (by w), are none. Orthogonal is within `orthogonal_within`, or three sigmas where the two axes are less
-// certain.
+// of any; the least cost wins. Candidates beyond three sigmas of roll or pitch, or with a cost above 16, are none.
+// Orthogonal is within `orthogonal_within`, or three sigmas where the two axes are less certain. Vanishing points
+// within 10 degrees of the candidate are no evidence against it: walls lean.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -39,6 +39,14 @@ struct Vertical {
 };
 // Empty without a candidate.
 std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, const VerticalPrior& prior = {});
+
+// Roll: right side down is positive; pitch: looking up is positive (radians). Of a vertical direction (down):
+//     down = (sin r cos p, cos r cos p, -sin p).
+struct RollPitch {
+  double roll = 0, pitch = 0;
+  Eigen::Matrix2d covariance;
+};
+RollPitch roll_pitch_of(const AxisDirection& down);
 
 // The rotation by the least angle with R down = (0, 1, 0), also for down = (0, -1, 0), which is half a turn about x.
 Eigen::Matrix3d levelling_rotation(const Eigen::Vector3d& down);

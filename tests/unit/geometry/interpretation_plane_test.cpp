@@ -51,6 +51,19 @@ TEST(ImageLine, FootAndMovedOriginByDifferences) {
   EXPECT_LT((line_about(line, origin).covariance - moved * moved.transpose()).norm(), 1e-2);
 }
 
+TEST(ImageLine, IndependentPointsCarryItsCovariance) {
+  std::vector<Eigen::Vector2d> points;
+  for (int i = 0; i < 120; ++i) points.emplace_back(900 + 0.8 * i, 200 - 0.6 * i);
+  const auto line = fit_image_line(points, 0.4);
+  ASSERT_TRUE(line);
+  const LinePoints two = independent_points(*line);
+  EXPECT_NEAR((two.first - two.second).norm(), 120 / std::sqrt(3.0), 0.1);
+  const auto again = fit_image_line(Ends{two.first, two.second}, two.sigma_px);
+  ASSERT_TRUE(again);
+  EXPECT_NEAR(again->rho, line->rho, 1e-9);
+  EXPECT_LT((again->covariance - line->covariance).norm(), 1e-9 * line->covariance.norm());
+}
+
 TEST(ImageLine, RefusesWhatHasNoDirection) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(fit_image_line({}, 0.3));
@@ -105,6 +118,17 @@ TEST(InterpretationPlane, OfTwoRaysIsThatOfTheirLine) {
   EXPECT_FALSE(interpretation_plane(ray_a, covariance_a, ray_a, covariance_a));
   EXPECT_FALSE(
       interpretation_plane(ray_a, covariance_a, ray_a * std::numeric_limits<double>::quiet_NaN(), covariance_b));
+}
+
+TEST(InterpretationPlane, OfACamera) {
+  const Intrinsics camera{3000, 1504, 1000};
+  const auto line = fit_image_line(Ends{Eigen::Vector2d(300, 500), Eigen::Vector2d(700, 420)}, 0.4);
+  ASSERT_TRUE(line);
+  const auto plane = interpretation_plane(*line, camera);
+  const InterpretationPlane pinhole = interpretation_plane(*line, PerspectiveCentre{{1504, 1000}, 3000});
+  ASSERT_TRUE(plane);
+  EXPECT_NEAR(std::abs(plane->normal.dot(pinhole.normal)), 1, 1e-12);
+  EXPECT_LT((plane->covariance - pinhole.covariance).norm(), 1e-6 * pinhole.covariance.norm());
 }
 
 TEST(AxisDirection, FromAnotherCentreAndInTheImage) {

@@ -50,6 +50,15 @@ TEST(Vertical, AStreetStraightAheadIsNone) {
     }
 }
 
+TEST(Vertical, OfLeaningWallsTheOneWithMostLines) {
+  const Held held{0.1, 0.3};
+  const std::vector<VanishingPoint> points{point_at(Held{0.08, 0.28}.vertical(), 12), point_at(held.vertical(), 50),
+                                           point_at(held.horizontal(0.4), 60)};
+  const auto vertical = find_vertical(points);
+  ASSERT_TRUE(vertical);
+  EXPECT_EQ(vertical->point, 1);
+}
+
 TEST(Vertical, NoneWithoutCandidates) {
   const Held held;
   EXPECT_FALSE(find_vertical({}));
@@ -84,6 +93,25 @@ TEST(Vertical, ExifCodes) {
   const Eigen::Vector3d down[9] = {y, y, y, -y, -y, x, x, -x, -x};
   for (int code = 0; code < 9; ++code) EXPECT_EQ(down_of_exif_orientation(code), down[code]) << code;
   EXPECT_EQ(down_of_exif_orientation(77), y);
+}
+
+TEST(Vertical, RollAndPitch) {
+  for (const double roll : {-1.4, 0.0, 0.3, 3.0})
+    for (const double pitch : {-1.2, 0.0, 0.5}) {
+      const auto down = [](double r, double p) {
+        return Eigen::Vector3d(std::sin(r) * std::cos(p), std::cos(r) * std::cos(p), -std::sin(p));
+      };
+      Eigen::Matrix<double, 3, 2> root;  // of the covariance that roll and pitch with these sigmas give
+      const double h = 1e-6, sigma_roll = 0.01, sigma_pitch = 0.02;
+      root.col(0) = (down(roll + h, pitch) - down(roll - h, pitch)) / (2 * h) * sigma_roll;
+      root.col(1) = (down(roll, pitch + h) - down(roll, pitch - h)) / (2 * h) * sigma_pitch;
+      const RollPitch found = roll_pitch_of({down(roll, pitch), root * root.transpose()});
+      EXPECT_NEAR(found.roll, roll, 1e-12);
+      EXPECT_NEAR(found.pitch, pitch, 1e-12);
+      EXPECT_NEAR(std::sqrt(found.covariance(0, 0)), sigma_roll, 1e-8);
+      EXPECT_NEAR(std::sqrt(found.covariance(1, 1)), sigma_pitch, 1e-8);
+      EXPECT_NEAR(found.covariance(0, 1), 0, 1e-9);
+    }
 }
 
 TEST(Vertical, LevelledImageHasUprightVerticals) {
