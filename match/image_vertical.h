@@ -1,0 +1,31 @@
+// The vertical in one picture, from its straight edges (M45): segments, vanishing points, the one of the vertical.
+// Nothing of any other picture is needed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "geometry/vertical.h"
+#include "io/block.h"
+#include "match/line_segments.h"
+
+namespace megablock {
+
+struct ImageVertical {
+  std::string failure;  // of reading the picture; one line
+  int segments = 0, vanishing_points = 0;
+  // Below, where there is a vertical.
+  bool found = false;
+  // Camera axes, pointing down. Its covariance is that of the lines times their variance factor, where that is above
+  // one, with what the prior sigmas of the camera's parameters add: these turn and bend all lines together.
+  AxisDirection down;
+  int lines = 0;  // that show it
+  double variance_factor = 0;
+  double log10_nfa = 0;
+};
+
+// Never throws for a bad file. `camera`: of the picture, whose size it must have; its mask is honoured.
+ImageVertical find_image_vertical(const std::string& path, const Camera& camera, const VerticalPrior& prior,
+                                  std::uint64_t seed, const SegmentOptions& options = {});
+
+}  // namespace megablock

@@ -1,0 +1,114 @@
+#include "match/image_vertical.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/Eigenvalues>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "geometry/rotation.h"
+
+namespace megablock {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Windows on the two walls of a corner, seen by a camera that is held askew.
+class ImageVerticalTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("megablock_verticals_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    camera_.width = 900;
+    camera_.height = 600;
+    camera_.intrinsics = Intrinsics{800, 450, 300};
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  // Camera axes of a ground with y down, z ahead.
+  Eigen::Matrix3d attitude() const {
+    return (Eigen::AngleAxisd(0.06, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-0.15, Eigen::Vector3d::UnitX()) *
+            Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()))
+        .toRotationMatrix();
+  }
+  std::string draw(bool windows) const {
+    cv::Mat picture(600, 900, CV_8U, cv::Scalar(170));
+    std::mt19937_64 random(4);
+    const auto pixel = [&](const Eigen::Vector3d& ground) {
+      const Eigen::Vector3d p = attitude() * ground;
+      // Drawn with 4 fractional bits; OpenCV's (0, 0) is the middle of the first pixel.
+      return cv::Point(static_cast<int>(std::lround(16 * (800 * p.x() / p.z() + 449.5))),
+                       static_cast<int>(std::lround(16 * (800 * p.y() / p.z() + 299.5))));
+    };
+    if (windows)
+      for (int wall = 0; wall < 2; ++wall)
+        for (int column = 0; column < 7; ++column)
+          for (int row = -4; row < 4; ++row) {
+            // Walls run off to either side of a corner 12 m ahead.
+            const double jitter = 0.3 * std::uniform_real_distribution<double>(0, 1)(random);
+            const auto at = [&](double along, double height) {
+              const Eigen::Vector3d way = wall == 0 ? Eigen::Vector3d(-0.8, 0, -0.2) : Eigen::Vector3d(0.9, 0, 0.6);
+              return pixel(Eigen::Vector3d(-2, height, 12) + along * way);
+            };
+            const double left = 0.5 + 1.5 * column + jitter, top = 1.6 * row + jitter;
+            const std::vector<cv::Point> window{at(left, top), at(left + 0.9, top), at(left + 0.9, top + 1.1),
+                                                at(left, top + 1.1)};
+            cv::fillConvexPoly(picture, window, cv::Scalar(60), cv::LINE_AA, 4);
+          }
+    cv::GaussianBlur(picture, picture, {}, 0.7);
+    const std::string file = (folder_ / (windows ? "windows.png" : "plain.png")).string();
+    cv::imwrite(file, picture);
+    return file;
+  }
+
+  fs::path folder_;
+  Camera camera_;
+};
+
+TEST_F(ImageVerticalTest, IsFoundInAPicture) {
+  const ImageVertical v = find_image_vertical(draw(true), camera_, {}, 1);
+  EXPECT_EQ(v.failure, "");
+  ASSERT_TRUE(v.found);
+  const Eigen::Vector3d truth = attitude() * Eigen::Vector3d::UnitY();
+  const double error = std::acos(v.down.direction.dot(truth)) * kDegreesPerRadian;
+  EXPECT_LT(error, 0.1);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(v.down.covariance);
+  const double sigma = std::sqrt(solver.eigenvalues()(2)) * kDegreesPerRadian;
+  EXPECT_LT(error, 4 * sigma) << "what it says of itself";
+  EXPECT_LT(sigma, 0.2);
+  EXPECT_GT(v.lines, 20);
+
+  // The same again, and less sure with a camera that is less sure.
+  EXPECT_EQ(find_image_vertical(draw(true), camera_, {}, 1).down.direction, v.down.direction);
+  camera_.prior_sigma[kFocal] = 40;
+  const ImageVertical unsure = find_image_vertical(draw(true), camera_, {}, 1);
+  EXPECT_GT(unsure.down.covariance.trace(), 2 * v.down.covariance.trace());
+}
+
+TEST_F(ImageVerticalTest, NoneWithoutEdgesAndForBadFiles) {
+  const ImageVertical plain = find_image_vertical(draw(false), camera_, {}, 1);
+  EXPECT_EQ(plain.failure, "");
+  EXPECT_FALSE(plain.found);
+  EXPECT_EQ(plain.segments, 0);
+
+  const ImageVertical missing = find_image_vertical((folder_ / "gone.jpg").string(), camera_, {}, 1);
+  EXPECT_FALSE(missing.failure.empty());
+  EXPECT_FALSE(missing.found);
+  const std::string windows = draw(true);
+  Camera other = camera_;
+  other.width = 901;
+  EXPECT_NE(find_image_vertical(windows, other, {}, 1).failure.find("900 x 600"), std::string::npos);
+  other = camera_;
+  other.mask_path = (folder_ / "mask.png").string();
+  EXPECT_NE(find_image_vertical(windows, other, {}, 1).failure.find("mask"), std::string::npos);
+  cv::imwrite(other.mask_path, cv::Mat(600, 900, CV_8U, cv::Scalar(0)));
+  const ImageVertical masked = find_image_vertical(windows, other, {}, 1);
+  EXPECT_EQ(masked.failure, "");
+  EXPECT_EQ(masked.segments, 0);
+}
+
+}  // namespace
+}  // namespace megablock
