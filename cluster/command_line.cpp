@@ -24,6 +24,7 @@
 #include "cluster/status.h"
 #include "cluster/train_filter_command.h"
 #include "cluster/version.h"
+#include "cluster/verticals_command.h"
 #include "io/check.h"
 #include "io/error.h"
 #include "io/evaluate.h"
@@ -356,6 +357,7 @@ int command_line(int argc, char** argv) {
     add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
     add_calibrate(app, action, ranks);
     add_masks(app, by_one);
+    add_verticals(app, by_one);
     add_train_filter(app, by_one);
     add_resect(app, by_one);
     add_register(app, action, ranks);
