@@ -71,6 +71,24 @@ TEST(Gp3p, RaysFromOneCentreAreTheCentralProblem) {
   }
 }
 
+TEST(Gp3p, NothingForBadPoints) {
+  std::mt19937_64 random(7);
+  const Case good = make_case(random, 1);
+  ASSERT_FALSE(solve_gp3p(good.origins, good.directions, good.points).empty());
+  Case bad = good;
+  bad.points[1] = bad.points[0];
+  EXPECT_TRUE(solve_gp3p(bad.origins, bad.directions, bad.points).empty()) << "two points are one";
+  bad = good;
+  bad.points[2].x() = std::nan("");
+  EXPECT_TRUE(solve_gp3p(bad.origins, bad.directions, bad.points).empty());
+  bad = good;
+  bad.directions[2].x() = std::nan("");
+  EXPECT_TRUE(solve_gp3p(bad.origins, bad.directions, bad.points).empty());
+  bad = good;
+  bad.directions[0] = -bad.directions[0];
+  EXPECT_GT(distance_to_truth(good, solve_gp3p(bad.origins, bad.directions, bad.points)), 1e-3) << "a point behind";
+}
+
 TEST(Gp3p, RefusesPointsOnOneLine) {
   const Corners points = {Eigen::Vector3d(-1, 0, 5), Eigen::Vector3d(0, 0, 5), Eigen::Vector3d(1, 0, 5)};
   const Corners origins = {Eigen::Vector3d(0.1, 0, 0), Eigen::Vector3d(0, 0.1, 0), Eigen::Vector3d(0, 0, 0.1)};

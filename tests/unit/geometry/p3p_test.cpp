@@ -35,6 +35,27 @@ TEST(P3p, FindsTheTruthAmongConsistentSolutions) {
   EXPECT_LE(missed, kTrials / 200) << "near-degenerate triangles only";
 }
 
+TEST(P3p, NothingForBadPoints) {
+  const std::array<Eigen::Vector3d, 3> points = {Eigen::Vector3d(-1, 0, 5), Eigen::Vector3d(1, 0.5, 6),
+                                                 Eigen::Vector3d(0, -1, 4)};
+  std::array<Eigen::Vector3d, 3> rays;
+  for (std::size_t k = 0; k < 3; ++k) rays[k] = points[k].normalized();
+  ASSERT_FALSE(solve_p3p(rays, points).empty());
+  auto bad = points;
+  bad[2] = bad[0];
+  EXPECT_TRUE(solve_p3p(rays, bad).empty()) << "two points are one";
+  bad[2].y() = std::nan("");
+  EXPECT_TRUE(solve_p3p(rays, bad).empty());
+  auto bad_rays = rays;
+  bad_rays[1].z() = std::nan("");
+  EXPECT_TRUE(solve_p3p(bad_rays, points).empty());
+  bad_rays = rays;
+  bad_rays[1] = -bad_rays[1];
+  for (const Pose& pose : solve_p3p(bad_rays, points))
+    EXPECT_GT(rotation_angle(pose.rotation, Eigen::Quaterniond::Identity()) + pose.centre.norm(), 1e-3)
+        << "a point behind";
+}
+
 TEST(P3p, RefusesPointsOnOneLine) {
   const std::array<Eigen::Vector3d, 3> points = {Eigen::Vector3d(-1, 0, 5), Eigen::Vector3d(0, 0, 5),
                                                  Eigen::Vector3d(1, 0, 5)};
