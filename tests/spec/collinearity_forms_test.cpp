@@ -1,7 +1,8 @@
-// Acceptance tests of ../shared/spec/known-positions-and-collinearity.md that concern solvers: T-KP01, T-KP03, T-CP01,
-// T-CP03/04, T-CP05, T-CP06.
+// Acceptance tests of ../shared/spec/known-positions-and-collinearity.md that concern solvers: T-KP01, T-KP02, T-KP03,
+// T-CP01, T-CP03/04, T-CP05, T-CP06.
 #include <gtest/gtest.h>
 
+#include "geometry/camera_matrix.h"
 #include "geometry/collinearity.h"
 #include "geometry/coplanarity.h"
 #include "geometry/triangulation.h"
@@ -27,6 +28,38 @@ TEST(Spec, TKP01AnglesAndRotations) {
   }
   expect_at_most(below, 1e-12, "largest error, rad");
   expect_at_most(above, 1e-9, "above 85 deg");
+}
+
+TEST(Spec, TKP02CameraMatrix) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  double calibration = 0, rotation = 0, centre = 0, determinant = 0, again = 0;
+  for (int trial = 0; trial < 10000; ++trial) {
+    CameraMatrixParts truth;
+    // Frame cameras and satellites; images with y up; skew; a principal point anywhere; any scale and sign.
+    const double focal = std::pow(10, 4.5 + 1.5 * uniform(random));
+    truth.calibration << focal, 0.01 * focal * uniform(random), 5000 * uniform(random), 0,
+        (trial % 2 ? 1 : -1) * focal * (1 + 0.01 * uniform(random)), 5000 * uniform(random), 0, 0, 1;
+    truth.pose = {rotation_exp<double>(3.1 * uniform(random) * random_direction(random)),
+                  1000 * random_direction(random)};
+    const Eigen::Vector3d seen = truth.pose.centre + truth.pose.rotation.conjugate() * Eigen::Vector3d(3, -2, 500);
+    const CameraMatrix p = std::pow(10, 3 * uniform(random)) * (trial % 3 ? 1 : -1) * camera_matrix(truth);
+    const auto found = decompose_camera_matrix(p, seen);
+    ASSERT_TRUE(found);
+    calibration = std::max(calibration, (found->calibration - truth.calibration).norm() / focal);
+    rotation = std::max(rotation, rotation_angle(found->pose.rotation, truth.pose.rotation));
+    centre = std::max(centre, (found->pose.centre - truth.pose.centre).norm() / 1000);
+    determinant = std::max(determinant, std::abs(found->pose.rotation.toRotationMatrix().determinant() - 1));
+    EXPECT_EQ(found->calibration(2, 2), 1);
+    const CameraMatrix back = camera_matrix(*found);
+    again = std::max(again,
+                     std::min((back / back.norm() - p / p.norm()).norm(), (back / back.norm() + p / p.norm()).norm()));
+  }
+  expect_at_most(calibration, 1e-10, "calibration, of the focal length");
+  expect_at_most(rotation, 1e-10, "rotation, rad");
+  expect_at_most(centre, 1e-10, "centre, relative");
+  expect_at_most(determinant, 1e-12, "determinant less one");
+  expect_at_most(again, 1e-10, "the matrix again, relative");
 }
 
 // The determinant by its definition, for differences.
