@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "adjust/line_terms.h"
+#include "adjust/residual_squares.h"
 
 namespace megablock {
 
@@ -110,22 +111,20 @@ Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState&
 namespace {
 
 double image_cost(const TileProblem& problem, const TileState& state) {
-  const std::vector<ImageView> views = image_views(problem, state);
+  std::vector<std::int64_t> active;
+  active.reserve(problem.points.size());
+  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+    if (problem.active(p)) active.push_back(p);
   double sum = 0;
-  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
-    if (!problem.active(p)) continue;
-    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
-      if (!problem.kept[row]) continue;
-      const Eigen::Vector2d difference =
-          views[problem.image[row].value].difference_px(state.points[p], {problem.x[row], problem.y[row]});
-      if (!difference.allFinite()) return std::numeric_limits<double>::infinity();
-      sum += problem.image_loss.evaluate((problem.inverse_sigma[row] * difference).squaredNorm())[0];
-    }
-  }
+  ResidualSquares(problem, state).visit(active, [&](std::int64_t, std::int64_t, double squares) {
+    sum += std::isfinite(squares) ? problem.image_loss.evaluate(squares)[0] : std::numeric_limits<double>::infinity();
+  });
   return sum;
 }
 
-double prior_cost(const TileProblem& problem, const TileState& state) {
+}  // namespace
+
+double other_cost(const TileProblem& problem, const TileState& state) {
   double sum = 0;
   for (const auto& term : problem.positions) {
     const double s = linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm();
@@ -153,13 +152,11 @@ double prior_cost(const TileProblem& problem, const TileState& state) {
   }
   for (const auto& term : problem.mount_priors)
     sum += linearise_mount(state.mounts[term.mount], term).residual.squaredNorm();
-  return sum;
+  return 0.5 * sum;
 }
 
-}  // namespace
-
 double evaluate_cost(const TileProblem& problem, const TileState& state) {
-  return 0.5 * (image_cost(problem, state) + prior_cost(problem, state));
+  return 0.5 * image_cost(problem, state) + other_cost(problem, state);
 }
 
 }  // namespace megablock

@@ -125,5 +125,7 @@ inline double intrinsic_prior_residual(const Intrinsics& value, const TileProble
 // Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a
 // camera (cannot be projected).
 double evaluate_cost(const TileProblem& problem, const TileState& state);
+// Of everything but the image observations.
+double other_cost(const TileProblem& problem, const TileState& state);
 
 }  // namespace megablock

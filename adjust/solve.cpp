@@ -7,6 +7,7 @@
 #include "adjust/datum.h"
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/residual_squares.h"
 #include "adjust/tile_adjustment.h"
 #include "io/error.h"
 
@@ -22,18 +23,14 @@ struct ResidualSum {
 };
 
 void add_images(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
-  const std::vector<ImageView> views = image_views(problem, state);
-  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
-    if (!problem.active(p)) continue;
-    ++sum.points;
-    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
-      if (!problem.kept[row]) continue;
-      const Eigen::Vector2d difference =
-          views[problem.image[row].value].difference_px(state.points[p], {problem.x[row], problem.y[row]});
-      sum.squares += (problem.inverse_sigma[row] * difference).squaredNorm();
-      ++sum.observations;
-    }
-  }
+  std::vector<std::int64_t> active;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+    if (problem.active(p)) active.push_back(p);
+  sum.points += std::ssize(active);
+  ResidualSquares(problem, state).visit(active, [&](std::int64_t, std::int64_t, double squares) {
+    sum.squares += squares;
+    ++sum.observations;
+  });
   sum.residuals += 2 * sum.observations;
 }
 

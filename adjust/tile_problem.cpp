@@ -11,25 +11,16 @@
 
 namespace megablock {
 
-std::array<double, 3> RobustLoss::evaluate(double squared_norm) const {
+std::array<double, 3> RobustLoss::evaluate_beyond(double squared_norm) const {
   const double s = squared_norm, b = scale * scale;
   constexpr double kTiny = std::numeric_limits<double>::min();
-  switch (kind) {
-    case Kind::kNone:
-      break;
-    case Kind::kHuber:
-      if (s > b) {
-        const double r = std::sqrt(s);
-        const double first = std::max(kTiny, scale / r);
-        return {2 * scale * r - b, first, -first / (2 * s)};
-      }
-      break;
-    case Kind::kCauchy: {
-      const double sum = 1 + s / b, inverse = 1 / sum;
-      return {b * std::log(sum), std::max(kTiny, inverse), -inverse * inverse / b};
-    }
+  if (kind == Kind::kHuber) {
+    const double r = std::sqrt(s);
+    const double first = std::max(kTiny, scale / r);
+    return {2 * scale * r - b, first, -first / (2 * s)};
   }
-  return {s, 1, 0};
+  const double sum = 1 + s / b, inverse = 1 / sum;  // Cauchy
+  return {b * std::log(sum), std::max(kTiny, inverse), -inverse * inverse / b};
 }
 
 bool TileProblem::active(std::int64_t point) const {

@@ -34,7 +34,16 @@ struct RobustLoss {
   Kind kind = Kind::kNone;
   double scale = 1;  // in sigmas: Huber's corner, Cauchy's scale
   // rho(s) of the squared norm s, with first and second derivative: {rho, rho', rho''}, as ceres::LossFunction.
-  std::array<double, 3> evaluate(double squared_norm) const;
+  std::array<double, 3> evaluate(double squared_norm) const {
+    return squares(squared_norm) ? std::array<double, 3>{squared_norm, 1, 0} : evaluate_beyond(squared_norm);
+  }
+
+ private:
+  // Nearly every observation: inline.
+  bool squares(double s) const {
+    return kind == Kind::kNone || (kind == Kind::kHuber && !(s > scale * scale));
+  }
+  std::array<double, 3> evaluate_beyond(double squared_norm) const;
 };
 
 struct MountId {

@@ -334,8 +334,7 @@ DownReport RankRunner::down(const Pass& pass) {
     TileStep& step = steps[row];
     solve_tile_points(tile.problem, plan, tile.state, pass, step);
     TileState trial = apply_step(gauge_, motions, tile.tile, tile.problem, plan, tile.state, step);
-    refine_points(tile.problem, plan, trial);
-    sums[row] = {step.damping_norm, evaluate_cost(tile.problem, trial)};
+    sums[row] = {step.damping_norm, refine_points(tile.problem, plan, trial)};
     trial_gauges_.push_back(tile_gauge(tile.problem, plan, trial));
     tiles_.put_trial(row, std::move(trial));
     step = {};

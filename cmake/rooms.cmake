@@ -1,7 +1,8 @@
 # A room is a folder of sources that becomes one static library, megablock::<room>.
 # Every .cpp directly in the folder, or in one of its sub-folders other than `main`, belongs to it.
-# Files named *_avx2.cpp are compiled for AVX2 and FMA; they hold raw-pointer kernels only, reached by
-# run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them: their ABI depends on the flags).
+# Files named *_avx2.cpp are compiled for AVX2 and FMA, *_avx512.cpp for AVX-512, *_portable.cpp as everything else; they
+# hold raw-pointer kernels only, reached by run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them: their
+# ABI depends on the flags).
 
 add_library(megablock_options INTERFACE)
 target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})
@@ -39,6 +40,10 @@ function(megablock_headers target)
   target_compile_options(${target} PRIVATE ${HEADERS_OPTIONS})
 endfunction()
 
+set(megablock_portable_options -fno-math-errno)
+set(megablock_avx2_options -mavx2 -mfma -fno-math-errno)
+set(megablock_avx512_options -mavx512f -mavx512dq -mavx512vl -mprefer-vector-width=512 -fno-math-errno)
+
 function(megablock_room name)
   cmake_parse_arguments(ROOM "" "" "DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${name}/*.cpp ${name}/*/*.cpp)
@@ -50,8 +55,9 @@ function(megablock_room name)
     set(type PUBLIC)
     add_library(megablock_${name} STATIC ${sources})
     foreach(source IN LISTS sources)
-      if(source MATCHES "_avx2\\.cpp$")
-        set_source_files_properties(${source} PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma" SKIP_PRECOMPILE_HEADERS ON)
+      if(source MATCHES "_(portable|avx2|avx512)\\.cpp$")
+        set_source_files_properties(${source} PROPERTIES COMPILE_OPTIONS "${megablock_${CMAKE_MATCH_1}_options}"
+                                                         SKIP_PRECOMPILE_HEADERS ON)
       endif()
     endforeach()
     target_precompile_headers(megablock_${name} REUSE_FROM megablock_room_headers)

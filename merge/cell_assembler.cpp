@@ -39,12 +39,6 @@ void add_squares(double* c, std::int64_t width, const double* jacobian, const do
   }
 }
 
-inline Eigen::Matrix3d crossed(const Eigen::Vector3d& u, const Eigen::Matrix3d& m) {  // [u]x m
-  Eigen::Matrix3d result;
-  for (int j = 0; j < 3; ++j) result.col(j) = u.cross(m.col(j));
-  return result;
-}
-
 }  // namespace
 
 void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen::Ref<const Eigen::MatrixXd>& block) {
@@ -61,51 +55,36 @@ CellAssembler::CellAssembler(const TilePlan& plan, Front& front)
   for (const Unknown& u : plan.unknowns) rows_.push_back(front.row_of(u.id));
 }
 
-void CellAssembler::add_point(const PointEquations& point) {
-  add_frames(point);
-  add_shared(point);
-  const auto blocks = point.blocks();
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const bool frame = i < point.frames().size();  // of frames Y_i Y_i' is in the sum
-    for (std::size_t j = 0; j < i + !frame; ++j)
-      subtract_outer({blocks[i].unknown, blocks[i].dimension, blocks[i].dimension, blocks[i].y},
-                     {blocks[j].unknown, blocks[j].dimension, blocks[j].dimension, blocks[j].y});
-  }
+void CellAssembler::add_points(PointEquations& equations) {
+  equations.reduce(frames_);
+  for (std::size_t i = 0; i < equations.points().size(); ++i) add_point(equations, i);
+}
+
+void CellAssembler::add_point(const PointEquations& equations, std::size_t i) {
+  const PointEquations::Point& point = equations.points()[i];
+  frame_rows_.clear();
+  for (std::int64_t lane = point.first; lane < point.last; ++lane)
+    frame_rows_.push_back(rows_[at(equations.unknowns_of(lane).frame)]);
+  equations.kernels().subtract_pairs(
+      point.observation_count(), equations.y(point.first), frame_rows_.data(),
+      {front_.factor(), front_.update(), front_.dimension(), front_.eliminated_dimension()});
+  if (point.shared_end > point.shared_begin) add_shared(equations, i);
+
   SubtreeSums& sums = front_.sums();
-  sums.cost += 0.5 * point.rho();
-  sums.weighted_squares += point.weighted_squares();
-  sums.decrement_squared += point.z().squaredNorm();
-  sums.residuals += point.residual_count();
+  sums.cost += 0.5 * point.rho;
+  sums.weighted_squares += point.weighted_squares;
+  sums.decrement_squared += equations.z(i).squaredNorm();
+  sums.residuals += point.residual_count;
   sums.observations += point.observation_count();
   sums.points += 1;
   sums.unknowns += 3;
-  sums.held_points += point.held();
+  sums.held_points += equations.held(i);
 }
 
-void CellAssembler::add_frames(const PointEquations& point) {
-  const Eigen::Vector3d own_step = point.inverse_factor().transpose() * point.z();  // V^-1 b
-  for (const PointEquations::FramePart& part : point.frames()) {
-    FrameSum& sum = frames_[at(part.unknown)];
-    const Eigen::Vector3d& u = part.from_frame;
-    for (int k = 0; k < 3; ++k) {  // of G'V_f G
-      const int a = (k + 1) % 3, b = (k + 2) % 3;
-      sum.diagonal[k] += u[a] * u[a] * part.v(b, b) - 2 * u[a] * u[b] * part.v(a, b) + u[b] * u[b] * part.v(a, a);
-      sum.diagonal[k + 3] += part.v(k, k);
-    }
-    const Eigen::Matrix3d reduced = part.v - part.t.lazyProduct(part.t.transpose());
-    const Eigen::Matrix3d turned = crossed(u, reduced);
-    sum.by_centre += reduced;
-    sum.mixed += turned;
-    sum.by_rotation += crossed(u, turned.transpose());
-    const Eigen::Vector3d rest = part.b - part.v * own_step;
-    sum.rhs.head<3>() += u.cross(rest);
-    sum.rhs.tail<3>() -= rest;
-  }
-}
-
-void CellAssembler::add_shared(const PointEquations& point) {
-  for (const PointEquations::Observation& o : point.observations()) {
-    const ImageUnknowns& u = point.unknowns_of(o);
+void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
+  const PointEquations::Point& point = equations.points()[i];
+  for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+    const ImageUnknowns& u = equations.unknowns_of(lane);
     const int width = u.shared_width;
     if (width == 0) continue;
     if (at(u.calibration) >= shared_.size()) shared_.resize(at(u.calibration + 1));
@@ -114,18 +93,24 @@ void CellAssembler::add_shared(const PointEquations& point) {
       sum.unknowns = u;
       sum.normal.assign(at(width * (width + 1)), 0);
     }
-    add_squares(sum.normal.data(), width, o.shared, o.residual.data());
+    const PointEquations::SharedRows& shared = equations.shared(lane);
+    add_squares(sum.normal.data(), width, shared.jacobian, equations.residual(lane).data());
     // J_s'J_f = W_sk G
-    const PointEquations::FramePart& part = point.frames()[at(o.frame)];
     Eigen::Matrix<double, 6, 3> minus_g;
-    minus_g << -skew<double>(part.from_frame), Eigen::Matrix3d::Identity();
-    const Factor frame{part.unknown, 6, 6, minus_g.data()};
-    if (u.camera >= 0) subtract_outer({u.camera, u.camera_width, width, o.shared_point}, frame);
-    if (u.mount >= 0) subtract_outer({u.mount, 6, width, o.shared_point + u.camera_width}, frame);
+    minus_g << -skew<double>(equations.from_frame(lane)), Eigen::Matrix3d::Identity();
+    const Factor frame{u.frame, 6, 6, minus_g.data()};
+    if (u.camera >= 0) subtract_outer({u.camera, u.camera_width, width, shared.by_point}, frame);
+    if (u.mount >= 0) subtract_outer({u.mount, 6, width, shared.by_point + u.camera_width}, frame);
   }
-  for (const auto& block : point.blocks().subspan(point.frames().size()))
+  equations.blocks(i, blocks_);
+  for (std::size_t b = at(point.observation_count()); b < blocks_.size(); ++b) {
+    const PointEquations::Block& block = blocks_[b];
+    for (std::size_t a = 0; a <= b; ++a)
+      subtract_outer({block.unknown, block.dimension, block.dimension, block.y},
+                     {blocks_[a].unknown, blocks_[a].dimension, blocks_[a].dimension, blocks_[a].y});
     Eigen::Map<Eigen::VectorXd>(front_.rhs() + rows_[at(block.unknown)], block.dimension).noalias() -=
-        block.matrix() * point.z();
+        block.matrix() * equations.z(i);
+  }
 }
 
 void CellAssembler::subtract_outer(const Factor& a, const Factor& b) {
@@ -163,12 +148,23 @@ void CellAssembler::add_normal(std::int64_t unknown, const Eigen::Ref<const Eige
 void CellAssembler::finish(std::vector<double>& diagonal) {
   for (std::size_t u = 0; u < frames_.size(); ++u) {
     if (rows_[u] < 0 || plan_.unknowns[u].id.kind != UnknownKind::kFrame) continue;
-    const FrameSum& sum = frames_[u];
+    const double* sum = frames_[u].values.data();
+    const auto symmetric = [](const double* lower) {
+      Eigen::Matrix3d m;
+      m << lower[0], lower[1], lower[3], lower[1], lower[2], lower[4], lower[3], lower[4], lower[5];
+      return m;
+    };
+    const double* m = sum + point_kernels::kMixed;
+    Eigen::Matrix3d mixed;
+    mixed << m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], -m[0] - m[4];
     Eigen::Matrix<double, 6, 6> normal;
-    normal << sum.by_rotation, -sum.mixed, -sum.mixed.transpose(), sum.by_centre;
+    normal << symmetric(sum + point_kernels::kByRotation), -mixed, -mixed.transpose(),
+        symmetric(sum + point_kernels::kByCentre);
     add_block(front_, rows_[u], rows_[u], normal);
-    Eigen::Map<Vector6>(front_.diagonal() + rows_[u]) += sum.diagonal;
-    Eigen::Map<Vector6>(front_.rhs() + rows_[u]) += sum.rhs;
+    for (int k = 0; k < 6; ++k) {
+      front_.diagonal()[rows_[u] + k] += sum[point_kernels::kDiagonal + k];
+      front_.rhs()[rows_[u] + k] += sum[point_kernels::kRightHandSide + k];
+    }
   }
   for (const SharedSum& sum : shared_) {
     if (sum.normal.empty()) continue;

@@ -1,7 +1,9 @@
 // Fills the front of a cell with its points, which are eliminated on the way, and its other observations.
 //
 // Per point (point_equations.h) K_ij -= Y_i Y_j' goes to the front at once. What only concerns one frame or the shared
-// unknowns of one camera in one mount, J'J and -J'r, is summed apart and added to the front once per cell.
+// unknowns of one camera in one mount, J'J and -J'r, is summed apart and added to the front once per cell: of a frame
+// G'(V_k - T T')G and G'(b_k - T z) of its observations k, T = V_k C^-T. By its blocks, with R = V_k - T T', the first
+// is [u]x R [u]x', -[u]x R and R. Further the diagonal of J'J (point_kernels::FrameValue).
 #pragma once
 
 #include <vector>
@@ -18,26 +20,19 @@ void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen:
 class CellAssembler {
  public:
   CellAssembler(const TilePlan& plan, Front& front);
-  void add_point(const PointEquations& point);  // after reduce()
+  void add_points(PointEquations& equations);  // after linearise()
   void add_term(const TermResidual& term);
   // Adds what was summed apart; the front is complete then. `diagonal`: of J'J over plan.unknowns, grows by the cell's.
   void finish(std::vector<double>& diagonal);
 
  private:
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
-  // Sum of G'(V_f - T T')G of a frame, T = V_f C^-T, by its blocks: with R = V_f - T T' they are [u]x R [u]x', -[u]x R
-  // and R. Further the diagonal of J'J, and G'(b_f - T z).
-  struct FrameSum {
-    Eigen::Matrix3d by_rotation = Eigen::Matrix3d::Zero(), mixed = by_rotation, by_centre = by_rotation;
-    Vector6 diagonal = Vector6::Zero(), rhs = diagonal;
-  };
   struct SharedSum {
     ImageUnknowns unknowns;
     std::vector<double> normal;  // [width x (width + 1)]: lower triangle of J'J, then J'r
   };
 
-  void add_frames(const PointEquations& point);
-  void add_shared(const PointEquations& point);
+  void add_point(const PointEquations& equations, std::size_t i);  // of equations.points()
+  void add_shared(const PointEquations& equations, std::size_t i);
   // Three columns over the rows of an unknown.
   struct Factor {
     std::int64_t unknown = -1;
@@ -50,9 +45,11 @@ class CellAssembler {
 
   const TilePlan& plan_;
   Front& front_;
-  std::vector<std::int64_t> rows_;  // of TilePlan::unknowns in the front (first row of each, -1: not in it)
-  std::vector<FrameSum> frames_;    // [plan.unknowns]
-  std::vector<SharedSum> shared_;   // by ImageUnknowns::calibration
+  std::vector<std::int64_t> rows_;             // of TilePlan::unknowns in the front (first row of each, -1: not in it)
+  std::vector<FrameSum> frames_;               // [plan.unknowns]
+  std::vector<SharedSum> shared_;              // by ImageUnknowns::calibration
+  std::vector<PointEquations::Block> blocks_;  // of the point at hand
+  std::vector<std::int64_t> frame_rows_;       // of its frames in the front
 };
 
 }  // namespace megablock

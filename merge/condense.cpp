@@ -15,10 +15,9 @@ namespace {
 void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                const PlanNode& node, PointEquations& equations, std::vector<double>& diagonal, Front& front) {
   CellAssembler assembler(plan, front);
-  for (std::int64_t point : plan.points[at(node.leaf)]) {
-    equations.linearise(point, pass);
-    equations.reduce();
-    assembler.add_point(equations);
+  for (std::span<const std::int64_t> rest = plan.points[at(node.leaf)]; !rest.empty();) {
+    rest = rest.subspan(equations.linearise(rest, pass));
+    assembler.add_points(equations);
   }
   visit_terms(problem, plan, state, pass, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
   assembler.finish(diagonal);
@@ -133,14 +132,14 @@ TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, con
 void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                        TileStep& step) {
   step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
-  const std::vector<std::int64_t> offsets = row_offsets(plan.unknowns);
+  const UnknownMotions motions(plan, step.unknowns.values.data());
   PointEquations equations(problem, plan, state);
   for (const auto& cell : plan.points) {
-    for (std::int64_t point : cell) {
-      equations.linearise(point, pass);
-      const Eigen::Vector3d x = equations.step(step.unknowns.values.data(), offsets);
-      step.points[at(point)] = x;
-      step.damping_norm += equations.diagonal().dot(x.cwiseAbs2());
+    for (std::span<const std::int64_t> rest = cell; !rest.empty();) {
+      rest = rest.subspan(equations.linearise(rest, pass));
+      equations.steps(motions, step.points);
+      for (std::size_t i = 0; i < equations.points().size(); ++i)
+        step.damping_norm += equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
     }
   }
 }

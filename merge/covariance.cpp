@@ -25,7 +25,8 @@ class TileCovarianceBuilder {
         state_(state),
         factor_(factor),
         columns_(columns),
-        equations_(problem, plan, state) {
+        equations_(problem, plan, state),
+        frame_sums_(plan.unknowns.size()) {
     offsets_ = row_offsets(plan.unknowns);
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
@@ -102,11 +103,14 @@ class TileCovarianceBuilder {
     cell_rows_ = offsets.back();
     for (std::size_t i = 0; i < covariance.unknowns.size(); ++i)
       row_of_unknown_[at(find_unknown(plan_.unknowns, covariance.unknowns[i].id))] = offsets[i];
-    for (std::int64_t point : plan_.points[cell]) {
-      equations_.linearise(point, 0);
-      equations_.reduce();
-      add_point(point);
-      if (columns_.columns > 1) add_point_columns(point);
+    for (std::span<const std::int64_t> rest = plan_.points[cell]; !rest.empty();) {
+      rest = rest.subspan(equations_.linearise(rest, 0));
+      equations_.reduce(frame_sums_);
+      for (std::size_t i = 0; i < equations_.points().size(); ++i) {
+        equations_.blocks(i, blocks_);
+        add_point(i);
+        if (columns_.columns > 1) add_point_columns(i);
+      }
     }
     visit_terms(problem_, plan_, state_, 0, cell, [&](const TermResidual& term) { add_term(term); });
   }
@@ -120,35 +124,36 @@ class TileCovarianceBuilder {
 
   // With Y_a = W_a C^-T of the unknowns a that see the point:
   // C_ap = -sum_b C_ab Y_b C^-1,  C_pp = C^-T (I + sum_a Y_a' sum_b C_ab Y_b) C^-1.
-  void add_point(std::int64_t point) {
-    const auto& blocks = equations_.blocks();
-    const Eigen::Matrix3d& inverse = equations_.inverse_factor();
+  void add_point(std::size_t i) {
+    const Eigen::Matrix3d inverse = equations_.inverse_factor(i);
     Eigen::Matrix3d inner = Eigen::Matrix3d::Identity();
-    with_point_.resize(blocks.size());
-    for (std::size_t a = 0; a < blocks.size(); ++a) {
+    with_point_.resize(blocks_.size());
+    for (std::size_t a = 0; a < blocks_.size(); ++a) {
       auto& sum = with_point_[a];
-      sum.setZero(blocks[a].dimension, 3);
-      for (const auto& b : blocks)
-        sum.noalias() += covariance_of(blocks[a].unknown, blocks[a].dimension, b.unknown, b.dimension) * b.matrix();
-      inner.noalias() += blocks[a].matrix().transpose() * sum;
+      sum.setZero(blocks_[a].dimension, 3);
+      for (const auto& b : blocks_)
+        sum.noalias() += covariance_of(blocks_[a].unknown, blocks_[a].dimension, b.unknown, b.dimension) * b.matrix();
+      inner.noalias() += blocks_[a].matrix().transpose() * sum;
       sum = (-sum * inverse).eval();
     }
     const Eigen::Matrix3d covariance = inverse.transpose() * inner * inverse;
-    result_.points[at(point)] = covariance;
+    const PointEquations::Point& point = equations_.points()[i];
+    result_.points[at(point.point)] = covariance;
     add_image_redundancy(point, covariance);
-    add_prior_redundancy(point, covariance);
+    add_prior_redundancy(point.point, covariance);
   }
 
-  void add_image_redundancy(std::int64_t point, const Eigen::Matrix3d& covariance) {
-    ObservationStatistics& sums = result_.observations[image_kind(problem_.points[at(point)].role)];
-    std::int64_t row = problem_.begin[at(point)];  // the equations hold the kept ones in their order
-    for (const auto& observation : equations_.observations()) {
-      const auto& by_point = observation.by_point;
-      const int count = equations_.jacobians(observation, jacobians_);
+  void add_image_redundancy(const PointEquations::Point& point, const Eigen::Matrix3d& covariance) {
+    ObservationStatistics& sums = result_.observations[image_kind(problem_.points[at(point.point)].role)];
+    std::int64_t row = problem_.begin[at(point.point)];  // the equations hold the kept ones in their order
+    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+      const Eigen::Matrix<double, 2, 3> by_point = equations_.by_point(lane);
+      const Eigen::Vector2d residual = equations_.residual(lane);
+      const int count = equations_.jacobians(lane, jacobians_);
       Eigen::Vector2d variance = (by_point * covariance).cwiseProduct(by_point).rowwise().sum();
       for (int i = 0; i < count; ++i) {
         const auto& a = jacobians_[at(i)];
-        const auto& with_point = with_point_[at(equations_.slot(a.unknown))];
+        const auto& with_point = with_point_[place(a.unknown)];
         variance += 2 * (a.jacobian * with_point).cwiseProduct(by_point).rowwise().sum();
         for (int j = 0; j < count; ++j) {
           const auto& b = jacobians_[at(j)];
@@ -158,11 +163,18 @@ class TileCovarianceBuilder {
                           .sum();
         }
       }
-      for (int k = 0; k < 2; ++k) sums.add(observation.residual[k] * observation.residual[k], 1 - variance[k]);
+      for (int k = 0; k < 2; ++k) sums.add(residual[k] * residual[k], 1 - variance[k]);
       while (!problem_.kept[at(row)]) ++row;
       result_.redundancy_x[at(row)] = static_cast<float>(1 - variance[0]);
       result_.redundancy_y[at(row++)] = static_cast<float>(1 - variance[1]);
     }
+  }
+
+  // Of an unknown that sees the point at hand in blocks_.
+  std::size_t place(std::int64_t unknown) const {
+    std::size_t i = 0;
+    while (blocks_[i].unknown != unknown) ++i;
+    return i;
   }
 
   void add_prior_redundancy(std::int64_t point, const Eigen::Matrix3d& covariance) {
@@ -194,16 +206,16 @@ class TileCovarianceBuilder {
   }
 
   // Their own right-hand side is zero: x_p = -C^-T sum Y_i' x_i.
-  void add_point_columns(std::int64_t point) {
+  void add_point_columns(std::size_t i) {
     const std::int64_t n = offsets_.back();
     Eigen::Matrix<double, 3, Eigen::Dynamic> sum = Eigen::MatrixXd::Zero(3, columns_.columns - 1);
-    for (const auto& block : equations_.blocks()) {
+    for (const auto& block : blocks_) {
       const double* first = columns_.values.data() + offsets_[at(block.unknown)] + n;
       const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> x(first, block.dimension, columns_.columns - 1,
                                                                          Eigen::OuterStride<>(n));
       sum -= block.matrix().transpose() * x;
     }
-    result_.point_columns[at(point)] = equations_.inverse_factor().transpose() * sum;
+    result_.point_columns[at(equations_.points()[i].point)] = equations_.inverse_factor(i).transpose() * sum;
   }
 
   const TileProblem& problem_;
@@ -213,6 +225,8 @@ class TileCovarianceBuilder {
   const Step& columns_;
   std::vector<std::int64_t> offsets_;
   PointEquations equations_;
+  std::vector<FrameSum> frame_sums_;           // not used
+  std::vector<PointEquations::Block> blocks_;  // of the point at hand
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_, row_of_unknown_;
   // Of the cell at hand: covariance of its unknowns.
   const double* cell_ = nullptr;

@@ -136,6 +136,9 @@ class Front {
     if (column < e) return {factor_.data() + row + column * dimension_, dimension_};
     return {update_.data() + (row - e) + (column - e) * p, p};
   }
+  double* factor() { return factor_.data(); }  // columns of E [n x e], n between them
+  double* update() { return update_.data(); }  // of P, rows of P alone [p x p]
+  std::int64_t eliminated_dimension() const { return eliminated_dimension_; }
   double* rhs() { return rhs_.data(); }            // [n x right_hand_sides]
   double* diagonal() { return diagonal_.data(); }  // [n] of J'J
   SubtreeSums& sums() { return sums_; }

@@ -1,13 +1,14 @@
 #include "merge/point_equations.h"
 
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "merge/unknowns.h"
 
 namespace megablock {
 
-std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan) {
+std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan, const TileState& state) {
   std::vector<ImageUnknowns> list;
   std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> calibrations;
   list.reserve(problem.images.size());
@@ -19,6 +20,7 @@ std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const Tile
     if (u.camera >= 0) u.free = plan.camera_free[at(image.camera.value)];
     u.camera_width = count_of(u.free);
     u.shared_width = u.camera_width + (u.mount >= 0 ? 6 : 0);
+    u.plain = u.shared_width == 0 && state.cameras[at(image.camera.value)].model().kind == CameraModelKind::kBrown;
     if (u.shared_width > 0)
       u.calibration =
           calibrations.try_emplace({u.camera, u.mount}, static_cast<std::int64_t>(calibrations.size())).first->second;
@@ -34,43 +36,76 @@ std::vector<std::int64_t> prior_rows(const TileProblem& problem) {
   return rows;
 }
 
+UnknownMotions::UnknownMotions(const TilePlan& plan, const double* x)
+    : x_(x), offsets_(row_offsets(plan.unknowns)), frames_(plan.unknowns.size()) {
+  for (std::size_t u = 0; u < frames_.size(); ++u)
+    if (plan.unknowns[u].id.kind == UnknownKind::kFrame) std::copy_n(x + offsets_[u], 6, frames_[u].begin());
+}
+
+namespace {
+
+const point_kernels::Kernels& point_kernels_of_processor() {
+  const lane_kernels::Kernels* kernels = &lane_kernels_of_processor();
+  return kernels == lane_kernels_of_width(8)   ? point_kernels::kAvx512
+         : kernels == lane_kernels_of_width(4) ? point_kernels::kAvx2
+                                               : point_kernels::kPortable;
+}
+
+}  // namespace
+
+using lane_kernels::kByPoint;
+using lane_kernels::kResidual;
+using namespace point_kernels;
+
 PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)
     : problem_(problem),
       state_(state),
+      kernels_(&point_kernels_of_processor()),
       views_(image_views(problem, state)),
-      unknowns_(image_unknowns(problem, plan)),
+      lane_views_(lane_views(views_)),
+      unknowns_(image_unknowns(problem, plan, state)),
       prior_(prior_rows(problem)) {
-  slot_.assign(plan.unknowns.size(), -1);
   for (const ImageUnknowns& u : unknowns_) widest_ = std::max(widest_, u.shared_width);
+  std::int64_t room = 64;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+    room = std::max(room, problem.begin[at(p + 1)] - problem.begin[at(p)]);
+  lanes_.reserve(room);
+  room = lanes_.capacity();
+  rows_.resize(at(room));
+  lane_unknowns_.resize(at(room));
+  point_of_lane_.resize(at(room));
+  shared_rows_.resize(at(room));
+  frame_sums_.resize(at(room));
+  motions_.resize(at(room));
+  values_.resize(room * kObservationValueCount);
+  point_values_.resize(room * kPointValueCount);
+  y_.resize(room * kYSize);
+  moved_.resize(room * 3);
+  store_.resize(at(room * 11 * widest_));  // J_s, W_sk, W_s and Y
 }
 
-void PointEquations::linearise(std::int64_t point, const Pass& pass) {
-  clear(point);
-  for (std::int64_t row = problem_.begin[at(point)]; row < problem_.begin[at(point + 1)]; ++row)
-    if (problem_.kept[at(row)]) add_observation(point, row, pass.curvature);
-  v_.setZero();
-  b_.setZero();
-  for (const FramePart& part : frames_) {
-    v_ += part.v;
-    b_ += part.b;
+std::size_t PointEquations::linearise(std::span<const std::int64_t> points, const Pass& pass) {
+  clear();
+  for (const std::int64_t point : points) {
+    if (lanes_.size() + problem_.begin[at(point + 1)] - problem_.begin[at(point)] > lanes_.capacity()) break;
+    add_observations(point);
   }
-  add_prior(point);
-  factorise(pass.lambda);
+  lanes_.linearise();
+  for (Point& point : points_) weigh(point, pass.curvature);
+  kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns());
+  for (std::size_t i = 0; i < points_.size(); ++i) sum_up(i);
+  for (std::size_t i = points_.size(); i < at(padded_points()); ++i)
+    for (int v = kPointV; v < kPointInverse; ++v) point_value(v, i) = 0;
+  kernels_->factorise(padded_points(), pass.lambda, kPivotTolerance * (1 + pass.lambda),
+                      {point_values_.data(), lanes_.capacity()});
+  spread();
+  return points_.size();
 }
 
-void PointEquations::clear(std::int64_t point) {
-  for (const FramePart& part : frames_) slot_[at(part.unknown)] = -1;
-  for (const SharedPart& part : shared_) slot_[at(part.unknown)] = -1;
-  frames_.clear();
+void PointEquations::clear() {
+  points_.clear();
+  lanes_.clear();
   shared_.clear();
-  blocks_.clear();
-  observations_.clear();
-  rho_ = weighted_squares_ = 0;
-  residual_count_ = 0;
-  // J_s, W_sk, W_s and Y: nothing that was taken moves until the next point.
-  const auto most = at(problem_.begin[at(point + 1)] - problem_.begin[at(point)]);
-  const std::size_t room = most * static_cast<std::size_t>(11 * widest_ + 18);
-  if (store_.size() < room) store_.resize(room);
   taken_ = 0;
 }
 
@@ -80,51 +115,73 @@ double* PointEquations::take(int count) {
   return first;
 }
 
-void PointEquations::add_observation(std::int64_t point, std::int64_t row, bool curvature) {
-  const std::int64_t image = problem_.image[at(row)].value;
+void PointEquations::add_observations(std::int64_t point) {
+  Point& added = points_.emplace_back();
+  added.point = point;
+  added.first = lanes_.size();
+  const Eigen::Vector3d& position = state_.points[at(point)];
+  for (std::int64_t row = problem_.begin[at(point)]; row < problem_.begin[at(point + 1)]; ++row) {
+    if (!problem_.kept[at(row)]) continue;
+    const std::int64_t image = problem_.image[at(row)].value;
+    rows_[at(lanes_.size())] = row;
+    lane_unknowns_[at(lanes_.size())] = &unknowns_[at(image)];
+    point_of_lane_[at(lanes_.size())] = std::ssize(points_) - 1;
+    lanes_.add(lane_views_[at(image)], position, problem_.x[at(row)], problem_.y[at(row)],
+               problem_.inverse_sigma[at(row)]);
+  }
+  added.last = lanes_.size();
+}
+
+void PointEquations::weigh(Point& point, bool curvature) {
+  point.residual_count = 2 * point.observation_count();
+  point.shared_begin = std::ssize(shared_);
+  const bool none = problem_.image_loss.kind == RobustLoss::Kind::kNone;
+  const double corner = problem_.image_loss.scale * problem_.image_loss.scale;
+  const double* residual = lanes_.values() + kResidual * lanes_.capacity();
+  for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+    const ImageUnknowns& unknowns = unknowns_of(lane);
+    const double x = residual[lane], y = residual[lane + lanes_.capacity()];
+    const double squares = x * x + y * y;
+    // Nearly all: nothing is to be done but to count.
+    if (problem_.image_loss.kind != RobustLoss::Kind::kCauchy && unknowns.plain &&
+        squares <= (none ? std::numeric_limits<double>::max() : corner)) {
+      point.rho += squares;
+      point.weighted_squares += squares;
+    } else {
+      weigh_lane(point, lane, curvature);
+    }
+  }
+  point.shared_end = std::ssize(shared_);
+}
+
+// One whose loss, camera or shared unknowns ask for more.
+void PointEquations::weigh_lane(Point& point, std::int64_t lane, bool curvature) {
+  const std::int64_t row = rows_[at(lane)], image = problem_.image[at(row)].value;
   const ImageView& view = views_[at(image)];
-  const ImageUnknowns& unknowns = unknowns_[at(image)];
+  const ImageUnknowns& unknowns = unknowns_of(lane);
   CameraResidual r;
-  if (!linearise_in_camera(view, state_.points[at(point)], {problem_.x[at(row)], problem_.y[at(row)]},
+  if (!linearise_in_camera(view, state_.points[at(point.point)], {problem_.x[at(row)], problem_.y[at(row)]},
                            problem_.inverse_sigma[at(row)], unknowns.camera >= 0, r))
-    throw ComputeError("a kept observation of point " + std::to_string(problem_.points[at(point)].index) +
+    throw ComputeError("a kept observation of point " + std::to_string(problem_.points[at(point.point)].index) +
                        " lies behind image " + std::to_string(problem_.images[at(image)].image.value));
   const double squares = r.residual.squaredNorm();
   if (!std::isfinite(squares))  // as a pivot it would pass for a direction that nothing observes
-    throw ComputeError("the observation of point " + std::to_string(problem_.points[at(point)].index) + " in image " +
-                       std::to_string(problem_.images[at(image)].image.value) + " or its sigma is not a finite number");
+    throw ComputeError("the observation of point " + std::to_string(problem_.points[at(point.point)].index) +
+                       " in image " + std::to_string(problem_.images[at(image)].image.value) +
+                       " or its sigma is not a finite number");
   const LossWeight weight(problem_.image_loss, squares, curvature);
-  rho_ += weight.rho;
-  weighted_squares_ += weight.first * squares;
-  residual_count_ += 2;
+  point.rho += weight.rho;
+  point.weighted_squares += weight.first * squares;
   if (weight.root != 1) {
     r.by_camera = weight.weighted(r.by_camera, r.residual);
     if (unknowns.camera >= 0) r.by_intrinsics = weight.weighted(r.by_intrinsics, r.residual);
   }
-
-  Observation& observation = observations_.emplace_back();
-  observation.image = image;
-  observation.residual = weight.residual_scale * r.residual;
-  observation.by_point.noalias() = r.by_camera * view.rotation;
-
-  std::int32_t& slot = slot_[at(unknowns.frame)];
-  if (slot < 0) {
-    slot = static_cast<std::int32_t>(frames_.size());
-    FramePart& added = frames_.emplace_back();
-    added.unknown = unknowns.frame;
-    added.from_frame = r.from_frame;
-    added.v.setZero();
-    added.b.setZero();
-  }
-  FramePart& part = frames_[at(slot)];
-  part.v.noalias() += observation.by_point.transpose().lazyProduct(observation.by_point);
-  part.b.noalias() -= observation.by_point.transpose().lazyProduct(observation.residual);
-  observation.frame = slot;
-  if (unknowns.shared_width > 0) add_shared(unknowns, view, r, observation);
+  lanes_.set(lane, weight.residual_scale * r.residual, r.from_frame, r.by_camera * view.rotation);
+  if (unknowns.shared_width > 0) add_shared(unknowns, view, r, lane, point);
 }
 
 void PointEquations::add_shared(const ImageUnknowns& unknowns, const ImageView& view, const CameraResidual& r,
-                                Observation& observation) {
+                                std::int64_t lane, Point& point) {
   const int width = unknowns.shared_width;
   double* rows = take(2 * width);
   Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> jacobian(rows, 2, width);
@@ -134,102 +191,142 @@ void PointEquations::add_shared(const ImageUnknowns& unknowns, const ImageView& 
   if (unknowns.mount >= 0) jacobian.rightCols<6>() = by_mount(view, r);
 
   double* w = take(3 * width);
+  const Eigen::Matrix<double, 2, 3> by_point = lanes_.by_point(lane);
   for (int j = 0; j < 3; ++j) {
-    const double first = observation.by_point(0, j), second = observation.by_point(1, j);
+    const double first = by_point(0, j), second = by_point(1, j);
     for (int i = 0; i < width; ++i) w[i + j * width] = rows[i] * first + rows[i + width] * second;
   }
-  observation.shared = rows;
-  observation.shared_point = w;
-  if (unknowns.camera >= 0) add_to_shared(unknowns.camera, unknowns.camera_width, w, width);
-  if (unknowns.mount >= 0) add_to_shared(unknowns.mount, 6, w + unknowns.camera_width, width);
+  shared_rows_[at(lane)] = {rows, w};
+  if (unknowns.camera >= 0) add_to_shared(unknowns.camera, unknowns.camera_width, w, width, point);
+  if (unknowns.mount >= 0) add_to_shared(unknowns.mount, 6, w + unknowns.camera_width, width, point);
 }
 
-void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows) {
-  std::int32_t& slot = slot_[at(unknown)];
-  if (slot < 0) {
-    slot = static_cast<std::int32_t>(shared_.size());
-    shared_.push_back({unknown, dimension, take(3 * dimension)});
+void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows, Point& point) {
+  std::size_t slot = at(point.shared_begin);  // a few at most
+  while (slot < shared_.size() && shared_[slot].unknown != unknown) ++slot;
+  if (slot == shared_.size()) {
+    shared_.push_back({unknown, dimension, take(3 * dimension), take(3 * dimension)});
     std::fill_n(shared_.back().w, 3 * dimension, 0.0);
   }
-  double* sum = shared_[at(slot)].w;
+  double* sum = shared_[slot].w;
   for (int j = 0; j < 3; ++j)
     for (int i = 0; i < dimension; ++i) sum[i + j * dimension] += w[i + j * rows];
 }
 
-void PointEquations::add_prior(std::int64_t point) {
-  const std::int64_t i = prior_[at(point)];
-  if (i < 0) return;
-  const auto& term = problem_.point_priors[at(i)];
+void PointEquations::sum_up(std::size_t i) {
+  const Point& point = points_[i];
+  const std::int64_t stride = lanes_.capacity();
+  std::array<double, 9> sum{};  // V, then b, as of observations
+  for (std::int64_t lane = point.first; lane < point.last; ++lane)
+    for (int v = 0; v < 9; ++v) sum[at(v)] += values_.data()[v * stride + lane];
+  for (int v = 0; v < 9; ++v) point_value(kPointV + v, i) = sum[at(v)];
+  if (prior_[at(point.point)] >= 0) add_prior(i);
+}
+
+void PointEquations::add_prior(std::size_t i) {
+  Point& point = points_[i];
+  const auto& term = problem_.point_priors[at(prior_[at(point.point)])];
   const Eigen::Vector3d weight = term.sigma.cwiseInverse();  // 0 on a free axis
-  const Eigen::Vector3d r = point_prior_residual(state_.points[at(point)], term);
-  v_.diagonal() += weight.cwiseAbs2();
-  b_ -= weight.cwiseProduct(r);
-  rho_ += r.squaredNorm();
-  weighted_squares_ += r.squaredNorm();
-  residual_count_ += (weight.array() > 0).count();
-}
-
-void PointEquations::factorise(double lambda) {
-  diagonal_ = v_.diagonal();
-  const double floor = kPivotTolerance * (1 + lambda);
-  Eigen::Matrix3d c = v_;  // its lower triangle becomes C without its diagonal, whose inverse goes to inverse_
-  inverse_.setZero();
-  held_ = 0;
+  const Eigen::Vector3d r = point_prior_residual(state_.points[at(point.point)], term);
+  constexpr int kOnDiagonal[3] = {kPointV, kPointV + 2, kPointV + 5};
   for (int k = 0; k < 3; ++k) {
-    double pivot = v_(k, k) + lambda * diagonal_[k];
-    for (int j = 0; j < k; ++j) pivot -= c(k, j) * c(k, j);
-    const bool free = pivot > floor * diagonal_[k];
-    held_ += !free;
-    inverse_(k, k) = free ? 1 / std::sqrt(pivot) : 0;  // a held row and column vanish
-    for (int i = k + 1; i < 3; ++i) {
-      for (int j = 0; j < k; ++j) c(i, k) -= c(i, j) * c(k, j);
-      c(i, k) *= inverse_(k, k);
+    point_value(kOnDiagonal[k], i) += weight[k] * weight[k];
+    point_value(kPointB + k, i) -= weight[k] * r[k];
+  }
+  point.rho += r.squaredNorm();
+  point.weighted_squares += r.squaredNorm();
+  point.residual_count += (weight.array() > 0).count();
+}
+
+// What the observations need of their point.
+void PointEquations::spread() {
+  constexpr int kFrom[9] = {kPointInverse,     kPointInverse + 1, kPointInverse + 2,
+                            kPointInverse + 3, kPointInverse + 4, kPointInverse + 5,
+                            kPointOwnStep,     kPointOwnStep + 1, kPointOwnStep + 2};
+  for (int k = 0; k < 9; ++k) {
+    double* to = values_.data() + (kInverse + k) * lanes_.capacity();
+    const double* from = point_values_.data() + kFrom[k] * lanes_.capacity();
+    for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) to[lane] = from[point_of_lane_[at(lane)]];
+    std::fill(to + lanes_.size(), to + lanes_.padded_size(), 0.0);
+  }
+}
+
+void PointEquations::reduce(std::vector<FrameSum>& sums) {
+  FrameSum unused;
+  for (std::int64_t lane = 0; lane < lanes_.padded_size(); ++lane)
+    frame_sums_[at(lane)] =
+        lane < lanes_.size() ? sums[at(unknowns_of(lane).frame)].values.data() : unused.values.data();
+  kernels_->reduce(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(), y_.data(),
+                   frame_sums_.data());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& point = points_[i];
+    for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k) {
+      const SharedPart& part = shared_[at(k)];
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3>>(part.y, part.dimension, 3).noalias() =
+          Rows3(part.w, part.dimension, 3).lazyProduct(inverse_factor(i).transpose());
     }
   }
-  inverse_(1, 0) = -inverse_(1, 1) * (c(1, 0) * inverse_(0, 0));
-  inverse_(2, 1) = -inverse_(2, 2) * (c(2, 1) * inverse_(1, 1));
-  inverse_(2, 0) = -inverse_(2, 2) * (c(2, 0) * inverse_(0, 0) + c(2, 1) * inverse_(1, 0));
-  z_ = inverse_ * b_;
 }
 
-void PointEquations::reduce() {
-  for (FramePart& part : frames_) {
-    part.t.noalias() = part.v.lazyProduct(inverse_.transpose());
-    double* y = take(18);  // G'T
-    for (int j = 0; j < 3; ++j) {
-      Eigen::Map<Eigen::Vector3d>(y + 6 * j) = part.from_frame.cross(part.t.col(j));
-      Eigen::Map<Eigen::Vector3d>(y + 6 * j + 3) = -part.t.col(j);
+void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out) {
+  for (std::int64_t lane = 0; lane < lanes_.padded_size(); ++lane)
+    motions_[at(lane)] = motions.of_frame(unknowns_of(std::min(lane, lanes_.size() - 1)).frame);
+  kernels_->move(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(), motions_.data(),
+                 moved_.data(), lanes_.capacity());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& point = points_[i];
+    std::array<double, 3> rest{};
+    for (std::int64_t lane = point.first; lane < point.last; ++lane)  // -G x_f = u x w + t
+      for (int k = 0; k < 3; ++k) rest[at(k)] += moved_.data()[k * lanes_.capacity() + lane];
+    for (std::int64_t s = point.shared_begin; s < point.shared_end; ++s) {
+      const SharedPart& part = shared_[at(s)];
+      const double* x = motions.of(part.unknown);
+      for (int k = 0; k < 3; ++k)
+        for (int j = 0; j < part.dimension; ++j) rest[at(k)] -= part.w[k * part.dimension + j] * x[j];
     }
-    blocks_.push_back({part.unknown, 6, y});
+    for (int k = 0; k < 3; ++k) point_value(kPointB + k, i) += rest[at(k)];
   }
-  for (const SharedPart& part : shared_) {
-    double* y = take(3 * part.dimension);
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3>>(y, part.dimension, 3).noalias() =
-        Rows3(part.w, part.dimension, 3).lazyProduct(inverse_.transpose());
-    slot_[at(part.unknown)] = static_cast<std::int32_t>(blocks_.size());
-    blocks_.push_back({part.unknown, part.dimension, y});
-  }
+  kernels_->solve(padded_points(), {point_values_.data(), lanes_.capacity()});
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (int k = 0; k < 3; ++k) out[at(points_[i].point)][k] = point_value(kPointOwnStep + k, i);
 }
 
-Eigen::Vector3d PointEquations::step(const double* x, const std::vector<std::int64_t>& offsets) const {
-  Eigen::Vector3d rest = b_;
-  for (const FramePart& part : frames_) {  // -G x_f = u x w + t, as [u]x w + t
-    const Eigen::Map<const PoseIncrement> frame(x + offsets[at(part.unknown)]);
-    rest += part.v * (part.from_frame.cross(frame.head<3>()) + frame.tail<3>());
-  }
-  for (const SharedPart& part : shared_)
-    rest -= Rows3(part.w, part.dimension, 3).transpose() *
-            Eigen::Map<const Eigen::VectorXd>(x + offsets[at(part.unknown)], part.dimension);
-  return inverse_.transpose() * (inverse_ * rest);
+std::int64_t PointEquations::padded_points() const {
+  return (std::ssize(points_) + lane_kernels::kGroup - 1) / lane_kernels::kGroup * lane_kernels::kGroup;
 }
 
-int PointEquations::jacobians(const Observation& observation,
-                              std::array<JacobianBlock<IntrinsicJacobian>, 3>& blocks) const {
-  const ImageUnknowns& u = unknowns_of(observation);
-  const Eigen::Map<const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> shared(observation.shared, 2,
-                                                                                           u.shared_width);
+Eigen::Matrix3d PointEquations::inverse_factor(std::size_t i) const {
+  Eigen::Matrix3d result;
+  const auto value = [&](int k) { return point_value(kPointInverse + k, i); };
+  result << value(0), 0, 0, value(1), value(2), 0, value(3), value(4), value(5);
+  return result;
+}
+
+Eigen::Vector3d PointEquations::z(std::size_t i) const {
+  return {point_value(kPointZ, i), point_value(kPointZ + 1, i), point_value(kPointZ + 2, i)};
+}
+
+Eigen::Vector3d PointEquations::diagonal(std::size_t i) const {
+  return {point_value(kPointV, i), point_value(kPointV + 2, i), point_value(kPointV + 5, i)};
+}
+
+int PointEquations::held(std::size_t i) const { return static_cast<int>(point_value(kPointHeld, i)); }
+
+void PointEquations::blocks(std::size_t i, std::vector<Block>& list) const {
+  const Point& point = points_[i];
+  list.clear();
+  for (std::int64_t lane = point.first; lane < point.last; ++lane)
+    list.push_back({unknowns_of(lane).frame, 6, y(lane)});
+  for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k)
+    list.push_back({shared_[at(k)].unknown, shared_[at(k)].dimension, shared_[at(k)].y});
+}
+
+int PointEquations::jacobians(std::int64_t lane, std::array<JacobianBlock<IntrinsicJacobian>, 3>& blocks) const {
+  const ImageUnknowns& u = unknowns_of(lane);
+  const Eigen::Map<const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> shared(
+      shared_rows_[at(lane)].jacobian, 2, u.shared_width);
   int count = 0;
-  blocks[at(count++)] = {u.frame, by_pose(observation.by_point, frames_[at(observation.frame)].from_frame)};
+  blocks[at(count++)] = {u.frame, by_pose(by_point(lane), from_frame(lane))};
   if (u.camera >= 0) blocks[at(count++)] = {u.camera, shared.leftCols(u.camera_width)};
   if (u.mount >= 0) blocks[at(count++)] = {u.mount, shared.rightCols(6)};
   return count;

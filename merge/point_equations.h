@@ -12,12 +12,17 @@
 //     x_p = C^-T (z - sum Y_i'x_i) = C^-T C^-1 (b - sum W_i'x_i),   W_f'x_f = V_f G x_f.
 //
 // A prior of the point joins V and b.
+//
+// Points are worked on many at once, by kernels over their observations and over the points (point_kernels.h). There
+// every observation stands for itself: of V_f and T the sums above are sums over its k, and two observations of a point
+// in one frame are a pair like any other.
 #pragma once
 
 #include <span>
 
-#include "adjust/linearise.h"
+#include "adjust/observation_lanes.h"
 #include "merge/condense.h"
+#include "merge/point_kernels.h"
 #include "merge/tile_linearisation.h"
 
 namespace megablock {
@@ -29,102 +34,139 @@ struct ImageUnknowns {
   int camera_width = 0;
   int shared_width = 0;           // of camera and mount, in this order
   std::int64_t calibration = -1;  // number of this (camera, mount) among those with shared unknowns
+  bool plain = false;             // a camera that the kernels know, without shared unknowns
 };
-std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan);  // [images]
+std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan,
+                                          const TileState& state);  // [images]
 
 // Row of the point's prior in TileProblem::point_priors, -1: none. [points]
 std::vector<std::int64_t> prior_rows(const TileProblem& problem);
 
+// Sums over observations of a frame, by point_kernels::FrameValue.
+struct alignas(64) FrameSum {
+  std::array<double, point_kernels::kFrameSize> values{};
+};
+
+// A step of plan.unknowns, as the points' steps read it.
+class UnknownMotions {
+ public:
+  UnknownMotions(const TilePlan& plan, const double* x);  // x outlives it
+  const double* of_frame(std::int64_t unknown) const { return frames_[static_cast<std::size_t>(unknown)].data(); }
+  const double* of(std::int64_t unknown) const { return x_ + offsets_[static_cast<std::size_t>(unknown)]; }
+
+ private:
+  const double* x_;
+  std::vector<std::int64_t> offsets_;
+  std::vector<std::array<double, 8>> frames_;
+};
+
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
-  // A frame that sees the point.
-  struct FramePart {
-    std::int64_t unknown = -1;
-    Eigen::Vector3d from_frame;  // u
-    Eigen::Matrix3d v;
-    Eigen::Vector3d b;
-    Eigen::Matrix3d t;  // V_f C^-T, after reduce()
-    FramePart() {}      // not defaulted: the vector must not fill it with zeros
+  // One of the points at hand, with its observations: lanes first to last, without the latter.
+  struct Point {
+    std::int64_t point = -1;
+    std::int64_t first = 0, last = 0;
+    std::int64_t shared_begin = 0, shared_end = 0;
+    double rho = 0, weighted_squares = 0;
+    std::int64_t residual_count = 0;
+    std::int64_t observation_count() const { return last - first; }
   };
-  // An unknown that sees the point, after reduce().
+  // An unknown that sees the point, once for each of its observations if it is a frame.
   struct Block {
     std::int64_t unknown = -1;
     int dimension = 0;
     const double* y = nullptr;  // Y, [dimension x 3] column by column
     Rows3 matrix() const { return {y, dimension, 3}; }
   };
-  struct Observation {
-    std::int64_t image = -1;
-    std::int32_t frame = -1;               // in frames()
-    Eigen::Vector2d residual;              // weighted, as the Jacobians
-    Eigen::Matrix<double, 2, 3> by_point;  // J_p
-    const double* shared = nullptr;        // J_s, [2 x shared_width] row by row
-    const double* shared_point = nullptr;  // W_sk, [shared_width x 3] column by column
-    Observation() {}                       // as FramePart
+  // Shared unknowns of an observation.
+  struct SharedRows {
+    const double* jacobian = nullptr;  // J_s, [2 x shared_width] row by row, weighted
+    const double* by_point = nullptr;  // W_sk, [shared_width x 3] column by column
   };
 
   PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
-  // Linearises all kept observations of the point and factorises its own block. Throws ComputeError behind a camera.
-  void linearise(std::int64_t point, const Pass& pass);
-  // After linearise(): Y of all unknowns that see the point.
-  void reduce();
-  // After linearise(): the point's step from that of plan.unknowns (first rows `offsets`).
-  Eigen::Vector3d step(const double* x, const std::vector<std::int64_t>& offsets) const;
+  // Linearises all kept observations of the first of the points, as many as there is room for, and factorises their own
+  // blocks. Returns how many. Throws ComputeError behind a camera.
+  std::size_t linearise(std::span<const std::int64_t> points, const Pass& pass);
+  const std::vector<Point>& points() const { return points_; }  // those
 
-  std::span<const Observation> observations() const { return observations_; }
-  std::span<const FramePart> frames() const { return frames_; }
-  std::span<const Block> blocks() const { return blocks_; }  // the frames, then the shared unknowns
-  const ImageUnknowns& unknowns_of(const Observation& o) const { return unknowns_[static_cast<std::size_t>(o.image)]; }
-  const Eigen::Matrix3d& inverse_factor() const { return inverse_; }  // C^-1, zero rows where held
-  const Eigen::Vector3d& z() const { return z_; }
-  const Eigen::Vector3d& diagonal() const { return diagonal_; }  // of V with the prior
-  double rho() const { return rho_; }
-  double weighted_squares() const { return weighted_squares_; }
-  std::int64_t residual_count() const { return residual_count_; }
-  std::int64_t observation_count() const { return static_cast<std::int64_t>(observations_.size()); }
-  int held() const { return held_; }
-  // Place of an unknown that sees the point in blocks(), and of the point's prior in TileProblem::point_priors (-1).
-  std::int64_t slot(std::int64_t unknown) const { return slot_[static_cast<std::size_t>(unknown)]; }
-  std::int64_t prior_row(std::int64_t point) const { return prior_[static_cast<std::size_t>(point)]; }
+  // After linearise(): Y of all unknowns that see the points; the frames' sums grow by theirs. [plan.unknowns]
+  void reduce(std::vector<FrameSum>& sums);
+  // After linearise(), once: the points' steps into `out` [problem.points].
+  void steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out);
+
+  const ImageUnknowns& unknowns_of(std::int64_t lane) const { return *lane_unknowns_[at(lane)]; }
+  Eigen::Vector2d residual(std::int64_t lane) const { return lanes_.residual(lane); }      // weighted, as the Jacobians
+  Eigen::Vector3d from_frame(std::int64_t lane) const { return lanes_.from_frame(lane); }  // u
+  Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const { return lanes_.by_point(lane); }  // J_p
+  const SharedRows& shared(std::int64_t lane) const { return shared_rows_[at(lane)]; }
+  const double* y(std::int64_t lane) const { return y_.data() + lane * point_kernels::kYSize; }
+  const point_kernels::Kernels& kernels() const { return *kernels_; }
+
+  // Of point number i of points().
+  Eigen::Matrix3d inverse_factor(std::size_t i) const;  // C^-1, zero rows where held
+  Eigen::Vector3d z(std::size_t i) const;
+  Eigen::Vector3d diagonal(std::size_t i) const;  // of V with the prior
+  int held(std::size_t i) const;
+  // After reduce(): the frames, one of each lane, then the shared unknowns.
+  void blocks(std::size_t i, std::vector<Block>& list) const;
+  // The point's prior in TileProblem::point_priors (-1).
+  std::int64_t prior_row(std::int64_t point) const { return prior_[at(point)]; }
   // Jacobians of an observation by its unknowns; how many.
-  int jacobians(const Observation& observation, std::array<JacobianBlock<IntrinsicJacobian>, 3>& blocks) const;
+  int jacobians(std::int64_t lane, std::array<JacobianBlock<IntrinsicJacobian>, 3>& blocks) const;
 
  private:
   struct SharedPart {
     std::int64_t unknown = -1;
     int dimension = 0;
     double* w = nullptr;  // W_s
+    double* y = nullptr;
   };
 
-  void clear(std::int64_t point);
+  void clear();
   double* take(int count);
-  void add_observation(std::int64_t point, std::int64_t row, bool curvature);
-  void add_shared(const ImageUnknowns& unknowns, const ImageView& view, const CameraResidual& r,
-                  Observation& observation);
-  void add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows);
-  void add_prior(std::int64_t point);
-  void factorise(double lambda);
+  void add_observations(std::int64_t point);
+  void weigh(Point& point, bool curvature);
+  void weigh_lane(Point& point, std::int64_t lane, bool curvature);
+  void add_shared(const ImageUnknowns& unknowns, const ImageView& view, const CameraResidual& r, std::int64_t lane,
+                  Point& point);
+  void add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows, Point& point);
+  void sum_up(std::size_t i);
+  void add_prior(std::size_t i);
+  void spread();
+  std::int64_t padded_points() const;
+  double& observation_value(int v, std::int64_t lane) { return values_.data()[v * lanes_.capacity() + lane]; }
+  double& point_value(int v, std::size_t i) {
+    return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];
+  }
+  double point_value(int v, std::size_t i) const {
+    return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];
+  }
+  point_kernels::Columns observation_columns() { return {values_.data(), lanes_.capacity()}; }
 
   const TileProblem& problem_;
   const TileState& state_;
+  const point_kernels::Kernels* kernels_;
   std::vector<ImageView> views_;
+  std::vector<LaneView> lane_views_;
   std::vector<ImageUnknowns> unknowns_;
   int widest_ = 0;  // shared_width
   std::vector<std::int64_t> prior_;
-  std::vector<std::int32_t> slot_;  // of an unknown in frames_ or shared_, then in blocks_
-  std::vector<Observation> observations_;
-  std::vector<FramePart> frames_;
+  // Of the points at hand.
+  std::vector<Point> points_;
+  ObservationLanes lanes_;
+  std::vector<std::int64_t> rows_;                   // [lanes] of the problem
+  std::vector<std::int64_t> point_of_lane_;          // [lanes] in points_
+  std::vector<const ImageUnknowns*> lane_unknowns_;  // [lanes]
+  std::vector<SharedRows> shared_rows_;              // [lanes]
+  AlignedValues values_, point_values_, y_, moved_;  // by ObservationValue, PointValue; [lanes x kYSize]; [3 x lanes]
+  std::vector<double*> frame_sums_;                  // [lanes]
+  std::vector<const double*> motions_;               // [lanes]
   std::vector<SharedPart> shared_;
-  std::vector<Block> blocks_;
-  std::vector<double> store_;  // what the pointers of one point point to
+  std::vector<double> store_;  // what the pointers of shared_ and shared_rows_ point to
   std::size_t taken_ = 0;
-  Eigen::Matrix3d v_, inverse_;
-  Eigen::Vector3d b_, z_, diagonal_;
-  double rho_ = 0, weighted_squares_ = 0;
-  std::int64_t residual_count_ = 0;
-  int held_ = 0;
 };
 
 }  // namespace megablock

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "adjust/residual_squares.h"
 #include "geometry/triangulation.h"
 #include "merge/point_equations.h"
 
@@ -25,7 +26,6 @@ class PointRefiner {
         prior_(prior_rows(problem)) {}
 
   void refine(std::int64_t point) {
-    if (!in_tail(point)) return;
     Eigen::Vector3d& position = state_.points[static_cast<std::size_t>(point)];
     Equations now = equations(point, position);
     if (!std::isfinite(now.cost)) {
@@ -79,19 +79,6 @@ class PointRefiner {
     return intersect_rays(rays_);
   }
 
-  // Whether an observation lies beyond the corner or behind its camera; most points are settled by this.
-  bool in_tail(std::int64_t point) const {
-    if (problem_.image_loss.kind == RobustLoss::Kind::kCauchy) return true;  // it has no corner
-    for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
-      if (!problem_.kept[row]) continue;
-      const Eigen::Vector2d difference =
-          views_[problem_.image[row].value].difference_px(state_.points[point], {problem_.x[row], problem_.y[row]});
-      const double squares = (problem_.inverse_sigma[row] * difference).squaredNorm();
-      if (!std::isfinite(squares) || problem_.image_loss.evaluate(squares)[2] < 0) return true;
-    }
-    return false;
-  }
-
   Equations equations(std::int64_t point, const Eigen::Vector3d& position) const {
     Equations e;
     for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
@@ -134,13 +121,59 @@ class PointRefiner {
   std::vector<Ray> rays_;  // of the point at hand
 };
 
+// Observations of points one after the other: their loss, and whether one lies beyond the corner or behind its camera.
+class LossSums {
+ public:
+  explicit LossSums(const RobustLoss& loss) : loss_(loss) {}
+  void add(std::int64_t point, double squares) {
+    if (point != point_) finish();
+    point_ = point;
+    const auto [rho, first, second] = loss_.evaluate(squares);
+    of_point_ += std::isfinite(squares) ? rho : std::numeric_limits<double>::infinity();
+    in_tail_ |= !std::isfinite(squares) || second < 0;
+  }
+  void finish() {
+    if (in_tail_) {
+      tail_.push_back(point_);
+    } else {
+      settled_ += of_point_;
+    }
+    of_point_ = 0;
+    in_tail_ = false;
+  }
+  double settled() const { return settled_; }  // of all other points
+  const std::vector<std::int64_t>& tail() const { return tail_; }
+
+ private:
+  RobustLoss loss_;
+  std::int64_t point_ = -1;
+  double of_point_ = 0, settled_ = 0;
+  bool in_tail_ = false;
+  std::vector<std::int64_t> tail_;
+};
+
 }  // namespace
 
-void refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
-  if (problem.image_loss.kind == RobustLoss::Kind::kNone) return;
+double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
+  if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
   PointRefiner refiner(problem, state, settled);
+  if (problem.image_loss.kind == RobustLoss::Kind::kCauchy) {  // all of it is tail
+    for (const auto& cell : plan.points)
+      for (const std::int64_t point : cell) refiner.refine(point);
+    return evaluate_cost(problem, state);
+  }
+  ResidualSquares residuals(problem, state);
+  LossSums sums(problem.image_loss);
   for (const auto& cell : plan.points)
-    for (std::int64_t point : cell) refiner.refine(point);
+    residuals.visit(cell, [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
+  sums.finish();
+  for (const std::int64_t point : sums.tail()) refiner.refine(point);
+  double images = sums.settled();
+  residuals.visit(sums.tail(), [&](std::int64_t, std::int64_t, double squares) {
+    images +=
+        std::isfinite(squares) ? problem.image_loss.evaluate(squares)[0] : std::numeric_limits<double>::infinity();
+  });
+  return 0.5 * images + other_cost(problem, state);
 }
 
 }  // namespace megablock

@@ -114,9 +114,8 @@ DownReport SerialRunner::down(const Pass& pass) {
   for (std::size_t t = 0; t < problems_.size(); ++t) {
     trial_.push_back(apply_step(block_gauge_, motions, static_cast<std::int64_t>(t), problems_[t], tile_plans_[t],
                                 states_[t], steps_[t]));
-    refine_points(problems_[t], tile_plans_[t], trial_.back());
     report.damping_norm += steps_[t].damping_norm;
-    report.trial_cost += evaluate_cost(problems_[t], trial_[t]);
+    report.trial_cost += refine_points(problems_[t], tile_plans_[t], trial_.back());
   }
   return report;
 }

@@ -36,8 +36,7 @@ class LoneTile : public TreeRunner {
     const std::vector<BlockMotion> motions =
         block_motions(gauge_, {motion_sums(gauge_, 0, problem_, plan_, state_, step.unknowns)});
     trial_ = apply_step(gauge_, motions, 0, problem_, plan_, state_, step);
-    refine_points(problem_, plan_, trial_, kSettled);
-    trial_cost_ = evaluate_cost(problem_, trial_);
+    trial_cost_ = refine_points(problem_, plan_, trial_, kSettled);
     return {step.damping_norm, trial_cost_};
   }
 

@@ -16,7 +16,8 @@ namespace megablock {
 
 namespace {
 
-constexpr double kHeldPosition = 1e-3, kHeldRotation = 1e-5;  // sigmas of the first frame of a window, m and rad
+constexpr double kFirstFramePosition = 1e-3,
+                 kFirstFrameRotation = 1e-5;  // sigmas of the first frame of a window, m and rad
 
 std::size_t at(FrameIndex f) { return static_cast<std::size_t>(f.value); }
 
@@ -77,8 +78,9 @@ void add_frames(const Block& whole, const JointInput& input, const Links& links,
       frame.position_prior.reset();
       frame.attitude_prior.reset();
       if (from == windows[w]) {
-        frame.position_prior = PositionPrior{frame.given_pose->centre, Eigen::Vector3d::Constant(kHeldPosition)};
-        frame.attitude_prior = AttitudePrior{frame.given_pose->rotation, Eigen::Vector3d::Constant(kHeldRotation)};
+        frame.position_prior = PositionPrior{frame.given_pose->centre, Eigen::Vector3d::Constant(kFirstFramePosition)};
+        frame.attitude_prior =
+            AttitudePrior{frame.given_pose->rotation, Eigen::Vector3d::Constant(kFirstFrameRotation)};
       } else {
         const ChainLink& link = *links.at(from);
         Pose pose = link.pose;

@@ -1,0 +1,28 @@
+// Projection and linearisation of observations in lanes (observation_lanes.h): the loops themselves, by raw pointers.
+#pragma once
+
+#include <cstdint>
+
+namespace megablock::lane_kernels {
+
+// Lanes are worked on in groups: counts are multiples of it.
+constexpr std::int64_t kGroup = 8;
+
+// What a lane is made of.
+constexpr int kViewSize = 24;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [8], unused
+constexpr int kRecordSize = 8;  // point [3], measured x and y [2], inverse sigma, unused [2]
+
+// Value v of lane i: values[v * stride + i].
+enum Value : int { kResidual = 0, kFromFrame = 2, kByPoint = 5, kValueCount = 11 };
+
+struct Kernels {
+  // `views`: of each lane; `records`: [count x kRecordSize]. The residual alone: NaN behind the camera.
+  void (*project)(const double* const* views, const double* records, std::int64_t count, double* values,
+                  std::int64_t stride);
+  // All values.
+  void (*linearise)(const double* const* views, const double* records, std::int64_t count, double* values,
+                    std::int64_t stride);
+};
+extern const Kernels kPortable, kAvx2, kAvx512;
+
+}  // namespace megablock::lane_kernels

@@ -1,0 +1,91 @@
+#include "adjust/observation_lanes.h"
+
+namespace megablock {
+
+using namespace lane_kernels;
+
+const Kernels* lane_kernels_of_width(int width) {
+  __builtin_cpu_init();
+  if (width == 8) return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") ? &kAvx512 : nullptr;
+  if (width == 4) return __builtin_cpu_supports("avx2") ? &kAvx2 : nullptr;
+  return &kPortable;
+}
+
+const Kernels& lane_kernels_of_processor() {
+  for (int width : {8, 4})
+    if (const Kernels* kernels = lane_kernels_of_width(width)) return *kernels;
+  return kPortable;
+}
+
+LaneView::LaneView(const ImageView& view) {
+  const Intrinsics& k = *view.intrinsics;
+  simple = k.model().kind == CameraModelKind::kBrown;
+  double* out = values.data();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) *out++ = view.rotation(i, j);
+  out = std::copy_n(view.centre.data(), 3, out);
+  out = std::copy_n(view.shift.data(), 3, out);
+  if (simple) std::copy_n(k.data(), kDecentring2 + 1, out);
+}
+
+std::vector<LaneView> lane_views(std::span<const ImageView> views) {
+  return std::vector<LaneView>(views.begin(), views.end());
+}
+
+void AlignedValues::resize(std::int64_t count) {
+  constexpr std::uintptr_t kLine = 64;
+  storage_.resize(static_cast<std::size_t>(count) + kLine / sizeof(double));
+  const auto address = reinterpret_cast<std::uintptr_t>(storage_.data());
+  first_ = storage_.data() + ((address + kLine - 1) / kLine * kLine - address) / sizeof(double);
+}
+
+void ObservationLanes::reserve(std::int64_t lanes) {
+  clear();
+  if (lanes <= capacity_) return;
+  capacity_ = (lanes + kGroup - 1) / kGroup * kGroup;
+  views_.resize(static_cast<std::size_t>(capacity_));
+  records_.resize(capacity_ * kRecordSize);
+  values_.resize(capacity_ * kValueCount);
+}
+
+std::int64_t ObservationLanes::padded_size() const { return (size_ + kGroup - 1) / kGroup * kGroup; }
+
+void ObservationLanes::pad() {
+  for (std::int64_t i = size_; i < padded_size(); ++i) {
+    views_[static_cast<std::size_t>(i)] = views_[0];
+    std::copy_n(records_.data(), kRecordSize, records_.data() + kRecordSize * i);
+  }
+}
+
+void ObservationLanes::project() {
+  pad();
+  kernels_->project(views_.data(), records_.data(), padded_size(), values_.data(), capacity_);
+}
+
+void ObservationLanes::linearise() {
+  pad();
+  kernels_->linearise(views_.data(), records_.data(), padded_size(), values_.data(), capacity_);
+}
+
+Eigen::Vector2d ObservationLanes::residual(std::int64_t lane) const {
+  return {value(kResidual, lane), value(kResidual + 1, lane)};
+}
+
+Eigen::Vector3d ObservationLanes::from_frame(std::int64_t lane) const {
+  return {value(kFromFrame, lane), value(kFromFrame + 1, lane), value(kFromFrame + 2, lane)};
+}
+
+Eigen::Matrix<double, 2, 3> ObservationLanes::by_point(std::int64_t lane) const {
+  Eigen::Matrix<double, 2, 3> result;
+  for (int k = 0; k < 6; ++k) result(k / 3, k % 3) = value(kByPoint + k, lane);
+  return result;
+}
+
+void ObservationLanes::set(std::int64_t lane, const Eigen::Vector2d& residual, const Eigen::Vector3d& from_frame,
+                           const Eigen::Matrix<double, 2, 3>& by_point) {
+  for (int k = 0; k < 2; ++k) value(kResidual + k, lane) = residual[k];
+  for (int k = 0; k < 3; ++k) value(kFromFrame + k, lane) = from_frame[k];
+  for (int k = 0; k < 6; ++k) value(kByPoint + k, lane) = by_point(k / 3, k % 3);
+}
+
+}  // namespace megablock

@@ -1,0 +1,65 @@
+// Squared residuals |r|^2 of image observations, divided by their variances, many at once (observation_lanes.h).
+#pragma once
+
+#include <limits>
+
+#include "adjust/observation_lanes.h"
+
+namespace megablock {
+
+class ResidualSquares {
+ public:
+  // Problem and state outlive it; the state's frames, cameras and mounts stay as they are, its points may move.
+  ResidualSquares(const TileProblem& problem, const TileState& state)
+      : problem_(problem), state_(state), views_(image_views(problem, state)), lane_views_(lane_views(views_)) {
+    lanes_.reserve(kLanes);
+  }
+
+  // Calls visit(point, row, |r|^2) for the kept observations of the points, in their order; not finite where the camera
+  // cannot project the point.
+  template <typename Points, typename Visit>
+  void visit(const Points& points, Visit&& visit) {
+    for (const std::int64_t point : points) {
+      for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
+        if (!problem_.kept[row]) continue;
+        sources_[static_cast<std::size_t>(lanes_.size())] = {point, row};
+        lanes_.add(lane_views_[problem_.image[row].value], state_.points[point], problem_.x[row], problem_.y[row],
+                   problem_.inverse_sigma[row]);
+        if (lanes_.size() == kLanes) flush(visit);
+      }
+    }
+    flush(visit);
+  }
+
+ private:
+  static constexpr std::int64_t kLanes = 64;
+  struct Source {
+    std::int64_t point, row;
+  };
+
+  template <typename Visit>
+  void flush(Visit&& visit) {
+    lanes_.project();
+    for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) {
+      const auto [point, row] = sources_[static_cast<std::size_t>(lane)];
+      visit(point, row, squares(point, row, lane));
+    }
+    lanes_.clear();
+  }
+  double squares(std::int64_t point, std::int64_t row, std::int64_t lane) const {
+    const std::int64_t image = problem_.image[row].value;
+    if (lane_views_[image].simple) return lanes_.residual(lane).squaredNorm();
+    return (problem_.inverse_sigma[row] *
+            views_[image].difference_px(state_.points[point], {problem_.x[row], problem_.y[row]}))
+        .squaredNorm();
+  }
+
+  const TileProblem& problem_;
+  const TileState& state_;
+  std::vector<ImageView> views_;
+  std::vector<LaneView> lane_views_;
+  ObservationLanes lanes_;
+  std::array<Source, kLanes> sources_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,66 @@
+// The loops over lanes of point_equations.h, by raw pointers. Lanes hold observations (adjust/observation_lanes.h) or
+// points; symmetric 3 x 3 matrices are stored by the rows of their lower triangle (6), as lower triangular ones.
+#pragma once
+
+#include <cstdint>
+
+namespace megablock::point_kernels {
+
+// Value v of lane i: values[v * stride + i]. Counts are multiples of lane_kernels::kGroup.
+struct Columns {
+  double* values;
+  std::int64_t stride;
+};
+
+// Of an observation, behind lane_kernels::Value: V_k = J_p'J_p and b_k = -J_p'r; C^-1 and V^-1 b of its point.
+enum ObservationValue : int { kV = 0, kB = 6, kInverse = 9, kPointStep = 15, kObservationValueCount = 18 };
+// Of a point.
+enum PointValue : int {
+  kPointV = 0,  // with its prior
+  kPointB = 6,
+  kPointInverse = 9,   // C^-1, zero rows where held
+  kPointZ = 15,        // C^-1 b
+  kPointOwnStep = 18,  // C^-T z
+  kPointHeld = 21,     // number of held rows
+  kPointValueCount = 22
+};
+
+constexpr int kYStride = 6;  // Y of a frame: [6 x 3] column by column
+constexpr int kYSize = 24;   // room of a lane, the last 6 unused
+// What an observation adds to its frame (cell_assembler.h), with R = V_k - T T', T = V_k C^-T: [u]x R [u]x' and R
+// (lower triangles by rows), [u]x R by rows without its last element (its trace is 0), the diagonal of G'V_k G, G'(b_k
+// - T z).
+enum FrameValue : int {
+  kByRotation = 0,
+  kByCentre = 6,
+  kMixed = 12,
+  kDiagonal = 20,
+  kRightHandSide = 26,
+  kFrameSize = 32
+};
+
+// The part of a front that the frames of a point touch (Front::place).
+struct FrontStorage {
+  double *factor, *update;
+  std::int64_t dimension, eliminated;
+};
+
+struct Kernels {
+  // From residuals and J_p (`linearised`: rows of lane_kernels::Value) to V_k and b_k.
+  void (*normal)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out);
+  // Of points: from V and b to the rest. A pivot of at most floor * V_kk is held.
+  void (*factorise)(std::int64_t count, double lambda, double floor, const Columns& points);
+  // Y of every observation [count x kYSize], and the sums of its frame.
+  void (*reduce)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
+                 double* y, double* const* frames);
+  // V_k (u x w + t) of the motion (w, t) of each observation's frame (8 values, two unused) to three rows.
+  void (*move)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
+               const double* const* motions, double* out, std::int64_t out_stride);
+  // Of points, from b plus what `move` gave, in kPointB, to their steps C^-T C^-1 b, in kPointOwnStep.
+  void (*solve)(std::int64_t count, const Columns& points);
+  // K_ij -= Y_i Y_j' for all pairs of observations of one point, i > j. rows: of their frames in the front [count].
+  void (*subtract_pairs)(std::int64_t count, const double* y, const std::int64_t* rows, const FrontStorage& front);
+};
+extern const Kernels kPortable, kAvx2, kAvx512;
+
+}  // namespace megablock::point_kernels

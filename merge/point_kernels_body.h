@@ -1,0 +1,271 @@
+// Included by point_kernels_*.cpp, which set the width of vectors. Formulas: point_equations.h, cell_assembler.h.
+#pragma once
+
+#if MEGABLOCK_LANE_WIDTH == 8
+#include <immintrin.h>
+#endif
+
+#include "adjust/lane_kernels.h"
+#include "geometry/lane_vector.h"
+#include "merge/point_kernels.h"
+
+namespace megablock::point_kernels {
+namespace {
+
+using lane_kernels::kByPoint;
+using lane_kernels::kFromFrame;
+using lane_kernels::kResidual;
+
+// Rows v, v + 1, ... of one group of lanes.
+template <int kCount>
+[[gnu::always_inline]] inline void read_rows(const double* values, std::int64_t stride, Lanes (&rows)[kCount]) {
+#pragma GCC unroll 64
+  for (int k = 0; k < kCount; ++k) rows[k] = load(values + k * stride);
+}
+
+// Lower triangle by rows.
+constexpr int lower(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : lower(j, i); }
+
+void normal(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out) {
+  for (std::int64_t i = 0; i < count; i += kWidth) {
+    Lanes r[2], j[6];
+    read_rows(linearised + kResidual * linearised_stride + i, linearised_stride, r);
+    read_rows(linearised + kByPoint * linearised_stride + i, linearised_stride, j);
+#pragma GCC unroll 64
+    for (int a = 0; a < 3; ++a) {
+#pragma GCC unroll 64
+      for (int b = 0; b <= a; ++b)
+        store(out.values + (kV + lower(a, b)) * out.stride + i, j[a] * j[b] + j[3 + a] * j[3 + b]);
+      store(out.values + (kB + a) * out.stride + i, -(j[a] * r[0] + j[3 + a] * r[1]));
+    }
+  }
+}
+
+void factorise(std::int64_t count, double lambda, double floor, const Columns& points) {
+  for (std::int64_t i = 0; i < count; i += kWidth) {
+    Lanes v[6], b[3];
+    double* at = points.values + i;
+    read_rows(at + kPointV * points.stride, points.stride, v);
+    read_rows(at + kPointB * points.stride, points.stride, b);
+    const Lanes zero = v[0] - v[0];
+    Lanes held = zero;
+    const auto invert = [&](const Lanes& pivot, const Lanes& diagonal) __attribute__((always_inline)) {
+      const LaneMask free = pivot > floor * diagonal;
+      held += free ? zero : zero + 1;
+      return free ? 1 / square_root(pivot) : zero;  // a held row and column vanish
+    };
+    const Lanes i00 = invert(v[0] + lambda * v[0], v[0]);
+    const Lanes c10 = v[1] * i00, c20 = v[3] * i00;
+    const Lanes i11 = invert(v[2] + lambda * v[2] - c10 * c10, v[2]);
+    const Lanes c21 = (v[4] - c20 * c10) * i11;
+    const Lanes i22 = invert(v[5] + lambda * v[5] - c20 * c20 - c21 * c21, v[5]);
+    const Lanes i10 = -i11 * (c10 * i00);
+    const Lanes i21 = -i22 * (c21 * i11);
+    const Lanes i20 = -i22 * (c20 * i00 + c21 * i10);
+    const Lanes z0 = i00 * b[0], z1 = i10 * b[0] + i11 * b[1], z2 = i20 * b[0] + i21 * b[1] + i22 * b[2];
+    const Lanes out[] = {
+        i00, i10, i11, i20, i21, i22, z0, z1, z2, i00 * z0 + i10 * z1 + i20 * z2, i11 * z1 + i21 * z2, i22 * z2, held};
+    int row = kPointInverse;
+    for (const Lanes& value : out) store(at + row++ * points.stride, value);
+  }
+}
+
+// Rows of one group of lanes to records side by side, kWidth lanes apart from each other.
+template <int kCount, typename Record, typename Write>
+[[gnu::always_inline]] inline void to_records(const Lanes (&values)[kCount], Record record, Write write) {
+  static_assert(kCount % kWidth == 0);
+#pragma GCC unroll 64
+  for (int block = 0; block < kCount; block += kWidth) {
+    Lanes rows[kWidth];
+#pragma GCC unroll 64
+    for (int k = 0; k < kWidth; ++k) rows[k] = values[block + k];
+    transpose(rows);
+#pragma GCC unroll 64
+    for (int lane = 0; lane < kWidth; ++lane) write(record(lane) + block, rows[lane]);
+  }
+}
+
+// u x m
+[[gnu::always_inline]] inline void cross(const Lanes (&u)[3], const Lanes& m0, const Lanes& m1, const Lanes& m2,
+                                         Lanes (&out)[3]) {
+  out[0] = u[1] * m2 - u[2] * m1;
+  out[1] = u[2] * m0 - u[0] * m2;
+  out[2] = u[0] * m1 - u[1] * m0;
+}
+
+void reduce(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
+            double* y, double* const* frames) {
+  for (std::int64_t i = 0; i < count; i += kWidth) {
+    Lanes u[3], v[6], b[3], inverse[6], step[3];
+    read_rows(linearised + kFromFrame * linearised_stride + i, linearised_stride, u);
+    read_rows(values.values + kV * values.stride + i, values.stride, v);
+    read_rows(values.values + kB * values.stride + i, values.stride, b);
+    read_rows(values.values + kInverse * values.stride + i, values.stride, inverse);
+    read_rows(values.values + kPointStep * values.stride + i, values.stride, step);
+    const Lanes zero = u[0] - u[0];
+
+    Lanes t[3][3];  // T: row, column
+#pragma GCC unroll 64
+    for (int r = 0; r < 3; ++r)
+#pragma GCC unroll 64
+      for (int c = 0; c < 3; ++c) {
+        t[r][c] = v[lower(r, 0)] * inverse[lower(c, 0)];
+#pragma GCC unroll 64
+        for (int k = 1; k <= c; ++k) t[r][c] += v[lower(r, k)] * inverse[lower(c, k)];
+      }
+    Lanes columns[kYSize];
+#pragma GCC unroll 64
+    for (int c = 0; c < 3; ++c) {
+      Lanes turned[3];
+      cross(u, t[0][c], t[1][c], t[2][c], turned);
+#pragma GCC unroll 64
+      for (int r = 0; r < 3; ++r) {
+        columns[kYStride * c + r] = turned[r];
+        columns[kYStride * c + 3 + r] = -t[r][c];
+      }
+    }
+#pragma GCC unroll 64
+    for (int k = 3 * kYStride; k < kYSize; ++k) columns[k] = zero;
+    to_records(
+        columns, [&](int lane) __attribute__((always_inline)) { return y + (i + lane) * kYSize; },
+        [](double* to, const Lanes& row) __attribute__((always_inline)) { store(to, row); });
+
+    Lanes sums[kFrameSize];
+    Lanes rest[6];  // R
+#pragma GCC unroll 64
+    for (int r = 0; r < 3; ++r)
+#pragma GCC unroll 64
+      for (int c = 0; c <= r; ++c)
+        rest[lower(r, c)] = v[lower(r, c)] - (t[r][0] * t[c][0] + t[r][1] * t[c][1] + t[r][2] * t[c][2]);
+    Lanes mixed[3][3];  // [column of [u]x R][row]
+#pragma GCC unroll 64
+    for (int c = 0; c < 3; ++c) cross(u, rest[lower(0, c)], rest[lower(1, c)], rest[lower(2, c)], mixed[c]);
+#pragma GCC unroll 64
+    for (int r = 0; r < 3; ++r) {
+      Lanes turned[3];  // row r of [u]x R [u]x' = u x (row r of [u]x R)
+      cross(u, mixed[0][r], mixed[1][r], mixed[2][r], turned);
+#pragma GCC unroll 64
+      for (int c = 0; c <= r; ++c) sums[kByRotation + lower(r, c)] = turned[c];
+#pragma GCC unroll 64
+      for (int c = 0; c < 3; ++c)
+        if (3 * r + c < 8) sums[kMixed + 3 * r + c] = mixed[c][r];
+    }
+#pragma GCC unroll 64
+    for (int k = 0; k < 6; ++k) sums[kByCentre + k] = rest[k];
+#pragma GCC unroll 64
+    for (int k = 0; k < 3; ++k) {
+      const int m = (k + 1) % 3, n = (k + 2) % 3;
+      sums[kDiagonal + k] =
+          u[m] * u[m] * v[lower(n, n)] - 2 * u[m] * u[n] * v[lower(m, n)] + u[n] * u[n] * v[lower(m, m)];
+      sums[kDiagonal + 3 + k] = v[lower(k, k)];
+    }
+    Lanes left[3], turned[3];  // b_k - T z
+#pragma GCC unroll 64
+    for (int r = 0; r < 3; ++r)
+      left[r] = b[r] - (v[lower(r, 0)] * step[0] + v[lower(r, 1)] * step[1] + v[lower(r, 2)] * step[2]);
+    cross(u, left[0], left[1], left[2], turned);
+#pragma GCC unroll 64
+    for (int k = 0; k < 3; ++k) {
+      sums[kRightHandSide + k] = turned[k];
+      sums[kRightHandSide + 3 + k] = -left[k];
+    }
+    to_records(
+        sums, [&](int lane) __attribute__((always_inline)) { return frames[i + lane]; },
+        [](double* to, const Lanes& row) __attribute__((always_inline)) { store(to, load(to) + row); });
+  }
+}
+
+void move(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
+          const double* const* motions, double* out, std::int64_t out_stride) {
+  for (std::int64_t i = 0; i < count; i += kWidth) {
+    Lanes u[3], v[6], motion[8], turned[3];
+    read_rows(linearised + kFromFrame * linearised_stride + i, linearised_stride, u);
+    read_rows(values.values + kV * values.stride + i, values.stride, v);
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return motions[i + lane]; }, motion);
+    cross(u, motion[0], motion[1], motion[2], turned);
+#pragma GCC unroll 64
+    for (int k = 0; k < 3; ++k) turned[k] += motion[3 + k];
+#pragma GCC unroll 64
+    for (int r = 0; r < 3; ++r)
+      store(out + r * out_stride + i,
+            v[lower(r, 0)] * turned[0] + v[lower(r, 1)] * turned[1] + v[lower(r, 2)] * turned[2]);
+  }
+}
+
+void solve(std::int64_t count, const Columns& points) {
+  for (std::int64_t i = 0; i < count; i += kWidth) {
+    Lanes b[3], c[6];
+    double* at = points.values + i;
+    read_rows(at + kPointB * points.stride, points.stride, b);
+    read_rows(at + kPointInverse * points.stride, points.stride, c);
+    const Lanes z0 = c[0] * b[0], z1 = c[1] * b[0] + c[2] * b[1], z2 = c[3] * b[0] + c[4] * b[1] + c[5] * b[2];
+    store(at + kPointOwnStep * points.stride, c[0] * z0 + c[1] * z1 + c[3] * z2);
+    store(at + (kPointOwnStep + 1) * points.stride, c[2] * z1 + c[4] * z2);
+    store(at + (kPointOwnStep + 2) * points.stride, c[5] * z2);
+  }
+}
+
+// Six rows of a column, in as few vectors as this processor needs.
+#if MEGABLOCK_LANE_WIDTH == 8
+struct Column {
+  __m512d rows;
+  static constexpr __mmask8 kSix = 0x3f;
+  [[gnu::always_inline]] static Column read(const double* p) { return {_mm512_maskz_loadu_pd(kSix, p)}; }
+  [[gnu::always_inline]] void write(double* p) const { _mm512_mask_storeu_pd(p, kSix, rows); }
+  [[gnu::always_inline]] void subtract(const Column (&a)[3], double b0, double b1, double b2) {
+    rows -= a[0].rows * b0 + a[1].rows * b1 + a[2].rows * b2;
+  }
+};
+#else
+struct Column {
+  typedef double Upper __attribute__((vector_size(32)));
+  typedef double Lower __attribute__((vector_size(16)));
+  Upper upper;
+  Lower lower;
+  [[gnu::always_inline]] static Column read(const double* p) {
+    Column c;
+    __builtin_memcpy(&c.upper, p, sizeof c.upper);
+    __builtin_memcpy(&c.lower, p + 4, sizeof c.lower);
+    return c;
+  }
+  [[gnu::always_inline]] void write(double* p) const {
+    __builtin_memcpy(p, &upper, sizeof upper);
+    __builtin_memcpy(p + 4, &lower, sizeof lower);
+  }
+  [[gnu::always_inline]] void subtract(const Column (&a)[3], double b0, double b1, double b2) {
+    upper -= a[0].upper * b0 + a[1].upper * b1 + a[2].upper * b2;
+    lower -= a[0].lower * b0 + a[1].lower * b1 + a[2].lower * b2;
+  }
+};
+#endif
+
+// C -= A B'
+[[gnu::always_inline]] inline void subtract_block(double* c, std::int64_t stride, const double* a, const double* b) {
+  const Column left[3] = {Column::read(a), Column::read(a + kYStride), Column::read(a + 2 * kYStride)};
+#pragma GCC unroll 6
+  for (int column = 0; column < 6; ++column) {
+    Column sum = Column::read(c + column * stride);
+    sum.subtract(left, b[column], b[column + kYStride], b[column + 2 * kYStride]);
+    sum.write(c + column * stride);
+  }
+}
+
+void subtract_pairs(std::int64_t count, const double* y, const std::int64_t* rows, const FrontStorage& front) {
+  const std::int64_t e = front.eliminated, n = front.dimension, p = n - e;
+  const auto subtract = [&](std::int64_t i, std::int64_t j) {
+    const std::int64_t row = rows[i], column = rows[j];
+    const bool first = column < e;
+    double* c = first ? front.factor + row + column * n : front.update + (row - e) + (column - e) * p;
+    subtract_block(c, first ? n : p, y + i * kYSize, y + j * kYSize);
+  };
+  for (std::int64_t i = 1; i < count; ++i) {
+    for (std::int64_t j = 0; j < i; ++j) {
+      if (rows[i] >= rows[j]) subtract(i, j);
+      if (rows[i] <= rows[j]) subtract(j, i);  // both in a frame's own block, where the lower triangle counts
+    }
+  }
+}
+
+}  // namespace
+}  // namespace megablock::point_kernels

@@ -1,0 +1,4 @@
+#define MEGABLOCK_LANE_WIDTH 2
+#include "merge/point_kernels_body.h"
+
+const megablock::point_kernels::Kernels megablock::point_kernels::kPortable{normal, factorise, reduce, move, solve, subtract_pairs};
