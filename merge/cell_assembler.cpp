@@ -6,29 +6,6 @@ namespace megablock {
 
 namespace {
 
-// C -= A B' with three columns each; leading dimensions n, lda, ldb. Numbers of rows are known when compiling, or 0.
-template <int kRows, int kColumns>
-void subtract(double* c, std::int64_t n, const double* a, std::int64_t lda, std::int64_t rows, const double* b,
-              std::int64_t ldb, std::int64_t columns) {
-  const std::int64_t height = kRows > 0 ? kRows : rows, width = kColumns > 0 ? kColumns : columns;
-  const double *a0 = a, *a1 = a + lda, *a2 = a1 + lda;
-  for (std::int64_t j = 0; j < width; ++j) {
-    const double b0 = b[j], b1 = b[j + ldb], b2 = b[j + 2 * ldb];
-    double* __restrict__ column = c + j * n;
-    for (std::int64_t i = 0; i < height; ++i) column[i] -= a0[i] * b0 + a1[i] * b1 + a2[i] * b2;
-  }
-}
-
-// Frames and mounts have 6 unknowns, Brown's cameras 8.
-void subtract_product(double* c, std::int64_t n, const double* a, std::int64_t lda, std::int64_t rows, const double* b,
-                      std::int64_t ldb, std::int64_t columns) {
-  if (rows == 6 && columns == 6) return subtract<6, 6>(c, n, a, lda, rows, b, ldb, columns);
-  if (rows == 8 && columns == 6) return subtract<8, 6>(c, n, a, lda, rows, b, ldb, columns);
-  if (rows == 6 && columns == 8) return subtract<6, 8>(c, n, a, lda, rows, b, ldb, columns);
-  if (rows == 8 && columns == 8) return subtract<8, 8>(c, n, a, lda, rows, b, ldb, columns);
-  subtract<0, 0>(c, n, a, lda, rows, b, ldb, columns);
-}
-
 // Lower triangle of C += J'J, and J'r behind it, of two residuals; C has the width of J.
 void add_squares(double* c, std::int64_t width, const double* jacobian, const double* residual) {
   const double *first = jacobian, *second = jacobian + width;
@@ -83,6 +60,7 @@ void CellAssembler::add_point(const PointEquations& equations, std::size_t i) {
 
 void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
   const PointEquations::Point& point = equations.points()[i];
+  const point_kernels::Kernels& kernels = equations.kernels();
   for (std::int64_t lane = point.first; lane < point.last; ++lane) {
     const ImageUnknowns& u = equations.unknowns_of(lane);
     const int width = u.shared_width;
@@ -99,27 +77,27 @@ void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
     Eigen::Matrix<double, 6, 3> minus_g;
     minus_g << -skew<double>(equations.from_frame(lane)), Eigen::Matrix3d::Identity();
     const Factor frame{u.frame, 6, 6, minus_g.data()};
-    if (u.camera >= 0) subtract_outer({u.camera, u.camera_width, width, shared.by_point}, frame);
-    if (u.mount >= 0) subtract_outer({u.mount, 6, width, shared.by_point + u.camera_width}, frame);
+    if (u.camera >= 0) subtract_outer(kernels, {u.camera, u.camera_width, width, shared.by_point}, frame);
+    if (u.mount >= 0) subtract_outer(kernels, {u.mount, 6, width, shared.by_point + u.camera_width}, frame);
   }
   equations.blocks(i, blocks_);
   for (std::size_t b = at(point.observation_count()); b < blocks_.size(); ++b) {
     const PointEquations::Block& block = blocks_[b];
     for (std::size_t a = 0; a <= b; ++a)
-      subtract_outer({block.unknown, block.dimension, block.dimension, block.y},
+      subtract_outer(kernels, {block.unknown, block.dimension, block.dimension, block.y},
                      {blocks_[a].unknown, blocks_[a].dimension, blocks_[a].dimension, blocks_[a].y});
     Eigen::Map<Eigen::VectorXd>(front_.rhs() + rows_[at(block.unknown)], block.dimension).noalias() -=
         block.matrix() * equations.z(i);
   }
 }
 
-void CellAssembler::subtract_outer(const Factor& a, const Factor& b) {
+void CellAssembler::subtract_outer(const point_kernels::Kernels& kernels, const Factor& a, const Factor& b) {
   const std::int64_t row = rows_[at(a.unknown)], column = rows_[at(b.unknown)];
   const bool below = row >= column;
   const Factor &left = below ? a : b, &right = below ? b : a;
   const Front::Place place = front_.place(std::max(row, column), std::min(row, column));
-  subtract_product(place.values, place.stride, left.values, left.stride, left.rows, right.values, right.stride,
-                   right.rows);
+  kernels.subtract_product(place.values, place.stride, left.values, left.stride, left.rows, right.values, right.stride,
+                           right.rows);
 }
 
 void CellAssembler::add_term(const TermResidual& term) {

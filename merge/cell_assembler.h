@@ -39,7 +39,8 @@ class CellAssembler {
     int rows = 0, stride = 0;
     const double* values = nullptr;
   };
-  void subtract_outer(const Factor& a, const Factor& b);  // A B' from the front
+  // A B' from the front
+  void subtract_outer(const point_kernels::Kernels& kernels, const Factor& a, const Factor& b);
   // An unknown's own J'J (lower triangle), with its diagonal.
   void add_normal(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& normal);
 

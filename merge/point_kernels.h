@@ -58,6 +58,9 @@ struct Kernels {
                const double* const* motions, double* out, std::int64_t out_stride);
   // Of points, from b plus what `move` gave, in kPointB, to their steps C^-T C^-1 b, in kPointOwnStep.
   void (*solve)(std::int64_t count, const Columns& points);
+  // C -= A B', three columns each, leading dimensions c_stride, a_stride, b_stride; A has `rows`, B `columns` rows.
+  void (*subtract_product)(double* c, std::int64_t c_stride, const double* a, std::int64_t a_stride, std::int64_t rows,
+                           const double* b, std::int64_t b_stride, std::int64_t columns);
   // K_ij -= Y_i Y_j' for all pairs of observations of one point, i > j. rows: of their frames in the front [count].
   void (*subtract_pairs)(std::int64_t count, const double* y, const std::int64_t* rows, const FrontStorage& front);
 };

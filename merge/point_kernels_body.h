@@ -206,48 +206,91 @@ void solve(std::int64_t count, const Columns& points) {
   }
 }
 
-// Six rows of a column, in as few vectors as this processor needs.
+// kRows rows of a column, in as few vectors as this processor needs; 1 to 8, or 2, 4, 6, 8.
 #if MEGABLOCK_LANE_WIDTH == 8
+template <int kRows>
 struct Column {
   __m512d rows;
-  static constexpr __mmask8 kSix = 0x3f;
-  [[gnu::always_inline]] static Column read(const double* p) { return {_mm512_maskz_loadu_pd(kSix, p)}; }
-  [[gnu::always_inline]] void write(double* p) const { _mm512_mask_storeu_pd(p, kSix, rows); }
+  static constexpr __mmask8 kMask = (1 << kRows) - 1;
+  [[gnu::always_inline]] static Column read(const double* p) { return {_mm512_maskz_loadu_pd(kMask, p)}; }
+  [[gnu::always_inline]] void write(double* p) const { _mm512_mask_storeu_pd(p, kMask, rows); }
   [[gnu::always_inline]] void subtract(const Column (&a)[3], double b0, double b1, double b2) {
     rows -= a[0].rows * b0 + a[1].rows * b1 + a[2].rows * b2;
   }
 };
 #else
+// Vectors of four and of two; the compiler halves the former where the processor has no such.
+template <int kRows>
 struct Column {
-  typedef double Upper __attribute__((vector_size(32)));
-  typedef double Lower __attribute__((vector_size(16)));
-  Upper upper;
-  Lower lower;
+  typedef double Four __attribute__((vector_size(32)));
+  typedef double Two __attribute__((vector_size(16)));
+  static constexpr int kFours = kRows / 4, kTwos = kRows % 4 / 2, kOnes = kRows % 2;
+  Four fours[kFours + 1];
+  Two two;
+  double one;
   [[gnu::always_inline]] static Column read(const double* p) {
     Column c;
-    __builtin_memcpy(&c.upper, p, sizeof c.upper);
-    __builtin_memcpy(&c.lower, p + 4, sizeof c.lower);
+#pragma GCC unroll 2
+    for (int k = 0; k < kFours; ++k) __builtin_memcpy(&c.fours[k], p + 4 * k, sizeof(Four));
+    if constexpr (kTwos) __builtin_memcpy(&c.two, p + 4 * kFours, sizeof(Two));
+    if constexpr (kOnes) c.one = p[kRows - 1];
     return c;
   }
   [[gnu::always_inline]] void write(double* p) const {
-    __builtin_memcpy(p, &upper, sizeof upper);
-    __builtin_memcpy(p + 4, &lower, sizeof lower);
+#pragma GCC unroll 2
+    for (int k = 0; k < kFours; ++k) __builtin_memcpy(p + 4 * k, &fours[k], sizeof(Four));
+    if constexpr (kTwos) __builtin_memcpy(p + 4 * kFours, &two, sizeof(Two));
+    if constexpr (kOnes) p[kRows - 1] = one;
   }
   [[gnu::always_inline]] void subtract(const Column (&a)[3], double b0, double b1, double b2) {
-    upper -= a[0].upper * b0 + a[1].upper * b1 + a[2].upper * b2;
-    lower -= a[0].lower * b0 + a[1].lower * b1 + a[2].lower * b2;
+#pragma GCC unroll 2
+    for (int k = 0; k < kFours; ++k) fours[k] -= a[0].fours[k] * b0 + a[1].fours[k] * b1 + a[2].fours[k] * b2;
+    if constexpr (kTwos) two -= a[0].two * b0 + a[1].two * b1 + a[2].two * b2;
+    if constexpr (kOnes) one -= a[0].one * b0 + a[1].one * b1 + a[2].one * b2;
   }
 };
 #endif
 
-// C -= A B'
-[[gnu::always_inline]] inline void subtract_block(double* c, std::int64_t stride, const double* a, const double* b) {
-  const Column left[3] = {Column::read(a), Column::read(a + kYStride), Column::read(a + 2 * kYStride)};
-#pragma GCC unroll 6
-  for (int column = 0; column < 6; ++column) {
-    Column sum = Column::read(c + column * stride);
-    sum.subtract(left, b[column], b[column + kYStride], b[column + 2 * kYStride]);
-    sum.write(c + column * stride);
+// C -= A B'; numbers of columns that are known when compiling, or 0.
+template <int kRows, int kColumns>
+[[gnu::always_inline]] inline void subtract_block(double* c, std::int64_t c_stride, const double* a,
+                                                  std::int64_t a_stride, const double* b, std::int64_t b_stride,
+                                                  std::int64_t columns = kColumns) {
+  using Rows = Column<kRows>;
+  const Rows left[3] = {Rows::read(a), Rows::read(a + a_stride), Rows::read(a + 2 * a_stride)};
+#pragma GCC unroll 8
+  for (std::int64_t column = 0; column < (kColumns > 0 ? kColumns : columns); ++column) {
+    Rows sum = Rows::read(c + column * c_stride);
+    sum.subtract(left, b[column], b[column + b_stride], b[column + 2 * b_stride]);
+    sum.write(c + column * c_stride);
+  }
+}
+
+void subtract_product(double* c, std::int64_t c_stride, const double* a, std::int64_t a_stride, std::int64_t rows,
+                      const double* b, std::int64_t b_stride, std::int64_t columns) {
+  const auto block = [&]<int kRows>(std::integral_constant<int, kRows>) {
+    if (columns == 6) return subtract_block<kRows, 6>(c, c_stride, a, a_stride, b, b_stride);
+    if (columns == 8) return subtract_block<kRows, 8>(c, c_stride, a, a_stride, b, b_stride);
+    subtract_block<kRows, 0>(c, c_stride, a, a_stride, b, b_stride, columns);
+  };
+  for (; rows > 8; rows -= 8, c += 8, a += 8) block(std::integral_constant<int, 8>());
+  switch (rows) {  // 6 of frames and mounts, 8 of Brown's cameras
+    case 1:
+      return block(std::integral_constant<int, 1>());
+    case 2:
+      return block(std::integral_constant<int, 2>());
+    case 3:
+      return block(std::integral_constant<int, 3>());
+    case 4:
+      return block(std::integral_constant<int, 4>());
+    case 5:
+      return block(std::integral_constant<int, 5>());
+    case 6:
+      return block(std::integral_constant<int, 6>());
+    case 7:
+      return block(std::integral_constant<int, 7>());
+    case 8:
+      return block(std::integral_constant<int, 8>());
   }
 }
 
@@ -257,7 +300,7 @@ void subtract_pairs(std::int64_t count, const double* y, const std::int64_t* row
     const std::int64_t row = rows[i], column = rows[j];
     const bool first = column < e;
     double* c = first ? front.factor + row + column * n : front.update + (row - e) + (column - e) * p;
-    subtract_block(c, first ? n : p, y + i * kYSize, y + j * kYSize);
+    subtract_block<6, 6>(c, first ? n : p, y + i * kYSize, kYStride, y + j * kYSize, kYStride);
   };
   for (std::int64_t i = 1; i < count; ++i) {
     for (std::int64_t j = 0; j < i; ++j) {

@@ -198,6 +198,24 @@ TEST_P(PointKernels, SolveForThePoints) {
   EXPECT_LT((w.three(w.points, kPointOwnStep, 2) - inverse.transpose() * (inverse * b)).norm(), 1e-12 * b.norm());
 }
 
+TEST_P(PointKernels, SubtractProductsOfAllSizes) {
+  for (std::int64_t rows = 1; rows <= 17; ++rows) {
+    for (const std::int64_t columns : {1, 5, 6, 8, 11}) {
+      const std::vector<double> a = Worked::random(3 * 20, 5), b = Worked::random(3 * 12, 6);
+      std::vector<double> c = Worked::random(20 * 12, 7), narrow = c;
+      const std::vector<double> before = c;
+      kernels_of_width(GetParam())->subtract_product(c.data(), 20, a.data(), 20, rows, b.data(), 12, columns);
+      kPortable.subtract_product(narrow.data(), 20, a.data(), 20, rows, b.data(), 12, columns);
+      EXPECT_EQ(c, narrow);
+      const Eigen::MatrixXd left = Eigen::Map<const Eigen::MatrixXd>(a.data(), 20, 3),
+                            right = Eigen::Map<const Eigen::MatrixXd>(b.data(), 12, 3);
+      Eigen::MatrixXd expected = Eigen::Map<const Eigen::MatrixXd>(before.data(), 20, 12);
+      expected.topLeftCorner(rows, columns) -= left.topRows(rows) * right.topRows(columns).transpose();
+      EXPECT_LT((Eigen::Map<const Eigen::MatrixXd>(c.data(), 20, 12) - expected).norm(), 1e-13) << rows << columns;
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Widths, PointKernels, testing::Values(2, 4, 8));
 
 }  // namespace
