@@ -12,8 +12,10 @@ template <bool kDerivatives>
 void work(const double* const* views, const double* records, std::int64_t count, double* values, std::int64_t stride) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
     Lanes view[kViewSize], record[kRecordSize];
-    read_records([&](int lane) [[gnu::always_inline]] { return views[i + lane]; }, view);
-    read_records([&](int lane) [[gnu::always_inline]] { return records + (i + lane) * kRecordSize; }, record);
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return views[i + lane]; }, view);
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return records + (i + lane) * kRecordSize; }, record);
     const Lanes* r = view;
     const Lanes *centre = view + 9, *shift = view + 12, *k = view + 15;  // k: f, cx, cy, k1, k2, k3, p1, p2
     const Lanes u0 = record[0] - centre[0], u1 = record[1] - centre[1], u2 = record[2] - centre[2];
@@ -26,7 +28,7 @@ void work(const double* const* views, const double* records, std::int64_t count,
     const Lanes distorted_x = x * radial + k[6] * xy2 + k[7] * (r2 + 2 * x * x);
     const Lanes distorted_y = y * radial + k[6] * (r2 + 2 * y * y) + k[7] * xy2;
     const Lanes weight = record[5];
-    const Lanes nan = weight * 0 + __builtin_nan("");
+    const Lanes nan = Lanes{} + __builtin_nan("");
     const LaneMask in_front = depth > 0;
     double* out = values + i;
     const Lanes residual_x = weight * (k[1] + k[0] * distorted_x - record[3]);

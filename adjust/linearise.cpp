@@ -111,12 +111,9 @@ Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState&
 namespace {
 
 double image_cost(const TileProblem& problem, const TileState& state) {
-  std::vector<std::int64_t> active;
-  active.reserve(problem.points.size());
-  for (std::int64_t p = 0; p < problem.point_count(); ++p)
-    if (problem.active(p)) active.push_back(p);
   double sum = 0;
-  ResidualSquares(problem, state).visit(active, [&](std::int64_t, std::int64_t, double squares) {
+  ResidualSquares residuals(problem, state);
+  residuals.visit(residuals.active_points(), [&](std::int64_t, std::int64_t, double squares) {
     sum += std::isfinite(squares) ? problem.image_loss.evaluate(squares)[0] : std::numeric_limits<double>::infinity();
   });
   return sum;

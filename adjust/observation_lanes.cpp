@@ -2,18 +2,28 @@
 
 namespace megablock {
 
-using namespace lane_kernels;
+using lane_kernels::kAvx2;
+using lane_kernels::kAvx512;
+using lane_kernels::kByPoint;
+using lane_kernels::kFromFrame;
+using lane_kernels::kPortable;
+using lane_kernels::kResidual;
 
-const Kernels* lane_kernels_of_width(int width) {
+const lane_kernels::Kernels* lane_kernels_of_width(int width) {
   __builtin_cpu_init();
-  if (width == 8) return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") ? &kAvx512 : nullptr;
-  if (width == 4) return __builtin_cpu_supports("avx2") ? &kAvx2 : nullptr;
+  // What cmake/rooms.cmake compiles them for.
+  if (width == 8) {
+    const bool has =
+        __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+    return has ? &kAvx512 : nullptr;
+  }
+  if (width == 4) return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kAvx2 : nullptr;
   return &kPortable;
 }
 
-const Kernels& lane_kernels_of_processor() {
+const lane_kernels::Kernels& lane_kernels_of_processor() {
   for (int width : {8, 4})
-    if (const Kernels* kernels = lane_kernels_of_width(width)) return *kernels;
+    if (const lane_kernels::Kernels* kernels = lane_kernels_of_width(width)) return *kernels;
   return kPortable;
 }
 
@@ -42,18 +52,20 @@ void AlignedValues::resize(std::int64_t count) {
 void ObservationLanes::reserve(std::int64_t lanes) {
   clear();
   if (lanes <= capacity_) return;
-  capacity_ = (lanes + kGroup - 1) / kGroup * kGroup;
+  capacity_ = (lanes + lane_kernels::kGroup - 1) / lane_kernels::kGroup * lane_kernels::kGroup;
   views_.resize(static_cast<std::size_t>(capacity_));
-  records_.resize(capacity_ * kRecordSize);
-  values_.resize(capacity_ * kValueCount);
+  records_.resize(capacity_ * lane_kernels::kRecordSize);
+  values_.resize(capacity_ * lane_kernels::kValueCount);
 }
 
-std::int64_t ObservationLanes::padded_size() const { return (size_ + kGroup - 1) / kGroup * kGroup; }
+std::int64_t ObservationLanes::padded_size() const {
+  return (size_ + lane_kernels::kGroup - 1) / lane_kernels::kGroup * lane_kernels::kGroup;
+}
 
 void ObservationLanes::pad() {
   for (std::int64_t i = size_; i < padded_size(); ++i) {
     views_[static_cast<std::size_t>(i)] = views_[0];
-    std::copy_n(records_.data(), kRecordSize, records_.data() + kRecordSize * i);
+    std::copy_n(records_.data(), lane_kernels::kRecordSize, records_.data() + lane_kernels::kRecordSize * i);
   }
 }
 

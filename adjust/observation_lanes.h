@@ -1,8 +1,8 @@
 // Image observations side by side ("lanes"), projected or linearised several at once by the widest vectors that the
 // processor has; the bits are the same for all widths. Formulas: linearise.h.
 //
-// Cameras of Brown's model alone (simple_camera); what others see is for their owner to write over what stands in the
-// lane (linearise_in_camera).
+// Cameras of Brown's model alone (LaneView::simple); what others see is for their owner to write over what stands in
+// the lane (linearise_in_camera).
 #pragma once
 
 #include <span>
@@ -28,6 +28,9 @@ std::vector<LaneView> lane_views(std::span<const ImageView> views);
 // Doubles in a buffer that begins a line of the cache.
 class AlignedValues {
  public:
+  AlignedValues() = default;
+  AlignedValues(const AlignedValues&) = delete;  // its first value would be another's
+  AlignedValues& operator=(const AlignedValues&) = delete;
   void resize(std::int64_t count);  // what stood there is lost
   double* data() { return first_; }
   const double* data() const { return first_; }
@@ -39,6 +42,8 @@ class AlignedValues {
 
 class ObservationLanes {
  public:
+  // As many as stay in the nearest cache, with what is made of them.
+  static constexpr std::int64_t kUsual = 64;
   // Takes `kernels` instead of the widest for tests.
   explicit ObservationLanes(const lane_kernels::Kernels& kernels = lane_kernels_of_processor()) : kernels_(&kernels) {}
 

@@ -1,7 +1,7 @@
 // Squared residuals |r|^2 of image observations, divided by their variances, many at once (observation_lanes.h).
 #pragma once
 
-#include <limits>
+#include <array>
 
 #include "adjust/observation_lanes.h"
 
@@ -14,6 +14,15 @@ class ResidualSquares {
       : problem_(problem), state_(state), views_(image_views(problem, state)), lane_views_(lane_views(views_)) {
     lanes_.reserve(kLanes);
   }
+
+  // The points that take part.
+  std::vector<std::int64_t> active_points() const {
+    std::vector<std::int64_t> list;
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p)
+      if (problem_.active(p)) list.push_back(p);
+    return list;
+  }
+  const std::vector<ImageView>& views() const { return views_; }
 
   // Calls visit(point, row, |r|^2) for the kept observations of the points, in their order; not finite where the camera
   // cannot project the point.
@@ -32,7 +41,7 @@ class ResidualSquares {
   }
 
  private:
-  static constexpr std::int64_t kLanes = 64;
+  static constexpr std::int64_t kLanes = ObservationLanes::kUsual;
   struct Source {
     std::int64_t point, row;
   };

@@ -23,11 +23,10 @@ struct ResidualSum {
 };
 
 void add_images(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
-  std::vector<std::int64_t> active;
-  for (std::int64_t p = 0; p < problem.point_count(); ++p)
-    if (problem.active(p)) active.push_back(p);
+  ResidualSquares residuals(problem, state);
+  const std::vector<std::int64_t> active = residuals.active_points();
   sum.points += std::ssize(active);
-  ResidualSquares(problem, state).visit(active, [&](std::int64_t, std::int64_t, double squares) {
+  residuals.visit(active, [&](std::int64_t, std::int64_t, double squares) {
     sum.squares += squares;
     ++sum.observations;
   });

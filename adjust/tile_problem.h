@@ -37,12 +37,12 @@ struct RobustLoss {
   std::array<double, 3> evaluate(double squared_norm) const {
     return squares(squared_norm) ? std::array<double, 3>{squared_norm, 1, 0} : evaluate_beyond(squared_norm);
   }
-
- private:
-  // Nearly every observation: inline.
+  // Whether rho(s) = s there, as for nearly every observation.
   bool squares(double s) const {
     return kind == Kind::kNone || (kind == Kind::kHuber && !(s > scale * scale));
   }
+
+ private:
   std::array<double, 3> evaluate_beyond(double squared_norm) const;
 };
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "adjust/linearise.h"
 #include "cluster/progress.h"
 #include "io/error.h"
 #include "merge/point_refinement.h"

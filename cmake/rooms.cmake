@@ -1,8 +1,8 @@
 # A room is a folder of sources that becomes one static library, megablock::<room>.
 # Every .cpp directly in the folder, or in one of its sub-folders other than `main`, belongs to it.
-# Files named *_avx2.cpp are compiled for AVX2 and FMA, *_avx512.cpp for AVX-512, *_portable.cpp as everything else; they
-# hold raw-pointer kernels only, reached by run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them: their
-# ABI depends on the flags).
+# Files named *_avx2.cpp are compiled for AVX2 and FMA, *_avx512.cpp for AVX-512, *_portable.cpp for any processor; they
+# hold raw-pointer kernels only, reached by run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them:
+# their ABI depends on the flags). Without errno a square root is one instruction.
 
 add_library(megablock_options INTERFACE)
 target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})

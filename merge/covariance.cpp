@@ -225,7 +225,7 @@ class TileCovarianceBuilder {
   const Step& columns_;
   std::vector<std::int64_t> offsets_;
   PointEquations equations_;
-  std::vector<FrameSum> frame_sums_;           // not used
+  std::vector<FrameSum> frame_sums_;           // reduce() makes them with Y
   std::vector<PointEquations::Block> blocks_;  // of the point at hand
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_, row_of_unknown_;
   // Of the cell at hand: covariance of its unknowns.

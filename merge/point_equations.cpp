@@ -8,7 +8,8 @@
 
 namespace megablock {
 
-std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan, const TileState& state) {
+std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan,
+                                          const std::vector<LaneView>& views) {
   std::vector<ImageUnknowns> list;
   std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> calibrations;
   list.reserve(problem.images.size());
@@ -20,7 +21,7 @@ std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const Tile
     if (u.camera >= 0) u.free = plan.camera_free[at(image.camera.value)];
     u.camera_width = count_of(u.free);
     u.shared_width = u.camera_width + (u.mount >= 0 ? 6 : 0);
-    u.plain = u.shared_width == 0 && state.cameras[at(image.camera.value)].model().kind == CameraModelKind::kBrown;
+    u.plain = u.shared_width == 0 && views[list.size()].simple;
     if (u.shared_width > 0)
       u.calibration =
           calibrations.try_emplace({u.camera, u.mount}, static_cast<std::int64_t>(calibrations.size())).first->second;
@@ -55,7 +56,16 @@ const point_kernels::Kernels& point_kernels_of_processor() {
 
 using lane_kernels::kByPoint;
 using lane_kernels::kResidual;
-using namespace point_kernels;
+using point_kernels::kInverse;
+using point_kernels::kObservationValueCount;
+using point_kernels::kPointB;
+using point_kernels::kPointHeld;
+using point_kernels::kPointInverse;
+using point_kernels::kPointOwnStep;
+using point_kernels::kPointV;
+using point_kernels::kPointValueCount;
+using point_kernels::kPointZ;
+using point_kernels::kYSize;
 
 PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)
     : problem_(problem),
@@ -63,10 +73,11 @@ PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan,
       kernels_(&point_kernels_of_processor()),
       views_(image_views(problem, state)),
       lane_views_(lane_views(views_)),
-      unknowns_(image_unknowns(problem, plan, state)),
+      unknowns_(image_unknowns(problem, plan, lane_views_)),
       prior_(prior_rows(problem)) {
-  for (const ImageUnknowns& u : unknowns_) widest_ = std::max(widest_, u.shared_width);
-  std::int64_t room = 64;
+  int widest = 0;
+  for (const ImageUnknowns& u : unknowns_) widest = std::max(widest, u.shared_width);
+  std::int64_t room = ObservationLanes::kUsual;
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
     room = std::max(room, problem.begin[at(p + 1)] - problem.begin[at(p)]);
   lanes_.reserve(room);
@@ -81,13 +92,15 @@ PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan,
   point_values_.resize(room * kPointValueCount);
   y_.resize(room * kYSize);
   moved_.resize(room * 3);
-  store_.resize(at(room * 11 * widest_));  // J_s, W_sk, W_s and Y
+  store_.resize(at(room * 11 * widest));  // J_s, W_sk, W_s and Y
 }
 
 std::size_t PointEquations::linearise(std::span<const std::int64_t> points, const Pass& pass) {
   clear();
   for (const std::int64_t point : points) {
-    if (lanes_.size() + problem_.begin[at(point + 1)] - problem_.begin[at(point)] > lanes_.capacity()) break;
+    const std::int64_t more = problem_.begin[at(point + 1)] - problem_.begin[at(point)];
+    const bool room = lanes_.size() + more <= ObservationLanes::kUsual && std::ssize(points_) < lanes_.capacity();
+    if (!points_.empty() && !room) break;
     add_observations(point);
   }
   lanes_.linearise();
@@ -135,16 +148,13 @@ void PointEquations::add_observations(std::int64_t point) {
 void PointEquations::weigh(Point& point, bool curvature) {
   point.residual_count = 2 * point.observation_count();
   point.shared_begin = std::ssize(shared_);
-  const bool none = problem_.image_loss.kind == RobustLoss::Kind::kNone;
-  const double corner = problem_.image_loss.scale * problem_.image_loss.scale;
   const double* residual = lanes_.values() + kResidual * lanes_.capacity();
   for (std::int64_t lane = point.first; lane < point.last; ++lane) {
     const ImageUnknowns& unknowns = unknowns_of(lane);
     const double x = residual[lane], y = residual[lane + lanes_.capacity()];
     const double squares = x * x + y * y;
     // Nearly all: nothing is to be done but to count.
-    if (problem_.image_loss.kind != RobustLoss::Kind::kCauchy && unknowns.plain &&
-        squares <= (none ? std::numeric_limits<double>::max() : corner)) {
+    if (unknowns.plain && std::isfinite(squares) && problem_.image_loss.squares(squares)) {
       point.rho += squares;
       point.weighted_squares += squares;
     } else {

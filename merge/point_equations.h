@@ -37,7 +37,7 @@ struct ImageUnknowns {
   bool plain = false;             // a camera that the kernels know, without shared unknowns
 };
 std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan,
-                                          const TileState& state);  // [images]
+                                          const std::vector<LaneView>& views);  // [images]
 
 // Row of the point's prior in TileProblem::point_priors, -1: none. [points]
 std::vector<std::int64_t> prior_rows(const TileProblem& problem);
@@ -137,7 +137,6 @@ class PointEquations {
   void add_prior(std::size_t i);
   void spread();
   std::int64_t padded_points() const;
-  double& observation_value(int v, std::int64_t lane) { return values_.data()[v * lanes_.capacity() + lane]; }
   double& point_value(int v, std::size_t i) {
     return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];
   }
@@ -152,7 +151,6 @@ class PointEquations {
   std::vector<ImageView> views_;
   std::vector<LaneView> lane_views_;
   std::vector<ImageUnknowns> unknowns_;
-  int widest_ = 0;  // shared_width
   std::vector<std::int64_t> prior_;
   // Of the points at hand.
   std::vector<Point> points_;

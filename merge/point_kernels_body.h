@@ -47,7 +47,7 @@ void factorise(std::int64_t count, double lambda, double floor, const Columns& p
     double* at = points.values + i;
     read_rows(at + kPointV * points.stride, points.stride, v);
     read_rows(at + kPointB * points.stride, points.stride, b);
-    const Lanes zero = v[0] - v[0];
+    const Lanes zero{};
     Lanes held = zero;
     const auto invert = [&](const Lanes& pivot, const Lanes& diagonal) __attribute__((always_inline)) {
       const LaneMask free = pivot > floor * diagonal;
@@ -102,7 +102,7 @@ void reduce(const double* linearised, std::int64_t linearised_stride, std::int64
     read_rows(values.values + kB * values.stride + i, values.stride, b);
     read_rows(values.values + kInverse * values.stride + i, values.stride, inverse);
     read_rows(values.values + kPointStep * values.stride + i, values.stride, step);
-    const Lanes zero = u[0] - u[0];
+    const Lanes zero{};
 
     Lanes t[3][3];  // T: row, column
 #pragma GCC unroll 64

@@ -156,8 +156,8 @@ class LossSums {
 
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
-  PointRefiner refiner(problem, state, settled);
   if (problem.image_loss.kind == RobustLoss::Kind::kCauchy) {  // all of it is tail
+    PointRefiner refiner(problem, state, settled);
     for (const auto& cell : plan.points)
       for (const std::int64_t point : cell) refiner.refine(point);
     return evaluate_cost(problem, state);
@@ -167,7 +167,10 @@ double refine_points(const TileProblem& problem, const TilePlan& plan, TileState
   for (const auto& cell : plan.points)
     residuals.visit(cell, [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
   sums.finish();
-  for (const std::int64_t point : sums.tail()) refiner.refine(point);
+  if (!sums.tail().empty()) {
+    PointRefiner refiner(problem, state, settled);
+    for (const std::int64_t point : sums.tail()) refiner.refine(point);
+  }
   double images = sums.settled();
   residuals.visit(sums.tail(), [&](std::int64_t, std::int64_t, double squares) {
     images +=

@@ -13,7 +13,8 @@ namespace megablock {
 
 // Moves active points that have an observation in the tail and are off their optimum by more than `settled` sigmas; all
 // others keep their bits. A point that a step has put behind a camera starts from the intersection of its rays; where
-// they do not meet in front of all cameras, it is left alone. Returns the cost then, as evaluate_cost (linearise.h).
+// they do not meet in front of all cameras, it is left alone. Returns the cost then: that of
+// evaluate_cost (linearise.h) but for the order of the sum.
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled = 1e-6);
 
 }  // namespace megablock

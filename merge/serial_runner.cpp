@@ -1,6 +1,5 @@
 #include "merge/serial_runner.h"
 
-#include "adjust/linearise.h"
 #include "io/error.h"
 #include "merge/point_refinement.h"
 #include "merge/unknowns.h"

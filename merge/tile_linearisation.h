@@ -34,7 +34,7 @@ struct LossWeight {
     rho = values[0];
     first = values[1];
     if (first != 1) root = residual_scale = std::sqrt(first);
-    if (!curvature || values[2] >= 0) return;
+    if (!curvature || values[2] >= 0 || squared_norm == 0) return;
     const double left = std::sqrt(std::max(kLeastCurvature, 1 + 2 * squared_norm * values[2] / first));
     along = (1 - left) / squared_norm;
     residual_scale = root / left;

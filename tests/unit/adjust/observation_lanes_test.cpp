@@ -18,7 +18,8 @@ class Lanes : public testing::Test {
     std::normal_distribution<double> normal;
     const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
     for (std::int64_t i = 0; i < count; ++i) {
-      const Pose frame{rotation_exp<double>(vector()), 100 * vector()}, mount{rotation_exp<double>(0.3 * vector()), 0.2 * vector()};
+      const Pose frame{rotation_exp<double>(vector()), 100 * vector()},
+          mount{rotation_exp<double>(0.3 * vector()), 0.2 * vector()};
       views_.emplace_back(frame, mount, camera_);
       const double depth = i % 7 == 3 ? -20 : 20;
       const Eigen::Vector3d in_camera = depth * Eigen::Vector3d(0.3 * normal(random), 0.3 * normal(random), 1);

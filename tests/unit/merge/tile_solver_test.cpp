@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "adjust/observation_lanes.h"
 #include "merge/gauge.h"
 #include "merge/monolithic.h"
 #include "tests/unit/adjust/single_tile.h"
@@ -68,6 +69,29 @@ void expect_optimum_of_ceres(const Start& start, const SolveOptions& options = k
 }
 
 TEST(TileSolver, AerialWithItsCamera) { expect_optimum_of_ceres(Start(aerial_tile(1))); }
+
+// One point is measured seven times in every image that sees it.
+TEST(TileSolver, TracksOfMoreObservationsThanLanes) {
+  Start start(aerial_tile(1));
+  TileProblem& problem = start.problem;
+  std::int64_t longest = 0;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+    if (problem.begin[p + 1] - problem.begin[p] > problem.begin[longest + 1] - problem.begin[longest]) longest = p;
+  const std::int64_t first = problem.begin[longest], count = problem.begin[longest + 1] - first;
+  const auto repeat = [&](auto& column) {
+    const std::vector<std::decay_t<decltype(column[0])>> rows(column.begin() + first, column.begin() + first + count);
+    for (int k = 0; k < 6; ++k) column.insert(column.begin() + first, rows.begin(), rows.end());
+  };
+  repeat(problem.image);
+  repeat(problem.x);
+  repeat(problem.y);
+  repeat(problem.inverse_sigma);
+  repeat(problem.kept);
+  for (std::size_t p = static_cast<std::size_t>(longest) + 1; p < problem.begin.size(); ++p)
+    problem.begin[p] += 6 * count;
+  ASSERT_GT(7 * count, ObservationLanes::kUsual);
+  expect_optimum_of_ceres(start);
+}
 
 TEST(TileSolver, StreetWithItsRigHeld) {
   SimulationOptions simulation = street_tile(2);
