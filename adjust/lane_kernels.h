@@ -7,6 +7,7 @@ namespace megablock::lane_kernels {
 
 // Lanes are worked on in groups: counts are multiples of it.
 constexpr std::int64_t kGroup = 8;
+constexpr std::int64_t padded(std::int64_t count) { return (count + kGroup - 1) / kGroup * kGroup; }
 
 // What a lane is made of.
 constexpr int kViewSize = 24;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [8], unused

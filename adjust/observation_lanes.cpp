@@ -52,14 +52,10 @@ void AlignedValues::resize(std::int64_t count) {
 void ObservationLanes::reserve(std::int64_t lanes) {
   clear();
   if (lanes <= capacity_) return;
-  capacity_ = (lanes + lane_kernels::kGroup - 1) / lane_kernels::kGroup * lane_kernels::kGroup;
+  capacity_ = lane_kernels::padded(lanes);
   views_.resize(static_cast<std::size_t>(capacity_));
   records_.resize(capacity_ * lane_kernels::kRecordSize);
   values_.resize(capacity_ * lane_kernels::kValueCount);
-}
-
-std::int64_t ObservationLanes::padded_size() const {
-  return (size_ + lane_kernels::kGroup - 1) / lane_kernels::kGroup * lane_kernels::kGroup;
 }
 
 void ObservationLanes::pad() {

@@ -62,7 +62,7 @@ class ObservationLanes {
     record[5] = inverse_sigma;
   }
   std::int64_t size() const { return size_; }
-  std::int64_t padded_size() const;  // what the kernels work on
+  std::int64_t padded_size() const { return lane_kernels::padded(size_); }  // what the kernels work on
   std::int64_t capacity() const { return capacity_; }
 
   // Residuals alone, NaN behind the camera; or all values.

@@ -54,7 +54,6 @@ const point_kernels::Kernels& point_kernels_of_processor() {
 
 }  // namespace
 
-using lane_kernels::kByPoint;
 using lane_kernels::kResidual;
 using point_kernels::kInverse;
 using point_kernels::kObservationValueCount;
@@ -299,10 +298,6 @@ void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vec
   kernels_->solve(padded_points(), {point_values_.data(), lanes_.capacity()});
   for (std::size_t i = 0; i < points_.size(); ++i)
     for (int k = 0; k < 3; ++k) out[at(points_[i].point)][k] = point_value(kPointOwnStep + k, i);
-}
-
-std::int64_t PointEquations::padded_points() const {
-  return (std::ssize(points_) + lane_kernels::kGroup - 1) / lane_kernels::kGroup * lane_kernels::kGroup;
 }
 
 Eigen::Matrix3d PointEquations::inverse_factor(std::size_t i) const {

@@ -136,7 +136,7 @@ class PointEquations {
   void sum_up(std::size_t i);
   void add_prior(std::size_t i);
   void spread();
-  std::int64_t padded_points() const;
+  std::int64_t padded_points() const { return lane_kernels::padded(std::ssize(points_)); }
   double& point_value(int v, std::size_t i) {
     return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];
   }

@@ -18,11 +18,12 @@ constexpr double kMaxDamping = 1e6;
 
 class PointRefiner {
  public:
-  PointRefiner(const TileProblem& problem, TileState& state, double settled)
+  // `views`: of the state's images (image_views).
+  PointRefiner(const TileProblem& problem, TileState& state, const std::vector<ImageView>& views, double settled)
       : problem_(problem),
         state_(state),
         settled_squared_(settled * settled),
-        views_(image_views(problem, state)),
+        views_(views),
         prior_(prior_rows(problem)) {}
 
   void refine(std::int64_t point) {
@@ -116,12 +117,13 @@ class PointRefiner {
   const TileProblem& problem_;
   TileState& state_;
   const double settled_squared_;
-  std::vector<ImageView> views_;
+  const std::vector<ImageView>& views_;
   std::vector<std::int64_t> prior_;
   std::vector<Ray> rays_;  // of the point at hand
 };
 
-// Observations of points one after the other: their loss, and whether one lies beyond the corner or behind its camera.
+// Observations of points one after the other: their loss, and whether one lies beyond the corner (Cauchy's loss has
+// none: all of it is tail) or behind its camera.
 class LossSums {
  public:
   explicit LossSums(const RobustLoss& loss) : loss_(loss) {}
@@ -156,19 +158,13 @@ class LossSums {
 
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
-  if (problem.image_loss.kind == RobustLoss::Kind::kCauchy) {  // all of it is tail
-    PointRefiner refiner(problem, state, settled);
-    for (const auto& cell : plan.points)
-      for (const std::int64_t point : cell) refiner.refine(point);
-    return evaluate_cost(problem, state);
-  }
   ResidualSquares residuals(problem, state);
   LossSums sums(problem.image_loss);
   for (const auto& cell : plan.points)
     residuals.visit(cell, [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
   sums.finish();
   if (!sums.tail().empty()) {
-    PointRefiner refiner(problem, state, settled);
+    PointRefiner refiner(problem, state, residuals.views(), settled);
     for (const std::int64_t point : sums.tail()) refiner.refine(point);
   }
   double images = sums.settled();
