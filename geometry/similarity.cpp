@@ -1,10 +1,14 @@
 #include "geometry/similarity.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "geometry/gauss_helmert.h"
+#include "geometry/rotation.h"
 
 namespace megablock {
 
@@ -53,6 +57,49 @@ std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, 
   result.translation = mean_to - result.scale * (result.rotation * mean_from);
   if (!(result.scale > 0) || !result.translation.allFinite()) return std::nullopt;
   return result;
+}
+
+Similarity similarity_update(const Similarity& similarity, const SimilarityStep& step) {
+  return {similarity.scale * std::exp(step(3)), rotation_update(similarity.rotation, step.head<3>()),
+          similarity.translation + step.tail<3>()};
+}
+
+std::optional<SimilarityCovariance> similarity_covariance(const Similarity& fitted,
+                                                          std::span<const Eigen::Vector3d> from,
+                                                          std::span<const double> weights) {
+  if (from.size() < 3 || (!weights.empty() && weights.size() != from.size())) return std::nullopt;
+  const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
+  double total = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    total += weight(i);
+    centre += weight(i) * from[i];
+  }
+  if (!(total > 0)) return std::nullopt;
+  centre /= total;
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i)
+    moments += weight(i) * (from[i] - centre) * (from[i] - centre).transpose();
+  const double squares = fitted.scale * fitted.scale;
+  const Eigen::Matrix3d turns = squares * (moments.trace() * Eigen::Matrix3d::Identity() - moments);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(turns);
+  constexpr double kLine = 1e-12;  // moment of inertia about a line through the points, of the largest
+  if (!(eigen.eigenvalues()(0) > kLine * eigen.eigenvalues()(2)) || !turns.allFinite()) return std::nullopt;
+  SimilarityCovariance about_centre = SimilarityCovariance::Zero();
+  about_centre.topLeftCorner<3, 3>() =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  about_centre(3, 3) = 1 / (squares * moments.trace());
+  about_centre.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / total;
+  return covariance_about_origin(fitted, centre, about_centre);
+}
+
+SimilarityCovariance covariance_about_origin(const Similarity& similarity, const Eigen::Vector3d& centre,
+                                             const SimilarityCovariance& about_centre) {
+  const Eigen::Matrix3d turn = similarity.scale * similarity.rotation.toRotationMatrix();
+  SimilarityCovariance about_origin = SimilarityCovariance::Identity();
+  about_origin.bottomLeftCorner<3, 3>() = turn * skew(centre);
+  about_origin.block<3, 1>(4, 3) = -turn * centre;
+  return propagated(about_origin, about_centre);
 }
 
 namespace {

@@ -3,6 +3,13 @@
 // Least squares in closed form after Umeyama, "Least-squares estimation of transformation parameters between two point
 // patterns", IEEE PAMI 13(4), 1991, with weights. The robust variant minimises sum log(1 + (|r_i| / sigma_i)^2)
 // (Cauchy): the best of the least squares solution and of samples of three points, refined by iterated reweighting.
+//
+// Steps of a similarity are (w, q, d): R Exp(w) (rotation.h), s exp(q), t + d. About the centroids, y = s R (x - c) +
+// u, the normal equations of the closed form fall apart,
+//
+//     w: s^2 sum g (|x - c|^2 I - (x - c)(x - c)')     q: s^2 sum g |x - c|^2     u: sum g I
+//
+// with g the inverse variances; and t = u - s R c.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,6 +40,22 @@ struct Similarity {
 // leave the rotation about the line arbitrary (but proper). Empty with fewer than two points or no extent.
 std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                          std::span<const double> weights = {});
+
+using SimilarityStep = Eigen::Matrix<double, 7, 1>;        // (w, q, d): rad, -, units of `to`
+using SimilarityCovariance = Eigen::Matrix<double, 7, 7>;  // of such a step
+
+Similarity similarity_update(const Similarity& similarity, const SimilarityStep& step);
+
+// Covariance of what fit_similarity returned for the same `from` and weights, where these are inverse variances: of the
+// coordinates of y - s R x, which is s^2 times the variance of those of x where x has errors too. Weights known up to a
+// factor leave the covariance known up to its inverse. Empty for points on one line and fewer than three.
+std::optional<SimilarityCovariance> similarity_covariance(const Similarity& fitted,
+                                                          std::span<const Eigen::Vector3d> from,
+                                                          std::span<const double> weights = {});
+
+// From a covariance of (w, q, u) about the centre c of `from` to that of (w, q, d).
+SimilarityCovariance covariance_about_origin(const Similarity& similarity, const Eigen::Vector3d& centre,
+                                             const SimilarityCovariance& about_centre);
 
 // Robust fit; sigma in the units of `to`, one per point. Deterministic: the samples depend on `seed` alone.
 std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d> from,

@@ -18,11 +18,7 @@ struct SimilarityEquations {
     out.by_unknowns << -turn * skew(from), turned, Eigen::Matrix3d::Identity();
     out.by_measurements << turn, -Eigen::Matrix3d::Identity();
   }
-  void move(State& s, const Eigen::Matrix<double, 7, 1>& step) const {
-    s.rotation = rotation_update(s.rotation, step.head<3>());
-    s.scale *= std::exp(step(3));
-    s.translation += step.tail<3>();
-  }
+  void move(State& s, const SimilarityStep& step) const { s = similarity_update(s, step); }
 };
 
 }  // namespace
@@ -50,12 +46,8 @@ std::optional<AdjustedSimilarity> adjust_similarity(const Similarity& start, std
 
   AdjustedSimilarity result{fit->state, {}, fit->weighted_squares, fit->redundancy};
   Similarity& s = result.similarity;
-  const Eigen::Matrix3d turn = s.scale * s.rotation.toRotationMatrix();
-  s.translation += to_centre - turn * from_centre;
-  Eigen::Matrix<double, 7, 7> about_origin = Eigen::Matrix<double, 7, 7>::Identity();
-  about_origin.bottomLeftCorner<3, 3>() = turn * skew(from_centre);
-  about_origin.block<3, 1>(4, 3) = -turn * from_centre;
-  result.covariance = propagated(about_origin, fit->covariance);
+  s.translation += to_centre - s.scale * (s.rotation * from_centre);
+  result.covariance = covariance_about_origin(s, from_centre, fit->covariance);
   return result;
 }
 

@@ -1,7 +1,7 @@
 // Similarity between two sets of points that both carry errors, with its covariance (M31, M50).
 //
 // y = s R x + t for the corrected x and y; three equations and six measurements a point (gauss_helmert.h). Steps are
-// (w, q, d): R Exp(w), s exp(q), t + d (rotation.h). The adjustment refers to the centre of the x, so that places far
+// those of similarity.h. The adjustment refers to the centre of the x, so that places far
 // from the origin cost no digits; the covariance is that of (w, q, d) about the origin all the same.
 #pragma once
 
@@ -19,7 +19,7 @@ struct PointPair {
 
 struct AdjustedSimilarity {
   Similarity similarity;
-  Eigen::Matrix<double, 7, 7> covariance;  // of (w, q, d)
+  SimilarityCovariance covariance;
   double weighted_squares = 0;
   std::int64_t redundancy = 0;
 };

@@ -76,8 +76,8 @@ TEST(Similarity, ProductIsOneBehindTheOther) {
   const Similarity first{0.5, rotation_exp<double>({0.1, 0.2, -2}), {7, 8, 9}};
   const Similarity then{3, rotation_exp<double>({-1, 0.3, 0.5}), {-70, 5, 1}};
   const Eigen::Vector3d point(10, 20, -30);
-  EXPECT_LT(((then * first)(point) - then(first(point))).norm(), 1e-12);
-  EXPECT_LT(((first.inverse() * first)(point) - point).norm(), 1e-12);
+  EXPECT_LT(((then * first)(point)-then(first(point))).norm(), 1e-12);
+  EXPECT_LT(((first.inverse() * first)(point)-point).norm(), 1e-12);
 }
 
 TEST(Similarity, NeverReflectsFlatOrMirroredPoints) {
@@ -96,6 +96,73 @@ TEST(Similarity, RobustFitIgnoresGrossErrors) {
   const auto found = fit_similarity_robust(clouds.from, clouds.to, sigma);
   ASSERT_TRUE(found);
   expect_same(*found, clouds.truth, 0.01, 0.5);
+}
+
+// Errors of many fits in the metric of the covariance: 7 on the average, and chi-square distributed where each is.
+TEST(Similarity, CovarianceIsThatOfRepeatedFits) {
+  const Clouds clouds(15, 0, {100, 60, 5});
+  std::mt19937_64 random(12);
+  std::normal_distribution<double> normal;
+  std::vector<double> from_sigma, weights;
+  for (int i = 0; i < 15; ++i) {
+    from_sigma.push_back(0.05 + 0.02 * (i % 4));
+    const double to_sigma = 2 * from_sigma.back(), s = clouds.truth.scale;
+    weights.push_back(1 / (to_sigma * to_sigma + s * s * from_sigma.back() * from_sigma.back()));
+  }
+  constexpr int kTrials = 4000;
+  double squares = 0;
+  SimilarityCovariance scatter = SimilarityCovariance::Zero(), predicted = scatter;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    auto from = clouds.from, to = clouds.to;
+    for (std::size_t i = 0; i < from.size(); ++i)
+      for (int k = 0; k < 3; ++k) {
+        from[i][k] += from_sigma[i] * normal(random);
+        to[i][k] += 2 * from_sigma[i] * normal(random);
+      }
+    const Similarity found = fit_similarity(from, to, weights).value();
+    predicted = similarity_covariance(found, from, weights).value();
+    SimilarityStep error;
+    error << rotation_log<double>(clouds.truth.rotation.conjugate() * found.rotation),
+        std::log(found.scale / clouds.truth.scale), found.translation - clouds.truth.translation;
+    squares += error.dot(predicted.ldlt().solve(error)) / kTrials;
+    scatter += error * error.transpose() / kTrials;
+    EXPECT_LT((clouds.truth(from[0]) - similarity_update(found, -error)(from[0])).norm(), 1e-3);
+  }
+  EXPECT_NEAR(squares, 7, 4 * std::sqrt(2.0 * 7 / kTrials));
+  for (int k = 0; k < 7; ++k) EXPECT_NEAR(scatter(k, k) / predicted(k, k), 1, 0.1) << k;
+}
+
+// The inverse of the normal equations at the origin, made without the centroids.
+TEST(Similarity, CovarianceIsTheInverseOfTheNormalEquations) {
+  const Clouds clouds(6);
+  const std::vector<double> weights = {1, 2, 3, 4, 0.5, 0.25};
+  SimilarityCovariance normal = SimilarityCovariance::Zero();
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    Eigen::Matrix<double, 3, 7> by_step;
+    for (int k = 0; k < 7; ++k) {
+      const SimilarityStep step = 1e-6 * SimilarityStep::Unit(k);
+      by_step.col(k) = (similarity_update(clouds.truth, step)(clouds.from[i]) -
+                        similarity_update(clouds.truth, -step)(clouds.from[i])) /
+                       2e-6;
+    }
+    normal += weights[i] * by_step.transpose() * by_step;
+  }
+  const SimilarityCovariance covariance = similarity_covariance(clouds.truth, clouds.from, weights).value();
+  const SimilarityCovariance product = normal * covariance;
+  EXPECT_LT((product - SimilarityCovariance::Identity()).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+TEST(Similarity, CovarianceRefusesWhatLeavesTheRotationOpen) {
+  const Similarity identity;
+  const std::vector<Eigen::Vector3d> line = {{0, 0, 0}, {1, 2, 3}, {2, 4, 6}, {-1, -2, -3}};
+  EXPECT_FALSE(similarity_covariance(identity, line));
+  EXPECT_FALSE(similarity_covariance(identity, std::vector<Eigen::Vector3d>(5, Eigen::Vector3d::Ones())));
+  std::vector<Eigen::Vector3d> good = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  EXPECT_TRUE(similarity_covariance(identity, good));
+  EXPECT_FALSE(similarity_covariance(identity, good, std::vector<double>(2, 1.0)));
+  EXPECT_FALSE(similarity_covariance(identity, std::span(good).first(2)));
+  good[1].x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(similarity_covariance(identity, good));
 }
 
 TEST(Similarity, RefusesPointsWithoutExtent) {
