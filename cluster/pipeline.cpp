@@ -160,9 +160,11 @@ void run_stages(Job& job, const std::string& tie_points) {
     const CandidateGraph graph = run_candidates(job, features);
     if (last == "partition") return;
     matches = run_matching(job, features, graph);
+    use_memory_sparingly();
     tiles = run_tiles(job, matches);
     tracks = run_tracks(job, matches, tiles);
   } else {
+    use_memory_sparingly();
     tiles = run_tiles_of_tracks(job, tie_points);
     if (last == "partition") return;
     tracks = run_given_tracks(job, tie_points, tiles);

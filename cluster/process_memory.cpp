@@ -27,10 +27,12 @@ double peak_rss_mib() { return read_kib("/proc/self/status", "VmHWM:") / 1024; }
 
 void reset_peak_rss() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
+void return_freed_memory() { malloc_trim(0); }
+
 void use_memory_sparingly() {
   constexpr int kLargeBlock = 1 << 20;
   mallopt(M_MMAP_THRESHOLD, kLargeBlock);
-  malloc_trim(0);
+  return_freed_memory();
 }
 
 double host_memory_mib() {

@@ -5,11 +5,12 @@
 
 namespace megablock {
 
-double peak_rss_mib();  // VmHWM since the last reset
-void reset_peak_rss();  // where the kernel allows it
+double peak_rss_mib();       // VmHWM since the last reset
+void reset_peak_rss();       // where the kernel allows it
+void return_freed_memory();  // to the system: what malloc keeps of it
 // What was freed goes back to the system, and from now on so does every block above 1 MiB as soon as it is freed. The
-// program's malloc keeps such pages for the next image's features (arithmetic.cpp); in a merge of thousands of fronts
-// and tiles of all sizes a third of the process would lie idle between them.
+// program's malloc keeps such pages for the next image's features (arithmetic.cpp); from the tiles on, among tracks,
+// tiles and thousands of fronts of all sizes, half of the process would lie idle between them.
 void use_memory_sparingly();
 double host_memory_mib();  // MemTotal, or less where a control group (Slurm, container) limits it
 // The least memory.max (version 2) or memory.limit_in_bytes (version 1) of a control group and those above it; infinity

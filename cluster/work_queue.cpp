@@ -104,6 +104,7 @@ void add_failures(Job& job, const std::vector<FailedUnit>& failures) {
 
 StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units) {
   begin_stage(job, stage, units);
+  return_freed_memory();
   reset_peak_rss();
   job.ranks.reset_counter();
   RankRecord mine;

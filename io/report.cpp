@@ -84,21 +84,21 @@ struct Report::Gathered {
 };
 
 Report::Report(const BlockResult& result, const TrackBatches& tracks) {
-  constexpr std::int64_t kDrawn = 400000;  // tracks at most
+  constexpr std::int64_t kDrawn = 200000;  // tracks at most
   gathered_.reset(new Gathered{report::figures_of(result, tracks), sample_of(tracks, kDrawn)});
 }
 
 Report::~Report() = default;
 Report::Report(Report&&) noexcept = default;
 
-std::string Report::html(BlockResult result, const ReportContext& context) const {
-  static_cast<TrackResults&>(result) = gathered_->sample;
+std::string Report::html(BlockResult result, const ReportContext& context) && {
+  static_cast<TrackResults&>(result) = std::move(gathered_->sample);
   return page_of(result, gathered_->figures, context);
 }
 
 std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context) {
-  const Report report(result, tracks);
-  return report.html(std::move(result), context);
+  Report report(result, tracks);
+  return std::move(report).html(std::move(result), context);
 }
 
 }  // namespace megablock

@@ -31,7 +31,7 @@ class Report {
   Report(const BlockResult& result, const TrackBatches& tracks);
   ~Report();
   Report(Report&&) noexcept;
-  std::string html(BlockResult result, const ReportContext& context) const;
+  std::string html(BlockResult result, const ReportContext& context) &&;  // hands over what was gathered
 
  private:
   struct Gathered;

@@ -183,7 +183,7 @@ StoredTracks::StoredTracks(std::string path)
     : path_(std::move(path)), count_(count_result_tracks(Hdf5Reader(path_, "result"))) {}
 
 void StoredTracks::visit(const Visit& visit) const {
-  constexpr std::int64_t kBatch = 1 << 16;  // tracks
+  constexpr std::int64_t kBatch = 1 << 14;  // tracks
   const Hdf5Reader file(path_, "result");
   for (std::int64_t first = 0; first < count_; first += kBatch)
     visit(read_result_tracks(file, {first, std::min(kBatch, count_ - first)}));

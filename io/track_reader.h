@@ -25,7 +25,7 @@ class TrackReader {
   void visit(
       const std::function<void(const TrackSet&)>& take,
       const Wanted& wanted = [](std::int64_t, std::int64_t) { return true; },
-      std::int64_t batch_observations = std::int64_t{1} << 20) const;
+      std::int64_t batch_observations = std::int64_t{1} << 18) const;
 
   // The observations in some images (ascending), in the order of the rows. Reads and keeps less than images().
   struct Found {

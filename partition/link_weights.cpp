@@ -6,7 +6,7 @@
 namespace megablock {
 
 void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
-  constexpr std::size_t kLeastWaiting = std::size_t{1} << 20;
+  constexpr std::size_t kLeastWaiting = std::size_t{1} << 18;
   if (a == b) return;
   edges_.push_back({std::min(a, b), std::max(a, b), tracks});
   if (edges_.size() - summed_ > std::max(kLeastWaiting, summed_ / 2)) sum_up();

@@ -20,6 +20,6 @@ TrackSet read_given_tracks(const std::string& tie_points, const Block& block);
 // result does not depend on it. Errors as check_images; StoreError where the scratch file cannot be written.
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
                        const std::string& scratch_file, const std::function<void(const TrackSet&)>& take,
-                       std::int64_t observations_at_a_time = std::int64_t{1} << 23);
+                       std::int64_t observations_at_a_time = std::int64_t{1} << 21);
 
 }  // namespace megablock

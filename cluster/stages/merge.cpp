@@ -169,6 +169,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
     if (!seam.note.empty()) job.notes.push_back(seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
     job.notes.push_back(line);
+  return_freed_memory();  // fronts, tiles
   BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
   result.stages = statistics_of(job, event);
   std::filesystem::create_directories(job.store.path("result"));
@@ -187,7 +188,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
 void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
                const std::vector<std::string>& adjusted_units) {
   const double start = monotonic_seconds();
-  use_memory_sparingly();
+  return_freed_memory();
   reset_peak_rss();
   const MergeInputs inputs{oriented, tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);

@@ -20,7 +20,7 @@ namespace megablock {
 namespace {
 
 constexpr std::int64_t kPieceTracks = 512;      // read at a time of each tile
-constexpr std::int64_t kBatchTracks = 1 << 16;  // handed on at a time
+constexpr std::int64_t kBatchTracks = 1 << 14;  // handed on at a time
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 // Adjusted minus measured; NaN where there is no point or it lies behind the camera.

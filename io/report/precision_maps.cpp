@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kMostCells = 56, kLeastCells = 8;  // along the map's longer side
 constexpr double kPointsPerCell = 12;               // in the mean, so that an empty cell says something
-constexpr std::size_t kCoveragePoints = 400000;     // looked at
+constexpr std::size_t kCoveragePoints = 200000;     // looked at
 constexpr std::size_t kEllipses = 1500;             // drawn
 
 // 1, 2, 3, 4, 5 to 6, 7 to 9, 10 and more images.
