@@ -25,7 +25,7 @@ namespace {
 
 using Block7 = SimilarityCovariance;
 
-std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
+std::size_t nth(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 // Median of a chi-square variable.
 double chi_square_median(int degrees) { return chi_square_quantile(0.5, degrees); }
@@ -61,10 +61,10 @@ class NormalEquations {
   }
   // Rows of m, columns of n.
   void add(std::int32_t m, std::int32_t n, const Block7& block) {
-    if (row_[at(m)] < row_[at(n)] || row_[at(n)] < 0) return;  // the lower triangle
-    blocks_.try_emplace({row_[at(m)], row_[at(n)]}, Block7::Zero()).first->second += block;
+    if (row_[nth(m)] < row_[nth(n)] || row_[nth(n)] < 0) return;  // the lower triangle
+    blocks_.try_emplace({row_[nth(m)], row_[nth(n)]}, Block7::Zero()).first->second += block;
   }
-  void add(std::int32_t m, const SimilarityStep& right) { right_[at(m)] += right; }
+  void add(std::int32_t m, const SimilarityStep& right) { right_[nth(m)] += right; }
 
   // Steps of all models, zero for held ones. False: not determined.
   bool factorise() {
@@ -93,16 +93,16 @@ class NormalEquations {
   }
   // Length of the steps of one model in the metric of its own normal equations.
   double length(std::int32_t m, const SimilarityStep& step) const {
-    const auto found = blocks_.find({row_[at(m)], row_[at(m)]});
+    const auto found = blocks_.find({row_[nth(m)], row_[nth(m)]});
     return found == blocks_.end() ? 0 : std::sqrt(std::max(0.0, step.dot(found->second * step)));
   }
   Block7 covariance(std::int32_t m) const {
-    if (row_[at(m)] < 0) return Block7::Zero();
+    if (row_[nth(m)] < 0) return Block7::Zero();
     Eigen::Matrix<double, Eigen::Dynamic, 7> unit(7 * rows_, 7);
     unit.setZero();
-    unit.middleRows<7>(7 * row_[at(m)]).setIdentity();
+    unit.middleRows<7>(7 * row_[nth(m)]).setIdentity();
     const Eigen::Matrix<double, Eigen::Dynamic, 7> columns = factor_.solve(unit);
-    const Block7 result = columns.middleRows<7>(7 * row_[at(m)]);
+    const Block7 result = columns.middleRows<7>(7 * row_[nth(m)]);
     return 0.5 * (result + result.transpose());
   }
 
@@ -161,12 +161,12 @@ class Assembly {
       : options_(options), row_of_(models.size()) {
     std::iota(row_of_.begin(), row_of_.end(), 0);
     std::sort(row_of_.begin(), row_of_.end(),
-              [&](std::int32_t a, std::int32_t b) { return models[at(a)].number < models[at(b)].number; });
+              [&](std::int32_t a, std::int32_t b) { return models[nth(a)].number < models[nth(b)].number; });
     for (const std::int32_t m : row_of_) {
-      check_finite(models[at(m)]);
-      if (!models_.empty() && models_.back().number == models[at(m)].number)
-        throw InputError(fmt::format("assembly: model {} is given twice", models[at(m)].number));
-      models_.push_back(models[at(m)]);
+      check_finite(models[nth(m)]);
+      if (!models_.empty() && models_.back().number == models[nth(m)].number)
+        throw InputError(fmt::format("assembly: model {} is given twice", models[nth(m)].number));
+      models_.push_back(models[nth(m)]);
       reduce(models_.back());
     }
     find_places();
@@ -208,23 +208,23 @@ class Assembly {
     };
     std::vector<Key> keys;
     for (std::int32_t m = 0; m < std::ssize(models_); ++m) {
-      for (std::int32_t i = 0; i < std::ssize(models_[at(m)].points); ++i)
-        keys.push_back({models_[at(m)].points[at(i)].number, m, i, false});
-      for (std::int32_t i = 0; i < std::ssize(models_[at(m)].images); ++i)
-        keys.push_back({models_[at(m)].images[at(i)].number, m, i, true});
+      for (std::int32_t i = 0; i < std::ssize(models_[nth(m)].points); ++i)
+        keys.push_back({models_[nth(m)].points[nth(i)].number, m, i, false});
+      for (std::int32_t i = 0; i < std::ssize(models_[nth(m)].images); ++i)
+        keys.push_back({models_[nth(m)].images[nth(i)].number, m, i, true});
     }
     std::sort(keys.begin(), keys.end());
     for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
       SharedPlace place;
       place.image = keys[begin].image;
       for (; end < keys.size() && keys[end].number == keys[begin].number && keys[end].image == place.image; ++end) {
-        const Model& model = models_[at(keys[end].model)];
+        const Model& model = models_[nth(keys[end].model)];
         if (place.image) {
-          const ModelImage& i = model.images[at(keys[end].row)];
+          const ModelImage& i = model.images[nth(keys[end].row)];
           place.entries.push_back(
               {keys[end].model, keys[end].row, i.pose.centre, i.centre_sigma, i.pose.rotation, i.rotation_sigma, true});
         } else {
-          const ModelPoint& p = model.points[at(keys[end].row)];
+          const ModelPoint& p = model.points[nth(keys[end].row)];
           place.entries.push_back(
               {keys[end].model, keys[end].row, p.position, p.sigma, Eigen::Quaterniond::Identity(), 0, true});
         }
@@ -253,7 +253,7 @@ class Assembly {
     std::vector<Block7> covariances;
     for (std::size_t l = 0; l < links_.size(); ++l) {
       link_of[{links_[l].a, links_[l].b}] = l;
-      above[at(links_[l].a)].push_back(links_[l].b);
+      above[nth(links_[l].a)].push_back(links_[l].b);
       covariances.push_back(links_[l].information.inverse());
     }
     struct Triangle {
@@ -263,7 +263,7 @@ class Assembly {
     std::vector<Triangle> triangles;
     for (std::size_t ab = 0; ab < links_.size(); ++ab) {
       const std::int32_t a = links_[ab].a, b = links_[ab].b;
-      for (const std::int32_t c : above[at(b)]) {
+      for (const std::int32_t c : above[nth(b)]) {
         const auto found = link_of.find({a, c});
         if (found == link_of.end()) continue;
         const std::size_t ac = found->second, bc = link_of.at({b, c});
@@ -296,22 +296,23 @@ class Assembly {
     std::vector<std::vector<std::size_t>> tree(models_.size());
     for (const std::size_t l : order)
       if (joined.join(links_[l].a, links_[l].b))
-        for (const std::int32_t m : {links_[l].a, links_[l].b}) tree[at(m)].push_back(l);
+        for (const std::int32_t m : {links_[l].a, links_[l].b}) tree[nth(m)].push_back(l);
     similarity_.assign(models_.size(), Similarity());
     reference_.assign(models_.size(), -1);
     for (std::int32_t first = 0; first < std::ssize(models_); ++first) {
-      if (reference_[at(first)] >= 0) continue;
-      reference_[at(first)] = first;
-      similarity_[at(first)].translation = centres_[at(first)];
+      if (reference_[nth(first)] >= 0) continue;
+      reference_[nth(first)] = first;
+      similarity_[nth(first)].translation = centres_[nth(first)];
       for (std::vector<std::int32_t> open{first}; !open.empty();) {
         const std::int32_t from = open.back();
         open.pop_back();
-        for (const std::size_t l : tree[at(from)]) {
+        for (const std::size_t l : tree[nth(from)]) {
           const ModelLink& link = links_[l];
           const std::int32_t to = link.a == from ? link.b : link.a;
-          if (reference_[at(to)] >= 0) continue;
-          similarity_[at(to)] = similarity_[at(from)] * (link.a == from ? link.similarity : link.similarity.inverse());
-          reference_[at(to)] = first;
+          if (reference_[nth(to)] >= 0) continue;
+          similarity_[nth(to)] =
+              similarity_[nth(from)] * (link.a == from ? link.similarity : link.similarity.inverse());
+          reference_[nth(to)] = first;
           open.push_back(to);
         }
       }
@@ -320,7 +321,7 @@ class Assembly {
 
   std::vector<std::uint8_t> held() const {
     std::vector<std::uint8_t> result(models_.size());
-    for (std::int32_t m = 0; m < std::ssize(models_); ++m) result[at(m)] = reference_[at(m)] == m;
+    for (std::int32_t m = 0; m < std::ssize(models_); ++m) result[nth(m)] = reference_[nth(m)] == m;
     return result;
   }
 
@@ -330,7 +331,7 @@ class Assembly {
 
   // What the models' similarities say of a link that they do not agree in, in b.
   SimilarityStep gap(const ModelLink& link) const {
-    return step_of(link.similarity.inverse() * (similarity_[at(link.a)].inverse() * similarity_[at(link.b)]));
+    return step_of(link.similarity.inverse() * (similarity_[nth(link.a)].inverse() * similarity_[nth(link.b)]));
   }
   std::vector<double> link_squares() const {
     std::vector<double> result;
@@ -378,7 +379,7 @@ class Assembly {
   double move_and_measure(const NormalEquations& equations, const std::vector<SimilarityStep>& steps) {
     double longest = 0;
     for (std::int32_t m = 0; m < std::ssize(models_); ++m)
-      longest = std::max(longest, equations.length(m, steps[at(m)]));
+      longest = std::max(longest, equations.length(m, steps[nth(m)]));
     if (!std::isfinite(longest)) throw ComputeError("assembly: the adjustment of the models does not converge");
     move(steps);
     return longest;
@@ -389,18 +390,18 @@ class Assembly {
     DisjointSets joined(static_cast<std::int32_t>(models_.size()));
     for (const ModelLink& link : links_)
       if (link.kept) joined.join(link.a, link.b);
-    for (std::int32_t m = 0; m < std::ssize(models_); ++m) reference_[at(m)] = joined.find(m);
+    for (std::int32_t m = 0; m < std::ssize(models_); ++m) reference_[nth(m)] = joined.find(m);
     std::vector<Similarity> back(models_.size());
     for (std::int32_t m = 0; m < std::ssize(models_); ++m)
-      if (reference_[at(m)] == m)
-        back[at(m)] = Similarity{1, Eigen::Quaterniond::Identity(), centres_[at(m)]} * similarity_[at(m)].inverse();
+      if (reference_[nth(m)] == m)
+        back[nth(m)] = Similarity{1, Eigen::Quaterniond::Identity(), centres_[nth(m)]} * similarity_[nth(m)].inverse();
     for (std::int32_t m = 0; m < std::ssize(models_); ++m)
-      similarity_[at(m)] = reference_[at(m)] == m ? Similarity{1, Eigen::Quaterniond::Identity(), centres_[at(m)]}
-                                                  : back[at(reference_[at(m)])] * similarity_[at(m)];
+      similarity_[nth(m)] = reference_[nth(m)] == m ? Similarity{1, Eigen::Quaterniond::Identity(), centres_[nth(m)]}
+                                                    : back[nth(reference_[nth(m)])] * similarity_[nth(m)];
     std::vector<SharedPlace> split;
     for (const SharedPlace& place : places_) {
       std::map<std::int32_t, SharedPlace> parts;
-      for (const auto& entry : place.entries) parts[reference_[at(entry.model)]].entries.push_back(entry);
+      for (const auto& entry : place.entries) parts[reference_[nth(entry.model)]].entries.push_back(entry);
       for (auto& [reference, part] : parts) {
         part.image = place.image;
         if (part.entries.size() > 1) split.push_back(std::move(part));
@@ -419,8 +420,8 @@ class Assembly {
     Mean m{Eigen::Vector3d::Zero(), Eigen::Quaterniond::Identity(), 0, 0};
     for (const auto& e : place.entries) {
       if (!e.kept) continue;
-      if (m.weight == 0 && place.image) m.rotation = e.rotation * similarity_[at(e.model)].rotation.conjugate();
-      m.position += weight(e) * similarity_[at(e.model)](e.position);
+      if (m.weight == 0 && place.image) m.rotation = e.rotation * similarity_[nth(e.model)].rotation.conjugate();
+      m.position += weight(e) * similarity_[nth(e.model)](e.position);
       m.weight += weight(e);
       m.rotation_weight += rotation_weight(e);
     }
@@ -429,26 +430,26 @@ class Assembly {
       Eigen::Vector3d turn = Eigen::Vector3d::Zero();
       for (const auto& e : place.entries)
         if (e.kept)
-          turn +=
-              rotation_weight(e) / m.rotation_weight *
-              rotation_log<double>(m.rotation.conjugate() * e.rotation * similarity_[at(e.model)].rotation.conjugate());
+          turn += rotation_weight(e) / m.rotation_weight *
+                  rotation_log<double>(m.rotation.conjugate() * e.rotation *
+                                       similarity_[nth(e.model)].rotation.conjugate());
       m.rotation = rotation_update(m.rotation, turn);
     }
     return m;
   }
   double weight(const SharedPlace::Entry& e) const {
-    const double sigma = e.sigma * similarity_[at(e.model)].scale;
+    const double sigma = e.sigma * similarity_[nth(e.model)].scale;
     return 1 / (sigma * sigma);
   }
   static double rotation_weight(const SharedPlace::Entry& e) {
     return e.rotation_sigma > 0 ? 1 / (e.rotation_sigma * e.rotation_sigma) : 0;
   }
   Eigen::Vector3d in_model(const SharedPlace::Entry& e, const Eigen::Vector3d& position) const {
-    const Similarity& s = similarity_[at(e.model)];
+    const Similarity& s = similarity_[nth(e.model)];
     return s.rotation.conjugate() * (position - s.translation) / s.scale;
   }
   Eigen::Vector3d turn_in_model(const SharedPlace::Entry& e, const Eigen::Quaterniond& rotation) const {
-    return rotation_log<double>(e.rotation.conjugate() * rotation * similarity_[at(e.model)].rotation);
+    return rotation_log<double>(e.rotation.conjugate() * rotation * similarity_[nth(e.model)].rotation);
   }
 
   // Squares of the misfit of an entry over their expectation were the similarities known; the larger of place and
@@ -516,7 +517,7 @@ class Assembly {
     equations.clear();
     weighted_squares_ = 0;
     redundancy_ = 0;
-    for (std::int32_t m = 0; m < std::ssize(models_); ++m) redundancy_ -= reference_[at(m)] == m ? 0 : 7;
+    for (std::int32_t m = 0; m < std::ssize(models_); ++m) redundancy_ -= reference_[nth(m)] == m ? 0 : 7;
     struct Rows {
       std::int32_t model;
       Eigen::Matrix<double, 7, 3> by_place, by_attitude;  // J' W B
@@ -528,7 +529,7 @@ class Assembly {
       rows.clear();
       for (const auto& e : place.entries) {
         if (!e.kept) continue;
-        const Similarity& s = similarity_[at(e.model)];
+        const Similarity& s = similarity_[nth(e.model)];
         const Eigen::Matrix3d back = s.rotation.conjugate().toRotationMatrix();
         const Eigen::Vector3d z = in_model(e, m.position), r = z - e.position;
         const Eigen::Matrix<double, 3, 7> by_step = by_model_step(z);
@@ -566,12 +567,12 @@ class Assembly {
     result.part.resize(count);
     if (!covariance_.empty()) result.covariance.resize(count);
     for (std::size_t m = 0; m < count; ++m) {
-      const std::size_t row = at(row_of_[m]);
+      const std::size_t row = nth(row_of_[m]);
       Similarity whole = similarity_[m];
       whole.translation -= whole.scale * (whole.rotation * centres_[m]);
       if (reference_[m] == static_cast<std::int32_t>(m)) whole = Similarity();
       result.similarity[row] = whole;
-      result.part[row] = models_[at(reference_[m])].number;
+      result.part[row] = models_[nth(reference_[m])].number;
       if (covariance_.empty()) continue;
       Block7 to_common = Block7::Identity();
       to_common.bottomRightCorner<3, 3>() = whole.scale * whole.rotation.toRotationMatrix();
@@ -580,9 +581,9 @@ class Assembly {
     }
     for (ModelLink link : links_) {
       Similarity& s = link.similarity;
-      s.translation += centres_[at(link.a)] - s.scale * (s.rotation * centres_[at(link.b)]);
-      link.a = row_of_[at(link.a)];
-      link.b = row_of_[at(link.b)];
+      s.translation += centres_[nth(link.a)] - s.scale * (s.rotation * centres_[nth(link.b)]);
+      link.a = row_of_[nth(link.a)];
+      link.b = row_of_[nth(link.b)];
       result.links.push_back(link);
     }
     for (const SharedPlace& place : places_)

@@ -66,6 +66,9 @@ class LinkFit {
     const auto start = best_sample();
     if (!start) return std::nullopt;
     Similarity s = *start;
+    const double inflation =
+        options_.scale_sigmas ? std::max(1.0, median(all_squares(s)) / chi_square_quantile(0.5, 3)) : 1.0;
+    limit_ *= inflation;
     std::vector<std::uint8_t> agrees = agreeing(s, kWide * kWide * limit_);
     ModelLink link;
     for (int round = 0; round < kRounds; ++round) {
@@ -81,6 +84,7 @@ class LinkFit {
     if (equations(agrees) < 7 + options_.min_redundancy || link.agreeing < options_.min_share * link.shared)
       return std::nullopt;
     link.similarity = s;
+    link.information /= inflation;
     return link;
   }
 
@@ -114,6 +118,11 @@ class LinkFit {
     const Turn& turn = turns_[i - first_image_];
     return std::max(place, std::pow(rotation_angle(s.rotation, turn.rotation) / turn.sigma, 2));
   }
+  std::vector<double> all_squares(const Similarity& s) const {
+    std::vector<double> result(places_.size());
+    for (std::size_t i = 0; i < result.size(); ++i) result[i] = squares(s, i);
+    return result;
+  }
   std::vector<std::uint8_t> agreeing(const Similarity& s, double limit) const {
     std::vector<std::uint8_t> result(places_.size());
     for (std::size_t i = 0; i < result.size(); ++i) result[i] = squares(s, i) <= limit;
@@ -145,16 +154,20 @@ class LinkFit {
     for (int draw = 0; draw < options_.max_samples && draw < wanted; ++draw) {
       const auto candidate = sample();
       if (!candidate || !candidate->translation.allFinite()) continue;
-      double sum = 0;
+      double value = 0;
       int agree = 0;
-      for (std::size_t i = 0; i < places_.size() && sum < least; ++i) {
+      if (options_.scale_sigmas) {
+        value = median(all_squares(*candidate));
+        agree = static_cast<int>(places_.size() / 2);
+      }
+      for (std::size_t i = 0; i < places_.size() && !options_.scale_sigmas && value < least; ++i) {
         const double e = squares(*candidate, i);
-        sum += std::min(e, limit);
+        value += std::min(e, limit);
         agree += e < limit;
       }
-      if (!(sum < least)) continue;
+      if (!(value < least)) continue;
       best = candidate;
-      least = sum;
+      least = value;
       const double good = std::pow(static_cast<double>(agree) / static_cast<double>(places_.size()), 3);
       wanted = good < 1 ? std::max(20.0, std::log(kMiss) / std::log1p(-good)) : 20;
     }
