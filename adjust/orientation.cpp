@@ -9,6 +9,7 @@
 #include "adjust/global_positioning.h"
 #include "adjust/ground_alignment.h"
 #include "adjust/orientation_graph.h"
+#include "adjust/orientation_parts.h"
 #include "adjust/resection.h"
 #include "adjust/rotation_averaging.h"
 #include "geometry/angles.h"
@@ -22,6 +23,7 @@ void OrientationOptions::check() const {
     throw InputError("orientation: max_rotation_error_deg must lie between 0 and 180");
   if (min_points_per_image < 4) throw InputError("orientation: min_points_per_image must be at least 4");
   if (tracks_per_pair < 20) throw InputError("orientation: tracks_per_pair must be at least 20");
+  if (part_frames != 0 && part_frames < 50) throw InputError("orientation: part_frames must be 0 or at least 50");
 }
 
 namespace {
@@ -355,6 +357,13 @@ OrientationResult orient_component(const Block& block, const BlockState& start, 
                                    const OrientationOptions& options) {
   options.check();
   if (frames.size() < 2) throw ComputeError("orientation: a component needs at least two frames");
+  const auto placed = [&](FrameIndex frame) {
+    return start.oriented[frame] ||
+           (options.observations.use_position_priors && block.frames[frame].position_prior.has_value());
+  };
+  if (options.part_frames > 0 && std::ssize(frames) > options.part_frames &&
+      std::none_of(frames.begin(), frames.end(), placed))
+    return orient_in_parts(block, start, frames, pairs, tracks, options);
   Orientation orientation(block, start, options, make_orientation_graph(block, start, frames, pairs, tracks, options));
   orientation.run();
   return orientation.result(start);

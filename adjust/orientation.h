@@ -16,13 +16,15 @@ struct OrientationOptions {
   double max_rotation_error_deg = 10;  // relative rotations farther from the average are dropped
   int min_points_per_image = 15;       // an image with fewer triangulated points is not oriented
   std::int64_t tracks_per_pair = 120;  // longest tracks used for positioning (bounds memory)
+  int part_frames = 0;                 // larger components without any position are oriented in parts of so many frames
+                                       // (orientation_parts.h); 0: always as a whole
   void check() const;                  // throws InputError
 };
 
 struct OrientationResult {
-  BlockState state;                    // `oriented` set for the frames that got a pose
+  BlockState state;                                        // `oriented` set for the frames that got a pose
   std::vector<std::pair<FrameIndex, std::string>> failed;  // frames without pose and why
-  std::string summary;                 // one line
+  std::string summary;                                     // one line
 };
 
 // Orients the frames of one component. Frames oriented in `start` (given poses) stay where they are and orient others.

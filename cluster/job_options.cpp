@@ -85,6 +85,7 @@ void describe(Visitor& visit, OrientationOptions& o) {
   visit.number("max_rotation_error_deg", o.max_rotation_error_deg);
   visit.integer("min_points_per_image", o.min_points_per_image);
   visit.integer("tracks_per_pair", o.tracks_per_pair);
+  visit.integer("part_frames", o.part_frames);
 }
 
 template <typename Visitor>

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/error.h"
-#include "model_grid.h"
+#include "tests/unit/adjust/model_grid.h"
 
 namespace megablock {
 namespace {
