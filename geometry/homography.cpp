@@ -47,6 +47,32 @@ std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector3d> a
   return *h * ((2 * front >= a.size() ? 1 : -1) / middle);
 }
 
+std::optional<Eigen::Matrix3d> solve_four_point_homography(const std::array<Eigen::Vector3d, 4>& a,
+                                                           const std::array<Eigen::Vector3d, 4>& b) {
+  constexpr double kOneLine = 1e-9;  // of determinants, against the lengths of their columns
+  // det(A) and det(A) l; the columns of the cofactors are those of the inverse, transposed.
+  const auto coordinates = [&](const std::array<Eigen::Vector3d, 4>& p, Eigen::Matrix3d& cofactor) {
+    Eigen::Matrix3d m;
+    m << p[0], p[1], p[2];
+    cofactor = cofactors(m);
+    Eigen::Vector4d l;
+    l << cofactor.transpose() * p[3], p[0].dot(cofactor.col(0));
+    const Eigen::Vector4d n(p[0].norm(), p[1].norm(), p[2].norm(), p[3].norm());
+    const Eigen::Vector4d least = n.prod() * n.cwiseInverse();
+    return (l.cwiseAbs().array() > kOneLine * least.array()).all() ? l : Eigen::Vector4d::Zero().eval();
+  };
+  Eigen::Matrix3d cofactor_a, cofactor_b;
+  const Eigen::Vector4d l = coordinates(a, cofactor_a), m = coordinates(b, cofactor_b);
+  if (!(l.w() * m.w() != 0)) return std::nullopt;
+  const Eigen::Vector3d ratio = m.head<3>().cwiseQuotient(l.head<3>());
+  // All points are taken to positive multiples, the fourth to itself.
+  const double sign = l.w() * m.w() > 0 ? 1 : -1;
+  if (!((sign * ratio).minCoeff() > 0) || !ratio.allFinite()) return std::nullopt;
+  Eigen::Matrix3d from;
+  from << ratio.x() * b[0], ratio.y() * b[1], ratio.z() * b[2];
+  return Eigen::Matrix3d(from * cofactor_a.transpose() * (m.w() > 0 ? 1 : -1));
+}
+
 std::optional<Eigen::Matrix3d> fit_pixel_homography(std::span<const Eigen::Vector2d> a,
                                                     std::span<const Eigen::Vector2d> b) {
   if (a.size() < 4 || a.size() != b.size()) return std::nullopt;

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <span>
 
@@ -24,7 +25,13 @@ namespace megablock {
 // four would lie behind an image, and where something is not a number.
 std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b);
 
-// The same for pixels (normalising_transformation); of Frobenius norm one.
+// Of four points (homogeneous, of any length) without least squares: with a_4 = sum l_i a_i and b_4 = sum m_i b_i it is
+// B diag(m / l) A^-1. Not scaled, of the sign with b.(H a) > 0; empty where that has not one sign, for three points on
+// one line, and where something is not a number.
+std::optional<Eigen::Matrix3d> solve_four_point_homography(const std::array<Eigen::Vector3d, 4>& a,
+                                                           const std::array<Eigen::Vector3d, 4>& b);
+
+// Least squares for pixels (normalising_transformation); of Frobenius norm one.
 std::optional<Eigen::Matrix3d> fit_pixel_homography(std::span<const Eigen::Vector2d> a,
                                                     std::span<const Eigen::Vector2d> b);
 

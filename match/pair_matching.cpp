@@ -110,7 +110,7 @@ namespace {
 
 // Verification of matches by two-view geometry; `by_chance`: see TwoViewOptions.
 VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
-                    const MatchOptions& options, const Matches& matches, double by_chance) {
+                    const MatchOptions& options, const Matches& matches, const PairKnowledge& known, double by_chance) {
   VerifiedPair pair;
   pair.a = a.image;
   pair.b = b.image;
@@ -123,6 +123,8 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
   two_view.min_inliers = options.min_inliers;
   two_view.by_chance = by_chance;
   two_view.seed = pair_seed(a.image, b.image);
+  two_view.vertical_a = known.vertical_a;
+  two_view.vertical_b = known.vertical_b;
   const TwoView found = estimate_two_view(positioned.points, two_view);
   if (found.model == PairModel::kNone) return pair;
 
@@ -178,10 +180,11 @@ VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Ca
     const GuidedMatches guided = match_along_epipolar(a, b, camera_a, camera_b, *known.orientation, options);
     // Wrong matches lie anywhere in the band.
     const double by_chance = std::min(1.0, options.max_residual_px / std::max(1.0, guided.half_width_px));
-    pair = verify(a, b, camera_a, camera_b, options, guided.matches, by_chance);
+    pair = verify(a, b, camera_a, camera_b, options, guided.matches, known, by_chance);
   }
   if (pair.model == PairModel::kNone)
-    pair = verify(a, b, camera_a, camera_b, options, match_descriptors(a.descriptors, b.descriptors, options), 0);
+    pair =
+        verify(a, b, camera_a, camera_b, options, match_descriptors(a.descriptors, b.descriptors, options), known, 0);
   if (known.orientation && known.filter && pair.model != PairModel::kNone)
     drop_wrong(a, b, camera_a, camera_b, options, *known.orientation, *known.filter, pair);
   return pair;

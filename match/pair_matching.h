@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/interpretation_plane.h"
 #include "io/block.h"
 #include "io/features.h"
 #include "match/trusted_pair.h"
@@ -39,6 +40,8 @@ std::vector<std::pair<std::int32_t, std::int32_t>> match_descriptors(const std::
 struct PairKnowledge {
   std::optional<TrustedPair> orientation;
   const MatchFilter* filter = nullptr;  // none: nothing is filtered
+  // The vertical in the axes of each camera, pointing down (TwoViewOptions).
+  std::optional<AxisDirection> vertical_a = std::nullopt, vertical_b = std::nullopt;
 };
 
 // Matches and verifies one pair; model kNone when it does not pass. Deterministic: seeded by the two image indices. A

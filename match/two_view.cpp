@@ -1,280 +1,283 @@
 #include "match/two_view.h"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
-#include <opencv2/calib3d.hpp>
-#include <optional>
-#include <random>
+#include <span>
 
-#include "match/relative_pose.h"
+#include "geometry/angles.h"
+#include "geometry/homography.h"
+#include "geometry/median.h"
+#include "geometry/pair_estimators.h"
+#include "geometry/ransac.h"
+#include "geometry/rotation_fit.h"
 
 namespace megablock {
 
 namespace {
 
-// OpenCV's robust estimators expect pixels; normalised points are given a nominal focal length.
-constexpr double kNominalFocal = 1000;
+// A simpler model is chosen when it explains this share of the matches of the richer one.
+constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
+// The fundamental matrix is tried below the first share of all matches and chosen by the second factor of gain.
+constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
+// Of the best orientation's support, for a plane's other one to be its twin.
+constexpr double kTwinShare = 0.95;
 
-std::vector<cv::Point2d> nominal_pixels(const std::vector<Eigen::Vector2d>& points) {
-  std::vector<cv::Point2d> result;
-  result.reserve(points.size());
-  for (const auto& p : points) result.emplace_back(p.x() * kNominalFocal, p.y() * kNominalFocal);
-  return result;
-}
-
-Eigen::Matrix3d to_eigen(const cv::Mat& m) {
-  Eigen::Matrix3d result;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) result(r, c) = m.at<double>(r, c);
-  }
-  return result;
-}
-
-cv::UsacParams usac_parameters(const TwoViewOptions& options) {
-  cv::UsacParams p;
-  p.randomGeneratorState = static_cast<int>(options.seed & 0x7FFFFFFF);
-  p.confidence = 0.999;
-  p.maxIterations = 3000;
-  p.score = cv::SCORE_METHOD_MAGSAC;
-  p.sampler = cv::SAMPLING_UNIFORM;
-  p.loMethod = cv::LOCAL_OPTIM_INNER_LO;
-  p.threshold = options.max_residual * kNominalFocal;
-  p.isParallel = false;
-  return p;
-}
-
-// Runs one of OpenCV's estimators; empty when it finds nothing.
-template <typename Estimator>
-std::optional<Eigen::Matrix3d> robust_matrix(Estimator estimator) {
-  try {
-    const cv::Mat m = estimator();
-    if (m.rows != 3 || m.cols != 3 || !cv::checkRange(m)) return std::nullopt;
-    return to_eigen(m);
-  } catch (const cv::Exception&) {
-    return std::nullopt;  // degenerate input
-  }
-}
-
-std::optional<Eigen::Matrix3d> robust_essential(const PointPairs& points, const TwoViewOptions& options) {
-  const auto a = nominal_pixels(points.a), b = nominal_pixels(points.b);
-  const cv::Mat k = (cv::Mat_<double>(3, 3) << kNominalFocal, 0, 0, 0, kNominalFocal, 0, 0, 0, 1);
-  return robust_matrix([&] {
-    cv::Mat mask;
-    return cv::findEssentialMat(a, b, k, k, cv::noArray(), cv::noArray(), mask, usac_parameters(options));
-  });
-}
-
-const Eigen::Matrix3d kNominalCamera = Eigen::Vector3d(kNominalFocal, kNominalFocal, 1).asDiagonal();
-
-std::optional<Eigen::Matrix3d> robust_fundamental(const PointPairs& points, const TwoViewOptions& options) {
-  const auto a = nominal_pixels(points.a), b = nominal_pixels(points.b);
-  auto f = robust_matrix([&] {
-    cv::Mat mask;
-    return cv::findFundamentalMat(a, b, mask, usac_parameters(options));
-  });
-  if (f) *f = kNominalCamera * *f * kNominalCamera;
-  return f;
-}
-
-// x_b ~ H x_a in normalised coordinates.
-std::optional<Eigen::Matrix3d> robust_homography(const PointPairs& points, const TwoViewOptions& options) {
-  const auto a = nominal_pixels(points.a), b = nominal_pixels(points.b);
-  auto h = robust_matrix([&] {
-    cv::Mat mask;
-    return cv::findHomography(a, b, mask, usac_parameters(options));
-  });
-  if (h) *h = kNominalCamera.inverse() * *h * kNominalCamera;
-  return h;
-}
-
-int count_homography(const Eigen::Matrix3d& h, const PointPairs& points, double max_residual) {
-  int count = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d moved = h * points.a[i].homogeneous();
-    if ((moved.hnormalized() - points.b[i]).squaredNorm() <= max_residual * max_residual) ++count;
-  }
-  return count;
-}
-
-std::vector<RelativePoseEstimate> decompose_homography(const Eigen::Matrix3d& h) {
-  cv::Mat matrix(3, 3, CV_64F);
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) matrix.at<double>(r, c) = h(r, c);
-  }
-  std::vector<cv::Mat> rotations, translations, normals;
-  try {
-    cv::decomposeHomographyMat(matrix, cv::Mat::eye(3, 3, CV_64F), rotations, translations, normals);
-  } catch (const cv::Exception&) {
-    return {};
-  }
-  std::vector<RelativePoseEstimate> poses;
-  for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const Eigen::Vector3d t(translations[i].at<double>(0), translations[i].at<double>(1),
-                            translations[i].at<double>(2));
-    if (!(t.norm() > 1e-9)) continue;
-    poses.push_back({Eigen::Quaterniond(to_eigen(rotations[i])).normalized(), t.normalized()});
-  }
-  return poses;
-}
-
-struct Hypothesis {
-  RelativePoseEstimate pose;
-  Support support;
-};
-
-// Best of the candidates by score; the first two are refined (the twisted pair of a plane may start ahead).
-std::optional<Hypothesis> best_hypothesis(const std::vector<RelativePoseEstimate>& candidates, const PointPairs& points,
-                                          double max_residual) {
-  std::vector<Hypothesis> all;
-  for (const auto& pose : candidates) all.push_back({pose, support_of(pose, points, max_residual)});
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Hypothesis& p, const Hypothesis& q) { return p.support.score > q.support.score; });
-  std::optional<Hypothesis> best;
-  for (std::size_t i = 0; i < all.size() && i < 2; ++i) {
-    const RelativePoseEstimate pose = refine(all[i].pose, points, 0.5 * max_residual);
-    Hypothesis refined{pose, support_of(pose, points, max_residual)};
-    Hypothesis& better = refined.support.score > all[i].support.score ? refined : all[i];
-    if (!best || better.support.score > best->support.score) best = std::move(better);
-  }
-  return best;
+RansacOptions sampling(const TwoViewOptions& options, int max_draws) {
+  RansacOptions sampling;
+  sampling.threshold = options.max_residual;
+  sampling.confidence = 0.999;
+  sampling.max_draws = max_draws;
+  sampling.seed = options.seed;
+  return sampling;
 }
 
 std::vector<std::size_t> rows_of(const std::vector<std::uint8_t>& inlier) {
   std::vector<std::size_t> rows;
-  for (std::size_t i = 0; i < inlier.size(); ++i) {
+  for (std::size_t i = 0; i < inlier.size(); ++i)
     if (inlier[i]) rows.push_back(i);
-  }
   return rows;
 }
 
-struct RotationHypothesis {
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  Support support;
+struct InlierRays {
+  std::vector<Eigen::Vector3d> a, b;
+};
+InlierRays rays_of(const PointPairs& points, const std::vector<std::uint8_t>& inlier) {
+  InlierRays rays;
+  for (const std::size_t i : rows_of(inlier)) {
+    rays.a.push_back(points.a[i].homogeneous().normalized());
+    rays.b.push_back(points.b[i].homogeneous().normalized());
+  }
+  return rays;
+}
+
+struct Hypothesis {
+  RelativeOrientation orientation;
+  Consensus support;
+  double scale = 0;  // of the weights of its adjustment
 };
 
-// Samples of two matches, then least squares over the inliers until their number stops growing.
-RotationHypothesis robust_rotation(const PointPairs& points, const TwoViewOptions& options) {
-  constexpr int kSamples = 60;
-  std::mt19937_64 generator(options.seed);
-  RotationHypothesis best;
-  best.support = support_of_rotation(best.rotation, points, options.max_residual);
-  const auto improve = [&](const Eigen::Quaterniond& rotation) {
-    Support support = support_of_rotation(rotation, points, options.max_residual);
-    if (!(support.score > best.support.score)) return false;
-    best = {rotation, std::move(support)};
-    return true;
-  };
-  for (int s = 0; s < kSamples; ++s) {
-    const std::size_t i = generator() % points.size(), j = generator() % points.size();
-    if (i != j) improve(fit_rotation(points, {i, j}));
+class PairEstimation {
+ public:
+  PairEstimation(const PointPairs& points, const TwoViewOptions& options)
+      : points_(points), options_(options), five_points_(points, options.max_residual), needed_(inliers_needed()) {}
+
+  TwoView estimate() {
+    TwoView none;
+    none.inlier.assign(points_.size(), 0);
+    const auto rotation = ransac(RotationPairEstimator(points_), sampling(options_, 300));
+    const int rotation_count = rotation ? rotation->consensus.count : 0;
+    if (rotation_count >= needed_ && rotation_count >= kRotationShare * static_cast<double>(points_.size()))
+      return turned(*rotation);
+    const auto plane = ransac(HomographyEstimator(points_), sampling(options_, 1000));
+    const int plane_count = plane ? plane->consensus.count : 0;
+    draws_ = (rotation ? rotation->draws : 0) + (plane ? plane->draws : 0);
+
+    std::vector<RelativeOrientation> starts;
+    if (rotation) starts.push_back({rotation->model});
+    if (plane) add_twins(plane->consensus.inlier, starts);
+    const std::size_t twins = starts.size();
+    if (const auto found = orientation(starts)) starts.push_back(*found);
+    refine_all(std::span(starts).subspan(std::min<std::size_t>(twins, rotation ? 1 : 0)));
+    const int best_count = hypotheses_.empty() ? 0 : hypotheses_.front().support.count;
+
+    if (rotation_count >= needed_ && rotation_count >= kRotationShare * best_count) return turned(*rotation);
+    // A plane leaves the fundamental matrix undetermined.
+    const bool planar = plane_count >= kPlaneShare * best_count;
+    if (best_count < needed_ || (!planar && best_count < kDoubtfulShare * static_cast<double>(points_.size()))) {
+      auto found = uncalibrated();
+      if (found && found->inlier_count > kFocalGain * best_count) return *std::move(found);
+    }
+    if (best_count < needed_) return none;
+    return oriented(planar);
   }
-  for (int round = 0; round < 10 && best.support.count >= 2; ++round) {
-    if (!improve(fit_rotation(points, rows_of(best.support.inlier)))) break;
+
+ private:
+  // Inliers that chance would give: random matches fall into the residual's band along the epipolar line with the share
+  // of the image that the band covers, and the unknowns of the model adapt to them.
+  int inliers_needed() const {
+    constexpr double kAdaptation = 4;
+    Eigen::AlignedBox2d box;
+    for (const auto& p : points_.b) box.extend(p);
+    const Eigen::Vector2d size = box.sizes().cwiseMax(options_.max_residual);
+    const double share = std::min(1.0, 2 * options_.max_residual * size.norm() / size.prod());
+    const auto count = static_cast<double>(points_.size());
+    const double by_chance = std::max(options_.by_chance, kAdaptation * share) * count;
+    // Matches crowded into a corner all lie in the band: never ask for more than a half.
+    return options_.min_inliers + static_cast<int>(std::min(by_chance, 0.5 * count));
   }
-  return best;
-}
 
-double median_angle_deg(const Eigen::Quaterniond& rotation, const PointPairs& points,
-                        const std::vector<std::uint8_t>& inlier) {
-  std::vector<double> angles;
-  for (const std::size_t i : rows_of(inlier)) angles.push_back(intersection_angle(rotation, points.a[i], points.b[i]));
-  if (angles.empty()) return 0;
-  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-  std::nth_element(angles.begin(), middle, angles.end());
-  return *middle * 180 / std::numbers::pi;
-}
-
-// Inliers that chance would give: random matches fall into the residual's band along the epipolar line with the share
-// of the image that the band covers, and the unknowns of the model adapt to them.
-int inliers_needed(const PointPairs& points, const TwoViewOptions& options) {
-  constexpr double kAdaptation = 4;
-  Eigen::AlignedBox2d box;
-  for (const auto& p : points.b) box.extend(p);
-  const Eigen::Vector2d size = box.sizes().cwiseMax(options.max_residual);
-  const double share = std::min(1.0, 2 * options.max_residual * size.norm() / size.prod());
-  const double by_chance = std::max(options.by_chance, kAdaptation * share) * static_cast<double>(points.size());
-  // Matches crowded into a corner all lie in the band: never ask for more than a half.
-  return options.min_inliers + static_cast<int>(std::min(by_chance, 0.5 * static_cast<double>(points.size())));
-}
-
-TwoView finish(PairModel model, const RelativePoseEstimate& pose, Support support, const PointPairs& points) {
-  TwoView result;
-  result.model = model;
-  result.rotation = pose.rotation;
-  result.translation = pose.translation;
-  result.inlier_count = support.count;
-  result.inlier = std::move(support.inlier);
-  result.median_angle_deg = median_angle_deg(pose.rotation, points, result.inlier);
-  return result;
-}
-
-// Last refinement, with the weights' reach taken from the inliers' own scatter.
-Hypothesis polish(const Hypothesis& start, const PointPairs& points, double max_residual) {
-  const Eigen::Matrix3d essential = essential_matrix(start.pose);
-  std::vector<double> residuals;
-  for (const std::size_t i : rows_of(start.support.inlier)) {
-    residuals.push_back(std::abs(sampson_residual(essential, points.a[i], points.b[i])));
+  // The orientations that explain a plane.
+  void add_twins(const std::vector<std::uint8_t>& inlier, std::vector<RelativeOrientation>& to) const {
+    const InlierRays rays = rays_of(points_, inlier);
+    const auto homography = fit_homography(rays.a, rays.b);
+    if (!homography) return;
+    for (const PlanarOrientation& planar : visible_orientations(*homography, rays.a)) to.push_back(planar.orientation);
   }
-  if (residuals.empty()) return start;
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  const double sigma = 1.4826 * *middle;
-  const RelativePoseEstimate pose =
-      refine(start.pose, points, std::clamp(2 * sigma, 1e-3 * max_residual, 0.5 * max_residual));
-  Hypothesis polished{pose, support_of(pose, points, max_residual)};
-  return polished.support.score > 0.98 * start.support.score ? polished : start;
-}
 
-// Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate.
-std::optional<TwoView> uncalibrated(const PointPairs& points, const TwoViewOptions& options, int needed) {
-  const auto f = robust_fundamental(points, options);
-  if (!f) return std::nullopt;
-  Support support = support_of_fundamental(*f, points, options.max_residual);
-  if (support.count < needed) return std::nullopt;
-  const auto pose = best_hypothesis(decompose_essential(*f), points, 4 * options.max_residual);
-  if (!pose || pose->support.count < needed / 2) return std::nullopt;
-  return finish(PairModel::kEssential, pose->pose, std::move(support), points);
-}
+  // By five points, or by three where the verticals are known and agree with what they give.
+  std::optional<RelativeOrientation> orientation(const std::vector<RelativeOrientation>& starts) {
+    std::optional<RelativeOrientation> by_vertical;
+    if (options_.vertical_a && options_.vertical_b) {
+      const VerticalPairEstimator estimator(points_, options_.max_residual, options_.vertical_a->direction,
+                                            options_.vertical_b->direction);
+      const auto found = ransac(estimator, sampling(options_, 1000), std::span<const RelativeOrientation>(starts));
+      if (found) {
+        draws_ += found->draws;
+        by_vertical = adjust_orientation(found->model, points_, {0.5 * options_.max_residual});
+        by_vertical_ = found->consensus.count >= needed_ &&
+                       found->consensus.count >= kDoubtfulShare * static_cast<double>(points_.size()) &&
+                       agrees_with_verticals(*by_vertical, found->consensus);
+        if (by_vertical_) return by_vertical;
+      }
+    }
+    std::vector<RelativeOrientation> all = starts;
+    if (by_vertical) all.push_back(*by_vertical);
+    const auto found = ransac(five_points_, sampling(options_, 3000), std::span<const RelativeOrientation>(all));
+    if (!found) return by_vertical;
+    draws_ += found->draws;
+    return found->model;
+  }
+
+  // Whether the rotation takes one vertical to the other, within four sigmas of both and of the rotation, and a tenth
+  // of a degree for what sigmas do not tell.
+  bool agrees_with_verticals(const RelativeOrientation& found, const Consensus& support) const {
+    constexpr double kSigmas = 4, kMore = 0.1 * kDegree;
+    const Eigen::Matrix3d rotation = found.rotation.toRotationMatrix();
+    const AxisDirection &a = *options_.vertical_a, &b = *options_.vertical_b;
+    const OrientationPrecision precision =
+        precision_of(found, points_, support.inlier, 0.5 * options_.max_residual, 1e-3 * options_.max_residual);
+    const Eigen::Vector3d turned = rotation * a.direction;
+    const Eigen::Matrix3d by_rotation = rotation * skew<double>(a.direction);
+    Eigen::Matrix3d covariance = rotation * a.covariance * rotation.transpose() + b.covariance +
+                                 by_rotation * precision.covariance.topLeftCorner<3, 3>() * by_rotation.transpose();
+    covariance += kMore * kMore / (kSigmas * kSigmas) * Eigen::Matrix3d::Identity();
+    covariance += b.direction * b.direction.transpose();  // along it nothing differs
+    const Eigen::Vector3d difference = turned - b.direction;
+    return turned.dot(b.direction) > 0 && difference.dot(covariance.inverse() * difference) < kSigmas * kSigmas;
+  }
+
+  // Refines candidates over all points; the best by score comes first, one of each.
+  void refine_all(std::span<const RelativeOrientation> candidates) {
+    for (const RelativeOrientation& start : candidates) {
+      const RelativeOrientation refined = adjust_orientation(start, points_, {0.5 * options_.max_residual});
+      Hypothesis before{start, consensus_of(five_points_, start, options_.max_residual), 0.5 * options_.max_residual};
+      Hypothesis after{refined, consensus_of(five_points_, refined, options_.max_residual),
+                       0.5 * options_.max_residual};
+      hypotheses_.push_back(std::move(after.support.score > before.support.score ? after : before));
+    }
+    std::stable_sort(hypotheses_.begin(), hypotheses_.end(),
+                     [](const Hypothesis& p, const Hypothesis& q) { return p.support.score > q.support.score; });
+  }
+
+  // Last refinement, with the weights' reach taken from the inliers' own scatter.
+  Hypothesis polished(const Hypothesis& start) const {
+    const Eigen::Matrix3d essential = essential_from(start.orientation);
+    std::vector<double> residuals;
+    for (const std::size_t i : rows_of(start.support.inlier))
+      residuals.push_back(std::abs(sampson_residual(essential, points_.a[i], points_.b[i])));
+    const double sigma = 1.4826 * median(std::move(residuals)), limit = options_.max_residual;
+    const double scale = std::clamp(2 * sigma, 1e-3 * limit, 0.5 * limit);
+    const RelativeOrientation last = adjust_orientation(start.orientation, points_, {scale});
+    Hypothesis result{last, consensus_of(five_points_, last, limit), scale};
+    return result.support.score > 0.98 * start.support.score ? result : start;
+  }
+
+  TwoView finish(PairModel model, const Eigen::Quaterniond& rotation, Consensus support) const {
+    TwoView result;
+    result.model = model;
+    result.rotation = rotation;
+    result.inlier_count = support.count;
+    result.inlier = std::move(support.inlier);
+    result.draws = draws_;
+    std::vector<double> angles;
+    for (const std::size_t i : rows_of(result.inlier))
+      angles.push_back(intersection_angle(rotation, points_.a[i], points_.b[i]));
+    result.median_angle_deg = median(std::move(angles)) / kDegree;
+    return result;
+  }
+
+  void set_base(TwoView& result, const RelativeOrientation& o, double scale) const {
+    result.translation = o.base;
+    result.precision = precision_of(o, points_, result.inlier, scale, 1e-3 * options_.max_residual);
+    result.ill_conditioned = !(result.precision.base_sigma() <= options_.max_base_sigma_deg * kDegree);
+  }
+
+  TwoView oriented(bool planar) {
+    const Hypothesis best = polished(hypotheses_.front());
+    TwoView result =
+        finish(planar ? PairModel::kHomography : PairModel::kEssential, best.orientation.rotation, best.support);
+    set_base(result, best.orientation, best.scale);
+    result.by_vertical = by_vertical_;
+    for (const Hypothesis& other : std::span(hypotheses_).subspan(1)) {
+      if (!planar || other.support.score < kTwinShare * best.support.score) continue;
+      const double apart = std::max(rotation_angle(other.orientation.rotation, best.orientation.rotation),
+                                    (other.orientation.base - best.orientation.base).norm());
+      if (apart > 3 * kDegree) result.twin = other.orientation;
+      if (result.twin) break;
+    }
+    return result;
+  }
+
+  TwoView turned(const RansacResult<Eigen::Quaterniond>& found) const {
+    const RotationPairEstimator estimator(points_);
+    RansacResult<Eigen::Quaterniond> best = found;
+    // Least squares over all inliers until their number stops growing.
+    for (int round = 0; round < 10; ++round) {
+      const InlierRays rays = rays_of(points_, best.consensus.inlier);
+      const Eigen::Quaterniond rotation = fit_rotation(rays.a, rays.b);
+      Consensus support = consensus_of(estimator, rotation, options_.max_residual);
+      if (!(support.score > best.consensus.score)) break;
+      best.model = rotation;
+      best.consensus = std::move(support);
+    }
+    TwoView result = finish(PairModel::kRotationOnly, best.model, best.consensus);
+    const InlierRays rays = rays_of(points_, result.inlier);
+    result.precision = precision_of_rotation(best.model, rays.a, rays.b, 1e-3 * options_.max_residual);
+    result.ill_conditioned = true;  // nothing is known of the base
+    return result;
+  }
+
+  // Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate.
+  std::optional<TwoView> uncalibrated() {
+    const auto found = ransac(FundamentalEstimator(points_), sampling(options_, 3000));
+    if (!found || found->consensus.count < needed_) return std::nullopt;
+    draws_ += found->draws;
+    const double limit = 4 * options_.max_residual;
+    const FivePointEstimator estimator(points_, limit);
+    std::optional<Hypothesis> best;
+    for (const RelativeOrientation& start : orientations_of_essential(nearest_essential(found->model))) {
+      const RelativeOrientation refined = adjust_orientation(start, points_, {0.5 * limit});
+      for (const RelativeOrientation& o : {start, refined}) {
+        Consensus support = consensus_of(estimator, o, limit);
+        if (!best || support.score > best->support.score) best = {o, std::move(support)};
+      }
+    }
+    if (!best || best->support.count < needed_ / 2) return std::nullopt;
+    TwoView result = finish(PairModel::kEssential, best->orientation.rotation, found->consensus);
+    set_base(result, best->orientation, 0.5 * limit);
+    return result;
+  }
+
+  const PointPairs& points_;
+  const TwoViewOptions& options_;
+  FivePointEstimator five_points_;
+  int needed_;
+  int draws_ = 0;
+  bool by_vertical_ = false;
+  std::vector<Hypothesis> hypotheses_;
+};
 
 }  // namespace
 
 TwoView estimate_two_view(const PointPairs& points, const TwoViewOptions& options) {
-  // A simpler model is chosen when it explains this share of the matches of the richer one.
-  constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
-  // The fundamental matrix is tried below the first share of all matches and chosen by the second factor of gain.
-  constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
-  TwoView none;
-  none.inlier.assign(points.size(), 0);
-  if (points.size() < static_cast<std::size_t>(options.min_inliers)) return none;
-  const int needed = inliers_needed(points, options);
-
-  std::vector<RelativePoseEstimate> candidates;
-  if (const auto e = robust_essential(points, options)) candidates = decompose_essential(*e);
-  const auto h = robust_homography(points, options);
-  if (h) std::ranges::copy(decompose_homography(*h), std::back_inserter(candidates));
-  const auto best = best_hypothesis(candidates, points, options.max_residual);
-  const int best_count = best ? best->support.count : 0;
-
-  const RotationHypothesis rotation = robust_rotation(points, options);
-  if (rotation.support.count >= needed && rotation.support.count >= kRotationShare * best_count) {
-    return finish(PairModel::kRotationOnly, {rotation.rotation, Eigen::Vector3d::Zero()}, rotation.support, points);
+  if (points.size() < static_cast<std::size_t>(options.min_inliers)) {
+    TwoView none;
+    none.inlier.assign(points.size(), 0);
+    return none;
   }
-  // A plane leaves the fundamental matrix undetermined.
-  const int plane_count = h ? count_homography(*h, points, options.max_residual) : 0;
-  const bool planar = plane_count >= kPlaneShare * best_count;
-  if (best_count < needed || (!planar && best_count < kDoubtfulShare * static_cast<double>(points.size()))) {
-    auto found = uncalibrated(points, options, needed);
-    if (found && found->inlier_count > kFocalGain * best_count) return *std::move(found);
-  }
-  if (best_count < needed) return none;
-  Hypothesis polished = polish(*best, points, options.max_residual);
-  return finish(planar ? PairModel::kHomography : PairModel::kEssential, polished.pose, std::move(polished.support),
-                points);
+  return PairEstimation(points, options).estimate();
 }
 
 }  // namespace megablock

@@ -4,23 +4,25 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "geometry/interpretation_plane.h"
+#include "geometry/point_pairs.h"
+#include "geometry/relative_adjustment.h"
 #include "io/features.h"
 
 namespace megablock {
-
-// Normalised image points (X/Z, Y/Z), row i of a matched to row i of b.
-struct PointPairs {
-  std::vector<Eigen::Vector2d> a, b;
-  std::size_t size() const { return a.size(); }
-};
 
 struct TwoViewOptions {
   double max_residual = 3e-3;  // Sampson or transfer residual, normalised units (pixels / focal length)
   int min_inliers = 20;
   double by_chance = 0;  // share of wrong matches that fit the model by chance; 0: of matches anywhere in the image
+  double max_base_sigma_deg = 1;  // of the base's direction; beyond it the pair is ill-conditioned
   std::uint64_t seed = 0;
+  // The vertical in the axes of each image, both up or both down: where both are known, three matches make a hypothesis
+  // instead of five. What is found is free of them; where it contradicts them, they are not used.
+  std::optional<AxisDirection> vertical_a = std::nullopt, vertical_b = std::nullopt;
 };
 
 // X_b = R X_a + t, |t| = 1 (t = 0 when rotation-only).
@@ -28,6 +30,12 @@ struct TwoView {
   PairModel model = PairModel::kNone;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  // The other orientation that explains a plane nearly as well (95 % of the support); a third image decides.
+  std::optional<RelativeOrientation> twin;
+  OrientationPrecision precision;    // of rotation and base; the base is open when rotation-only
+  bool ill_conditioned = false;      // the base's direction is worse than max_base_sigma_deg
+  bool by_vertical = false;          // found by three matches and the verticals
+  int draws = 0;                     // of all samples
   double median_angle_deg = 0;       // of intersection of the inlier rays
   std::vector<std::uint8_t> inlier;  // [pairs]
   int inlier_count = 0;

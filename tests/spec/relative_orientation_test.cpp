@@ -6,9 +6,9 @@
 #include <chrono>
 
 #include "geometry/five_point.h"
+#include "geometry/relative_adjustment.h"
 #include "geometry/rotation_parameters.h"
 #include "geometry/vertical_pair.h"
-#include "match/relative_pose.h"
 #include "reached.h"
 #include "tests/unit/geometry/pair_scene.h"
 
@@ -27,8 +27,7 @@ RelativeOrientation refined_orientation(const RelativeOrientation& start, const 
     points.a.emplace_back(scene.a[i].hnormalized());
     points.b.emplace_back(scene.b[i].hnormalized());
   }
-  const RelativePoseEstimate pose = refine({start.rotation, start.base}, points, 3 * sigma);
-  return {pose.rotation, pose.translation};
+  return adjust_orientation(start, points, {3 * sigma});
 }
 
 struct Protocol {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/relative_adjustment.h"
 #include "geometry/rotation.h"
-#include "match/relative_pose.h"
 #include "match/trusted_pair.h"
 
 namespace megablock {
@@ -41,11 +41,11 @@ TEST(MatchErrors, ReprojectionIsSampsonsResidual) {
   const TwoCameras two;
   const Eigen::Vector3d point = two.ahead(9);
   const Eigen::Vector2d a = two.in_a(point), b = two.in_b(point) + Eigen::Vector2d(1.5, 2);
-  RelativePoseEstimate pose;
+  RelativeOrientation pose;
   pose.rotation = two.b.rotation * two.a.rotation.conjugate();
-  pose.translation = (two.b.rotation * (two.a.centre - two.b.centre)).normalized();
+  pose.base = (two.b.rotation * (two.a.centre - two.b.centre)).normalized();
   const double sampson =
-      1000 * std::abs(sampson_residual(essential_matrix(pose), *unproject(kCamera, a), *unproject(kCamera, b)));
+      1000 * std::abs(sampson_residual(essential_from(pose), *unproject(kCamera, a), *unproject(kCamera, b)));
   const MatchErrors e = two.of(a, b);
   EXPECT_GT(sampson, 0.5);
   // Pixels grow towards the border of a plane image, which angles do not: within a few per cent here.

@@ -8,7 +8,6 @@
 
 #include "geometry/angles.h"
 #include "geometry/rotation.h"
-#include "match/relative_pose.h"
 
 namespace megablock {
 namespace {
@@ -30,7 +29,7 @@ struct Simulation {
 struct SimulatedPair {
   PointPairs points;
   std::vector<std::uint8_t> good;
-  RelativePoseEstimate truth;
+  RelativeOrientation truth;
 };
 
 // Camera a looks down on ground 1 away; camera b is moved sideways and turned.
@@ -43,7 +42,7 @@ SimulatedPair simulate(const Simulation& s) {
   const Eigen::Vector3d centre(s.baseline, 0.3 * s.baseline, 0.05 * s.baseline);
   const Eigen::Vector3d t =
       s.scene == Relief::kRotation ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-(result.truth.rotation * centre));
-  result.truth.translation = t.normalized();
+  result.truth.base = t.normalized();
   const auto random_point = [&] {
     return Eigen::Vector2d((unit(generator) - 0.5) * kWidth / kFocal, (unit(generator) - 0.5) * kHeight / kFocal);
   };
@@ -76,7 +75,7 @@ double rotation_error_deg(const TwoView& found, const SimulatedPair& pair) {
 }
 
 double translation_error_deg(const TwoView& found, const SimulatedPair& pair) {
-  return std::acos(std::clamp(found.translation.dot(pair.truth.translation), -1.0, 1.0)) / kDegree;
+  return std::acos(std::clamp(found.translation.dot(pair.truth.base), -1.0, 1.0)) / kDegree;
 }
 
 // Shares of the good and of the wrong matches that are accepted.
@@ -162,6 +161,51 @@ TEST_P(TwoViews, RandomMatchesAreRefused) {
   }
 }
 
+// A vertical of each image, tilted by an error in a direction of its own.
+TwoViewOptions with_verticals(const SimulatedPair& pair, double error_deg, std::uint64_t seed) {
+  TwoViewOptions options = options_for(seed);
+  const Eigen::Vector3d down = Eigen::Vector3d(0.1, 0.2, 1).normalized();
+  const auto seen = [&](const Eigen::Vector3d& v, const Eigen::Vector3d& about) {
+    const double sigma = std::max(error_deg, 0.01) * kDegree;
+    return AxisDirection{rotation_exp<double>(error_deg * kDegree * v.cross(about).normalized()) * v,
+                         sigma * sigma * (Eigen::Matrix3d::Identity() - v * v.transpose())};
+  };
+  options.vertical_a = seen(down, {1, 0.3, 0});
+  options.vertical_b = seen(pair.truth.rotation * down, {-0.2, 1, 0});
+  return options;
+}
+
+TEST_P(TwoViews, VerticalsTakeFewerDraws) {
+  for (const Relief scene : {Relief::kGeneral, Relief::kPlane}) {
+    for (const double error_deg : {0.0, 0.1, 0.5}) {
+      Simulation s;
+      s.scene = scene;
+      s.baseline = 0.3;
+      s.seed = static_cast<std::uint64_t>(GetParam());
+      const SimulatedPair pair = simulate(s);
+      const TwoView found = estimate_two_view(pair.points, with_verticals(pair, error_deg, s.seed)),
+                    without = estimate_two_view(pair.points, options_for(s.seed));
+      EXPECT_TRUE(found.by_vertical) << error_deg;
+      EXPECT_EQ(found.model, without.model);
+      EXPECT_LT(found.draws, without.draws) << error_deg;
+      EXPECT_LT(translation_error_deg(found, pair), 3);
+      EXPECT_GT(accepted_shares(found, pair).first, 0.98);
+    }
+  }
+}
+
+TEST_P(TwoViews, WrongVerticalsAreNoHarm) {
+  Simulation s;
+  s.seed = static_cast<std::uint64_t>(GetParam());
+  const SimulatedPair pair = simulate(s);
+  TwoViewOptions options = with_verticals(pair, 0, s.seed);
+  options.vertical_b->direction = Eigen::Vector3d(0.7, -0.7, 0.1).normalized();
+  const TwoView found = estimate_two_view(pair.points, options);
+  EXPECT_FALSE(found.by_vertical);
+  EXPECT_EQ(found.model, PairModel::kEssential);
+  EXPECT_LT(translation_error_deg(found, pair), 2);
+}
+
 INSTANTIATE_TEST_SUITE_P(Seeds, TwoViews, testing::Range(1, 9));
 
 TEST(TwoView, IsRepeatable) {
@@ -171,6 +215,29 @@ TEST(TwoView, IsRepeatable) {
   EXPECT_EQ(first.inlier, second.inlier);
   EXPECT_EQ(first.rotation.coeffs(), second.rotation.coeffs());
   EXPECT_EQ(first.translation, second.translation);
+}
+
+TEST(TwoView, PrecisionIsThatOfTheErrors) {
+  // Wrong matches that are accepted are not foreseen: of the half they make 1.6 of the mean.
+  for (const auto& [outliers, least, most] : {std::array{0.0, 0.8, 1.25}, std::array{0.2, 0.8, 1.4}}) {
+    constexpr int kTrials = 60;
+    double sum = 0;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      Simulation s;
+      s.matches = 300;
+      s.outlier_share = outliers;
+      s.seed = static_cast<std::uint64_t>(100 + trial);
+      const SimulatedPair pair = simulate(s);
+      const TwoView found = estimate_two_view(pair.points, options_for(s.seed));
+      Eigen::Matrix<double, 5, 1> error;
+      error << rotation_log<double>((found.rotation.conjugate() * pair.truth.rotation).normalized()),
+          axes_across(found.translation).transpose() * (pair.truth.base - found.translation);
+      sum += error.dot(found.precision.covariance.inverse() * error) / 5;
+      EXPECT_FALSE(found.ill_conditioned);
+    }
+    EXPECT_GT(sum / kTrials, least);
+    EXPECT_LT(sum / kTrials, most);
+  }
 }
 
 TEST(TwoView, TooFewOrDegenerateMatches) {
@@ -184,66 +251,6 @@ TEST(TwoView, TooFewOrDegenerateMatches) {
   const TwoView found = estimate_two_view(identical, options_for(1));
   EXPECT_EQ(found.model, PairModel::kRotationOnly);
   EXPECT_LT(rotation_angle(found.rotation, Eigen::Quaterniond::Identity()), 1e-6);
-}
-
-TEST(RelativePose, EssentialDecompositionContainsTheTruth) {
-  const SimulatedPair pair = simulate({});
-  double best = 1e9;
-  for (const auto& pose : decompose_essential(-3 * essential_matrix(pair.truth))) {
-    best = std::min(
-        best, rotation_angle(pose.rotation, pair.truth.rotation) + (pose.translation - pair.truth.translation).norm());
-  }
-  EXPECT_LT(best, 1e-7);
-}
-
-TEST(RelativePose, RefinementReachesTheTruthWithoutNoiseFromNearby) {
-  Simulation s;
-  s.noise_px = 0;
-  const SimulatedPair pair = simulate(s);
-  RelativePoseEstimate start = pair.truth;
-  start.rotation = rotation_update(start.rotation, Eigen::Vector3d(1e-4, -1e-4, 2e-4));
-  start.translation = (start.translation + Eigen::Vector3d(0.001, 0.002, -0.001)).normalized();
-  const RelativePoseEstimate refined = refine(start, pair.points, 0.2 / kFocal);
-  EXPECT_LT(rotation_angle(refined.rotation, pair.truth.rotation), 1e-5);
-  EXPECT_LT((refined.translation - pair.truth.translation).norm(), 1e-4);
-}
-
-TEST(RelativePose, RefinementEndsInAMinimumOfTheSampsonResiduals) {
-  Simulation s;
-  s.outlier_share = 0;
-  const SimulatedPair pair = simulate(s);
-  const double scale = 1.5 / kFocal;
-  const auto cost = [&](const RelativePoseEstimate& pose) {
-    double sum = 0;
-    const Eigen::Matrix3d essential = essential_matrix(pose);
-    for (std::size_t i = 0; i < pair.points.size(); ++i) {
-      const double r = sampson_residual(essential, pair.points.a[i], pair.points.b[i]);
-      sum += r * r / (1 + r * r / (scale * scale));
-    }
-    return sum;
-  };
-  const RelativePoseEstimate refined = refine(pair.truth, pair.points, scale);
-  const double least = cost(refined);
-  EXPECT_LE(least, cost(pair.truth));
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double step : {-1e-5, 1e-5}) {
-      RelativePoseEstimate turned = refined, moved = refined;
-      turned.rotation = rotation_update(refined.rotation, step * Eigen::Vector3d::Unit(axis));
-      moved.translation = (refined.translation + 10 * step * Eigen::Vector3d::Unit(axis)).normalized();
-      EXPECT_GE(cost(turned), least);
-      EXPECT_GE(cost(moved), least * (1 - 1e-12));
-    }
-  }
-}
-
-TEST(RelativePose, PointsBehindTheCamerasAreNoInliers) {
-  Simulation s;
-  s.outlier_share = 0;
-  s.noise_px = 0;
-  const SimulatedPair pair = simulate(s);
-  const RelativePoseEstimate opposite{pair.truth.rotation, -pair.truth.translation};
-  EXPECT_EQ(support_of(pair.truth, pair.points, 3 / kFocal).count, s.matches);
-  EXPECT_LT(support_of(opposite, pair.points, 3 / kFocal).count, s.matches / 20);
 }
 
 }  // namespace
