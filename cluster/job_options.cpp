@@ -89,6 +89,12 @@ void describe(Visitor& visit, OrientationOptions& o) {
 }
 
 template <typename Visitor>
+void describe(Visitor& visit, EnvironmentOptions& o) {
+  visit.flag("refraction", o.refraction);
+  visit.flag("earth_curvature", o.earth_curvature);
+}
+
+template <typename Visitor>
 void describe(Visitor& visit, AdjustOptions& o) {
   describe(visit, o.observations);
   visit.flag("estimate_image_sigma", o.estimate_image_sigma);
@@ -115,6 +121,7 @@ void for_each_section(JobOptionsOrConst& o, Function&& function) {
   function("matching", o.matching, o.tracks);
   function("tiles", o.tiles);
   function("orientation", o.orientation);
+  function("environment", o.environment);
   function("adjustment", o.adjustment);
   function("merge", o.merge);
 }
@@ -217,6 +224,7 @@ void add_to_hash(Hasher& hasher, const OrientationOptions& options) {
   hash_options(hasher, options);
   hash_options(hasher, options.observations);
 }
+void add_to_hash(Hasher& hasher, const EnvironmentOptions& options) { hash_options(hasher, options); }
 void add_to_hash(Hasher& hasher, const AdjustOptions& options) { hash_options(hasher, options); }
 void add_to_hash(Hasher& hasher, const MergeSettings& options) { hash_options(hasher, options); }
 

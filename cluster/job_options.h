@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "adjust/environment_correction.h"
 #include "adjust/orientation.h"
 #include "adjust/tile_adjustment.h"
 #include "io/hash.h"
@@ -36,6 +37,7 @@ struct JobOptions {
   TrackOptions tracks;
   TileOptions tiles;
   OrientationOptions orientation;
+  EnvironmentOptions environment;
   AdjustOptions adjustment;
   MergeSettings merge;
 };
@@ -55,6 +57,7 @@ void add_to_hash(Hasher& hasher, const CandidateOptions& options);
 void add_to_hash(Hasher& hasher, const MatchOptions& options);
 void add_to_hash(Hasher& hasher, const TileOptions& options);
 void add_to_hash(Hasher& hasher, const OrientationOptions& options);
+void add_to_hash(Hasher& hasher, const EnvironmentOptions& options);
 void add_to_hash(Hasher& hasher, const AdjustOptions& options);
 void add_to_hash(Hasher& hasher, const MergeSettings& options);
 

@@ -77,7 +77,7 @@ Project read_whole_project(const RunOptions& options) {
   if (!std::filesystem::exists(options.project))
     throw InputError(options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
   Project project = read_project(options.project);
-  read_options(project.settings);
+  check_environment(read_options(project.settings).environment, project.block);
   return project;
 }
 

@@ -91,8 +91,9 @@ std::string unknown_key_message(const std::string& key, const std::string& secti
 }
 
 const std::vector<std::string>& stage_sections() {
-  static const std::vector<std::string> sections = {"features",    "candidates", "matching", "tiles",
-                                                    "orientation", "adjustment", "merge"};
+  static const std::vector<std::string> sections = {"features",   "candidates",  "matching",
+                                                    "tiles",      "orientation", "environment",
+                                                    "adjustment", "merge"};
   return sections;
 }
 

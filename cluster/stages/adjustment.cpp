@@ -2,6 +2,7 @@
 #include <limits>
 #include <utility>
 
+#include "adjust/environment_correction.h"
 #include "adjust/image_sigma.h"
 #include "adjust/tile_adjustment.h"
 #include "adjust/track_parts.h"
@@ -25,6 +26,14 @@ struct TileStart {
   TileState state;
 };
 
+// The heights of the ground that the correction needs are those of the points as measured.
+void correct_environment(const Job& job, TileStart& start) {
+  TileProblem measured = start.problem;
+  TileState at = start.state;
+  triangulate_points(measured, at, job.settings.adjustment);
+  correct_measurements(job.settings.environment, job.block.ground, at, start.problem);
+}
+
 TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile, TrackSet tracks) {
   TileStart start;
   start.tracks = std::move(tracks);
@@ -33,6 +42,7 @@ TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& ti
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   start.state =
       make_tile_state(start.problem, oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
+  if (job.settings.environment.any()) correct_environment(job, start);
   return start;
 }
 

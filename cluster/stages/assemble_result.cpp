@@ -27,6 +27,8 @@ void append_control(BlockResult& result, const std::vector<TilePart>& parts) {
       const auto rows = static_cast<std::ptrdiff_t>(std::min(from.residual_px.size(), to.residual_px.size()));
       std::copy_n(from.residual_px.begin(), rows, to.residual_px.begin());
       std::copy_n(from.kept.begin(), rows, to.kept.begin());
+      auto& measurements = result.block.control_points[static_cast<std::size_t>(part.control_rows[i])].measurements;
+      for (std::size_t k = 0; k < measurements.size(); ++k) measurements[k].pixel = part.control_measured[i][k];
     }
 }
 

@@ -33,6 +33,7 @@ std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
   hasher.add(algorithm::kMerge);
   add_to_hash(hasher, job.settings.merge);
   add_to_hash(hasher, job.settings.adjustment);
+  if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
   hasher.add(job.store.seal("block.h5")->content_hash).add(job.store.seal("tiles.h5")->content_hash);
   for (const std::string& name : inputs.tracks) hasher.add(job.store.seal(name)->content_hash);
   for (const std::string& name : inputs.adjusted)

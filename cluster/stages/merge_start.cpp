@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "adjust/environment_correction.h"
 #include "adjust/tile_adjustment.h"
 #include "adjust/track_parts.h"
 #include "adjust/turned_stretches.h"
@@ -136,6 +137,28 @@ std::vector<std::uint8_t> left_behind(const MergeTile& merge, const MergeStart& 
   return result;
 }
 
+// `values` of `keys` (ascending, those of the adjustment) for each of `wanted`, where they are.
+template <typename Key, typename Value>
+void take_known(const std::vector<Key>& keys, const std::vector<Value>& values, const std::vector<Key>& wanted,
+                std::vector<Value>& to) {
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto it = std::lower_bound(keys.begin(), keys.end(), wanted[i]);
+    if (it != keys.end() && *it == wanted[i]) to[i] = values[static_cast<std::size_t>(it - keys.begin())];
+  }
+}
+
+// A tile as its own adjustment left it. A run that resumes in the middle of the merge still knows this state, and
+// corrects measurements by the same bits.
+TileState own_solution(const TileProblem& problem, const TileAdjustment& adjustment, TileState state) {
+  std::vector<MountId> mounts;
+  for (std::size_t m = 0; m < adjustment.mounts.size(); ++m)
+    mounts.push_back({adjustment.mount_rigs[m], adjustment.mount_numbers[m]});
+  take_known(adjustment.frames, adjustment.poses, problem.frames, state.frames);
+  take_known(adjustment.cameras, adjustment.intrinsics, problem.cameras, state.cameras);
+  take_known(mounts, adjustment.mounts, problem.mounts, state.mounts);
+  return state;
+}
+
 bool any_free(const TileProblem& problem) {
   const auto set = [](auto flag) { return flag != 0; };
   return std::any_of(problem.camera_free.begin(), problem.camera_free.end(), set) ||
@@ -202,6 +225,8 @@ MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& 
   }
   for (std::size_t o = 0; o < merge.problem.kept.size(); ++o) merge.problem.kept[o] &= adjustment.kept[o];
   merge.state.points = adjustment.points;
+  correct_measurements(job.settings.environment, job.block.ground, own_solution(merge.problem, adjustment, merge.state),
+                       merge.problem);
   if (start.motions.empty()) return merge;
   const Similarity& motion = start.motions[static_cast<std::size_t>(tile.value)];
   for (Eigen::Vector3d& point : merge.state.points) point = motion(point);

@@ -63,6 +63,10 @@ TrackResults track_results(const RankTile& tile, const TrackSet& tracks, const s
   TrackResults result;
   result.tracks = tracks;
   const std::int64_t count = tracks.track_count(), rows = tracks.observation_count();
+  for (std::size_t o = 0; o < tracks.image.size(); ++o) {
+    result.tracks.x[o] = to_fixed_pixel(tile.problem.x[o]);
+    result.tracks.y[o] = to_fixed_pixel(tile.problem.y[o]);
+  }
   result.file_tracks = tracks.id;
   result.file_tiles.assign(static_cast<std::size_t>(count), TileIndex(tile.tile));
   result.points.assign(tile.state.points.begin(), tile.state.points.begin() + count);
@@ -90,14 +94,17 @@ void add_control(const RankTile& tile, const std::vector<std::uint8_t>& kept,
   for (std::int64_t p = 0; p < tile.problem.point_count(); ++p) {
     const auto row = static_cast<std::size_t>(p);
     if (tile.problem.points[row].role == PointRole::kTie) continue;
+    std::vector<Eigen::Vector2d> measured;
     BlockResult::ControlResult control{tile.state.points[row], Eigen::Matrix3d::Constant(kNaN), {}, {}};
     if (row < covariances.size()) control.covariance = covariances[row];
     for (std::int64_t o = tile.problem.begin[row]; o < tile.problem.begin[row + 1]; ++o) {
+      measured.emplace_back(tile.problem.x[static_cast<std::size_t>(o)], tile.problem.y[static_cast<std::size_t>(o)]);
       control.residual_px.push_back(residual(tile, p, o));
       control.kept.push_back(kept[static_cast<std::size_t>(o)]);
     }
     part.control_rows.push_back(tile.problem.points[row].index);
     part.control.push_back(std::move(control));
+    part.control_measured.push_back(std::move(measured));
   }
 }
 
@@ -216,6 +223,7 @@ Bytes TilePart::to_bytes() const {
     write_matrices(writer, point.residual_px);
     writer.values(point.kept);
   }
+  for (const std::vector<Eigen::Vector2d>& measured : control_measured) write_matrices(writer, measured);
   return writer.take();
 }
 
@@ -234,6 +242,8 @@ TilePart TilePart::from_bytes(const Bytes& bytes) {
     point.kept = reader.values<std::uint8_t>();
     part.control.push_back(std::move(point));
   }
+  for (std::size_t i = 0; i < part.control_rows.size(); ++i)
+    part.control_measured.push_back(read_matrices<Eigen::Vector2d>(reader));
   return part;
 }
 

@@ -19,11 +19,13 @@ struct TilePart {
   std::vector<FrameIndex> frames;          // touched by observations that take part
   std::vector<std::int64_t> control_rows;  // in block.control_points
   std::vector<BlockResult::ControlResult> control;
+  std::vector<std::vector<Eigen::Vector2d>> control_measured;  // px, corrected as they were adjusted
   Bytes to_bytes() const;
   static TilePart from_bytes(const Bytes& bytes);
 };
 
-// Writes the tracks of a merged tile, whose first points they are, to `path`, ascending by their keys.
+// Writes the tracks of a merged tile, whose first points they are, to `path`, ascending by their keys; positions are
+// those that the tile was adjusted with (adjust/environment_correction.h).
 // A full disk is an InputError.
 TilePart write_part(const std::string& path, const RankTile& tile, const TrackSet& tracks,
                     const TileCovariance& covariance);
