@@ -13,6 +13,8 @@
 #include "cluster/calibrate_command.h"
 #include "cluster/collective.h"
 #include "cluster/communicator.h"
+#include "cluster/diagnose_command.h"
+#include "cluster/diagnostics.h"
 #include "cluster/exit_codes.h"
 #include "cluster/masks_command.h"
 #include "cluster/measurements_command.h"
@@ -233,10 +235,15 @@ void add_report(CLI::App& app, Action& action) {
       const std::string result = finished_result(options->job);
       const auto written =
           std::filesystem::file_time_type::clock::to_sys(std::filesystem::last_write_time(store.path(kResult)));
+      BlockResult block = read_result_without_tracks(result);
+      const StoredTracks tracks(result);
+      const BlockDiagnostics diagnostics = diagnose_result(block, tracks, options_of_job(store).diagnostics);
+      const std::string json = to_json(diagnostics, block.block);
       const std::string page =
-          report_html(read_result_without_tracks(result), StoredTracks(result),
-                      {options->job, std::chrono::duration<double>(written.time_since_epoch()).count()});
+          report_html(std::move(block), tracks,
+                      {options->job, std::chrono::duration<double>(written.time_since_epoch()).count(), &diagnostics});
       if (options->output.empty()) {
+        store.write_text(kDiagnostics, json);
         store.write_text("result/report.html", page);
       } else {
         JobStore(std::filesystem::absolute(options->output).parent_path().string())
@@ -363,6 +370,7 @@ int command_line(int argc, char** argv) {
     add_register(app, action, ranks);
     add_status(app, by_one);
     add_report(app, by_one);
+    add_diagnose(app, by_one);
     add_export(app, by_one);
     add_measurements(app, by_one);
     add_import(app, by_one);

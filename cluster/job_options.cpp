@@ -3,6 +3,9 @@
 
 #include "cluster/job_options.h"
 
+#include <fstream>
+#include <nlohmann/json.hpp>
+
 #include "io/error.h"
 #include "io/settings_reader.h"
 
@@ -105,6 +108,16 @@ void describe(Visitor& visit, AdjustOptions& o) {
 }
 
 template <typename Visitor>
+void describe(Visitor& visit, DiagnosticsOptions& o) {
+  visit.number("min_base_to_height", o.min_base_to_height);
+  visit.number("max_base_to_height", o.max_base_to_height);
+  visit.number("min_overlap", o.min_overlap);
+  visit.integer("min_images", o.min_images);
+  visit.integer("min_link_points", o.min_link_points);
+  visit.number("gap_factor", o.gap_factor);
+}
+
+template <typename Visitor>
 void describe(Visitor& visit, MergeSettings& o) {
   visit.integer("max_iterations", o.max_iterations);
   visit.number("decrement", o.decrement);
@@ -124,6 +137,7 @@ void for_each_section(JobOptionsOrConst& o, Function&& function) {
   function("environment", o.environment);
   function("adjustment", o.adjustment);
   function("merge", o.merge);
+  function("diagnostics", o.diagnostics);
 }
 
 // Visitor that feeds every described value to a hash.
@@ -204,6 +218,20 @@ JobOptions read_options(const StageSettings& settings) {
   });
   options.orientation.observations = options.adjustment.observations;  // one description for all stages
   return options;
+}
+
+JobOptions options_of_job(const JobStore& store) {
+  std::ifstream in(store.path("job.json"));
+  if (!in)
+    throw InputError(store.directory() + ": is not a job directory (no job.json); name the folder given to 'run -j'");
+  StageSettings settings;
+  try {
+    const nlohmann::json json = nlohmann::json::parse(in);
+    for (const auto& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
+  } catch (const nlohmann::json::exception&) {
+    throw InputError(store.path("job.json") + ": is not readable; restore it or start a new job directory");
+  }
+  return read_options(settings);
 }
 
 std::vector<OptionValue> option_values(const JobOptions& options) {

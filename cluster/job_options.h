@@ -8,7 +8,9 @@
 #include "adjust/environment_correction.h"
 #include "adjust/orientation.h"
 #include "adjust/tile_adjustment.h"
+#include "io/block_diagnostics.h"
 #include "io/hash.h"
+#include "io/job_store.h"
 #include "io/project.h"
 #include "match/features.h"
 #include "match/pair_matching.h"
@@ -40,10 +42,13 @@ struct JobOptions {
   EnvironmentOptions environment;
   AdjustOptions adjustment;
   MergeSettings merge;
+  DiagnosticsOptions diagnostics;  // of the report alone: no unit depends on them
 };
 
 // Defaults, overridden by the project file; InputError with file:line for unknown keys and bad values.
 JobOptions read_options(const StageSettings& settings);
+// Those that a job was last run with.
+JobOptions options_of_job(const JobStore& store);
 
 // The values in force, in the order of the docs.
 struct OptionValue {

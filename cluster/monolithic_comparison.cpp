@@ -3,7 +3,6 @@
 #include <ceres/solver.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -114,13 +113,7 @@ OwnRun adjust_single_tile(const BlockResult& result, const SingleTile& tile) {
 
 }  // namespace
 
-ObservationOptions observation_options(const JobStore& store) {
-  std::ifstream in(store.path("job.json"));
-  const Json json = Json::parse(in);
-  StageSettings settings;
-  for (const Json& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
-  return read_options(settings).adjustment.observations;
-}
+ObservationOptions observation_options(const JobStore& store) { return options_of_job(store).adjustment.observations; }
 
 std::string compare_with_monolithic(const JobStore& store) {
   if (!store.seal(kResult)) throw InputError(store.path(kResult) + ": the job has no result yet; run it to the end");

@@ -63,7 +63,8 @@ std::string page_of(const BlockResult& result, const report::Figures& figures, c
   const std::string body =
       headline(result, figures) + assessment(result, figures) + map_section(result, figures) +
       coverage_section(result, figures) + tie_points_section(result, figures) + residuals_section(result, figures) +
-      images_section(result, figures) + observations_section(result, figures) + positions_section(result, figures) + attitudes_section(result, figures) +
+      (context.diagnostics ? diagnostics_section(result, *context.diagnostics) : "") + images_section(result, figures) +
+      observations_section(result, figures) + positions_section(result, figures) + attitudes_section(result, figures) +
       control_section(result, figures) + cameras_section(result, figures) + accuracy_section(result, figures) +
       tiles_section(result, figures) + failures_section(result, figures) + stages_section(result) +
       provenance_section(result, context);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "io/block_diagnostics.h"
 #include "io/result.h"
 #include "io/track_batches.h"
 
@@ -15,6 +16,7 @@ namespace megablock {
 struct ReportContext {
   std::string job;                                               // directory
   double computed_s = std::numeric_limits<double>::quiet_NaN();  // when the result was written, since 1970
+  const BlockDiagnostics* diagnostics = nullptr;                 // null: not looked for
 };
 
 // Works for any result, however incomplete: what was not computed is left out or said to be missing, and no figure that

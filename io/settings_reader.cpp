@@ -93,7 +93,7 @@ std::string unknown_key_message(const std::string& key, const std::string& secti
 const std::vector<std::string>& stage_sections() {
   static const std::vector<std::string> sections = {"features",   "candidates",  "matching",
                                                     "tiles",      "orientation", "environment",
-                                                    "adjustment", "merge"};
+                                                    "adjustment", "merge",       "diagnostics"};
   return sections;
 }
 

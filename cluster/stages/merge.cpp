@@ -9,6 +9,7 @@
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
+#include "cluster/diagnostics.h"
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
@@ -180,7 +181,9 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   // Both go through all tracks, while the other ranks have nothing left to do.
   std::future<Report> report = std::async(std::launch::async, [&] { return Report(result, tracks); });
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  const ReportContext context{job.options.directory, seconds_since_1970()};
+  const BlockDiagnostics diagnostics = diagnose_result(result, tracks, job.settings.diagnostics);
+  job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
+  const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics};
   job.store.write_text("result/report.html", report.get().html(std::move(result), context));
 }
 

@@ -108,6 +108,15 @@ svg .title{fill:var(--ink);font-size:12px}
 .map .scale path{stroke:#1c2733;stroke-width:1.5;fill:none}
 .map .scale .needle{fill:#1c2733;stroke:none}
 .map .scale text{font-size:14px;fill:#1c2733}
+.map .foot-print{fill:#4e79a7;fill-opacity:.05;stroke:#4e79a7;stroke-opacity:.35;stroke-width:.6}
+.map .thin{fill:var(--bad);fill-opacity:.28;stroke:none}
+.map .gap{stroke:var(--bad);stroke-width:2.5;fill:none;stroke-dasharray:7 4}
+.map .weak{stroke:#b26a00;stroke-width:1.6;fill:none;stroke-dasharray:3 3}
+.map .single{stroke:#b26a00;stroke-width:3;fill:none}
+.map .proposal{fill:#fff;stroke:var(--good);stroke-width:2}
+.map .number circle{fill:#fff;stroke:var(--bad);stroke-width:1.5}
+.map .number text{fill:var(--bad);font-size:13px;font-weight:600}
+.key .swatch{border-radius:2px;width:16px}
 [hidden]{display:none}
 .legend,.controls{display:flex;flex-wrap:wrap;gap:4px 18px;font-size:13px;margin:2px 0 8px;align-items:center}
 .key{display:inline-flex;align-items:center;gap:6px}

@@ -18,6 +18,7 @@ std::string headline(const BlockResult& result, const Figures& figures);
 std::string assessment(const BlockResult& result, const Figures& figures);  // what is well and what needs a look
 std::string map_section(const BlockResult& result, const Figures& figures);
 std::string coverage_section(const BlockResult& result, const Figures& figures);
+std::string diagnostics_section(const BlockResult& result, const BlockDiagnostics& diagnostics);
 std::string images_section(const BlockResult& result, const Figures& figures);
 std::string tie_points_section(const BlockResult& result, const Figures& figures);
 std::string residuals_section(const BlockResult& result, const Figures& figures);

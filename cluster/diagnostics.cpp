@@ -1,0 +1,107 @@
+#include "cluster/diagnostics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "io/error.h"
+#include "io/unit_files.h"
+#include "partition/block_diagnostics.h"
+#include "partition/link_weights.h"
+
+namespace megablock {
+
+namespace {
+
+// Links of frames and heights of what images see, gathered from tracks.
+class TrackEvidence {
+ public:
+  explicit TrackEvidence(const Block& block) : block_(block) {
+    sum_.assign(block.images.size(), 0);
+    count_.assign(block.images.size(), 0);
+  }
+
+  // `kept` and `points` may be empty: all observations, no points.
+  void add(const TrackSet& tracks, const std::vector<std::uint8_t>& kept, const std::vector<Eigen::Vector3d>& points) {
+    for (std::size_t t = 0; t < tracks.id.size(); ++t) {
+      frames_.clear();
+      for (auto o = static_cast<std::size_t>(tracks.begin[t]); o < static_cast<std::size_t>(tracks.begin[t + 1]); ++o) {
+        if (!kept.empty() && !kept[o]) continue;
+        const ImageIndex image = tracks.image[o];
+        frames_.push_back(block_.images[image].frame);
+        if (t >= points.size() || !std::isfinite(points[t].z())) continue;
+        sum_[image] += points[t].z();
+        ++count_[image];
+      }
+      std::sort(frames_.begin(), frames_.end());
+      frames_.erase(std::unique(frames_.begin(), frames_.end()), frames_.end());
+      for (std::size_t i = 0; i < frames_.size(); ++i)
+        for (std::size_t j = i + 1; j < frames_.size(); ++j) links_.add(frames_[i], frames_[j], 1);
+    }
+  }
+
+  FrameGraph graph() { return links_.graph(static_cast<std::int64_t>(block_.frames.size())); }
+  IndexedVector<ImageIndex, double> ground_height() const {
+    IndexedVector<ImageIndex, double> height;
+    for (ImageIndex i(0); count_.contains(i); ++i.value)
+      height.push_back(count_[i] > 0 ? sum_[i] / static_cast<double>(count_[i])
+                                     : std::numeric_limits<double>::quiet_NaN());
+    return height;
+  }
+
+ private:
+  const Block& block_;
+  LinkWeights links_;
+  IndexedVector<ImageIndex, double> sum_;  // of heights of points
+  IndexedVector<ImageIndex, std::int64_t> count_;
+  std::vector<FrameIndex> frames_;  // of one track
+};
+
+BlockDiagnostics diagnose_with(TrackEvidence& evidence, const Block& block, const BlockState& state,
+                               const DiagnosticsOptions& options) {
+  return diagnose(block, state, evidence.ground_height(), evidence.graph(), options);
+}
+
+// The last generation's orientation, if it is of the block as it is now.
+std::optional<BlockState> oriented_state(const JobStore& store, const Block& block) {
+  std::vector<std::string> units = store.list("orient");
+  std::sort(units.begin(), units.end());
+  if (units.empty()) return std::nullopt;
+  BlockState state = read_orientation(store.verified_path(units.back())).state;
+  return state.frames.size() == block.frames.size() ? std::optional(std::move(state)) : std::nullopt;
+}
+
+}  // namespace
+
+BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
+                                 const DiagnosticsOptions& options) {
+  TrackEvidence evidence(result.block);
+  tracks.visit([&](const TrackResults& batch) { evidence.add(batch.tracks, batch.kept, batch.points); });
+  return diagnose_with(evidence, result.block, result.state, options);
+}
+
+JobDiagnostics diagnose_job(const JobStore& store) {
+  const DiagnosticsOptions options = options_of_job(store).diagnostics;
+  if (store.seal(kResult)) {
+    const std::string path = store.verified_path(kResult);
+    const BlockResult result = read_result_without_tracks(path);
+    return {result.block, diagnose_result(result, StoredTracks(path), options), "the result"};
+  }
+  if (!store.seal("block.h5")) throw InputError(store.directory() + ": the job holds no block yet; run it first");
+  JobDiagnostics job{read_block(store.verified_path("block.h5")), {}, "the given poses"};
+  BlockState state = state_of_priors(job.block);
+  if (auto oriented = oriented_state(store, job.block)) {
+    state = std::move(*oriented);
+    job.source = "the initial orientation";
+  }
+  TrackEvidence evidence(job.block);
+  std::vector<std::string> units = store.list("tracks");
+  std::sort(units.begin(), units.end());
+  for (const std::string& unit : units)
+    if (unit.ends_with(".h5")) evidence.add(read_tracks(store.verified_path(unit)), {}, {});
+  job.found = diagnose_with(evidence, job.block, state, options);
+  return job;
+}
+
+}  // namespace megablock

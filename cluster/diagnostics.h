@@ -1,0 +1,28 @@
+// The diagnostics of a job (io/block_diagnostics.h): of its result, or of what there is before.
+#pragma once
+
+#include <string>
+
+#include "cluster/job_options.h"
+#include "io/block_diagnostics.h"
+#include "io/job_store.h"
+#include "io/result.h"
+#include "io/track_batches.h"
+
+namespace megablock {
+
+inline constexpr const char* kDiagnostics = "result/diagnostics.json";
+
+// From poses and kept observations of a result. Passes once through its tracks.
+BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
+                                 const DiagnosticsOptions& options);
+
+// Of the job's result; without one, of its initial orientation or given poses, and its tracks as far as there are any.
+struct JobDiagnostics {
+  Block block;
+  BlockDiagnostics found;
+  std::string source;  // what they are of: "the result", "the initial orientation", "the given poses"
+};
+JobDiagnostics diagnose_job(const JobStore& store);
+
+}  // namespace megablock

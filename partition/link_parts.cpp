@@ -1,0 +1,147 @@
+#include "partition/link_parts.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "partition/disjoint_sets.h"
+
+namespace megablock {
+
+namespace {
+
+struct GoodLink {
+  FrameIndex a, b;
+  std::int64_t points;
+};
+
+// Links of enough points and relative poses, ascending; two that join the same frames are one.
+std::vector<GoodLink> good_links(const Block& block, const BlockState& state, const FrameGraph& links,
+                                 std::int64_t enough) {
+  std::vector<GoodLink> good;
+  for (const FrameEdge& edge : links.edges)
+    if (edge.weight >= enough && state.oriented[edge.a] && state.oriented[edge.b])
+      good.push_back({edge.a, edge.b, edge.weight});
+  for (const RelativePose& pose : block.relative_poses)
+    if (pose.from != pose.to && state.oriented[pose.from] && state.oriented[pose.to])
+      good.push_back({std::min(pose.from, pose.to), std::max(pose.from, pose.to), 0});
+  std::stable_sort(good.begin(), good.end(),
+                   [](const GoodLink& x, const GoodLink& y) { return std::pair(x.a, x.b) < std::pair(y.a, y.b); });
+  const auto same = [](const GoodLink& x, const GoodLink& y) { return x.a == y.a && x.b == y.b; };
+  good.erase(std::unique(good.begin(), good.end(), same), good.end());
+  return good;
+}
+
+// Bridges by depth-first search without recursion; how many frames lie below each.
+class Bridges {
+ public:
+  Bridges(std::int64_t frames, const std::vector<GoodLink>& links) : links_(links) {
+    const auto n = static_cast<std::size_t>(frames);
+    begin_.assign(n + 1, 0);
+    for (const GoodLink& link : links) {
+      ++begin_[static_cast<std::size_t>(link.a.value) + 1];
+      ++begin_[static_cast<std::size_t>(link.b.value) + 1];
+    }
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    ends_.resize(2 * links.size());
+    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::size_t l = 0; l < links.size(); ++l) {
+      ends_[next[static_cast<std::size_t>(links[l].a.value)]++] = l;
+      ends_[next[static_cast<std::size_t>(links[l].b.value)]++] = l;
+    }
+    number_.assign(n, -1);
+    lowest_.assign(n, -1);
+    below_.assign(n, 1);
+  }
+
+  // Calls found(link, frames on the far side of it) for each bridge.
+  template <typename Found>
+  void find(Found&& found) {
+    struct Step {
+      std::size_t frame, by, next;  // by: the link it was reached on
+    };
+    std::vector<Step> path;
+    std::int64_t numbers = 0;
+    for (std::size_t root = 0; root < number_.size(); ++root) {
+      if (number_[root] >= 0) continue;
+      number_[root] = lowest_[root] = numbers++;
+      path.push_back({root, links_.size(), begin_[root]});
+      while (!path.empty()) {
+        Step& step = path.back();
+        const std::size_t frame = step.frame;
+        if (step.next < begin_[frame + 1]) {
+          const std::size_t link = ends_[step.next++];
+          if (link == step.by) continue;
+          const auto a = static_cast<std::size_t>(links_[link].a.value),
+                     b = static_cast<std::size_t>(links_[link].b.value);
+          const std::size_t other = a == frame ? b : a;
+          if (number_[other] >= 0) {
+            lowest_[frame] = std::min(lowest_[frame], number_[other]);
+          } else {
+            number_[other] = lowest_[other] = numbers++;
+            path.push_back({other, link, begin_[other]});
+          }
+          continue;
+        }
+        const std::size_t by = step.by;
+        path.pop_back();
+        if (path.empty()) break;
+        const std::size_t above = path.back().frame;
+        lowest_[above] = std::min(lowest_[above], lowest_[frame]);
+        below_[above] += below_[frame];
+        if (lowest_[frame] > number_[above]) found(by, below_[frame]);
+      }
+    }
+  }
+
+ private:
+  const std::vector<GoodLink>& links_;
+  std::vector<std::size_t> begin_, ends_;
+  std::vector<std::int64_t> number_, lowest_, below_;
+};
+
+void number_parts(const BlockState& state, DisjointSets& sets, BlockDiagnostics& d) {
+  const std::size_t n = state.oriented.size();
+  std::vector<std::int64_t> size(n, 0);
+  for (std::size_t f = 0; f < n; ++f)
+    if (state.oriented[FrameIndex(static_cast<std::int64_t>(f))])
+      ++size[static_cast<std::size_t>(sets.find(static_cast<std::int64_t>(f)))];
+  std::vector<std::size_t> roots;
+  for (std::size_t f = 0; f < n; ++f)
+    if (size[f] > 0) roots.push_back(f);
+  std::stable_sort(roots.begin(), roots.end(), [&](std::size_t a, std::size_t b) { return size[a] > size[b]; });
+  std::vector<std::int32_t> part(n, -1);
+  for (std::size_t p = 0; p < roots.size(); ++p) {
+    part[roots[p]] = static_cast<std::int32_t>(p);
+    d.part_frames.push_back(size[roots[p]]);
+  }
+  d.part_of_frame.assign(n, -1);
+  for (FrameIndex f(0); state.oriented.contains(f); ++f.value)
+    if (state.oriented[f]) d.part_of_frame[f] = part[static_cast<std::size_t>(sets.find(f.value))];
+}
+
+}  // namespace
+
+void find_link_parts(const Block& block, const BlockState& state, const FrameGraph& links, BlockDiagnostics& d) {
+  if (!d.links_known) {
+    d.part_of_frame.assign(state.oriented.size(), -1);
+    return;
+  }
+  const std::vector<GoodLink> good = good_links(block, state, links, d.requested.min_link_points);
+  DisjointSets sets(static_cast<std::int64_t>(state.oriented.size()));
+  for (const GoodLink& link : good) sets.unite(link.a.value, link.b.value);
+  number_parts(state, sets, d);
+  for (const FrameEdge& edge : links.edges) {
+    const std::int32_t a = d.part_of_frame[edge.a], b = d.part_of_frame[edge.b];
+    if (a >= 0 && b >= 0 && a != b) d.weak_links.push_back({edge.a, edge.b, edge.weight, 0});
+  }
+  Bridges(static_cast<std::int64_t>(state.oriented.size()), good).find([&](std::size_t l, std::int64_t below) {
+    const GoodLink& link = good[l];
+    const std::int64_t whole = d.part_frames[static_cast<std::size_t>(d.part_of_frame[link.a])];
+    const std::int64_t smaller = std::min(below, whole - below);
+    if (smaller >= 2 && link.points > 0) d.single_links.push_back({link.a, link.b, link.points, smaller});
+  });
+  std::sort(d.single_links.begin(), d.single_links.end(),
+            [](const auto& x, const auto& y) { return std::pair(x.a, x.b) < std::pair(y.a, y.b); });
+}
+
+}  // namespace megablock

@@ -1,0 +1,13 @@
+// Parts of a block that hang together by good links, and the links that alone hold two parts together.
+#pragma once
+
+#include "io/block_diagnostics.h"
+#include "io/image_graph.h"
+
+namespace megablock {
+
+// Fills in part_of_frame, part_frames, weak_links and single_links, of frames with a pose. Linear in the links.
+void find_link_parts(const Block& block, const BlockState& state, const FrameGraph& links,
+                     BlockDiagnostics& diagnostics);
+
+}  // namespace megablock

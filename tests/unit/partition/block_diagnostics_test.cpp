@@ -1,0 +1,221 @@
+#include "partition/block_diagnostics.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "io/error.h"
+#include "partition/flight_lines.h"
+#include "partition/ground_cover.h"
+#include "partition/link_parts.h"
+
+namespace megablock {
+namespace {
+
+// Vertical photographs 60 m wide and 40 m long along their line, from 100 m.
+struct Survey {
+  Block block;
+  BlockState state;
+  std::vector<FrameEdge> links;
+
+  Survey() {
+    Camera camera;
+    camera.name = "camera";
+    camera.width = 600;
+    camera.height = 400;
+    camera.intrinsics = Intrinsics(CameraModel{CameraModelKind::kPinhole});
+    camera.intrinsics[kFocal] = 1000;
+    camera.intrinsics[kPrincipalX] = 300;
+    camera.intrinsics[kPrincipalY] = 200;
+    block.cameras.push_back(camera);
+    Rig rig;
+    rig.name = "rig";
+    rig.mounts.resize(1);
+    rig.mounts[0].camera = CameraIndex(0);
+    block.rigs.push_back(rig);
+  }
+
+  // Flying along `heading` (from east, counter-clockwise); looking down, or ahead.
+  FrameIndex add(double x, double y, double heading = 0, std::int64_t pass = 0, bool down = true) {
+    const FrameIndex index(static_cast<std::int64_t>(block.frames.size()));
+    Frame frame;
+    frame.name = "f" + std::to_string(index.value);
+    frame.rig = RigIndex(0);
+    frame.pass = pass;
+    Pose pose;
+    pose.centre = {x, y, 100};
+    Eigen::Matrix3d r;
+    const Eigen::Vector3d ahead(std::cos(heading), std::sin(heading), 0), up(0, 0, 1);
+    r.row(0) = ahead.cross(up);
+    r.row(1) = down ? -ahead : -up;
+    r.row(2) = down ? -up : ahead;
+    pose.rotation = Eigen::Quaterniond(r);
+    frame.given_pose = pose;
+    block.frames.push_back(frame);
+    Image image;
+    image.name = frame.name + ".jpg";
+    image.frame = index;
+    block.images.push_back(image);
+    return index;
+  }
+
+  void link(FrameIndex a, FrameIndex b, std::int64_t points) { links.push_back({a, b, points}); }
+
+  BlockDiagnostics found(const DiagnosticsOptions& options = {}) {
+    state = initial_state(block);
+    FrameGraph graph{static_cast<std::int64_t>(block.frames.size()), links};
+    std::sort(graph.edges.begin(), graph.edges.end());
+    return diagnose(block, state, IndexedVector<ImageIndex, double>(block.images.size(), 0.0), graph, options);
+  }
+};
+
+TEST(FlightLines, AreFoundWithoutPassesAndTurnsBelongToNone) {
+  Survey survey;
+  for (int i = 0; i < 6; ++i) survey.add(16 * i, 0, 0, -1);
+  for (int i = 5; i >= 0; --i) survey.add(16 * i, 42, std::numbers::pi, -1);
+  survey.add(-16, 60, 1, -1);
+  survey.add(-16, 84, 1, -1);
+  for (int i = 0; i < 6; ++i) survey.add(16 * i, 84, 0, -1);
+  const BlockState state = initial_state(survey.block);
+  const auto lines = flight_lines(acquisition_order(survey.block, state), state);
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0].front(), FrameIndex(0));
+  EXPECT_EQ(lines[0].back(), FrameIndex(5));
+  EXPECT_EQ(lines[1].front(), FrameIndex(6));
+  EXPECT_EQ(lines[1].back(), FrameIndex(11));
+  EXPECT_EQ(lines[2].back(), FrameIndex(19));
+}
+
+TEST(FlightLines, TwoExposuresOfOnePlaceDoNotEndALine) {
+  Survey survey;
+  for (const double x : {0., 16., 32., 31.9, 48., 64.}) survey.add(x, 0);
+  const BlockState state = initial_state(survey.block);
+  EXPECT_EQ(flight_lines(acquisition_order(survey.block, state), state).size(), 1u);
+}
+
+TEST(GroundCover, CommonShareOfQuadrilaterals) {
+  const Quadrilateral a = {Eigen::Vector2d(0, 0), {4, 0}, {4, 2}, {0, 2}};
+  const Quadrilateral turned = {Eigen::Vector2d(0, 2), {4, 2}, {4, 0}, {0, 0}};
+  EXPECT_NEAR(common_share(a, turned), 1, 1e-14);
+  EXPECT_NEAR(common_share(a, {Eigen::Vector2d(3, 1), {7, 1}, {7, 3}, {3, 3}}), 1. / 8, 1e-14);
+  EXPECT_NEAR(common_share(a, {Eigen::Vector2d(1, 0.5), {2, 0.5}, {2, 1.5}, {1, 1.5}}), 1, 1e-14);  // inside
+  EXPECT_NEAR(common_share(a, {Eigen::Vector2d(2, -1), {4, 1}, {2, 3}, {0, 1}}), 6. / 8, 1e-14);
+  EXPECT_EQ(common_share(a, {Eigen::Vector2d(5, 0), {9, 0}, {9, 2}, {5, 2}}), 0);
+  EXPECT_EQ(common_share(a, {Eigen::Vector2d(1, 1), {1, 1}, {1, 1}, {1, 1}}), 0);
+}
+
+TEST(BlockDiagnostics, BasesOverlapsAndTwoMissingExposures) {
+  Survey survey;
+  for (const int i : {0, 1, 2, 5, 6, 7}) survey.add(16 * i, 0);
+  const BlockDiagnostics d = survey.found();
+  EXPECT_TRUE(d.aerial);
+  EXPECT_FALSE(d.links_known);
+  ASSERT_EQ(d.footprints.size(), 6u);
+  EXPECT_NEAR((d.footprints[0].corners[1] - d.footprints[0].corners[0]).norm(), 60, 1e-9);
+  EXPECT_DOUBLE_EQ(d.usual_step_m, 16);
+  EXPECT_DOUBLE_EQ(d.height_m, 100);
+  ASSERT_EQ(d.pairs.size(), 5u);
+  EXPECT_NEAR(d.pairs[0].base_to_height, 0.16, 1e-12);
+  EXPECT_NEAR(d.pairs[0].overlap, 0.6, 1e-9);
+  EXPECT_EQ(d.pairs[2].overlap, 0);
+  EXPECT_TRUE(d.overlap_is_missing(d.pairs[2]));
+  ASSERT_EQ(d.gaps.size(), 1u);
+  EXPECT_EQ(d.gaps[0].missing, 2);
+  ASSERT_EQ(d.proposals.size(), 2u);
+  EXPECT_LT((d.proposals[0].centre - Eigen::Vector3d(48, 0, 100)).norm(), 1e-9);
+  EXPECT_LT((d.proposals[1].centre - Eigen::Vector3d(64, 0, 100)).norm(), 1e-9);
+  EXPECT_TRUE(d.thin_ground.empty());  // a single line has rim on both sides
+}
+
+TEST(BlockDiagnostics, RotatedBlockHasTheSameGaps) {
+  for (const double turn : {0.3, 1.0, 2.5}) {
+    Survey survey;
+    const Eigen::Rotation2Dd rotation(turn);
+    for (int line = 0; line < 5; ++line)
+      for (int i = 0; i < 8; ++i) {
+        if (line == 2 || (line == 3 && i == 4)) continue;
+        const Eigen::Vector2d p = rotation * Eigen::Vector2d(16 * i, 42 * line);
+        survey.add(p.x(), p.y(), turn, line);
+      }
+    const BlockDiagnostics d = survey.found();
+    ASSERT_EQ(d.gaps.size(), 2u) << turn;
+    EXPECT_FALSE(d.gaps[0].line);
+    EXPECT_TRUE(d.gaps[1].line);
+    EXPECT_NEAR(d.gaps[1].distance_m, 84, 1e-9);
+    EXPECT_EQ(d.proposals.size(), 9u);
+  }
+}
+
+TEST(BlockDiagnostics, StreetsHaveInterruptionsAndLinksOnly) {
+  Survey survey;
+  for (const int i : {0, 1, 2, 4, 5, 9, 10}) survey.add(4 * i, 0, 0, 7, false);
+  survey.add(0, 100, 0, 8, false);
+  for (std::int64_t f = 0; f < 6; ++f) survey.link(FrameIndex(f), FrameIndex(f + 1), 40);
+  survey.link(FrameIndex(0), FrameIndex(2), 40);
+  survey.link(FrameIndex(6), FrameIndex(7), 3);
+  const BlockDiagnostics d = survey.found();
+  EXPECT_FALSE(d.aerial);
+  ASSERT_EQ(d.gaps.size(), 1u);  // two steps are no gap where vehicles stop
+  EXPECT_EQ(d.gaps[0].before, FrameIndex(4));
+  EXPECT_TRUE(d.pairs.empty() && d.footprints.empty() && d.thin_ground.empty() && d.proposals.empty());
+  EXPECT_EQ(d.part_frames, (std::vector<std::int64_t>{7, 1}));
+  ASSERT_EQ(d.weak_links.size(), 1u);
+  EXPECT_EQ(d.weak_links[0].points, 3);
+  ASSERT_EQ(d.single_links.size(), 3u);  // 2-3, 3-4, 4-5: two frames and more on either side
+  EXPECT_EQ(d.single_links[0].a, FrameIndex(2));
+  EXPECT_EQ(d.single_links[0].frames, 3);
+}
+
+TEST(BlockDiagnostics, RelativePosesHoldPartsTogether) {
+  Survey survey;
+  for (int i = 0; i < 4; ++i) survey.add(4 * i, 0, 0, 0, false);
+  survey.link(FrameIndex(0), FrameIndex(1), 40);
+  survey.link(FrameIndex(2), FrameIndex(3), 40);
+  EXPECT_EQ(survey.found().part_frames.size(), 2u);
+  survey.block.relative_poses.push_back({FrameIndex(2), FrameIndex(1), {}, 1e-3, 0.01});
+  const BlockDiagnostics d = survey.found();
+  EXPECT_EQ(d.part_frames.size(), 1u);
+  EXPECT_TRUE(d.single_links.empty());  // it is no link of tie points
+}
+
+TEST(BlockDiagnostics, NothingPlacedAndBadOptions) {
+  Survey survey;
+  const BlockDiagnostics empty = survey.found();
+  EXPECT_FALSE(empty.aerial);
+  EXPECT_TRUE(empty.gaps.empty() && empty.part_frames.empty());
+  survey.add(0, 0);
+  survey.block.frames[FrameIndex(0)].given_pose.reset();
+  EXPECT_TRUE(survey.found().pairs.empty());
+  for (int i = 0; i < 3; ++i) survey.add(5, 5);  // all at one place
+  EXPECT_TRUE(survey.found().gaps.empty());
+  DiagnosticsOptions options;
+  options.min_base_to_height = 2;
+  EXPECT_THROW(survey.found(options), InputError);
+  options = {};
+  options.gap_factor = 1;
+  EXPECT_THROW(survey.found(options), InputError);
+}
+
+TEST(BlockDiagnostics, PosesOfPriorsBeforeAnythingIsOriented) {
+  Survey survey;
+  for (int i = 0; i < 4; ++i) {
+    const FrameIndex f = survey.add(16 * i, 0);
+    Frame& frame = survey.block.frames[f];
+    frame.attitude_prior = AttitudePrior{frame.given_pose->rotation, Eigen::Vector3d::Constant(0.05)};
+    PositionPrior position;
+    position.lever_arm = {0.1, 0, -0.2};
+    position.position = frame.given_pose->centre + frame.given_pose->rotation.conjugate() * position.lever_arm;
+    frame.position_prior = position;
+    frame.given_pose.reset();
+  }
+  survey.block.frames[FrameIndex(3)].attitude_prior.reset();
+  const BlockState state = state_of_priors(survey.block);
+  EXPECT_EQ(std::vector<std::uint8_t>(state.oriented.begin(), state.oriented.end()),
+            (std::vector<std::uint8_t>{1, 1, 1, 0}));
+  EXPECT_LT((state.frames[FrameIndex(2)].centre - Eigen::Vector3d(32, 0, 100)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace megablock
