@@ -17,6 +17,8 @@ using OrderedJson = nlohmann::ordered_json;
 
 OrderedJson finite_number(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
 
+constexpr std::size_t kMostListedFootprints = 10000;  // a million of them would be half a gigabyte of text
+
 class JsonWriter {
  public:
   JsonWriter(const BlockDiagnostics& d, const Block& block) : d_(d), block_(block) {
@@ -34,7 +36,10 @@ class JsonWriter {
     json["thin_ground"] = list(d_.thin_ground, [&](const auto& ground) {
       return OrderedJson{{"centre_m", {ground.centre.x(), ground.centre.y()}}, {"area_m2", ground.area_m2}};
     });
-    json["pairs"] = list(d_.pairs, [&](const auto& pair) { return of(pair); });
+    json["pair_count"] = d_.pairs.size();
+    json["pairs"] = OrderedJson::array();
+    for (const auto& pair : d_.pairs)
+      if (d_.base_is_outside(pair) || d_.overlap_is_missing(pair)) json["pairs"].push_back(of(pair));
     json["links_known"] = d_.links_known;
     json["part_frames"] = d_.part_frames;
     json["smaller_parts"] = smaller_parts();
@@ -45,7 +50,9 @@ class JsonWriter {
       return row;
     });
     json["proposals"] = list(d_.proposals, [&](const auto& proposal) { return of(proposal); });
-    json["footprints"] = list(d_.footprints, [&](const auto& footprint) { return of(footprint); });
+    json["footprints"] = OrderedJson::array();
+    if (d_.footprints.size() <= kMostListedFootprints)
+      json["footprints"] = list(d_.footprints, [&](const auto& footprint) { return of(footprint); });
     return json;
   }
 

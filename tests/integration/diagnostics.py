@@ -26,7 +26,7 @@ def main():
         after = json.loads((job / "result/diagnostics.json").read_text())
         assert after == diagnosed(job)
         assert after["links_known"] and after["part_frames"] == [30] and after["gaps"] == [], after
-        assert len(after["pairs"]) == 30 - after["flight_lines"] and not any(p["outside"] for p in after["pairs"])
+        assert after["pair_count"] == 30 - after["flight_lines"] and after["pairs"] == [], after["pairs"]
         page = (job / "result/report.html").read_text()
         assert "Gaps and links" in page and "No exposure and no flight line is missing." in page
         digest = megablock("status", job, "--digest")
@@ -36,7 +36,7 @@ def main():
         megablock("run", project, "-j", job, "--quiet")
         megablock("report", job)
         after = json.loads((job / "result/diagnostics.json").read_text())
-        assert all(pair["outside"] for pair in after["pairs"]), after["pairs"]
+        assert len(after["pairs"]) == after["pair_count"] and all(pair["outside"] for pair in after["pairs"])
         assert megablock("status", job, "--digest") == digest
 
         project.write_text(project.read_text().replace("0.5}", "5}"))
