@@ -152,6 +152,24 @@ ceres::CostFunction* automatic_image(const residual::ImageMeasured& image) {
   return cost;
 }
 
+// Of a camera of any model, or of none.
+struct DynamicVertical {
+  residual::VerticalSeen vertical;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return vertical(blocks[0], blocks[1], vertical.term.camera.size() > 0 ? blocks[2] : nullptr, result);
+  }
+};
+
+ceres::CostFunction* automatic_vertical(const TileProblem::VerticalTerm& term) {
+  auto* cost =
+      new ceres::DynamicAutoDiffCostFunction<DynamicVertical, 8>(new DynamicVertical{residual::VerticalSeen{term}});
+  for (const int size : {kPoseBlock, kPoseBlock}) cost->AddParameterBlock(size);
+  if (term.camera.size() > 0) cost->AddParameterBlock(static_cast<int>(term.camera.size()));
+  cost->SetNumResiduals(2);
+  return cost;
+}
+
 // A prior has as many residuals as its camera has parameters.
 struct DynamicIntrinsicsKnown {
   residual::IntrinsicsKnown known;
@@ -183,6 +201,7 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
       attitude_loss_(ceres_loss(problem.attitude_loss)),
       relative_loss_(ceres_loss(problem.relative_loss)),
       line_loss_(ceres_loss(problem.line_loss)),
+      vertical_loss_(ceres_loss(problem.vertical_loss)),
       ceres_(std::make_unique<ceres::Problem>(problem_options())) {
   const auto& camera_free = options.camera_free.empty() ? problem.camera_free : options.camera_free;
   if (state.frames.size() != problem.frames.size() || state.cameras.size() != problem.cameras.size() ||
@@ -240,6 +259,12 @@ void CeresTile::add_priors(const TileProblem& problem) {
     else
       ceres_->AddResidualBlock(automatic<1, kPoseBlock>(residual::VerticalLine{term}), line_loss_.get(),
                                frame(term.frame.value));
+  }
+  for (const auto& term : problem.verticals) {
+    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
+    std::vector<double*> blocks{frame(image.frame.value), mount(image.mount)};
+    if (term.camera.size() > 0) blocks.push_back(camera(image.camera.value));
+    ceres_->AddResidualBlock(automatic_vertical(term), vertical_loss_.get(), blocks);
   }
   for (const auto& term : problem.relatives)
     ceres_->AddResidualBlock(automatic<6, kPoseBlock, kPoseBlock>(residual::RelativeMeasured{term}),

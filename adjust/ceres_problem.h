@@ -62,7 +62,8 @@ class CeresTile {
   std::vector<std::uint8_t> point_used_;
   PoseManifold pose_manifold_;
   std::vector<std::unique_ptr<ceres::Manifold>> camera_manifolds_;
-  std::unique_ptr<ceres::LossFunction> image_loss_, position_loss_, attitude_loss_, relative_loss_, line_loss_;
+  std::unique_ptr<ceres::LossFunction> image_loss_, position_loss_, attitude_loss_, relative_loss_, line_loss_,
+      vertical_loss_;
   std::unique_ptr<ceres::Problem> ceres_;
 };
 

@@ -188,6 +188,28 @@ struct HorizontalLine {
   }
 };
 
+// vertical_terms.h.
+struct VerticalSeen {
+  TileProblem::VerticalTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* mount, const Scalar* camera, Scalar* result) const {
+    const Vector3<Scalar> ground = term.ground.cast<Scalar>();
+    const Vector3<Scalar> in_rig = rotation_of(frame) * ground;
+    const Vector3<Scalar> down = rotation_of(mount) * in_rig;
+    const Scalar sum = term.seen.cast<Scalar>().dot(down) + Scalar(1);
+    const Scalar stretch = sqrt(Scalar(2) / (sum > Scalar(1e-9) ? sum : Scalar(1e-9)));
+    for (int i = 0; i < 2; ++i) {
+      result[i] = stretch * term.weight.row(i).cast<Scalar>().dot(down);
+      for (int p = 0; p < term.camera.size(); ++p) result[i] -= term.by_camera(i, p) * (camera[p] - term.camera[p]);
+    }
+    return true;
+  }
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* mount, Scalar* result) const {
+    return (*this)(frame, mount, static_cast<const Scalar*>(nullptr), result);
+  }
+};
+
 struct PointKnown {
   TileProblem::PointTerm term;
   template <typename Scalar>

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "adjust/ceres_problem.h"
+#include "adjust/vertical_terms.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -64,6 +65,18 @@ void add_cameras(const Block& block, const OrientationGraph& graph, const Orient
   tile.problem.mount_free.assign(tile.problem.mounts.size(), 0);
 }
 
+void add_verticals(const Block& block, const OrientationGraph& graph, CoarseTile& tile) {
+  const GroundVertical ground(block.ground);
+  for (std::size_t i = 0; i < graph.images.size(); ++i) {
+    const auto& image = graph.images[i];
+    const std::int32_t frame = tile.frame_row[static_cast<std::size_t>(image.frame)];
+    if (image.vertical == nullptr || frame < 0 || graph.frames[static_cast<std::size_t>(image.frame)].given) continue;
+    tile.problem.verticals.push_back(
+        vertical_term(*image.vertical, ground, tile.state.frames[static_cast<std::size_t>(frame)].centre));
+    tile.problem.verticals.back().image = LocalImage(static_cast<std::int32_t>(i));
+  }
+}
+
 void add_points(const OrientationGraph& graph, const OrientationValues& values, double inverse_sigma,
                 CoarseTile& tile) {
   TileProblem& problem = tile.problem;
@@ -98,9 +111,11 @@ void adjust_coarsely(const Block& block, const OrientationGraph& graph, const Co
   CoarseTile tile;
   add_frames(graph, values, tile);
   add_cameras(block, graph, values, options, tile);
+  add_verticals(block, graph, tile);
   add_points(graph, values, 1 / options.observations.image_sigma_px, tile);
   tile.problem.image_loss = {RobustLoss::Kind::kCauchy, options.loss_scale_px / options.observations.image_sigma_px};
   tile.problem.position_loss = {RobustLoss::Kind::kCauchy, 3.0};
+  tile.problem.vertical_loss = {RobustLoss::Kind::kCauchy, 3.0};
 
   CeresOptions ceres_options;
   ceres_options.derivatives = CeresOptions::Derivatives::kAnalytic;

@@ -8,6 +8,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/vertical_terms.h"
 #include "geometry/decompositions.h"
 
 namespace megablock {
@@ -109,6 +110,11 @@ void add_priors(const TileProblem& problem, const TileState& state, Components& 
     const Pose& frame = state.frames[term.frame.value];
     const LineResidual line = linearise_line(frame, state.frames[term.seen_by().value], term);
     c.add((line.by_frame + line.by_other) * c.move(frame));
+  }
+  for (const auto& term : problem.verticals) {
+    const std::int32_t frame = problem.images[static_cast<std::size_t>(term.image.value)].frame.value;
+    Component& c = all[components.of(frame)];
+    c.add(linearise_vertical(problem, state, term).by_frame * c.move(state.frames[frame]));
   }
   for (const auto& term : problem.relatives) {
     Component& c = all[components.of(term.from.value)];

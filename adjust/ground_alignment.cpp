@@ -93,8 +93,16 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
 
 }  // namespace
 
+GroundAngles known_angles(const OrientationGraph& graph) {
+  for (const auto& frame : graph.frames)
+    if (frame.given || frame.attitude) return GroundAngles::kAll;
+  for (const auto& image : graph.images)
+    if (image.vertical != nullptr) return GroundAngles::kLevel;
+  return GroundAngles::kNone;
+}
+
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
-                                               double median_distance, bool rotations_in_ground) {
+                                               double median_distance, GroundAngles known_angles) {
   const KnownPositions known = known_positions(graph, values);
   auto similarity = fit_similarity_robust(known.from, known.to, known.sigma);
   if (!similarity) return std::nullopt;
@@ -117,11 +125,14 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   const double length = std::sqrt(std::max(0.0, eigen.eigenvalues()(2)));
   const double width = std::sqrt(std::max(0.0, eigen.eigenvalues()(1)));
   const bool line = count < 3 || width < std::max(0.03 * length, 2 * known.stated_sigma / std::sqrt(count));
-  if (!line) return similarity;
+  if (!line && known_angles != GroundAngles::kLevel) return similarity;
 
-  const Eigen::Vector3d axis = eigen.eigenvectors().col(2);
+  const Eigen::Vector3d axis = eigen.eigenvectors().col(2), up = Eigen::Vector3d::UnitZ();
   Eigen::Quaterniond rotation;
-  if (rotations_in_ground) {
+  if (known_angles == GroundAngles::kLevel) {
+    rotation = line ? turn_about(up, similarity->rotation.conjugate() * axis, axis)
+                    : similarity->rotation * without_twist(similarity->rotation, up).conjugate();
+  } else if (known_angles == GroundAngles::kAll) {
     // Left factor about the axis is what the positions leave open: take it out of the rotation.
     rotation = without_twist(similarity->rotation, similarity->rotation.conjugate() * axis);
   } else {
@@ -136,7 +147,7 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   return similarity;
 }
 
-Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, bool keep_rotation,
+Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, GroundAngles known,
                                     bool keep_scale) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double count = 0;
@@ -162,7 +173,7 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
 
   Similarity result;
   if (!keep_scale && baselines > 0) result.scale = links / baselines;
-  if (!keep_rotation) {
+  if (known != GroundAngles::kAll) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
     const MeanAxes axes = mean_axes(graph, values);
     const bool line = eigen.eigenvalues()(1) < 1e-3 * eigen.eigenvalues()(2);
@@ -173,6 +184,10 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
     if (!line) {
       up = eigen.eigenvectors().col(0) * (eigen.eigenvectors().col(0).dot(axes.view + axes.down) > 0 ? -1.0 : 1.0);
       east = (east - up * up.dot(east)).normalized();
+    }
+    if (known == GroundAngles::kLevel) {
+      up = Eigen::Vector3d::UnitZ();
+      east = (farthest - up * farthest.z()).normalized();
     }
     if (up.allFinite() && east.allFinite()) {
       Eigen::Matrix3d rotation;

@@ -7,20 +7,25 @@
 
 namespace megablock {
 
+// What of the averaged rotations refers to the ground already.
+enum class GroundAngles { kNone, kLevel, kAll };
+// By attitude priors and given poses, or by verticals.
+GroundAngles known_angles(const OrientationGraph& graph);
+
 // Similarity that brings the oriented frames onto the known positions (priors and given poses), robustly; empty with
 // fewer than two of them. Positions on one line leave the rotation about the line open; it follows from
-//  * the rotations as they are, when these refer to the ground already (`rotations_in_ground`: attitude priors or given
-//    poses), else
+//  * the rotations as they are, when these refer to the ground already (kAll: attitude priors or given poses), else
+//  * their level (kLevel: verticals; more positions than a line turn the heading alone then, too), else
 //  * gravity: images that look across the line over more than 25 m distance look down (nadir), all others have the
 //    camera's y axis pointing down (street).
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
-                                               double median_distance, bool rotations_in_ground);
+                                               double median_distance, GroundAngles known);
 
 // Similarity to the frame of a free block: centroid of the frames at the origin, mean baseline of the linked frames one
 // unit (`keep_scale`: as it is), first principal plane of the centres horizontal with the images' mean viewing and y
-// directions downwards, the frame farthest from the centroid on the positive x axis. `keep_rotation`: rotations refer
-// to the ground already.
-Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, bool keep_rotation,
+// directions downwards, the frame farthest from the centroid on the positive x axis. Of what is known of the rotations
+// it keeps all, or the level.
+Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, GroundAngles known,
                                     bool keep_scale);
 
 }  // namespace megablock

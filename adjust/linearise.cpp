@@ -9,6 +9,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/residual_squares.h"
+#include "adjust/vertical_terms.h"
 
 namespace megablock {
 
@@ -138,6 +139,8 @@ double other_cost(const TileProblem& problem, const TileState& state) {
     const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
     sum += problem.line_loss.evaluate(r * r)[0];
   }
+  for (const auto& term : problem.verticals)
+    sum += problem.vertical_loss.evaluate(linearise_vertical(problem, state, term).residual.squaredNorm())[0];
   for (const auto& term : problem.point_priors)
     if (problem.active(term.point.value))
       sum += point_prior_residual(state.points[term.point.value], term).squaredNorm();

@@ -12,8 +12,10 @@
 #include "adjust/orientation_parts.h"
 #include "adjust/resection.h"
 #include "adjust/rotation_averaging.h"
+#include "adjust/vertical_terms.h"
 #include "geometry/angles.h"
 #include "io/error.h"
+#include "io/verticals.h"
 
 namespace megablock {
 
@@ -39,8 +41,8 @@ class Orientation {
     for (const auto& frame : graph_.frames) {
       any_position_ |= frame.position.has_value();
       any_given_ |= frame.given.has_value();
-      rotations_in_ground_ |= frame.given.has_value() || frame.attitude.has_value();
     }
+    known_angles_ = known_angles(graph_);
   }
 
   void run() {
@@ -50,7 +52,7 @@ class Orientation {
     to_ground();
     position();
     adjust();
-    if (!in_ground_) move(similarity_to_free_frame(graph_, values_, rotations_in_ground_, metric_rigs()));
+    if (!in_ground_) move(similarity_to_free_frame(graph_, values_, known_angles_, metric_rigs()));
   }
 
   OrientationResult result(const BlockState& start) const {
@@ -96,13 +98,29 @@ class Orientation {
       else if (frame.attitude)
         priors[f] = {frame.attitude->rotation_cw, std::max(1e-4, frame.attitude->sigma_rad.norm())};
     }
-    const AveragedRotations averaged =
-        average_rotations(graph_.frame_count(), relative, priors, options_.max_rotation_error_deg * kDegree);
+    const AveragedRotations averaged = average_rotations(graph_.frame_count(), relative, priors,
+                                                         options_.max_rotation_error_deg * kDegree, known_verticals());
     usable_ = averaged.kept;
     dropped_edges_ = std::count(usable_.begin(), usable_.end(), 0);
     rotations_ = averaged.rotation;
     for (std::size_t f = 0; f < rotations_.size(); ++f)
       if (rotations_[f]) reasons_[f] = "no baseline to other images could be measured";
+  }
+
+  // In the axes of the frames, with all their errors: the cameras are not estimated here.
+  std::vector<KnownVertical> known_verticals() const {
+    const GroundVertical ground(block_.ground);
+    std::vector<KnownVertical> verticals;
+    for (const auto& image : graph_.images) {
+      if (image.vertical == nullptr) continue;
+      const auto& frame = graph_.frames[row(image.frame)];
+      const AxisDirection down = whole_error(*image.vertical, block_.cameras[graph_.cameras[row(image.camera)]],
+                                             values_.cameras[row(image.camera)]);
+      verticals.push_back({image.frame, image.mount.rotation.conjugate() * down.direction,
+                           ground.down(frame.position ? frame.position->position : Eigen::Vector3d::Zero()),
+                           std::max(1e-4, std::sqrt(down.covariance.trace() / 2))});
+    }
+    return verticals;
   }
 
   void first_centres() {
@@ -144,7 +162,7 @@ class Orientation {
     intersect(3 * kDegree, 1 * kDegree);
     const double distance =
         median_of_kept([](const Eigen::Vector3d&, const Eigen::Vector3d& inside) { return inside.norm(); });
-    const auto similarity = similarity_to_ground(graph_, values_, distance, rotations_in_ground_);
+    const auto similarity = similarity_to_ground(graph_, values_, distance, known_angles_);
     if (!similarity) return;
     in_ground_ = true;
     for (auto& rotation : rotations_)
@@ -347,7 +365,8 @@ class Orientation {
   std::vector<Baseline> baselines_;
   std::vector<std::string> reasons_;  // [frames] why it has no pose
   std::int64_t dropped_edges_ = 0;
-  bool any_position_ = false, any_given_ = false, rotations_in_ground_ = false, in_ground_ = false;
+  bool any_position_ = false, any_given_ = false, in_ground_ = false;
+  GroundAngles known_angles_ = GroundAngles::kNone;
 };
 
 }  // namespace

@@ -60,8 +60,11 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
     rows.image[image] = static_cast<std::int32_t>(graph.images.size());
     const auto mount = static_cast<std::size_t>(block.images[image].mount);
     graph.images.push_back(
-        {image, rows.frame[frame], camera_row[camera], start.mounts[block.frames[frame].rig][mount]});
+        {image, rows.frame[frame], camera_row[camera], start.mounts[block.frames[frame].rig][mount], nullptr});
   }
+  for (const SeenVertical& vertical : block.verticals)
+    if (const std::int32_t image = rows.image[vertical.image]; image >= 0)
+      graph.images[static_cast<std::size_t>(image)].vertical = &vertical;
   return rows;
 }
 

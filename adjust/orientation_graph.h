@@ -30,6 +30,7 @@ struct OrientationGraph {
     std::int32_t frame = -1;
     std::int32_t camera = -1;  // row of `cameras`
     Pose mount;
+    const SeenVertical* vertical = nullptr;  // of the block
   };
   // Relative orientation of camera b with respect to camera a.
   struct PairEdge {

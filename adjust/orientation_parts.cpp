@@ -216,13 +216,11 @@ class PartwiseOrientation {
   void to_free_frame(BlockState& state) const {
     const OrientationGraph graph = make_orientation_graph(block_, start_, frames_, pairs_, TrackSet(), options_);
     OrientationValues values;
-    bool attitudes = false, metric = false;
-    for (const auto& node : graph.frames) {
+    bool metric = false;
+    for (const auto& node : graph.frames)
       values.frames.push_back(state.oriented[node.index] ? std::optional(state.frames[node.index]) : std::nullopt);
-      attitudes |= node.attitude.has_value();
-    }
     for (const auto& image : graph.images) metric |= image.mount.centre.norm() > 0;
-    const Similarity similarity = similarity_to_free_frame(graph, values, attitudes, metric);
+    const Similarity similarity = similarity_to_free_frame(graph, values, known_angles(graph), metric);
     for (const FrameIndex frame : frames_)
       if (state.oriented[frame]) state.frames[frame] = similarity(state.frames[frame]);
   }

@@ -16,6 +16,7 @@ namespace {
 
 using Edges = std::vector<RelativeRotation>;
 using Priors = std::vector<std::optional<RotationPrior>>;
+using Verticals = std::vector<KnownVertical>;
 
 struct Neighbour {
   std::int32_t node;
@@ -44,6 +45,44 @@ std::vector<std::vector<Neighbour>> adjacency(std::int32_t nodes, const Edges& e
 
 Eigen::Quaterniond along(const RelativeRotation& edge, std::int32_t from) {
   return edge.a == from ? edge.rotation : edge.rotation.conjugate();
+}
+
+// Edges and verticals, without those that the others make unlikely.
+struct Likely {
+  Edges edges;
+  Verticals verticals;
+};
+
+// A vertical with which less than a quarter of its node's edges agree, by inliers, is left out; an edge that the
+// verticals at its ends then contradict counts a tenth.
+Likely likely_ones(std::int32_t nodes, const Edges& edges, const Verticals& verticals) {
+  constexpr double kAgree = 5 * kDegree, kFewest = 0.25, kDiscount = 0.1;
+  std::vector<std::int32_t> vertical(row(nodes), -1);  // of several the last
+  for (std::size_t v = 0; v < verticals.size(); ++v) vertical[row(verticals[v].node)] = static_cast<std::int32_t>(v);
+  std::vector<double> agreeing(row(nodes), 0), all(row(nodes), 0);
+  const auto tested = [&](const RelativeRotation& edge) {
+    return vertical[row(edge.a)] >= 0 && vertical[row(edge.b)] >= 0;
+  };
+  const auto agrees = [&](const RelativeRotation& edge) {
+    const auto &a = verticals[row(vertical[row(edge.a)])], &b = verticals[row(vertical[row(edge.b)])];
+    return (edge.rotation * a.seen - b.seen).norm() < kAgree;
+  };
+  for (const RelativeRotation& edge : edges) {
+    if (!tested(edge)) continue;
+    for (const std::int32_t node : {edge.a, edge.b}) {
+      all[row(node)] += edge.inliers;
+      if (agrees(edge)) agreeing[row(node)] += edge.inliers;
+    }
+  }
+  Likely likely{edges, {}};
+  for (const KnownVertical& v : verticals)
+    if (agreeing[row(v.node)] >= kFewest * all[row(v.node)])
+      likely.verticals.push_back(v);
+    else
+      vertical[row(v.node)] = -1;
+  for (RelativeRotation& edge : likely.edges)
+    if (tested(edge) && !agrees(edge)) edge.inliers *= kDiscount;
+  return likely;
 }
 
 // Inliers times the share of the edge's triangles that close within 5 degrees (one half without triangles).
@@ -170,81 +209,153 @@ void turn_to_priors(const Priors& priors, const std::vector<std::uint8_t>& activ
   for (auto& r : rotation) r = (r * best).normalized();
 }
 
-// The reweighted iterations over the active nodes.
+// Down as most nodes see it, turned to down in the world by the least rotation of all.
+void turn_to_verticals(const Verticals& verticals, const std::vector<std::uint8_t>& active,
+                       std::vector<Eigen::Quaterniond>& rotation) {
+  struct Seen {
+    Eigen::Vector3d from, to;  // world axes as they are, and as they should be
+  };
+  std::vector<Seen> seen;
+  for (const KnownVertical& v : verticals)
+    if (active[row(v.node)]) seen.push_back({rotation[row(v.node)].conjugate() * v.seen, v.ground});
+  if (seen.empty()) return;
+  constexpr double kSpread = 5 * kDegree;
+  const auto turn_of = [](const Seen& s) { return Eigen::Quaterniond::FromTwoVectors(s.to, s.from); };
+  const auto cost = [&](const Eigen::Quaterniond& g) {
+    double sum = 0;
+    for (const Seen& s : seen) sum += std::log1p((g * s.to - s.from).squaredNorm() / (kSpread * kSpread));
+    return sum;
+  };
+  Eigen::Quaterniond best = turn_of(seen.front());
+  double best_cost = cost(best);
+  const std::size_t stride = 1 + seen.size() / 100;
+  for (std::size_t i = stride; i < seen.size(); i += stride)
+    if (const double c = cost(turn_of(seen[i])); c < best_cost) best = turn_of(seen[i]), best_cost = c;
+  for (auto& r : rotation) r = (r * best).normalized();
+}
+
+// The reweighted iterations over the active nodes. Increments about x and y are solved for with the verticals, those
+// about z without; where there are none all three are one system.
 class Averager {
  public:
-  Averager(const Edges& edges, const std::vector<std::uint8_t>& kept, const Priors& priors,
+  Averager(const Edges& edges, const std::vector<std::uint8_t>& kept, const Priors& priors, const Verticals& verticals,
            const std::vector<std::uint8_t>& active, std::vector<Eigen::Quaterniond>& rotation)
-      : edges_(edges),
-        kept_(kept),
-        priors_(priors),
-        active_(active),
-        rotation_(rotation),
-        unknown_(rotation.size(), -1) {
+      : edges_(edges), kept_(kept), priors_(priors), active_(active), rotation_(rotation) {
+    for (const KnownVertical& v : verticals)
+      if (active[row(v.node)]) verticals_.push_back(v);
     bool anchored = false;
     for (std::size_t i = 0; i < rotation.size(); ++i) anchored |= active[i] && priors[i].has_value();
-    for (std::size_t i = 0; i < rotation.size(); ++i) {
-      if (!active[i] || held(priors, i)) continue;
-      if (!anchored) {  // the first node carries the gauge
-        anchored = true;
-        continue;
-      }
-      unknown_[i] = count_++;
-    }
+    number(level_, anchored || !verticals_.empty());
+    number(heading_, anchored);
   }
 
   void run() {
-    if (count_ == 0) return;
-    constexpr double kSmallest = 0.05 * kDegree, kScale = 2 * kDegree;
+    if (level_.count == 0) return;
+    constexpr double kSmallest = 0.05 * kDegree;
     constexpr int kL1Iterations = 15, kIterations = 100;
     for (int i = 0; i < kL1Iterations; ++i)
-      if (iterate([&](double e) { return kScale / std::max(e, kSmallest); }) < 1e-6) break;
+      if (iterate([&](double e) { return kScale / std::max(e, kSmallest); }, 1) < 1e-6) break;
     for (int i = 0; i < kIterations; ++i)
-      if (iterate([&](double e) { return std::pow(1 + e * e / (kScale * kScale), -2); }) < 1e-12) break;
+      if (iterate([&](double e) { return std::pow(1 + e * e / (kScale * kScale), -2); }, 2) < 1e-12) break;
   }
 
  private:
-  // One weighted solution; returns the largest increment.
+  static constexpr double kScale = 2 * kDegree;
+  struct System {
+    std::vector<std::int32_t> unknown;  // number of the node's unknown; -1: none
+    std::int32_t count = 0;
+    bool analysed = false;
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
+  };
+  // w_b - w_a = e of weight w; a negative: w_b = e.
+  struct Equation {
+    std::int32_t a, b;
+    double weight;
+    Eigen::Vector3d error;
+  };
+
+  // Without an anchor the first node carries the gauge.
+  void number(System& system, bool anchored) const {
+    system.unknown.assign(rotation_.size(), -1);
+    for (std::size_t i = 0; i < rotation_.size(); ++i) {
+      if (!active_[i] || held(priors_, i)) continue;
+      if (anchored) system.unknown[i] = system.count++;
+      anchored = true;
+    }
+  }
+
+  // One weighted solution; returns the largest increment. Verticals are good to tenths of a degree or wrong: their
+  // weights fall off from the start, at first slowly (power 1), so that they reach what has wandered off.
   template <typename Weight>
-  double iterate(Weight robust) {
-    std::vector<Eigen::Triplet<double>> entries;
-    Eigen::MatrixX3d right = Eigen::MatrixX3d::Zero(count_, 3);
-    const auto add = [&](std::int32_t i, double w, const Eigen::Vector3d& e) {
-      if (i < 0) return;
-      entries.emplace_back(i, i, w);
-      right.row(i) += w * e.transpose();
-    };
+  double iterate(Weight robust, int vertical_power) {
+    std::vector<Equation> equations;
     for (std::size_t k = 0; k < edges_.size(); ++k) {
       const RelativeRotation& edge = edges_[k];
       if (!kept_[k] || !active_[row(edge.a)]) continue;
       const Eigen::Vector3d e = error(edge);
       constexpr double kVariance = 0.25 * kDegree * kDegree * 100;  // of a rotation from one inlier
-      const double w = (1 + edge.inliers) / kVariance * robust(e.norm());
-      const std::int32_t a = unknown_[row(edge.a)], b = unknown_[row(edge.b)];
-      add(a, w, -e);
-      add(b, w, e);
-      if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -w);
+      equations.push_back({edge.a, edge.b, (1 + edge.inliers) / kVariance * robust(e.norm()), e});
     }
     for (std::size_t i = 0; i < rotation_.size(); ++i)
-      if (unknown_[i] >= 0 && priors_[i]) {
+      if (active_[i] && !held(priors_, i) && priors_[i]) {
         const Eigen::Vector3d e = rotation_log<double>(rotation_[i].conjugate() * priors_[i]->rotation);
         const double sigma = priors_[i]->sigma_rad;
-        add(unknown_[i], 1 / (sigma * sigma + e.squaredNorm()), e);
+        equations.push_back({-1, static_cast<std::int32_t>(i), 1 / (sigma * sigma + e.squaredNorm()), e});
       }
-    Eigen::SparseMatrix<double> normal(count_, count_);
-    normal.setFromTriplets(entries.begin(), entries.end());
-    if (!analysed_) solver_.analyzePattern(normal), analysed_ = true;
-    solver_.factorize(normal);
-    if (solver_.info() != Eigen::Success) return 0;
-    const Eigen::MatrixX3d step = solver_.solve(right);
+    Eigen::MatrixX3d step = Eigen::MatrixX3d::Zero(std::ssize(rotation_), 3);
+    if (verticals_.empty()) {
+      solve(level_, equations, 0, 3, step);
+    } else {
+      solve(heading_, equations, 2, 1, step);
+      for (const KnownVertical& v : verticals_) {
+        const Eigen::Vector3d now = rotation_[row(v.node)].conjugate() * v.seen, cross = v.ground.cross(now);
+        const double angle = std::atan2(cross.norm(), v.ground.dot(now));
+        const Eigen::Vector3d e = cross.norm() > 0 ? Eigen::Vector3d(angle / cross.norm() * cross) : cross;
+        constexpr double kPlumb = 0.1 * kDegree;  // what upright edges are good for
+        equations.push_back({-1, v.node,
+                             std::pow(1 + angle * angle / (kScale * kScale), -vertical_power) /
+                                 (v.sigma_rad * v.sigma_rad + kPlumb * kPlumb),
+                             e});
+      }
+      solve(level_, equations, 0, 2, step);
+    }
     double largest = 0;
-    for (std::size_t i = 0; i < rotation_.size(); ++i)
-      if (unknown_[i] >= 0) {
-        const Eigen::Vector3d w = step.row(unknown_[i]).transpose();
-        rotation_[i] = rotation_update(rotation_[i], w);
-        largest = std::max(largest, w.norm());
-      }
+    for (std::size_t i = 0; i < rotation_.size(); ++i) {
+      const Eigen::Vector3d w = step.row(static_cast<Eigen::Index>(i)).transpose();
+      if (w.isZero(0)) continue;
+      rotation_[i] = rotation_update(rotation_[i], w);
+      largest = std::max(largest, w.norm());
+    }
     return largest;
+  }
+
+  // Some columns of the increments of all nodes.
+  static void solve(System& system, const std::vector<Equation>& equations, int first, int columns,
+                    Eigen::MatrixX3d& step) {
+    if (system.count == 0) return;
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(system.count, columns);
+    const auto add = [&](std::int32_t i, double w, const Eigen::Vector3d& e) {
+      if (i < 0) return;
+      entries.emplace_back(i, i, w);
+      right.row(i) += w * e.segment(first, columns).transpose();
+    };
+    for (const Equation& equation : equations) {
+      const std::int32_t a = equation.a < 0 ? -1 : system.unknown[row(equation.a)];
+      const std::int32_t b = system.unknown[row(equation.b)];
+      add(a, equation.weight, -equation.error);
+      add(b, equation.weight, equation.error);
+      if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -equation.weight);
+    }
+    Eigen::SparseMatrix<double> normal(system.count, system.count);
+    normal.setFromTriplets(entries.begin(), entries.end());
+    if (!system.analysed) system.solver.analyzePattern(normal), system.analysed = true;
+    system.solver.factorize(normal);
+    if (system.solver.info() != Eigen::Success) return;
+    const Eigen::MatrixXd solution = system.solver.solve(right);
+    for (std::size_t i = 0; i < system.unknown.size(); ++i)
+      if (system.unknown[i] >= 0)
+        step.row(static_cast<Eigen::Index>(i)).segment(first, columns) = solution.row(system.unknown[i]);
   }
 
   Eigen::Vector3d error(const RelativeRotation& edge) const {
@@ -254,32 +365,32 @@ class Averager {
   const Edges& edges_;
   const std::vector<std::uint8_t>& kept_;
   const Priors& priors_;
+  Verticals verticals_;  // of active nodes
   const std::vector<std::uint8_t>& active_;
   std::vector<Eigen::Quaterniond>& rotation_;
-  std::vector<std::int32_t> unknown_;  // number of the node's unknown; -1: none
-  std::int32_t count_ = 0;
-  bool analysed_ = false;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+  System level_, heading_;
 };
 
 }  // namespace
 
-AveragedRotations average_rotations(std::int32_t nodes, const Edges& edges, const Priors& priors,
-                                    double max_error_rad) {
+AveragedRotations average_rotations(std::int32_t nodes, const Edges& measured, const Priors& priors,
+                                    double max_error_rad, const Verticals& seen) {
+  const auto [edges, verticals] = likely_ones(nodes, measured, seen);
   AveragedRotations result;
   result.kept.assign(edges.size(), 1);
   auto active = reachable(nodes, edges, result.kept, priors);
   std::vector<Eigen::Quaterniond> rotation = tree_start(nodes, edges, priors, active);
-  const bool any_held = [&] {
-    for (std::size_t i = 0; i < priors.size(); ++i)
-      if (held(priors, i)) return true;
-    return false;
-  }();
+  bool any_held = false, any_prior = false;
+  for (std::size_t i = 0; i < priors.size(); ++i) {
+    any_held |= held(priors, i);
+    any_prior |= active[i] && priors[i].has_value();
+  }
+  if (!any_held && !any_prior) turn_to_verticals(verticals, active, rotation);
   if (!any_held) turn_to_priors(priors, active, rotation);
 
   constexpr int kRounds = 3;  // of dropping edges and averaging again
   for (int round = 0; round < kRounds; ++round) {
-    Averager(edges, result.kept, priors, active, rotation).run();
+    Averager(edges, result.kept, priors, verticals, active, rotation).run();
     bool changed = false;
     for (std::size_t e = 0; e < edges.size(); ++e) {
       if (!active[row(edges[e].a)]) continue;

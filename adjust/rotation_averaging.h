@@ -5,6 +5,12 @@
 // graph Laplacian times the 3x3 identity, by sparse Cholesky factorisation. Start: the spanning tree of the most
 // trusted edges (inliers times the share of triangles that close). Weights: first 1/|e| (L1), then Geman-McClure, after
 // Chatterjee and Govindu, "Efficient and robust large-scale rotation averaging", ICCV 2013.
+//
+// The average is free by a rotation of the world, and its errors add up along chains. A node that sees the vertical
+// fixes two angles of three: with d where it sees down and g down in the world (the axis -z, to a degree) it measures
+// w = g x R_i'd about the axes x and y. Where edge and verticals at its ends
+// disagree by more than 5 degrees, a vertical that most edges of its node contradict is left out, and an edge that
+// others contradict counts a tenth. The heading, about z, stays free.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -28,14 +34,24 @@ struct RotationPrior {
   double sigma_rad = 0;  // 0: held
 };
 
+// Where a node sees down (Kalantari 2009, M45).
+struct KnownVertical {
+  std::int32_t node = -1;
+  Eigen::Vector3d seen = Eigen::Vector3d::UnitY();     // unit, the node's axes
+  Eigen::Vector3d ground = -Eigen::Vector3d::UnitZ();  // unit, world axes
+  double sigma_rad = 0;                                // per angle, greater than 0
+};
+
 struct AveragedRotations {
   std::vector<std::optional<Eigen::Quaterniond>> rotation;  // [nodes] empty: not connected
   std::vector<std::uint8_t> kept;                           // [edges] 0: farther from the average than allowed
 };
 
 // `priors` [nodes]. With held rotations the nodes connected to them are averaged, else the largest connected part
-// (ties: the lowest node); without any prior its lowest node gets the identity.
+// (ties: the lowest node); without any prior its lowest node gets the identity. With `verticals` alone the world's z is
+// up, and the heading any.
 AveragedRotations average_rotations(std::int32_t nodes, const std::vector<RelativeRotation>& edges,
-                                    const std::vector<std::optional<RotationPrior>>& priors, double max_error_rad);
+                                    const std::vector<std::optional<RotationPrior>>& priors, double max_error_rad,
+                                    const std::vector<KnownVertical>& verticals = {});
 
 }  // namespace megablock

@@ -17,7 +17,7 @@ SigmaScales next_sigma_scales(const SigmaScales& now, const ObservationTable& ta
   constexpr double kMostAtOnce = 10;
   SigmaScales scales;
   for (const ObservationKind kind :
-       {kPositionHorizontal, kPositionHeight, kAttitude, kRelativeRotation, kRelativePosition}) {
+       {kPositionHorizontal, kPositionHeight, kAttitude, kRelativeRotation, kRelativePosition, kVertical}) {
     const ObservationStatistics& s = table[kind];
     if (s.redundancy < kFewestRedundancy) continue;
     const double shown = std::clamp(std::sqrt(s.weighted_squares / s.redundancy), 1 / kMostAtOnce, kMostAtOnce);
@@ -31,6 +31,10 @@ void scale_sigmas(TileProblem& problem, const SigmaScales& scales) {
   for (auto& term : problem.positions)
     term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
   for (auto& term : problem.attitudes) term.prior.sigma_rad *= scales[kAttitude];
+  for (auto& term : problem.verticals) {
+    term.weight /= scales[kVertical];
+    term.by_camera /= scales[kVertical];
+  }
   for (auto& term : problem.relatives) {
     term.rotation_sigma_rad *= scales[kRelativeRotation];
     term.position_sigma_m *= scales[kRelativePosition];

@@ -1,5 +1,5 @@
 // Variance components of everything but image measurements (those: image_sigma.h), where stated sigmas are not to be
-// trusted: sigmas of positions, attitudes and relative poses are multiplied by what their residuals show.
+// trusted: sigmas of positions, attitudes, relative poses and verticals are multiplied by what their residuals show.
 #pragma once
 
 #include <array>

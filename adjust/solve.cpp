@@ -9,6 +9,7 @@
 #include "adjust/linearise.h"
 #include "adjust/residual_squares.h"
 #include "adjust/tile_adjustment.h"
+#include "adjust/vertical_terms.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -48,6 +49,8 @@ void add_priors(const TileProblem& problem, const TileState& state, ResidualSum&
     const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
     add(r * r, 1, problem.line_loss);
   }
+  for (const auto& term : problem.verticals)
+    add(linearise_vertical(problem, state, term).residual.squaredNorm(), 2, problem.vertical_loss);
   for (const auto& term : problem.relatives)
     add(linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual.squaredNorm(), 6,
         problem.relative_loss);

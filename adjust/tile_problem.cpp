@@ -7,6 +7,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/owner.h"
+#include "adjust/vertical_terms.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -34,7 +35,7 @@ bool TileProblem::active(std::int64_t point) const {
 
 void ObservationOptions::check() const {
   if (!(image_sigma_px > 0)) throw InputError("image_sigma_px must be positive (pixels)");
-  for (const RobustLoss& loss : {image_loss, position_loss, attitude_loss, relative_loss, line_loss})
+  for (const RobustLoss& loss : {image_loss, position_loss, attitude_loss, relative_loss, line_loss, vertical_loss})
     if (loss.kind != RobustLoss::Kind::kNone && !(loss.scale > 0))
       throw InputError("the scale of a robust loss must be positive (sigmas)");
 }
@@ -89,16 +90,19 @@ class TileBuilder {
     problem_.attitude_loss = options_.attitude_loss;
     problem_.relative_loss = options_.relative_loss;
     problem_.line_loss = options_.line_loss;
+    problem_.vertical_loss = options_.vertical_loss;
     lines_ = line_terms(block_, state_, tiles_, tile_);
     select_control_points();
     select_relative_poses();
     select_prior_owners();
+    select_verticals();
     make_tables();
     for (std::int64_t t = 0; t < owned_.track_count(); ++t) add_track(t);
     for (std::int64_t row : control_points_) add_control_point(row);
     add_frame_priors();
     add_relative_poses();
     add_lines();
+    add_verticals();
     add_camera_priors();
     add_mount_priors();
     return std::move(problem_);
@@ -163,8 +167,16 @@ class TileBuilder {
     make_distinct(prior_mounts_);
   }
 
+  void select_verticals() {
+    for (const SeenVertical& vertical : block_.verticals) {
+      const FrameIndex frame = block_.images[vertical.image].frame;
+      if (oriented(frame) && tiles_.tile_of_frame[frame] == tile_) verticals_.push_back(&vertical);
+    }
+  }
+
   void make_tables() {
     std::vector<ImageIndex> images(owned_.image);
+    for (const SeenVertical* vertical : verticals_) images.push_back(vertical->image);
     for (std::int64_t row : control_points_)
       for (const ImageMeasurement& m : block_.control_points[static_cast<std::size_t>(row)].measurements)
         images.push_back(m.image);
@@ -277,6 +289,15 @@ class TileBuilder {
     }
   }
 
+  void add_verticals() {
+    const GroundVertical ground(block_.ground);
+    for (const SeenVertical* vertical : verticals_) {
+      const Pose& frame = state_.frames[block_.images[vertical->image].frame];
+      problem_.verticals.push_back(vertical_term(*vertical, ground, frame.centre));
+      problem_.verticals.back().image = LocalImage(row_of(image_table_, vertical->image));
+    }
+  }
+
   void add_camera_priors() {
     for (CameraIndex index : prior_cameras_) {
       const Camera& camera = block_.cameras[index];
@@ -308,6 +329,7 @@ class TileBuilder {
   std::vector<std::int64_t> control_points_;
   std::vector<std::size_t> relative_poses_;
   std::vector<BlockLineTerm> lines_;
+  std::vector<const SeenVertical*> verticals_;
   std::vector<CameraIndex> prior_cameras_;
   std::vector<MountId> prior_mounts_;
   std::vector<ImageIndex> image_table_;

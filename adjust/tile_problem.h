@@ -10,8 +10,9 @@
 //   intrinsics prior k - k_0                               (per parameter with finite sigma)             [1 each]
 //   mount prior      Log(R R_0'), C - C_0                                                                [6]
 //   line             off the vertical, or the horizontal (line_terms.h)                                 [1]
-// Robust losses act on image residuals (all), position and attitude priors, relative poses and lines (their own
-// option).
+//   vertical         where an image should see down - where it does (vertical_terms.h)                  [2]
+// Robust losses act on image residuals (all), position and attitude priors, relative poses, lines and verticals (their
+// own option).
 //
 // Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3).
 // Every table is ascending by global index; a local index is a row of its table.
@@ -38,9 +39,7 @@ struct RobustLoss {
     return squares(squared_norm) ? std::array<double, 3>{squared_norm, 1, 0} : evaluate_beyond(squared_norm);
   }
   // Whether rho(s) = s there, as for nearly every observation.
-  bool squares(double s) const {
-    return kind == Kind::kNone || (kind == Kind::kHuber && !(s > scale * scale));
-  }
+  bool squares(double s) const { return kind == Kind::kNone || (kind == Kind::kHuber && !(s > scale * scale)); }
 
  private:
   std::array<double, 3> evaluate_beyond(double squared_norm) const;
@@ -119,6 +118,15 @@ struct TileProblem {
     double weight = 0;
     LocalFrame seen_by() const { return other.valid() ? other : frame; }
   };
+  // Where an image sees down (vertical_terms.h).
+  struct VerticalTerm {
+    LocalImage image;
+    Eigen::Vector3d ground = -Eigen::Vector3d::UnitZ();  // down at the frame, ground axes
+    Eigen::Vector3d seen = Eigen::Vector3d::UnitY();     // camera axes
+    Eigen::Matrix<double, 2, 3> weight;                  // camera axes -> sigmas, across `seen`
+    Eigen::VectorXd camera;                              // parameters of the camera that `seen` goes with, or empty
+    Eigen::Matrix2Xd by_camera;                          // weight * d seen / d parameter
+  };
   std::vector<PositionTerm> positions;
   std::vector<AttitudeTerm> attitudes;
   std::vector<RelativeTerm> relatives;
@@ -126,8 +134,9 @@ struct TileProblem {
   std::vector<IntrinsicTerm> intrinsic_priors;
   std::vector<MountTerm> mount_priors;
   std::vector<LineTerm> lines;
+  std::vector<VerticalTerm> verticals;
 
-  RobustLoss image_loss, position_loss, attitude_loss, relative_loss, line_loss;
+  RobustLoss image_loss, position_loss, attitude_loss, relative_loss, line_loss, vertical_loss;
 
   std::int64_t point_count() const { return static_cast<std::int64_t>(points.size()); }
   std::int64_t observation_count() const { return static_cast<std::int64_t>(image.size()); }
@@ -156,6 +165,7 @@ struct ObservationOptions {
   RobustLoss attitude_loss{RobustLoss::Kind::kNone, 3.0};
   RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
   RobustLoss line_loss{RobustLoss::Kind::kHuber, 3.0};
+  RobustLoss vertical_loss{RobustLoss::Kind::kCauchy, 3.0};
   bool use_position_priors = true;
   bool use_attitude_priors = true;
   void check() const;  // throws InputError

@@ -79,6 +79,7 @@ void describe(Visitor& visit, ObservationOptions& o) {
   describe_loss(visit, "attitude_loss", o.attitude_loss);
   describe_loss(visit, "relative_loss", o.relative_loss);
   describe_loss(visit, "line_loss", o.line_loss);
+  describe_loss(visit, "vertical_loss", o.vertical_loss);
   visit.flag("use_position_priors", o.use_position_priors);
   visit.flag("use_attitude_priors", o.use_attitude_priors);
 }

@@ -16,6 +16,7 @@
 #include "io/image_header.h"
 #include "io/job_store.h"
 #include "io/project.h"
+#include "io/verticals.h"
 #include "match/image_vertical.h"
 
 namespace megablock {
@@ -53,16 +54,22 @@ std::uint64_t seed_of(const Image& image) {
   return hasher.value();
 }
 
-std::string row_of(const std::string& name, const ImageVertical& v) {
-  std::string row = fmt::format("{},{},{}", name, v.segments, v.vanishing_points);
-  if (!v.found) return row + ",,,,,,,,,,\n";
-  const RollPitch angles = roll_pitch_of(v.down);
-  const double roll = std::sqrt(angles.covariance(0, 0)), pitch = std::sqrt(angles.covariance(1, 1));
-  const Eigen::Vector3d& d = v.down.direction;
-  return row + fmt::format(",{},{:.9f},{:.9f},{:.9f},{:.5f},{:.5f},{:.3g},{:.3g},{:.3f},{:.3f}\n", v.lines, d.x(),
-                           d.y(), d.z(), angles.roll * kDegreesPerRadian, angles.pitch * kDegreesPerRadian,
-                           roll * kDegreesPerRadian, pitch * kDegreesPerRadian,
-                           angles.covariance(0, 1) / (roll * pitch), v.variance_factor);
+SeenVertical seen_vertical(ImageIndex image, const ImageVertical& found, const Intrinsics& camera) {
+  return {image, found.down.direction, found.down.covariance,
+          Eigen::Map<const Eigen::VectorXd>(camera.data(), camera.size()), found.by_camera};
+}
+
+// With the sigmas that the camera's own add, for the reader of the table.
+std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
+  const std::string& name = block.images[i].name;
+  const std::string found_in = fmt::format("{},{},{}", v.segments, v.vanishing_points, v.lines);
+  if (!v.found) return name + ",,,,,,,,,,," + found_in + ",,,\n";
+  const Camera& camera = block.cameras[block.camera_of(i)];
+  const SeenVertical seen = seen_vertical(i, v, camera.intrinsics);
+  const Eigen::Matrix2d whole = roll_pitch_of(whole_error(seen, camera, camera.intrinsics)).covariance;
+  return verticals_row(seen, name) + fmt::format(",{},{:.3f},{:.3g},{:.3g}\n", found_in, v.variance_factor,
+                                                 std::sqrt(whole(0, 0)) * kDegreesPerRadian,
+                                                 std::sqrt(whole(1, 1)) * kDegreesPerRadian);
 }
 
 int write_verticals(VerticalsOptions options) {
@@ -86,20 +93,20 @@ int write_verticals(VerticalsOptions options) {
                             seed_of(block.images[i]), options.segments);
   }
 
-  std::string table =
-      "image,segments,vanishing_points,lines,down_x,down_y,down_z,roll_deg,pitch_deg,sigma_roll_deg,sigma_pitch_deg,"
-      "correlation,variance_factor\n";
+  std::string table = verticals_header() +
+                      ",segments,vanishing_points,lines,variance_factor,whole_sigma_roll_deg,whole_sigma_pitch_deg\n";
   int found = 0, failed = 0;
   for (std::int64_t k = 0; k < count; ++k) {
     const ImageVertical& v = verticals[static_cast<std::size_t>(k)];
     const Image& image = block.images[ImageIndex(k)];
-    table += row_of(image.name, v);
+    table += row_of(block, ImageIndex(k), v);
     found += v.found;
     failed += !v.failure.empty();
     if (!v.failure.empty()) std::fprintf(stderr, "megablock: %s: %s\n", image.name.c_str(), v.failure.c_str());
   }
   JobStore(output.parent_path().string()).write_text(output.filename().string(), table);
   std::printf("%d of %zu images show the vertical: %s\n", found, verticals.size(), options.output.c_str());
+  std::printf("To use them, give 'verticals: FILE' in the project file.\n");
   return failed > 0 ? kExitFailedUnits : kExitDone;
 }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 #include <optional>
 
@@ -110,6 +111,10 @@ Block append_to(const Block& previous, const Block& now) {
   merged.lines = moved.lines;
   for (KnownLine& line : merged.lines)
     for (KnownLine::Measurement& measurement : line.measurements) measurement.image = images[measurement.image];
+  merged.verticals = moved.verticals;
+  for (SeenVertical& vertical : merged.verticals) vertical.image = images[vertical.image];
+  std::sort(merged.verticals.begin(), merged.verticals.end(),
+            [](const SeenVertical& a, const SeenVertical& b) { return a.image < b.image; });
   return merged;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "geometry/camera.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -46,6 +47,27 @@ void check_names(const auto& items, const std::string& kind) {
 }
 
 bool positive(const Eigen::Vector3d& sigma) { return (sigma.array() > 0).all(); }
+
+void check_verticals(const Block& block) {
+  ImageIndex before;
+  for (const SeenVertical& vertical : block.verticals) {
+    require(block.images.contains(vertical.image), "a vertical names no image of the block");
+    const std::string what = "vertical of image '" + block.images[vertical.image].name + "'";
+    require(before < vertical.image, what + ": appears twice, or out of the order of images");
+    before = vertical.image;
+    require(std::abs(vertical.down.norm() - 1) < 1e-6, what + ": is no unit vector");
+    const Eigen::Matrix<double, 3, 2> plane = tangent_plane(vertical.down);
+    const Eigen::Matrix2d covariance = plane.transpose() * vertical.covariance * plane;
+    require(covariance.allFinite() && covariance(0, 0) > 0 && covariance.determinant() > 0,
+            what + ": its covariance is not positive; sigmas must be greater than 0");
+    require(vertical.camera.size() == vertical.by_camera.cols() && vertical.camera.allFinite() &&
+                vertical.by_camera.allFinite(),
+            what + ": its derivatives by the camera's parameters are not as many as these, or not finite");
+    require(vertical.camera.size() == 0 ||
+                vertical.camera.size() == block.cameras[block.camera_of(vertical.image)].intrinsics.size(),
+            what + ": was found with another model of its camera; find it again");
+  }
+}
 
 }  // namespace
 
@@ -116,6 +138,7 @@ void check(const Block& block) {
       require(m.first.allFinite() && m.second.allFinite() && m.first != m.second && m.sigma_px > 0,
               "line '" + line.name + "': bad image measurement");
     }
+  check_verticals(block);
 }
 
 }  // namespace megablock

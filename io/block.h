@@ -118,6 +118,17 @@ struct KnownLine {
   std::vector<Measurement> measurements;
 };
 
+// Where an image sees down: by the vanishing point of vertical edges, or as an inclinometer says.
+struct SeenVertical {
+  ImageIndex image;
+  Eigen::Vector3d down = Eigen::Vector3d::UnitY();           // camera axes, unit
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // of `down`, radians^2, of rank two; of measuring alone
+  // What `down` owes to the camera, the same error for all its images: the parameters that it was found with, and its
+  // derivative by each. Empty where it owes it nothing.
+  Eigen::VectorXd camera;
+  Eigen::Matrix3Xd by_camera;
+};
+
 struct Block {
   GroundFrame ground;
   IndexedVector<CameraIndex, Camera> cameras;
@@ -127,6 +138,7 @@ struct Block {
   std::vector<RelativePose> relative_poses;
   std::vector<ControlPoint> control_points;
   std::vector<KnownLine> lines;
+  std::vector<SeenVertical> verticals;  // ascending by image
 
   const Rig& rig_of(FrameIndex frame) const { return rigs[frames[frame].rig]; }
   const Mount& mount_of(ImageIndex image) const {

@@ -361,6 +361,57 @@ std::vector<KnownLine> get_lines(const Hdf5Reader& file) {
   return lines;
 }
 
+void put_verticals(Hdf5Writer& file, const std::vector<SeenVertical>& verticals) {
+  if (verticals.empty()) return;
+  std::vector<double> covariances, values, derivatives;
+  for (const SeenVertical& v : verticals) {
+    const Eigen::Matrix3d& c = v.covariance;
+    covariances.insert(covariances.end(), {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
+    values.insert(values.end(), v.camera.begin(), v.camera.end());
+    derivatives.insert(derivatives.end(), v.by_camera.data(), v.by_camera.data() + v.by_camera.size());
+  }
+  file.group("verticals", "where images see down");
+  file.vector("verticals/image", column(verticals, [](const SeenVertical& v) { return v.image.value; }),
+              {"", "row in images, ascending"});
+  file.matrix("verticals/down", vectors3(verticals, [](const SeenVertical& v) { return v.down; }), 3,
+              {"", "unit vector in camera axes"});
+  file.matrix("verticals/covariance", covariances, 6,
+              {"rad^2", "of 'down' by measuring alone: xx, xy, xz, yy, yz, zz; of rank two"});
+  file.vector("verticals/parameters",
+              column(verticals, [](const SeenVertical& v) { return static_cast<std::int32_t>(v.camera.size()); }),
+              {"", "of the camera that 'down' depends on: rows of the group 'verticals/camera', in order; 0: none"});
+  file.group("verticals/camera", "the parameters of the camera that verticals were found with");
+  file.vector("verticals/camera/value", values, {"", "in the unit of the parameter"});
+  file.matrix("verticals/camera/derivative", derivatives, 3, {"", "of 'down' by the parameter"});
+}
+
+std::vector<SeenVertical> get_verticals(const Hdf5Reader& file) {
+  if (!file.has("verticals")) return {};
+  const auto images = file.vector<std::int64_t>("verticals/image");
+  const auto count = static_cast<std::int64_t>(images.size());
+  const auto downs = file.matrix<double>("verticals/down", 3, count);
+  const auto covariances = file.matrix<double>("verticals/covariance", 6, count);
+  const auto values = file.vector<double>("verticals/camera/value");
+  const auto rows = static_cast<std::int64_t>(values.size());
+  const auto derivatives = file.matrix<double>("verticals/camera/derivative", 3, rows);
+  const auto begin =
+      begin_of(file, "verticals/parameters", file.vector<std::int64_t>("verticals/parameters", count), rows);
+  std::vector<SeenVertical> verticals;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const double* c = &covariances[6 * i];
+    SeenVertical v;
+    v.image = ImageIndex(images[i]);
+    v.down = vector3(downs, i);
+    v.covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+    const auto first = static_cast<std::size_t>(begin[i]);
+    const auto parameters = static_cast<Eigen::Index>(begin[i + 1] - begin[i]);
+    v.camera = Eigen::Map<const Eigen::VectorXd>(values.data() + first, parameters);
+    v.by_camera = Eigen::Map<const Eigen::Matrix3Xd>(derivatives.data() + 3 * first, 3, parameters);
+    verticals.push_back(std::move(v));
+  }
+  return verticals;
+}
+
 }  // namespace
 
 void put_block(Hdf5Writer& file, const Block& block) {
@@ -372,6 +423,7 @@ void put_block(Hdf5Writer& file, const Block& block) {
   put_relative_poses(file, block.relative_poses);
   put_control(file, block.control_points);
   put_lines(file, block.lines);
+  put_verticals(file, block.verticals);
 }
 
 Block get_block(const Hdf5Reader& file) {
@@ -384,6 +436,7 @@ Block get_block(const Hdf5Reader& file) {
   block.relative_poses = get_relative_poses(file);
   block.control_points = get_control(file);
   block.lines = get_lines(file);
+  block.verticals = get_verticals(file);
   return block;
 }
 

@@ -19,7 +19,8 @@ constexpr std::array<Names, kObservationKinds> kNames{{{"image, tie points", "im
                                                        {"control, height", "control_height"},
                                                        {"camera, prior values", "intrinsics"},
                                                        {"mount, prior values", "mount"},
-                                                       {"lines of known direction", "line"}}};
+                                                       {"lines of known direction", "line"},
+                                                       {"vertical in images", "vertical"}}};
 
 }  // namespace
 

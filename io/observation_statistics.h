@@ -28,8 +28,9 @@ enum class ObservationKind : std::uint8_t {
   kIntrinsics,  // prior values of cameras
   kMount,       // prior values of mounts
   kLine,        // lines known to be vertical or horizontal
+  kVertical,    // where images see down
 };
-inline constexpr std::size_t kObservationKinds = 13;
+inline constexpr std::size_t kObservationKinds = 14;
 
 // "image, tie points" ...: for tables.
 const char* name_of(ObservationKind kind);
@@ -47,7 +48,9 @@ struct ObservationStatistics {
     redundancy += redundancy_number;
   }
   // Sigma that the residuals show over the stated one; NaN with less than one redundant observation.
-  double sigma_factor() const { return redundancy >= 1 ? scale * std::sqrt(weighted_squares / redundancy) : std::nan(""); }
+  double sigma_factor() const {
+    return redundancy >= 1 ? scale * std::sqrt(weighted_squares / redundancy) : std::nan("");
+  }
 };
 
 struct ObservationTable {

@@ -14,6 +14,7 @@
 #include "io/project_sections.h"
 #include "io/settings_reader.h"
 #include "io/unit_files.h"
+#include "io/verticals.h"
 #include "io/yaml_reader.h"
 
 namespace megablock {
@@ -114,6 +115,8 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (control) add_control(*control, names_left_out(project), project.block, project.warnings);
   if (const auto lines = top.existing_file("lines"))
     read_lines(*lines, names_left_out(project), project.block, project.warnings);
+  if (const auto verticals = top.existing_file("verticals"))
+    read_verticals(*verticals, names_left_out(project), project.block);
 }
 
 }  // namespace

@@ -22,23 +22,26 @@ std::vector<InterpretationPlane> planes_of(const std::vector<ImageLine>& lines, 
   return planes;
 }
 
-// Adds what each parameter of the camera, wrong by its prior sigma, does to the axis of these lines: by a hundredth of
-// it.
-void add_camera_errors(const std::vector<ImageLine>& lines, const Camera& camera, AxisDirection& down) {
+// Of the axis of these lines by each parameter of the camera: by a hundredth of what it may be wrong by.
+Eigen::Matrix3Xd derivatives_by_camera(const std::vector<ImageLine>& lines, const Camera& camera,
+                                       const Eigen::Vector3d& down) {
   const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width);
+  Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Zero(3, camera.intrinsics.size());
   for (int p = 0; p < camera.intrinsics.size(); ++p) {
     const auto at = static_cast<std::size_t>(p);
-    double sigma = camera.prior_sigma[at];
-    if (!std::isfinite(sigma)) sigma = weak[at];  // free without prior
-    if (!(sigma > 0)) continue;
-    Intrinsics changed = camera.intrinsics;
-    changed[at] += 0.01 * sigma;
-    const auto fit = fit_axis(planes_of(lines, changed));
-    if (!fit) continue;
-    const double sign = fit->axis.direction.dot(down.direction) < 0 ? -1 : 1;
-    const Eigen::Vector3d change = (sign * fit->axis.direction - down.direction) / 0.01;
-    down.covariance += change * change.transpose();
+    const double step = 0.01 * weak[at];
+    if (!(step > 0)) continue;
+    const auto down_at = [&](double change) -> std::optional<Eigen::Vector3d> {
+      Intrinsics changed = camera.intrinsics;
+      changed[at] += change;
+      const auto fit = fit_axis(planes_of(lines, changed));
+      if (!fit) return std::nullopt;
+      return fit->axis.direction.dot(down) < 0 ? Eigen::Vector3d(-fit->axis.direction) : fit->axis.direction;
+    };
+    const auto above = down_at(step), below = down_at(-step);
+    if (above && below) result.col(p) = (*above - *below) / (2 * step);
   }
+  return result;
 }
 
 }  // namespace
@@ -95,7 +98,7 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
   result.down.covariance *= std::max(1.0, result.variance_factor);
   std::vector<ImageLine> own;
   for (const int i : point.lines) own.push_back(lines[static_cast<std::size_t>(i)]);
-  add_camera_errors(own, camera, result.down);
+  result.by_camera = derivatives_by_camera(own, camera, result.down.direction);
   result.log10_nfa = point.log10_nfa;
   return result;
 }

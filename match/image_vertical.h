@@ -17,8 +17,10 @@ struct ImageVertical {
   // Below, where there is a vertical.
   bool found = false;
   // Camera axes, pointing down. Its covariance is that of the lines times their variance factor, where that is above
-  // one, with what the prior sigmas of the camera's parameters add: these turn and bend all lines together.
+  // one.
   AxisDirection down;
+  // Of `down` by each parameter of the camera: these turn and bend the lines of all its images together.
+  Eigen::Matrix3Xd by_camera;
   int lines = 0;  // that show it
   double variance_factor = 0;
   double log10_nfa = 0;

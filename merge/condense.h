@@ -31,7 +31,8 @@ struct TilePlan {
   EliminationPlan cells;                          // leaves = cells
   std::vector<std::vector<std::int64_t>> points;  // [cells] active points, ascending
   // Rows of the problem's tables of observations without a point, [cells].
-  std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, lines, intrinsic_priors, mount_priors;
+  std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, lines, verticals, intrinsic_priors,
+      mount_priors;
   // Part of every frame row that hangs together by points and relative poses, by lowest frame; -1: untouched. [frames]
   std::vector<std::int64_t> part_of_frame;
   std::int64_t part_count = 0;

@@ -3,6 +3,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/vertical_terms.h"
 #include "merge/gauge.h"
 #include "merge/unknowns.h"
 
@@ -24,6 +25,7 @@ class PartBuilder {
     add_frame_priors();
     add_relatives();
     add_lines();
+    add_verticals();
     add_point_priors();
     add_mounts();
     return std::move(parts_);
@@ -88,6 +90,14 @@ class PartBuilder {
       const LineResidual line =
           linearise_line(state_.frames[at(term.frame.value)], state_.frames[at(term.seen_by().value)], term);
       add(part, (line.by_frame + line.by_other) * move(part, term.frame));
+    }
+  }
+
+  void add_verticals() {
+    for (const auto& term : problem_.verticals) {
+      const LocalFrame frame = problem_.images[at(term.image.value)].frame;
+      GaugePart& part = part_of(frame);
+      add(part, linearise_vertical(problem_, state_, term).by_frame * move(part, frame));
     }
   }
 

@@ -1,6 +1,7 @@
 #include "merge/tile_linearisation.h"
 
 #include "adjust/line_terms.h"
+#include "adjust/vertical_terms.h"
 
 namespace megablock {
 
@@ -10,6 +11,14 @@ using enum ObservationKind;
 constexpr std::array<ObservationKind, 6> kPositionKinds{kPositionHorizontal, kPositionHorizontal, kPositionHeight};
 constexpr std::array<ObservationKind, 6> kRelativeKinds{kRelativeRotation, kRelativeRotation, kRelativeRotation,
                                                         kRelativePosition, kRelativePosition, kRelativePosition};
+
+Eigen::MatrixXd free_columns(const Eigen::Matrix2Xd& by_parameters, ParameterMask free) {
+  Eigen::MatrixXd columns(2, count_of(free));
+  Eigen::Index column = 0;
+  for (int p = 0; p < by_parameters.cols(); ++p)
+    if (contains(free, p)) columns.col(column++) = by_parameters.col(p);
+  return columns;
+}
 
 }  // namespace
 
@@ -45,6 +54,21 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
     if (term.other.valid()) out.add_block(plan.unknown_of_frame[term.other.value], r.by_other);
     out.weight(problem.line_loss, pass);
+    visit(out);
+  }
+  for (std::int64_t i : plan.verticals[cell]) {
+    const auto& term = problem.verticals[static_cast<std::size_t>(i)];
+    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
+    const auto camera = static_cast<std::size_t>(image.camera.value), mount = static_cast<std::size_t>(image.mount);
+    const VerticalResidual r = linearise_vertical(problem, state, term);
+    TermResidual out;
+    out.residual = r.residual;
+    out.kinds.fill(ObservationKind::kVertical);
+    out.add_block(plan.unknown_of_frame[image.frame.value], r.by_frame);
+    out.add_block(plan.unknown_of_mount[mount], r.by_mount);
+    if (term.camera.size() > 0)
+      out.add_block(plan.unknown_of_camera[camera], free_columns(-term.by_camera, plan.camera_free[camera]));
+    out.weight(problem.vertical_loss, pass);
     visit(out);
   }
   for (std::int64_t i : plan.relatives[cell]) {

@@ -58,7 +58,7 @@ struct JacobianBlock {
 struct TermResidual {
   using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxIntrinsics>;
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
-  std::array<JacobianBlock<Jacobian>, 2> blocks;
+  std::array<JacobianBlock<Jacobian>, 3> blocks;
   int block_count = 0;
   std::array<ObservationKind, 6> kinds{};  // [residual]
   double rho = 0;                          // of the squared norm

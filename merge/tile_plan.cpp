@@ -35,6 +35,12 @@ TouchedRows touched_rows(const TileProblem& problem, const std::vector<Parameter
   for (const auto& term : problem.positions) touched.frames[term.frame.value] = 1;
   for (const auto& term : problem.attitudes) touched.frames[term.frame.value] = 1;
   for (const auto& term : problem.lines) touched.frames[term.frame.value] = touched.frames[term.seen_by().value] = 1;
+  for (const auto& term : problem.verticals) {
+    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
+    touched.frames[image.frame.value] = 1;
+    if (term.camera.size() > 0 && camera_free[image.camera.value]) touched.cameras[image.camera.value] = 1;
+    if (problem.mount_free[image.mount]) touched.mounts[image.mount] = 1;
+  }
   for (const auto& term : problem.relatives) touched.frames[term.from.value] = touched.frames[term.to.value] = 1;
   for (const auto& term : problem.intrinsic_priors)
     if (camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
@@ -134,7 +140,7 @@ class CellPlanner {
   CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
               const std::vector<std::int32_t>& depth_of_frame, std::size_t cells)
       : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame), depth_of_frame_(depth_of_frame) {
-    for (auto* list : {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.lines,
+    for (auto* list : {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
                        &plan.intrinsic_priors, &plan.mount_priors})
       list->resize(cells);
     touched_.assign(cells, std::vector<std::uint8_t>(plan.unknowns.size(), 0));
@@ -208,6 +214,15 @@ class CellPlanner {
       plan_.lines[cell].push_back(static_cast<std::int64_t>(i));
       touch(cell, plan_.unknown_of_frame[term.frame.value]);
       touch(cell, plan_.unknown_of_frame[term.seen_by().value]);
+    }
+    for (std::size_t i = 0; i < problem_.verticals.size(); ++i) {
+      const auto& term = problem_.verticals[i];
+      const TileImage& image = problem_.images[static_cast<std::size_t>(term.image.value)];
+      const std::size_t cell = cell_of(image.frame);
+      plan_.verticals[cell].push_back(static_cast<std::int64_t>(i));
+      touch(cell, plan_.unknown_of_frame[image.frame.value]);
+      touch(cell, plan_.unknown_of_mount[image.mount]);
+      if (term.camera.size() > 0) touch(cell, plan_.unknown_of_camera[image.camera.value]);
     }
     // Shared parameters' priors go where the first image of the camera or mount lies.
     std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);

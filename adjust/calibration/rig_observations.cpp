@@ -20,6 +20,7 @@ void remove_datum(Block& block) {
   block.control_points.clear();
   block.relative_poses.clear();
   block.lines.clear();
+  block.verticals.clear();
   for (Frame& frame : block.frames) frame.position_prior.reset(), frame.attitude_prior.reset();
 }
 

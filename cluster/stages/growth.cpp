@@ -23,6 +23,7 @@ Block first_images(const Block& block, std::int64_t n) {
   part.relative_poses.clear();
   part.control_points.clear();
   part.lines.clear();
+  std::erase_if(part.verticals, [&](const SeenVertical& vertical) { return vertical.image.value >= n; });
   return part;
 }
 

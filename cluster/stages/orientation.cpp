@@ -23,6 +23,15 @@ namespace {
 using Frames = std::set<FrameIndex>;
 using Links = std::map<FrameIndex, Frames>;  // of frames with a verified pair
 
+void add_vertical_values(Hasher& hasher, const Block& block) {
+  for (const SeenVertical& vertical : block.verticals) {
+    add_to_hash(hasher.add(vertical.image.value), vertical.down);
+    for (const double value : vertical.covariance.reshaped()) hasher.add(value);
+    for (const double value : vertical.camera) hasher.add(value);
+    for (const double value : vertical.by_camera.reshaped()) hasher.add(value);
+  }
+}
+
 void add_block_values(Hasher& hasher, const Block& block) {
   for (const Image& image : block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
   for (const Frame& frame : block.frames) {
@@ -37,6 +46,7 @@ void add_block_values(Hasher& hasher, const Block& block) {
     add_to_hash(hasher, camera.intrinsics);
     for (const double value : camera.prior_sigma) hasher.add(value);
   }
+  add_vertical_values(hasher, block);
 }
 
 Links links_of(const Block& block, const std::vector<VerifiedPair>& pairs) {

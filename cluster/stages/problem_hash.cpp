@@ -46,7 +46,17 @@ void add_other_terms(Hasher& hasher, const TileProblem& p) {
     hasher.add(term.frame.value).add(term.other.value).add(term.weight);
     for (const Eigen::Vector3d& v : {term.middle, term.across, term.other_normal}) add_to_hash(hasher, v);
   }
-  for (const RobustLoss& loss : {p.image_loss, p.position_loss, p.attitude_loss, p.relative_loss, p.line_loss})
+  hasher.add(p.verticals.size());
+  for (const auto& term : p.verticals) {
+    hasher.add(term.image.value);
+    for (const Eigen::Vector3d& v : {term.ground, term.seen}) add_to_hash(hasher, v);
+    for (const double value : term.weight.reshaped()) hasher.add(value);
+    hasher.add(term.camera.size());
+    for (const double value : term.camera) hasher.add(value);
+    for (const double value : term.by_camera.reshaped()) hasher.add(value);
+  }
+  for (const RobustLoss& loss :
+       {p.image_loss, p.position_loss, p.attitude_loss, p.relative_loss, p.line_loss, p.vertical_loss})
     hasher.add(loss.kind).add(loss.scale);
 }
 

@@ -39,7 +39,7 @@ def errors(folder, table):
         x, y, z = by_vector(mounts["camera" + camera]["rotation"], down[frame])
         roll, pitch = math.degrees(math.atan2(x, y)), math.degrees(math.atan2(-z, math.hypot(x, y)))
         error = [float(row["roll_deg"]) - roll, float(row["pitch_deg"]) - pitch]
-        sigma = [float(row["sigma_roll_deg"]), float(row["sigma_pitch_deg"])]
+        sigma = [float(row["whole_sigma_roll_deg"]), float(row["whole_sigma_pitch_deg"])]
         squares += (error[0] ** 2 + error[1] ** 2) / len(found)
         normalised += sum((e / s) ** 2 for e, s in zip(error, sigma)) / 2 / len(found)
         assert abs(sum(float(row[f"down_{axis}"]) ** 2 for axis in "xyz") - 1) < 1e-6, row
@@ -71,7 +71,7 @@ def main():
         assert "f000001_c2.jpg" in said, said
         lines = first.decode().splitlines()
         again = table.read_text().splitlines()
-        assert [a for a, b in zip(again, lines) if a != b] == ["f000001_c2.jpg,0,0,,,,,,,,,,"], again
+        assert [a for a, b in zip(again, lines) if a != b] == ["f000001_c2.jpg,,,,,,,,,,,0,0,0,,,"], again
 
 
 main()

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <limits>
 
@@ -337,6 +338,49 @@ TEST(Spec, AT24Vertical) {
 // Issue 5: waits for the photographs; on others verticals are only plausible (tests/real/verticals_test.cpp).
 TEST(Spec, AT25VerticalsOfPhotographs) {
   GTEST_SKIP() << "the photographs of entry-P10 (Strecha et al. 2008) are not available";
+}
+
+// Three pictures by a camera on a theodolite (X8), grades: angles from their three orthogonal vanishing points, and the
+// instrument's circles. The angles go through the rays of the vanishing points and come back; what is published beyond
+// them are differences between pictures, which the instrument shares but for the camera's mounting.
+TEST(Spec, AT28AnglesOfAPhototheodolite) {
+  struct Picture {
+    double omega, vertical_circle, phi, horizontal_circle;
+  };
+  constexpr double kGrade = 0.9 * kDegree;
+  const std::array<Picture, 3> pictures{
+      {{25.362, 326.058, 28.509, 393.131}, {33.809, 333.601, 46.415, 411.355}, {24.538, 325.087, 33.134, 395.983}}};
+  std::array<YawPitchRoll, 3> read;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const Eigen::Quaterniond rotation =
+        rotation_from(YawPitchRoll{pictures[i].phi * kGrade, pictures[i].omega * kGrade, 0.03});
+    std::vector<SeenAxis> axes;
+    for (const Eigen::Vector3d& ground :
+         {Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, -1)})
+      axes.push_back({ground, {rotation * ground, 1e-8 * Eigen::Matrix3d::Identity()}});
+    const auto attitude = attitude_from_axes(axes);
+    ASSERT_TRUE(attitude);
+    read[i] = yaw_pitch_roll(attitude->rotation_cw);
+    EXPECT_NEAR(read[i].pitch, pictures[i].omega * kGrade, 1e-9);
+    EXPECT_NEAR(read[i].yaw, pictures[i].phi * kGrade, 1e-9);
+    // The vertical alone gives omega.
+    EXPECT_NEAR(roll_pitch_of(axes[2].seen).pitch, pictures[i].omega * kGrade, 1e-9);
+  }
+  struct Difference {
+    std::size_t from, to;
+    double omega, vertical_circle, phi, horizontal_circle, off_vertical, off_horizontal;
+  };
+  constexpr double kRounding = 0.0016;
+  for (const Difference& d : {Difference{1, 0, -8.446, -7.543, -17.905, -18.224, -0.903, 0.318},
+                              Difference{1, 2, -9.270, -8.514, -13.280, -15.372, -0.756, 2.091}}) {
+    const Picture &a = pictures[d.from], &b = pictures[d.to];
+    const double omega = (read[d.to].pitch - read[d.from].pitch) / kGrade;
+    const double phi = (read[d.to].yaw - read[d.from].yaw) / kGrade;
+    EXPECT_NEAR(omega, d.omega, kRounding);
+    EXPECT_NEAR(phi, d.phi, kRounding);
+    EXPECT_NEAR(omega - (b.vertical_circle - a.vertical_circle), d.off_vertical, kRounding);
+    EXPECT_NEAR(phi - (b.horizontal_circle - a.horizontal_circle), d.off_horizontal, kRounding);
+  }
 }
 
 TEST(Spec, AT35SameBitsForTheSameSeed) {

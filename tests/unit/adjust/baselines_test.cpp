@@ -165,7 +165,7 @@ TEST(GroundAlignment, PositionsOnALineLeaveTheRollToGravity) {
   OrientationValues turned = line.values();
   const Similarity gauge{0.3, rotation_exp<double>({2, -1, 0.5}), {100, 20, -7}};
   for (auto& frame : turned.frames) frame = gauge(*frame);
-  const auto back = similarity_to_ground(line.graph, turned, 3, false);
+  const auto back = similarity_to_ground(line.graph, turned, 3, GroundAngles::kNone);
   ASSERT_TRUE(back);
   for (std::size_t f = 0; f < turned.frames.size(); ++f) {
     const Pose pose = (*back)(*turned.frames[f]);
@@ -178,7 +178,7 @@ TEST(GroundAlignment, PositionsOnALineLeaveTheRollToGravity) {
     frame = Similarity{2, Eigen::Quaterniond::Identity(), {5, 5, 5}}(*frame);
     frame->rotation = frame->rotation * rotation_exp<double>(Eigen::Vector3d(0.2, 0, 0));
   }
-  const auto kept = similarity_to_ground(line.graph, shifted, 3, true);
+  const auto kept = similarity_to_ground(line.graph, shifted, 3, GroundAngles::kAll);
   ASSERT_TRUE(kept);
   EXPECT_LT(rotation_angle(kept->rotation, Eigen::Quaterniond::Identity()), 1 * kDegree);
   EXPECT_NEAR(kept->scale, 0.5, 0.01);
@@ -191,7 +191,7 @@ TEST(GroundAlignment, FreeFrameIsCentredUprightAndOfUnitBaseline) {
   for (auto& frame : values.frames) frame->centre += Eigen::Vector3d(0, 3, 0) * normal_vector(random).x();
   const Similarity gauge{7, rotation_exp<double>({1, 2, -0.5}), {100, 20, -7}};
   for (auto& frame : values.frames) frame = gauge(*frame);
-  const Similarity free = similarity_to_free_frame(line.graph, values, false, false);
+  const Similarity free = similarity_to_free_frame(line.graph, values, GroundAngles::kNone, false);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double baselines = 0;
   for (auto& frame : values.frames) {

@@ -11,6 +11,8 @@
 
 #include "adjust/ceres_problem.h"
 #include "adjust/line_terms.h"
+#include "adjust/vertical_terms.h"
+#include "geometry/camera.h"
 
 namespace megablock {
 namespace {
@@ -150,6 +152,42 @@ TEST_P(Linearise, Line) {
   Matrix jacobian(1, 12);
   jacobian << horizontal.by_frame, horizontal.by_other;
   expect_same(jacobian, two.jacobian);
+}
+
+// Everything from a good attitude to one nearly upside down; a camera that matters and one that does not.
+TEST_P(Linearise, Vertical) {
+  const Pose frame = far_pose(), mount = near_pose();
+  const Intrinsics k = intrinsics();
+  SeenVertical seen;
+  const Eigen::Vector3d down = mount.rotation * (frame.rotation * -Eigen::Vector3d::UnitZ());
+  seen.down = rotation(GetParam() % 2 ? 0.01 : 3.1) * down;
+  const Eigen::Matrix<double, 3, 2> plane = tangent_plane(seen.down);
+  const Eigen::Matrix2d root{{uniform(1e-4, 1e-2), 0}, {uniform(-1e-3, 1e-3), uniform(1e-4, 1e-2)}};
+  seen.covariance = plane * root * root.transpose() * plane.transpose();
+  seen.camera = Eigen::VectorXd(8);
+  for (int p = 0; p < 8; ++p) seen.camera[p] = k[static_cast<std::size_t>(p)] * uniform(0.9, 1.1);
+  seen.by_camera.resize(3, 8);
+  for (int p = 0; p < 8; ++p) seen.by_camera.col(p) = plane * plane.transpose() * vector(0.1);
+
+  const auto term = vertical_term(seen, GroundVertical(GroundFrame()), frame.centre);
+  const VerticalResidual ours = linearise_vertical(frame, mount, k, term);
+  const Evaluated reference =
+      by_ceres<2, 7, 7, 8>(residual::VerticalSeen{term}, {block(frame), block(mount), block(k)});
+  expect_residual(ours.residual, reference.residual);
+  Matrix jacobian(2, 20);
+  jacobian << ours.by_frame, ours.by_mount, -term.by_camera;
+  expect_same(jacobian, reference.jacobian);
+
+  // Of the length of the chord, in sigmas.
+  seen.camera.resize(0);
+  seen.by_camera.resize(3, 0);
+  seen.covariance = 1e-4 * plane * plane.transpose();
+  const auto plain = vertical_term(seen, GroundVertical(GroundFrame()), frame.centre);
+  const VerticalResidual alone = linearise_vertical(frame, mount, k, plain);
+  EXPECT_NEAR(alone.residual.norm(), 100 * (seen.down - down).norm(), 1e-6);
+  EXPECT_NEAR((alone.by_frame * PoseIncrement::Unit(2)).norm(), 0, 1e-9) << "a turn about the vertical";
+  const Evaluated without = by_ceres<2, 7, 7>(residual::VerticalSeen{plain}, {block(frame), block(mount)});
+  expect_residual(alone.residual, without.residual);
 }
 
 TEST_P(Linearise, RelativePose) {

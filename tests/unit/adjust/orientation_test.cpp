@@ -8,6 +8,7 @@
 
 #include "io/error.h"
 #include "tests/unit/adjust/orientation_scene.h"
+#include "tests/unit/adjust/seen_verticals.h"
 
 namespace megablock {
 namespace {
@@ -253,6 +254,29 @@ TEST(Orientation, AttitudePriorsTurnAFreeBlock) {
     largest =
         std::max(largest, rotation_angle(result.state.frames[f].rotation, scene.truth.frames[f].rotation) / kDegree);
   EXPECT_LT(largest, 2);
+}
+
+// Mean angle between where the images see down and where they should, degrees.
+double off_level_deg(const SimulatedBlock& scene, const OrientationResult& result) {
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  double sum = 0;
+  for (FrameIndex f(0); scene.block.frames.contains(f); ++f.value)
+    sum += (result.state.frames[f].rotation * down - scene.truth.frames[f].rotation * down).norm() / kDegree;
+  return sum / static_cast<double>(scene.block.frames.size());
+}
+
+// A free block is level, one in ten of its verticals anywhere; so is a street whose positions lie on a line.
+TEST(Orientation, VerticalsLevelABlock) {
+  SceneOptions positions;
+  positions.gps_sigma_m = 3;
+  for (SimulatedBlock scene : {ring(20, {}), street(30, {}), street(30, positions), aerial(4, 7, positions)}) {
+    const double without = off_level_deg(scene, orient(scene, pairs_of(scene)));
+    add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1, .wrong_share = 0.1});
+    const auto result = orient(scene, pairs_of(scene));
+    EXPECT_LT(errors_of(scene, result, true).position_m, 0.5);
+    EXPECT_EQ(errors_of(scene, result, true).oriented, scene.block.frames.size());
+    EXPECT_LT(off_level_deg(scene, result), 0.15) << "without: " << without;
+  }
 }
 
 TEST(Orientation, ResectsAnImageWhoseRelativeRotationsAreAllWrong) {

@@ -68,6 +68,74 @@ TEST(RotationAveraging, NoiseAveragesOut) {
   EXPECT_LT(largest_error_deg(graph, found, false), 1.2);
 }
 
+// Angle between where the nodes see down and where it is, and the error of their relative rotation.
+struct ChainError {
+  double level_deg = 0, relative_deg = 0;
+};
+ChainError chain_error(const Graph& graph, const AveragedRotations& found) {
+  ChainError error;
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  for (std::size_t i = 0; i < graph.truth.size(); ++i) {
+    error.level_deg = std::max(error.level_deg, (*found.rotation[i] * down - graph.truth[i] * down).norm() / kDegree);
+    const Eigen::Quaterniond turn = found.rotation[i]->conjugate() * graph.truth[i];
+    const Eigen::Quaterniond first = found.rotation[0]->conjugate() * graph.truth[0];
+    error.relative_deg = std::max(error.relative_deg, rotation_angle(turn, first) / kDegree);
+  }
+  return error;
+}
+
+std::vector<KnownVertical> verticals_of(const Graph& graph, double noise_deg, double wrong) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<KnownVertical> verticals;
+  for (std::size_t i = 0; i < graph.truth.size(); ++i) {
+    const Eigen::Quaterniond off = rotation_exp<double>(noise_deg * kDegree * normal_vector(random));
+    Eigen::Vector3d seen = off * (graph.truth[i] * -Eigen::Vector3d::UnitZ());
+    if (uniform(random) < wrong) seen = normal_vector(random).normalized();
+    verticals.push_back({static_cast<std::int32_t>(i), seen, -Eigen::Vector3d::UnitZ(), noise_deg * kDegree});
+  }
+  return verticals;
+}
+
+// A chain wanders off, about the vertical only where the nodes see it; one tenth of them see it elsewhere.
+TEST(RotationAveraging, VerticalsLevelAChain) {
+  const Graph graph = chain(200, 1, 0.5, 0);
+  const auto without = average_rotations(200, graph.edges, graph.priors, 10 * kDegree);
+  EXPECT_GT(chain_error(graph, without).relative_deg, 4);
+  for (const double wrong : {0.0, 0.1}) {
+    const auto with = average_rotations(200, graph.edges, graph.priors, 10 * kDegree, verticals_of(graph, 0.1, wrong));
+    const ChainError error = chain_error(graph, with);
+    EXPECT_LT(error.level_deg, wrong > 0 ? 2.0 : 0.4) << "nodes without a vertical hang on edges of 0.9 degrees";
+    EXPECT_LT(error.relative_deg, chain_error(graph, without).relative_deg) << wrong;
+    EXPECT_EQ(std::count(with.kept.begin(), with.kept.end(), 0), 0);
+  }
+}
+
+// Beside each relative rotation another one that is anything, and nothing but the verticals tells which.
+TEST(RotationAveraging, VerticalsTellWrongEdges) {
+  Graph graph = chain(30, 1, 0.2, 0);
+  const std::vector<RelativeRotation> wrong = chain(30, 1, 60, 0).edges;
+  const auto edges = static_cast<std::ptrdiff_t>(graph.edges.size());
+  for (RelativeRotation edge : wrong) {
+    edge.inliers = 120;
+    graph.edges.push_back(edge);
+  }
+  const auto found = average_rotations(30, graph.edges, graph.priors, 10 * kDegree, verticals_of(graph, 0.1, 0));
+  EXPECT_LT(chain_error(graph, found).level_deg, 1);
+  EXPECT_EQ(std::count(found.kept.begin(), found.kept.begin() + edges, 1), edges);
+}
+
+// With priors and held nodes the heading is known too.
+TEST(RotationAveraging, VerticalsBesidePriors) {
+  for (const double sigma : {0.0, 5 * kDegree}) {
+    Graph graph = chain(60, 2, 0.3, 0);
+    graph.priors[5] = RotationPrior{graph.truth[5], sigma};
+    const auto found = average_rotations(60, graph.edges, graph.priors, 10 * kDegree, verticals_of(graph, 0.05, 0.1));
+    EXPECT_LT(chain_error(graph, found).level_deg, 0.5);
+    EXPECT_LT(largest_error_deg(graph, found, true), 5);
+  }
+}
+
 TEST(RotationAveraging, PriorsGiveTheGround) {
   Graph graph = chain(40, 5, 0.2, 0.1);
   std::mt19937_64 random(2);

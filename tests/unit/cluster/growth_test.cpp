@@ -8,6 +8,7 @@
 #include "io/simulate/simulate.h"
 #include "io/unit_files.h"
 #include "tests/unit/adjust/known_lines.h"
+#include "tests/unit/adjust/seen_verticals.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
@@ -40,9 +41,12 @@ TEST(Growth, FirstImagesAreABlockOfTheirOwn) {
   check(block);
 
   block.lines.push_back({"edge", KnownLine::Direction::kVertical, {{ImageIndex(7), {1, 2}, {3, 90}, 1}}});
+  block.verticals.push_back({ImageIndex(5), Eigen::Vector3d::UnitY(), Eigen::Matrix3d::Identity(), {}, {}});
+  block.verticals.push_back({ImageIndex(7), Eigen::Vector3d::UnitY(), Eigen::Matrix3d::Identity(), {}, {}});
   const Block part = first_images(block, 6);
   EXPECT_NO_THROW(check(part));
   EXPECT_EQ(part.images.size(), 6u);
+  EXPECT_EQ(part.verticals.size(), 1u);
   EXPECT_EQ(part.frames.size(), 2u);
   EXPECT_EQ(part.rigs.size(), 1u);
   EXPECT_EQ(part.cameras.size(), 3u);
@@ -65,6 +69,7 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
   options.control_points = 8;
   SimulatedBlock simulated = simulate_block(options);
   add_known_lines(simulated, 10, 1);
+  add_seen_verticals(simulated, {.by_radial = 0.02});
   for (Mount& mount : simulated.block.rigs[RigIndex(0)].mounts) mount.rotation_sigma_rad = 0.01;
   simulated.block.rigs[RigIndex(0)].mounts[0].rotation_sigma_rad = 0;
   for (Camera& camera : simulated.block.cameras) camera.prior_sigma[kFocal] = 20;
@@ -77,7 +82,7 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
       make_tile_state(problem, start, std::vector<Eigen::Vector3d>(problem.points.size(), Eigen::Vector3d::Zero()));
   for (const std::size_t terms :
        {problem.positions.size(), problem.attitudes.size(), problem.relatives.size(), problem.point_priors.size(),
-        problem.intrinsic_priors.size(), problem.mount_priors.size(), problem.lines.size()})
+        problem.intrinsic_priors.size(), problem.mount_priors.size(), problem.lines.size(), problem.verticals.size()})
     ASSERT_GT(terms, 0u) << "the block must have every kind of term";
   const std::uint64_t reference = hash_of(problem, state);
   EXPECT_EQ(hash_of(problem, state), reference);
@@ -99,6 +104,10 @@ TEST(ProblemHash, HoldsEveryTermAndStartValue) {
   EXPECT_TRUE(differs([](auto& p, auto&) { p.mount_priors.at(0).rotation_sigma_rad *= 2; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.lines.at(0).weight *= 2; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.line_loss.scale *= 2; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.verticals.at(0).weight(0, 1) += 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.verticals.at(0).camera[0] += 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.verticals.at(0).by_camera(1, 0) += 1; }));
+  EXPECT_TRUE(differs([](auto& p, auto&) { p.vertical_loss.scale *= 2; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.attitude_loss.scale *= 2; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.camera_free.at(0) ^= 1; }));
   EXPECT_TRUE(differs([](auto& p, auto&) { p.image_loss.scale *= 2; }));

@@ -42,6 +42,8 @@ Block block_of(const std::vector<std::string>& names, const GroundFrame& ground)
   line.name = "edge";
   line.measurements.push_back({point.measurements.front().image, {1, 2}, {3, 90}, 1});
   block.lines.push_back(line);
+  block.verticals.push_back(
+      {point.measurements.front().image, Eigen::Vector3d::UnitY(), Eigen::Matrix3d::Identity(), {}, {}});
   return block;
 }
 
@@ -71,6 +73,8 @@ TEST(AppendTo, OldIndicesStayNewImagesFollow) {
 TEST(AppendTo, MeasurementsFollowTheirImages) {
   const Block now = block_of({"a1", "b1", "b15", "b2"}, kHere);
   const Block merged = append_to(block_of({"b1", "b2", "c1"}, kHere), now);
+  ASSERT_EQ(merged.verticals.size(), 1u);
+  EXPECT_EQ(merged.images[merged.verticals.front().image].name, "b2");
   ASSERT_EQ(merged.lines.size(), 1u);
   EXPECT_EQ(merged.images[merged.lines.front().measurements.front().image].name, "b2");
   EXPECT_EQ(merged.images[merged.control_points.front().measurements.front().image].name, "b2");

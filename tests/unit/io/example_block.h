@@ -55,6 +55,10 @@ inline Block example_block() {
   ControlPoint control{"GCP 1", PointRole::kControl, {10, 20, std::nan("")}, {0.01, 0.01, 0.02}, {}};
   control.measurements = {{ImageIndex(0), {100.25, 200.5}, 0.3}, {ImageIndex(3), {7, 8}, 0.5}};
   block.control_points = {control, {"CP 1", PointRole::kCheck, {1, 2, 3}, {0.02, 0.02, 0.04}, {}}};
+  const Eigen::Matrix3d across = Eigen::Vector3d(1e-6, 0, 4e-6).asDiagonal();
+  block.verticals.push_back({ImageIndex(0), Eigen::Vector3d::UnitY(), across, {}, {}});
+  block.verticals.push_back({ImageIndex(3), Eigen::Vector3d::UnitY(), across, Eigen::VectorXd::LinSpaced(8, 1, 2),
+                             Eigen::Matrix3Xd::Constant(3, 8, 0.1)});
   return block;
 }
 

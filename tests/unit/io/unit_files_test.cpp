@@ -102,6 +102,14 @@ void expect_equal(const Block& a, const Block& b) {
   }
   ASSERT_EQ(a.control_points.size(), b.control_points.size());
   for (std::size_t p = 0; p < a.control_points.size(); ++p) expect_equal(a.control_points[p], b.control_points[p]);
+  ASSERT_EQ(a.verticals.size(), b.verticals.size());
+  for (std::size_t v = 0; v < a.verticals.size(); ++v) {
+    EXPECT_EQ(a.verticals[v].image, b.verticals[v].image);
+    EXPECT_EQ(a.verticals[v].down, b.verticals[v].down);
+    EXPECT_EQ(a.verticals[v].covariance, b.verticals[v].covariance);
+    EXPECT_EQ(a.verticals[v].camera, b.verticals[v].camera);
+    EXPECT_EQ(a.verticals[v].by_camera, b.verticals[v].by_camera);
+  }
 }
 
 void expect_equal(const TrackSet& a, const TrackSet& b) {

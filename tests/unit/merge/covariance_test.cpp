@@ -7,6 +7,7 @@
 #include "geometry/decompositions.h"
 #include "merge/monolithic.h"
 #include "tests/unit/adjust/known_lines.h"
+#include "tests/unit/adjust/seen_verticals.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
@@ -39,8 +40,8 @@ void expect_covariances(const TiledBlock& block, const std::vector<TileCovarianc
     const auto n = ours.rows();
     const Eigen::MatrixXd block_expected = expected.block(column, column, n, n);
     const Eigen::VectorXd sigma = block_expected.diagonal().cwiseSqrt();
-    const Eigen::MatrixXd error = sigma.cwiseInverse().asDiagonal() * (ours - block_expected) *
-                                  sigma.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd error =
+        sigma.cwiseInverse().asDiagonal() * (ours - block_expected) * sigma.cwiseInverse().asDiagonal();
     EXPECT_LE(error.cwiseAbs().maxCoeff(), tolerance) << what << " at column " << column;
   };
   for (std::size_t t = 0; t < tiles.size(); ++t) {
@@ -175,6 +176,17 @@ TEST(Gauge, LinesLeaveShiftScaleAndHeading) {
   options.calibrate = false;
   SimulatedBlock simulated = simulate_block(options);
   add_known_lines(simulated, 10, 1);
+  const TiledBlock block(std::move(simulated), 12, {}, 0);
+  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  runner.final_up();
+  EXPECT_EQ(runner.gauge().defect, 5);
+}
+
+TEST(Gauge, VerticalsLeaveShiftScaleAndHeading) {
+  SimulationOptions options = small(SimulationOptions::Scene::kAerial, 40, 40);
+  options.gps_sigma_m = 0;
+  SimulatedBlock simulated = simulate_block(options);
+  add_seen_verticals(simulated, {.by_radial = 0.02, .every = 3});
   const TiledBlock block(std::move(simulated), 12, {}, 0);
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
   runner.final_up();

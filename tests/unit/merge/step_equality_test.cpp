@@ -5,6 +5,7 @@
 
 #include "merge/monolithic.h"
 #include "tests/unit/adjust/known_lines.h"
+#include "tests/unit/adjust/seen_verticals.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
@@ -16,6 +17,7 @@ struct StepCase {
   ObservationOptions observations;
   bool free_mounts = false;
   bool lines = false;
+  bool verticals = false;
 };
 
 SimulationOptions aerial_steps() {
@@ -58,12 +60,19 @@ std::vector<StepCase> scenes() {
   list.push_back({"StreetRelative", relative, cauchy});
   list.push_back({"StreetFreeMounts", street_steps(), {}, true});
   list.push_back({"StreetLines", street_steps(), cauchy, false, true});
+  cauchy.vertical_loss = {RobustLoss::Kind::kCauchy, 2};
+  list.push_back({"StreetVerticals", street_steps(), cauchy, true, false, true});
+  SimulationOptions calibrated = street_steps();
+  calibrated.calibrate = true;
+  list.push_back({"StreetVerticalsCalibrated", calibrated, {}, false, false, true});
   return list;
 }
 
 SimulatedBlock simulated(const StepCase& scene) {
   SimulatedBlock block = simulate_block(scene.simulation);
   if (scene.lines) add_known_lines(block, 20, 1);
+  if (scene.verticals)
+    add_seen_verticals(block, {.noise_deg = 0.1, .wrong_share = 0.05, .by_radial = 0.02, .every = 2});
   if (scene.free_mounts)
     for (Rig& rig : block.block.rigs)
       for (std::size_t m = 1; m < rig.mounts.size(); ++m) {
