@@ -1,9 +1,12 @@
 #include <algorithm>
+#include <map>
 
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
+#include "geometry/angles.h"
 #include "io/hash.h"
 #include "io/unit_files.h"
+#include "io/verticals.h"
 #include "match/match_filter.h"
 #include "match/pair_matching.h"
 
@@ -23,19 +26,38 @@ void add_camera(Hasher& hasher, const Camera& camera) {
   add_to_hash(hasher, camera.intrinsics);
 }
 
-// What the trajectory says of pairs before they are matched.
+// Where images see down, with all its errors, as far as it is good to half a degree but for those of the camera: these
+// turn the verticals of both images of a pair alike, which for one camera hardly matters.
+std::map<ImageIndex, AxisDirection> good_verticals(const Block& block) {
+  constexpr double kGood = 0.5 * kDegree;
+  std::map<ImageIndex, AxisDirection> good;
+  for (const SeenVertical& vertical : block.verticals) {
+    const Camera& camera = block.cameras[block.camera_of(vertical.image)];
+    if (vertical.covariance.trace() <= 2 * kGood * kGood)
+      good.emplace(vertical.image, whole_error(vertical, camera, camera.intrinsics));
+  }
+  return good;
+}
+
+// What the trajectory and the images' verticals say of pairs before they are matched.
 struct Knowledge {
   explicit Knowledge(const Job& job)
       : trajectory(job.block, job.settings.matching.trust),
         filter(job.settings.matching.filter_model.empty() ? MatchFilter::shipped()
                                                           : MatchFilter::load(job.settings.matching.filter_model)),
-        filtered(job.settings.matching.filter) {}
+        filtered(job.settings.matching.filter),
+        verticals(good_verticals(job.block)) {}
   PairKnowledge of(const ImagePair& pair) const {
-    return {trajectory.relate(pair.a, pair.b), filtered ? &filter : nullptr};
+    return {trajectory.relate(pair.a, pair.b), filtered ? &filter : nullptr, vertical(pair.a), vertical(pair.b)};
+  }
+  std::optional<AxisDirection> vertical(ImageIndex image) const {
+    const auto found = verticals.find(image);
+    return found == verticals.end() ? std::nullopt : std::optional(found->second);
   }
   TrustedPairs trajectory;
   MatchFilter filter;
   bool filtered;
+  std::map<ImageIndex, AxisDirection> verticals;
 };
 
 std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs,
@@ -54,6 +76,10 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
     for (const ImageIndex image : {pair.a, pair.b}) {
       hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
       add_camera(hasher, job.block.cameras[job.block.camera_of(image)]);
+      if (const auto vertical = knowledge.vertical(image)) {
+        add_to_hash(hasher, vertical->direction);
+        for (const double value : vertical->covariance.reshaped()) hasher.add(value);
+      }
     }
   }
   return hasher.value();
