@@ -13,4 +13,9 @@ inline void expect_at_most(double reached, double limit, const std::string& what
   EXPECT_LE(reached, limit) << what;
 }
 
+inline void expect_at_least(double reached, double limit, const std::string& what) {
+  std::printf("[ reached  ] %s: %.4g, limit %.4g\n", what.c_str(), reached, limit);
+  EXPECT_GE(reached, limit) << what;
+}
+
 }  // namespace megablock

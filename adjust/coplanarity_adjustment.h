@@ -1,0 +1,83 @@
+// Angles and image coordinates from the coplanarity of rays alone, positions known: the determinant method of Barrier
+// and Martin, "Bundle adjustment with known positions" (KP-03 to KP-10). No ground points among the unknowns.
+//
+// For every point and every pair of the cameras that see it F = det(d_1 | d_2 | C_2 - C_1) = 0 (coplanarity.h). With
+// A = dF/d(angles), B = dF/d(image coordinates) a step solves, in least squares,
+//
+//     (A B) (da, dx) = -F,          with forcing also   lambda_a / sigma_a da = 0,   lambda_x / sigma_x dx = 0.
+//
+// Without forcing, angles and image coordinates together are never determined: K concurrent rays carry 2K - 3
+// conditions (K - 1 where the cameras lie on one line), whatever the number of pairs, so that (A B) of N points has the
+// rank N (2K - 3) and 3N + 3K directions are free. LSQR then gives the solution of least norm, which need not be nearer
+// to the truth: such solutions are marked. Image coordinates alone, with angles held that are wrong, move away from the
+// truth: marked too, by the chi-square of the corrections. This is the method of the report, for comparison and
+// for screening; the adjustment of ground points with priors (tile_adjustment.h) is better in every case.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "geometry/coplanarity.h"
+#include "geometry/lsqr.h"
+
+namespace megablock {
+
+// Cameras of one focal length (px) and no distortion; image coordinates from the principal point. Observations of point
+// j are rows [begin[j], begin[j + 1]), cameras distinct within a point.
+struct CoplanarityNetwork {
+  double focal_px = 0;
+  std::vector<Eigen::Vector3d> centres;  // [cameras] ground frame, m
+  std::vector<XyzAngles> angles;         // [cameras]
+  std::vector<std::int64_t> begin{0};    // [points + 1]
+  std::vector<std::int32_t> camera;      // [observations]
+  std::vector<Eigen::Vector2d> image;    // [observations] px
+  // 1 = held. Empty: all free.
+  std::vector<std::uint8_t> angles_held;  // [3 x cameras]
+  std::vector<std::uint8_t> images_held;  // [2 x observations]
+
+  std::int64_t point_count() const { return static_cast<std::int64_t>(begin.size()) - 1; }
+  void check() const;  // throws InputError
+};
+
+struct CoplanarityOptions {
+  enum class Solver : std::uint8_t {
+    kLsqr,   // as published: stops at twice the number of unknowns
+    kDirect  // sparse QR; refuses what is not determined
+  };
+  Solver solver = Solver::kLsqr;
+  LsqrOptions lsqr;
+  double forcing_angles = 0, forcing_images = 0;  // lambda_a, lambda_x; 0: unforced. Published: 0.02
+  double angle_sigma_rad = 1e-5, image_sigma_px = 0.1;
+  int steps = 1;  // linearisations
+  bool forced() const { return forcing_angles > 0 || forcing_images > 0; }
+  void check() const;  // throws InputError
+};
+
+// What the equations determine, at the rays brought together (so that noise makes no ranks), images and angles as far
+// as they are free.
+struct CoplanarityDiagnosis {
+  std::int64_t rows = 0, columns = 0, rank = 0;  // of (A B)
+  std::int64_t image_rank = 0;                   // of B
+  bool collinear = false;                        // the cameras of every point lie on one line
+  std::vector<double> angle_values;              // singular values of A (free angles), descending
+  std::int64_t nullity() const { return columns - rank; }
+  double angle_condition() const;  // infinite where A is singular; 1 without free angles
+};
+CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network);
+
+struct CoplanaritySolution {
+  CoplanarityNetwork network;              // with corrected angles and image coordinates; held ones have the same bits
+  double mean_before = 0, mean_after = 0;  // of |F|
+  std::int64_t iterations = 0;             // of LSQR, all steps
+  CoplanarityDiagnosis diagnosis;
+  bool rank_deficient = false;               // unforced and not determined: one of many solutions
+  bool held_contradicted = false;            // with held angles: the corrections are larger than the sigmas allow
+  double chi2_per_freedom = 0;               // of the corrections, by the stated sigmas
+  std::vector<std::string> remarks() const;  // one line each
+};
+// Throws InputError for a network or options that make no sense, ComputeError where kDirect is asked for what has no
+// unique solution.
+CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, const CoplanarityOptions& options);
+
+}  // namespace megablock
