@@ -1,0 +1,157 @@
+// Acceptance tests of "Bundle adjustment with known positions" (A. Barrier, S. Martin) that concern tracks: building
+// them from pairs, choosing images by what they have in common, thresholds of the verification.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+
+#include "io/error.h"
+#include "match/common_tracks.h"
+#include "match/pair_matching.h"
+#include "match/tracks.h"
+#include "match/two_view.h"
+#include "reached.h"
+
+namespace megablock {
+namespace {
+
+using Sighting = std::pair<std::int64_t, std::int32_t>;  // image, feature
+using SightingSets = std::set<std::vector<Sighting>>;
+
+constexpr std::int64_t kImages = 20;
+constexpr std::int32_t kFeatures = 400;
+
+IndexedVector<ImageIndex, std::vector<Keypoint>> keypoints() {
+  IndexedVector<ImageIndex, std::vector<Keypoint>> all(kImages);
+  std::int32_t place = 0;
+  for (auto& points : all)
+    for (std::int32_t i = 0; i < kFeatures; ++i) points.push_back({++place, 2 * place, 3, 0});
+  return all;
+}
+
+// Feature i of every image that sees point i; a point is matched in a share of its pairs of images.
+std::vector<VerifiedPair> incomplete_pairs(std::mt19937_64& random) {
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::int32_t>> matches;
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (std::int32_t point = 0; point < kFeatures; ++point) {
+    std::vector<std::int64_t> seen;
+    for (std::int64_t image = 0; image < kImages; ++image)
+      if (unit(random) < 0.3) seen.push_back(image);
+    for (std::size_t a = 0; a < seen.size(); ++a)
+      for (std::size_t b = a + 1; b < seen.size(); ++b)
+        if (unit(random) < 0.5) matches[{seen[a], seen[b]}].push_back(point);
+  }
+  std::vector<VerifiedPair> pairs;
+  for (const auto& [images, features] : matches) {
+    VerifiedPair pair;
+    pair.a = ImageIndex(images.first);
+    pair.b = ImageIndex(images.second);
+    pair.model = PairModel::kEssential;
+    pair.feature_a = pair.feature_b = features;
+    pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+// Connected components, by walking through the graph.
+SightingSets components_of(const std::vector<VerifiedPair>& pairs) {
+  std::map<Sighting, std::vector<Sighting>> edges;
+  for (const VerifiedPair& pair : pairs)
+    for (std::size_t m = 0; m < pair.feature_a.size(); ++m) {
+      const Sighting a{pair.a.value, pair.feature_a[m]}, b{pair.b.value, pair.feature_b[m]};
+      edges[a].push_back(b);
+      edges[b].push_back(a);
+    }
+  SightingSets components;
+  std::set<Sighting> done;
+  for (const auto& [start, ignored] : edges) {
+    if (!done.insert(start).second) continue;
+    std::vector<Sighting> component{start};
+    for (std::size_t i = 0; i < component.size(); ++i)
+      for (const Sighting& next : edges[component[i]])
+        if (done.insert(next).second) component.push_back(next);
+    std::sort(component.begin(), component.end());
+    components.insert(component);
+  }
+  return components;
+}
+
+SightingSets tracks_of(const std::vector<VerifiedPair>& pairs) {
+  const TrackSet set = build_tracks(keypoints(), pairs, {});
+  SightingSets tracks;
+  for (std::size_t t = 0; t < set.id.size(); ++t) {
+    std::vector<Sighting> track;
+    for (std::int64_t o = set.begin[t]; o < set.begin[t + 1]; ++o)
+      track.emplace_back(set.image[static_cast<std::size_t>(o)].value, set.feature[static_cast<std::size_t>(o)]);
+    tracks.insert(track);
+  }
+  return tracks;
+}
+
+TEST(KnownPositionsTracks, TKP11IncompletePairListsGiveTheConnectedComponents) {
+  std::mt19937_64 random(11);
+  std::vector<VerifiedPair> pairs = incomplete_pairs(random);
+  const SightingSets expected = components_of(pairs);
+  EXPECT_EQ(tracks_of(pairs), expected);
+  std::shuffle(pairs.begin(), pairs.end(), random);
+  EXPECT_EQ(tracks_of(pairs), expected);
+}
+
+TEST(KnownPositionsTracks, TKP11FalseMergesDoNotPutAnImageTwiceIntoATrack) {
+  std::mt19937_64 random(12);
+  std::vector<VerifiedPair> pairs = incomplete_pairs(random);
+  for (VerifiedPair& pair : pairs)
+    for (std::int32_t& feature : pair.feature_b)
+      if (random() % 50 == 0) feature = static_cast<std::int32_t>(random() % kFeatures);
+  const SightingSets tracks = tracks_of(pairs);
+  EXPECT_GT(tracks.size(), 300u);
+  for (const std::vector<Sighting>& track : tracks)
+    for (std::size_t i = 1; i < track.size(); ++i) ASSERT_LT(track[i - 1].first, track[i].first);
+  std::shuffle(pairs.begin(), pairs.end(), random);
+  EXPECT_EQ(tracks_of(pairs), tracks);
+}
+
+// Five times six images of which all have about as many matches in pairs, but few, fewer and hardly any tracks in
+// common.
+TEST(KnownPositionsTracks, TKP12SubsetsAreRankedByTheTracksThatAllTheirImagesShare) {
+  const std::vector<std::vector<std::int64_t>> tuples = {{7, 8, 9, 10, 11, 12},
+                                                         {12, 13, 14, 18, 19, 20},
+                                                         {2, 15, 16, 17, 18, 19},
+                                                         {1, 2, 7, 8, 13, 14},
+                                                         {1, 2, 3, 4, 5, 6}};
+  const std::vector<std::int64_t> common = {88, 280, 2311, 185, 1193};
+  TrackSet tracks;
+  tracks.begin.push_back(0);
+  const auto add = [&](const std::vector<std::int64_t>& images) {
+    for (std::int64_t image : images) tracks.image.push_back(ImageIndex(image));
+    tracks.begin.push_back(std::ssize(tracks.image));
+  };
+  std::vector<std::vector<ImageIndex>> subsets;
+  for (std::size_t k = 0; k < tuples.size(); ++k) {
+    for (std::int64_t n = 0; n < common[k]; ++n) add(tuples[k]);
+    for (std::int64_t n = common[k]; n < 3000; ++n) {
+      std::vector<std::int64_t> five = tuples[k];
+      five.erase(five.begin() + n % 6);
+      add(five);
+    }
+    subsets.emplace_back(tuples[k].rbegin(), tuples[k].rend());
+    subsets.back().push_back(subsets.back().front());
+  }
+  const std::vector<ImageSubset> ranked = rank_by_common_tracks(tracks, subsets);
+  ASSERT_EQ(ranked.size(), 5u);
+  const std::int64_t counts[] = {2311, 1193, 280, 185, 88};
+  for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(ranked[k].common_tracks, counts[k]);
+  EXPECT_EQ(ranked[0].images.front(), ImageIndex(2));
+  EXPECT_EQ(
+      ranked[4].images, subsets[0].empty() ? ranked[4].images : [&] {
+        std::vector<ImageIndex> images;
+        for (std::int64_t image : tuples[0]) images.push_back(ImageIndex(image));
+        return images;
+      }());
+  EXPECT_THROW(rank_by_common_tracks(tracks, {{}}), InputError);
+}
+
+}  // namespace
+}  // namespace megablock
