@@ -11,9 +11,9 @@
 //
 //     sum over |r_i| <= t of 1 - (r_i / t)^2              (P. Torr and A. Zisserman, CVIU 78, 2000),
 //
-// and given up as soon as it cannot exceed the best one's any more. Every new best model is refined over its inliers
-// before the draws go on (O. Chum, J. Matas and J. Kittler, "Locally optimized RANSAC", DAGM 2003): the model of a
-// minimal sample misses inliers, and w with them.
+// and given up as soon as it cannot exceed the best one's any more, or is unlikely to by a hundred observations. Every
+// new best model is refined over its inliers before the draws go on (O. Chum, J. Matas and J. Kittler, "Locally
+// optimized RANSAC", DAGM 2003): the model of a minimal sample misses inliers, and w with them.
 //
 // Without a threshold it is chosen a contrario (L. Moisan and B. Stival, IJCV 57(3), 2004): of thresholds in steps of
 // sqrt(2) the one at which so many observations agree the least by accident. With a(t) the probability that a wrong
@@ -122,10 +122,24 @@ struct Score {
   std::size_t inliers = 0;
 };
 
-// By the support within a given threshold; `least` is the score to exceed.
+// Whether so few of some hundred observations agree that a model as good as the best has them once in five thousand
+// times at most.
 template <typename Residual>
-Score supported(const Residual& squared_residual, std::size_t size, double threshold, double least) {
-  const double limit = threshold * threshold, most_lost = static_cast<double>(size) - least;
+bool hopeless(const Residual& squared_residual, std::size_t size, double limit, const Score& best) {
+  constexpr std::size_t kLooked = 100;
+  if (size < 3 * kLooked) return false;
+  const std::size_t step = size / kLooked;
+  std::size_t agreeing = 0;
+  for (std::size_t k = 0; k < kLooked; ++k) agreeing += squared_residual(k * step) <= limit;
+  const double share = static_cast<double>(best.inliers) / static_cast<double>(size), expected = kLooked * share;
+  return static_cast<double>(agreeing) < expected - 3.5 * std::sqrt(expected * (1 - share));
+}
+
+// By the support within a given threshold; empty where that of the best is not exceeded.
+template <typename Residual>
+Score supported(const Residual& squared_residual, std::size_t size, double threshold, const Score& best) {
+  const double limit = threshold * threshold, most_lost = static_cast<double>(size) - best.value;
+  if (hopeless(squared_residual, size, limit, best)) return {};
   double lost = 0;
   std::size_t inliers = 0;
   for (std::size_t i = 0; i < size; ++i) {
@@ -188,7 +202,7 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
   const auto consider = [&](const Model& model) {
     Score score;
     if (!alarms) {
-      score = ransac_detail::supported(estimator.squared_residuals(model), size, options.threshold, best_score.value);
+      score = ransac_detail::supported(estimator.squared_residuals(model), size, options.threshold, best_score);
     } else if constexpr (requires { estimator.chance(1.0); }) {
       score = ransac_detail::meaningful(estimator.squared_residuals(model), size, kSize, options.max_threshold, *alarms,
                                         [&](double threshold) { return estimator.chance(threshold); });

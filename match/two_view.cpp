@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -21,14 +22,17 @@ namespace {
 constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
 // The fundamental matrix is tried below the first share of all matches and chosen by the second factor of gain.
 constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
+// Below this share of all matches what verticals give is checked by five points.
+constexpr double kDoubtfulVertical = 0.25;
 // Of the best orientation's support, for a plane's other one to be its twin.
 constexpr double kTwinShare = 0.95;
 
-RansacOptions sampling(const TwoViewOptions& options, int max_draws) {
+RansacOptions sampling(const TwoViewOptions& options, int max_draws, double inlier_share = 0) {
   RansacOptions sampling;
   sampling.threshold = options.max_residual;
   sampling.confidence = 0.999;
   sampling.max_draws = max_draws;
+  sampling.inlier_share = inlier_share;
   sampling.seed = options.seed;
   return sampling;
 }
@@ -66,20 +70,17 @@ class PairEstimation {
   TwoView estimate() {
     TwoView none;
     none.inlier.assign(points_.size(), 0);
-    const auto rotation = ransac(RotationPairEstimator(points_), sampling(options_, 300));
-    const int rotation_count = rotation ? rotation->consensus.count : 0;
-    if (rotation_count >= needed_ && rotation_count >= kRotationShare * static_cast<double>(points_.size()))
-      return turned(*rotation);
-    const auto plane = ransac(HomographyEstimator(points_), sampling(options_, 1000));
-    const int plane_count = plane ? plane->consensus.count : 0;
-    draws_ = (rotation ? rotation->draws : 0) + (plane ? plane->draws : 0);
-
-    std::vector<RelativeOrientation> starts;
-    if (rotation) starts.push_back({rotation->model});
-    if (plane) add_twins(plane->consensus.inlier, starts);
-    const std::size_t twins = starts.size();
-    if (const auto found = orientation(starts)) starts.push_back(*found);
-    refine_all(std::span(starts).subspan(std::min<std::size_t>(twins, rotation ? 1 : 0)));
+    // The general model first: what it explains tells how many draws a simpler one that is to be chosen needs.
+    if (const auto general = orientation()) refine_all(std::array{*general});
+    const double share =
+        hypotheses_.empty() ? 0 : hypotheses_.front().support.count / static_cast<double>(points_.size());
+    const auto rotation = ransac(RotationPairEstimator(points_), sampling(options_, 300, kRotationShare * share));
+    const auto plane = ransac(HomographyEstimator(points_), sampling(options_, 1000, kPlaneShare * share));
+    const int rotation_count = rotation ? rotation->consensus.count : 0,
+              plane_count = plane ? plane->consensus.count : 0;
+    draws_ += (rotation ? rotation->draws : 0) + (plane ? plane->draws : 0);
+    if (plane && plane_count >= kPlaneShare * share * static_cast<double>(points_.size()))
+      refine_all(twins(plane->consensus.inlier));
     const int best_count = hypotheses_.empty() ? 0 : hypotheses_.front().support.count;
 
     if (rotation_count >= needed_ && rotation_count >= kRotationShare * best_count) return turned(*rotation);
@@ -109,33 +110,32 @@ class PairEstimation {
   }
 
   // The orientations that explain a plane.
-  void add_twins(const std::vector<std::uint8_t>& inlier, std::vector<RelativeOrientation>& to) const {
+  std::vector<RelativeOrientation> twins(const std::vector<std::uint8_t>& inlier) const {
     const InlierRays rays = rays_of(points_, inlier);
-    const auto homography = fit_homography(rays.a, rays.b);
-    if (!homography) return;
-    for (const PlanarOrientation& planar : visible_orientations(*homography, rays.a)) to.push_back(planar.orientation);
+    std::vector<RelativeOrientation> found;
+    if (const auto homography = fit_homography(rays.a, rays.b))
+      for (const PlanarOrientation& planar : visible_orientations(*homography, rays.a))
+        found.push_back(planar.orientation);
+    return found;
   }
 
   // By five points, or by three where the verticals are known and agree with what they give.
-  std::optional<RelativeOrientation> orientation(const std::vector<RelativeOrientation>& starts) {
-    std::optional<RelativeOrientation> by_vertical;
+  std::optional<RelativeOrientation> orientation() {
+    std::vector<RelativeOrientation> starts;
     if (options_.vertical_a && options_.vertical_b) {
       const VerticalPairEstimator estimator(points_, options_.max_residual, options_.vertical_a->direction,
                                             options_.vertical_b->direction);
-      const auto found = ransac(estimator, sampling(options_, 1000), std::span<const RelativeOrientation>(starts));
-      if (found) {
+      if (const auto found = ransac(estimator, sampling(options_, 1000))) {
         draws_ += found->draws;
-        by_vertical = adjust_orientation(found->model, points_, {0.5 * options_.max_residual});
+        starts.push_back(adjust_orientation(found->model, points_, {0.5 * options_.max_residual}));
         by_vertical_ = found->consensus.count >= needed_ &&
-                       found->consensus.count >= kDoubtfulShare * static_cast<double>(points_.size()) &&
-                       agrees_with_verticals(*by_vertical, found->consensus);
-        if (by_vertical_) return by_vertical;
+                       found->consensus.count >= kDoubtfulVertical * static_cast<double>(points_.size()) &&
+                       agrees_with_verticals(starts.front(), found->consensus);
+        if (by_vertical_) return starts.front();
       }
     }
-    std::vector<RelativeOrientation> all = starts;
-    if (by_vertical) all.push_back(*by_vertical);
-    const auto found = ransac(five_points_, sampling(options_, 3000), std::span<const RelativeOrientation>(all));
-    if (!found) return by_vertical;
+    const auto found = ransac(five_points_, sampling(options_, 3000), std::span<const RelativeOrientation>(starts));
+    if (!found) return std::nullopt;
     draws_ += found->draws;
     return found->model;
   }

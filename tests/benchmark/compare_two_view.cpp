@@ -1,0 +1,201 @@
+// Verification of pairs (match/two_view.h) against OpenCV's robust estimators (opencv_two_view.h): processor time,
+// right models, errors of rotation and base.
+//
+//   compare_two_view [pairs = 40]            simulated: general, plane, rotation only; 10 to 70 % wrong matches
+//   compare_two_view FOLDER FOCAL_PX [STEP]  photographs: each with its next STEP (4) by name; matches, inliers
+//
+// Simulated: 2000 x 1500 px, focal length 1400 px, 800 matches with 0.5 px of noise, base 0.15 (plane: 0.3) of the
+// depth; "3 pt": with verticals good to 0.1 degrees.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <string>
+
+#include "geometry/angles.h"
+#include "geometry/camera.h"
+#include "geometry/median.h"
+#include "io/tracks.h"
+#include "match/features.h"
+#include "match/pair_matching.h"
+#include "opencv_two_view.h"
+
+namespace {
+
+using namespace megablock;
+
+constexpr double kFocal = 1400;
+
+double processor_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+enum class Scene { kGeneral, kPlane, kRotation };
+
+struct Pair {
+  PointPairs points;
+  RelativeOrientation truth;
+  AxisDirection vertical_a, vertical_b;
+};
+
+Pair simulated(Scene scene, double wrong, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::normal_distribution<double> normal(0, 1);
+  const auto anywhere = [&] {
+    const double x = uniform(random), y = uniform(random);
+    return Eigen::Vector2d(1000 / kFocal * x, 750 / kFocal * y);
+  };
+  const auto small = [&](double size) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Eigen::Vector3d(size * x, size * y, size * z);
+  };
+  Pair pair;
+  pair.truth.rotation = rotation_exp<double>({0.05 * uniform(random), 0.08 * uniform(random), 0.5 * uniform(random)});
+  const double base = scene == Scene::kRotation ? 0 : scene == Scene::kPlane ? 0.3 : 0.15;
+  const Eigen::Vector3d t =
+      -(pair.truth.rotation * (base * Eigen::Vector3d(1, 0.5 * uniform(random), 0.1 * uniform(random))));
+  if (base > 0) pair.truth.base = t.normalized();
+  const Eigen::Vector3d down = (Eigen::Vector3d::UnitZ() + small(0.1)).normalized();
+  const auto seen = [&](const Eigen::Vector3d& v) {
+    const double sigma = 0.1 * kDegree;
+    return AxisDirection{(v + small(sigma)).normalized(),
+                         sigma * sigma * (Eigen::Matrix3d::Identity() - v * v.transpose())};
+  };
+  pair.vertical_a = seen(down);
+  pair.vertical_b = seen(pair.truth.rotation * down);
+  while (pair.points.size() < 800) {
+    const Eigen::Vector2d a = anywhere();
+    const double depth = scene == Scene::kPlane ? 1 : 1 + 0.3 * uniform(random);
+    Eigen::Vector2d b = (pair.truth.rotation * (depth * a.homogeneous()) + t).hnormalized();
+    if (std::abs(b.x()) > 1000 / kFocal || std::abs(b.y()) > 750 / kFocal) continue;
+    if (0.5 * (uniform(random) + 1) < wrong) b = anywhere();
+    pair.points.a.push_back(a + small(0.5 / kFocal).head<2>());
+    pair.points.b.push_back(b + small(0.5 / kFocal).head<2>());
+  }
+  return pair;
+}
+
+struct Measured {
+  double seconds = 0;
+  int right_models = 0, pairs = 0;
+  std::vector<double> rotation_deg, base_deg;
+
+  template <typename Estimate>
+  void run(const Pair& pair, PairModel right, const Estimate& estimate) {
+    const double start = processor_seconds();
+    const TwoView found = estimate();
+    seconds += processor_seconds() - start;
+    ++pairs;
+    right_models += found.model == right;
+    rotation_deg.push_back(rotation_angle(found.rotation, pair.truth.rotation) / kDegree);
+    const double cosine = std::clamp(found.translation.dot(pair.truth.base), -1.0, 1.0);
+    base_deg.push_back(std::acos(cosine) / kDegree);
+  }
+  void print(const char* name, bool with_base) const {
+    const auto off = std::count_if(rotation_deg.begin(), rotation_deg.end(), [](double e) { return e > 1; });
+    std::printf("  %-7s %7.2f ms  models %3d/%d  rotation %.4f", name, 1e3 * seconds / pairs, right_models, pairs,
+                median(rotation_deg));
+    if (with_base) std::printf("  base %.3f deg", median(base_deg));
+    std::printf("  off by > 1 deg: %td\n", off);
+  }
+};
+
+void compare_simulated(int pairs) {
+  for (const auto& [name, scene, right] : {std::tuple{"general", Scene::kGeneral, PairModel::kEssential},
+                                           std::tuple{"plane", Scene::kPlane, PairModel::kHomography},
+                                           std::tuple{"rotation", Scene::kRotation, PairModel::kRotationOnly}}) {
+    for (const double wrong : {0.1, 0.3, 0.5, 0.6, 0.7}) {
+      Measured cv, ours, verticals;
+      for (int i = 0; i < pairs; ++i) {
+        const auto seed = static_cast<std::uint64_t>(i);
+        const Pair pair = simulated(scene, wrong, seed);
+        TwoViewOptions options;
+        options.max_residual = 3 / kFocal;
+        options.seed = seed;
+        cv.run(pair, right, [&] { return OpencvTwoView(pair.points, options).estimate(); });
+        ours.run(pair, right, [&] { return estimate_two_view(pair.points, options); });
+        options.vertical_a = pair.vertical_a;
+        options.vertical_b = pair.vertical_b;
+        verticals.run(pair, right, [&] { return estimate_two_view(pair.points, options); });
+      }
+      std::printf("%s, %.0f %% wrong\n", name, 100 * wrong);
+      cv.print("OpenCV", scene != Scene::kRotation);
+      ours.print("ours", scene != Scene::kRotation);
+      verticals.print("3 pt", scene != Scene::kRotation);
+    }
+  }
+}
+
+// The matches of two photographs as normalised points.
+PointPairs matched(const ImageFeatures& a, const ImageFeatures& b, const Intrinsics& camera) {
+  PointPairs points;
+  const auto at = [&](const ImageFeatures& f, std::int32_t row) {
+    const Keypoint& k = f.keypoints[static_cast<std::size_t>(row)];
+    return unproject(camera, {from_fixed_pixel(k.x), from_fixed_pixel(k.y)});
+  };
+  for (const auto& [row_a, row_b] : match_descriptors(a.descriptors, b.descriptors, {})) {
+    const auto pa = at(a, row_a), pb = at(b, row_b);
+    if (!pa || !pb) continue;
+    points.a.push_back(*pa);
+    points.b.push_back(*pb);
+  }
+  return points;
+}
+
+void compare_photographs(const std::string& folder, double focal_px, std::size_t step) {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    std::string extension = entry.path().extension().string();
+    std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+    if (extension == ".jpg") files.push_back(entry.path().string());
+  }
+  std::sort(files.begin(), files.end());
+  std::vector<ImageFeatures> features;
+  FeatureOptions detection;
+  detection.max_features = 4000;
+  for (std::size_t i = 0; i < files.size(); ++i)
+    features.push_back(detect_features(files[i], "", ImageIndex(static_cast<std::int32_t>(i)), detection));
+  double seconds_cv = 0, seconds_ours = 0;
+  int verified_cv = 0, verified_ours = 0, inliers_cv = 0, inliers_ours = 0, pairs = 0;
+  std::vector<double> apart;
+  for (std::size_t i = 0; i < files.size(); ++i)
+    for (std::size_t j = i + 1; j < std::min(files.size(), i + 1 + step); ++j) {
+      const Intrinsics camera = {focal_px, 0.5 * features[i].width, 0.5 * features[i].height, 0, 0, 0, 0, 0};
+      const PointPairs points = matched(features[i], features[j], camera);
+      TwoViewOptions options;
+      options.max_residual = 3 / focal_px;
+      options.seed = i * files.size() + j;
+      if (points.size() < static_cast<std::size_t>(options.min_inliers)) continue;
+      ++pairs;
+      const double start = processor_seconds();
+      const TwoView cv = OpencvTwoView(points, options).estimate();
+      const double middle = processor_seconds();
+      const TwoView ours = estimate_two_view(points, options);
+      seconds_ours += processor_seconds() - middle;
+      seconds_cv += middle - start;
+      verified_cv += cv.model != PairModel::kNone;
+      verified_ours += ours.model != PairModel::kNone;
+      if (cv.model == PairModel::kNone || ours.model == PairModel::kNone) continue;
+      inliers_cv += cv.inlier_count;
+      inliers_ours += ours.inlier_count;
+      apart.push_back(rotation_angle(cv.rotation, ours.rotation) / kDegree);
+    }
+  std::printf("%s: %d pairs\n", folder.c_str(), pairs);
+  std::printf("  OpenCV %7.2f ms a pair, %d verified, %d inliers of pairs that both verify\n", 1e3 * seconds_cv / pairs,
+              verified_cv, inliers_cv);
+  std::printf("  ours   %7.2f ms a pair, %d verified, %d inliers; rotations apart by %.3f deg (median)\n",
+              1e3 * seconds_ours / pairs, verified_ours, inliers_ours, median(apart));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc > 2)
+    compare_photographs(argv[1], std::atof(argv[2]), argc > 3 ? static_cast<std::size_t>(std::atoi(argv[3])) : 4);
+  else
+    compare_simulated(argc > 1 ? std::atoi(argv[1]) : 40);
+}

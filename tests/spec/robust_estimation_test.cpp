@@ -1,0 +1,227 @@
+// Acceptance tests of robust estimation: draws, determinism, model selection, and three points with the vertical
+// against five.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <limits>
+#include <thread>
+
+#include "geometry/pair_estimators.h"
+#include "geometry/ransac.h"
+#include "match/two_view.h"
+#include "reached.h"
+#include "tests/unit/geometry/linear_model.h"
+#include "tests/unit/geometry/scene_pairs.h"
+
+namespace megablock {
+namespace {
+
+constexpr std::array kShares = {0.95, 0.9, 0.8, 0.75, 0.7, 0.6, 0.5};
+constexpr std::array<std::array<int, 7>, 7> kTableA1 = {{{2, 3, 5, 6, 7, 11, 17},
+                                                         {3, 4, 7, 9, 11, 19, 35},
+                                                         {3, 5, 9, 13, 17, 34, 72},
+                                                         {4, 6, 12, 17, 26, 57, 146},
+                                                         {4, 7, 16, 24, 37, 97, 293},
+                                                         {4, 8, 20, 33, 54, 163, 588},
+                                                         {5, 9, 26, 44, 78, 272, 1177}}};  // samples of 2 to 8
+
+TEST(Spec, AT17TableOfDraws) {
+  int different = 0;
+  for (std::size_t n = 2; n <= 8; ++n)
+    for (std::size_t w = 0; w < 7; ++w) different += draws_needed(n, kShares[w], 0.99) != kTableA1[n - 2][w];
+  expect_at_most(different, 0, "entries of the table that differ, of 49");
+}
+
+// Draws over those of the table, mean and largest of 100 runs for each of the seven shares; right observations have
+// normal errors.
+template <int N>
+void expect_draws_of_table(bool share_known) {
+  double worst_mean = 0, worst = 0;
+  for (std::size_t w = 0; w < 7; ++w) {
+    double sum = 0;
+    for (std::uint64_t seed = 0; seed < 100; ++seed) {
+      const LinearModelScene<N> scene(200, 1 - kShares[w], 0.01, seed);
+      RansacOptions options{.threshold = threshold_of_sigma(0.01, 1, 0.999), .seed = seed};
+      if (share_known) options.inlier_share = kShares[w];
+      const auto found = ransac(LinearModelEstimator<N>(scene), options);
+      const double ratio = found ? found->draws / static_cast<double>(kTableA1[N - 2][w]) : 100;
+      sum += ratio;
+      worst = std::max(worst, ratio);
+    }
+    worst_mean = std::max(worst_mean, sum / 100);
+  }
+  const std::string name = "samples of " + std::to_string(N) + (share_known ? ", share known: " : ", share found: ");
+  // What the share is the engine finds to one observation in some hundred: mean draws of few are up or down by one.
+  expect_at_most(worst_mean, 1.2, name + "mean draws over the table's");
+  if (share_known) expect_at_most(worst, 1.2, name + "most draws over the table's");
+}
+
+TEST(Spec, AT17AdaptiveDraws) {
+  for (const bool known : {true, false}) {
+    expect_draws_of_table<2>(known);
+    expect_draws_of_table<3>(known);
+    expect_draws_of_table<4>(known);
+    expect_draws_of_table<5>(known);
+    expect_draws_of_table<6>(known);
+    expect_draws_of_table<7>(known);
+    expect_draws_of_table<8>(known);
+  }
+}
+
+struct TiltedPair {
+  PairScene scene;
+  PointPairs points;
+  Eigen::Vector3d down_a, down_b;
+};
+
+TiltedPair tilted_pair(PairSceneOptions options, std::size_t count, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> tilt(-0.1, 0.1);
+  const auto turn = [&] { return rotation_exp<double>({tilt(random), tilt(random), tilt(random)}); };
+  const Eigen::Quaterniond a = turn(), b = turn();
+  options.rotation = b * a.conjugate();
+  const PairScene scene(options, count, random);
+  return {scene, normalised_points(scene), a * Eigen::Vector3d::UnitY(), b * Eigen::Vector3d::UnitY()};
+}
+
+PairSceneOptions half_wrong() {
+  PairSceneOptions options;
+  options.noise_px = 0.3;
+  options.outliers = 0.5;
+  return options;
+}
+constexpr double kThreshold = 1 / kSceneFocalPx;
+
+TEST(Spec, AT37ThreePointsAgainstFive) {
+  constexpr int kPairs = 40;
+  double draws_three = 0, draws_five = 0, time_three = 0, time_five = 0, wrong = 0;
+  for (std::uint64_t seed = 0; seed < kPairs; ++seed) {
+    const TiltedPair pair = tilted_pair(half_wrong(), 600, seed);
+    const FivePointEstimator five(pair.points, kThreshold);
+    const VerticalPairEstimator three(pair.points, kThreshold, pair.down_a, pair.down_b);
+    const RansacOptions options{.threshold = kThreshold, .inlier_share = 0.5, .seed = seed};
+    const auto run = [&](const auto& estimator, double& draws, double& time) {
+      std::optional<RansacResult<RelativeOrientation>> found;
+      double best = std::numeric_limits<double>::infinity();
+      for (int repetition = 0; repetition < 3; ++repetition) {  // other programs may be at work
+        const auto start = std::chrono::steady_clock::now();
+        found = ransac(estimator, options);
+        best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+      }
+      time += best;
+      draws += found->draws;
+      wrong += rotation_error_deg(found->model, pair.scene.truth) > 0.5;
+    };
+    run(three, draws_three, time_three);
+    run(five, draws_five, time_five);
+  }
+  expect_at_most(draws_three / kPairs, 35, "mean draws, three points");
+  expect_at_most(draws_five / kPairs, 146, "mean draws, five points");
+  expect_at_most(time_three / time_five, 0.4, "time over that of five points");
+  expect_at_most(wrong, 4, "of 80 runs with p = 0.99, rotations off by more than half a degree");
+}
+
+TEST(Spec, AT35SameInliersForAnyNumberOfThreads) {
+  constexpr std::size_t kPairs = 64;
+  std::vector<TiltedPair> pairs;
+  for (std::uint64_t seed = 0; seed < kPairs; ++seed) pairs.push_back(tilted_pair(half_wrong(), 150, seed));
+  std::vector<TwoView> reference;
+  for (const std::size_t threads : {1, 8, 64}) {
+    std::vector<TwoView> found(kPairs);
+    std::vector<std::thread> workers;
+    for (std::size_t worker = 0; worker < threads; ++worker)
+      workers.emplace_back([&, worker] {
+        for (std::size_t i = worker; i < kPairs; i += threads)
+          found[i] = estimate_two_view(pairs[i].points, {.max_residual = kThreshold, .seed = i});
+      });
+    for (std::thread& worker : workers) worker.join();
+    if (reference.empty()) reference = found;
+    for (std::size_t i = 0; i < kPairs; ++i) {
+      EXPECT_EQ(found[i].inlier, reference[i].inlier);
+      EXPECT_EQ(found[i].rotation.coeffs(), reference[i].rotation.coeffs());
+      EXPECT_EQ(found[i].translation, reference[i].translation);
+      EXPECT_EQ(found[i].draws, reference[i].draws);
+    }
+  }
+}
+
+TwoView two_view(const PairSceneOptions& options, std::uint64_t seed, RelativeOrientation* truth = nullptr,
+                 std::size_t matches = 300) {
+  const TiltedPair pair = tilted_pair(options, matches, seed);
+  if (truth) *truth = pair.scene.truth;
+  return estimate_two_view(pair.points,
+                           {.max_residual = std::max(4 * options.noise_px, 1.0) / kSceneFocalPx, .seed = seed});
+}
+
+TEST(Spec, AT06PlanesKeepTheirTwin) {
+  int planes = 0, twins = 0, near = 0;
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    PairSceneOptions options;
+    options.plane = true;
+    options.base = {0.1, 0, 0};
+    options.noise_px = 0.5;
+    RelativeOrientation truth;
+    const TwoView found = two_view(options, seed, &truth, 2000);
+    planes += found.model == PairModel::kHomography;
+    twins += found.twin.has_value();
+    const auto error = [&](const RelativeOrientation& o) {
+      return rotation_error_deg(o, truth) + base_error_deg(o, truth);
+    };
+    double nearest = error({found.rotation, found.translation});
+    if (found.twin) nearest = std::min(nearest, error(*found.twin));
+    near += nearest < 9;
+  }
+  expect_at_most(30 - planes, 0, "planes not recognised, of 30");
+  expect_at_most(30 - near, 0, "planes of 30 where neither orientation is within 9 deg of the truth");
+  std::printf("[ reached  ] twins within 95 %% of the support: %d of 30\n", twins);
+}
+
+TEST(Spec, AT07AlongTheNormalIsIllConditioned) {
+  for (const double noise_px : {0.1, 0.5, 1.0}) {
+    int flagged = 0;
+    double over_sigma = 0;
+    for (std::uint64_t seed = 0; seed < 50; ++seed) {
+      PairSceneOptions options;
+      options.plane = true;
+      options.base = {0, 0, 0.1};
+      options.noise_px = noise_px;
+      RelativeOrientation truth;
+      const TwoView found = two_view(options, seed, &truth);
+      flagged += found.ill_conditioned;
+      if (found.model == PairModel::kRotationOnly) continue;
+      const double error = base_error_deg({found.rotation, found.translation}, truth);
+      over_sigma = std::max(over_sigma, error / degrees(found.precision.base_sigma()));
+    }
+    const std::string name = " at " + std::to_string(noise_px).substr(0, 3) + " px";
+    expect_at_most(50 - flagged, 0, "pairs of 50 without the flag" + name);
+    std::printf("[ reached  ] largest error of the base over its sigma%s: %.2f\n", name.c_str(), over_sigma);
+  }
+  int flagged = 0;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) flagged += two_view(half_wrong(), seed).ill_conditioned;
+  expect_at_most(flagged, 0, "of 50 general pairs with the flag");
+}
+
+TEST(Spec, AT08RotationOnly) {
+  for (const double noise_px : {0.2, 0.5}) {
+    int missed = 0, false_flags = 0;
+    for (std::uint64_t seed = 0; seed < 100; ++seed) {
+      PairSceneOptions options;
+      options.noise_px = noise_px;
+      options.base.setZero();
+      missed += two_view(options, seed).model != PairModel::kRotationOnly;
+      for (const bool lateral : {true, false}) {
+        options.base = lateral ? Eigen::Vector3d(0.05, 0, 0) : Eigen::Vector3d(0, 0, 0.05);
+        false_flags += two_view(options, seed).model == PairModel::kRotationOnly;
+      }
+    }
+    const std::string name = " at " + std::to_string(noise_px).substr(0, 3) + " px";
+    expect_at_most(missed / 100.0, 0.01, "share of pairs without base that are not rotation-only" + name);
+    expect_at_most(false_flags / 200.0, 0.01, "share of pairs with base 0.05 that are rotation-only" + name);
+  }
+}
+
+TEST(Spec, AT26RealPairs) { GTEST_SKIP() << "the photographs of entry-P10 (Strecha et al. 2008) are not available"; }
+TEST(Spec, AT27RealPairs) { GTEST_SKIP() << "the photographs of the ISPRS sequence \"stones\" are not available"; }
+
+}  // namespace
+}  // namespace megablock
