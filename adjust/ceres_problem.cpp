@@ -10,6 +10,7 @@
 
 #include "adjust/linearise.h"
 #include "io/error.h"
+#include "io/held_priors.h"
 
 namespace megablock {
 
@@ -247,11 +248,11 @@ void CeresTile::add_images(const TileProblem& problem, const TileState& state, C
 
 void CeresTile::add_priors(const TileProblem& problem) {
   for (const auto& term : problem.positions)
-    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::PositionMeasured{term.prior}), position_loss_.get(),
-                             frame(term.frame.value));
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::PositionMeasured{term.prior}),
+                             held(term.prior) ? nullptr : position_loss_.get(), frame(term.frame.value));
   for (const auto& term : problem.attitudes)
-    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}), attitude_loss_.get(),
-                             frame(term.frame.value));
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}),
+                             held(term.prior) ? nullptr : attitude_loss_.get(), frame(term.frame.value));
   for (const auto& term : problem.lines) {
     if (term.other.valid())
       ceres_->AddResidualBlock(automatic<1, kPoseBlock, kPoseBlock>(residual::HorizontalLine{term}), line_loss_.get(),

@@ -10,6 +10,7 @@
 #include "adjust/linearise.h"
 #include "adjust/vertical_terms.h"
 #include "geometry/decompositions.h"
+#include "io/held_priors.h"
 
 namespace megablock {
 
@@ -98,12 +99,12 @@ void add_priors(const TileProblem& problem, const TileState& state, Components& 
   for (const auto& term : problem.positions) {
     Component& c = all[components.of(term.frame.value)];
     const Pose& frame = state.frames[term.frame.value];
-    c.add(linearise_position(frame, term.prior).by_frame * c.move(frame));
+    c.add(linearise_position(frame, comparable(term.prior)).by_frame * c.move(frame));
   }
   for (const auto& term : problem.attitudes) {
     Component& c = all[components.of(term.frame.value)];
     const Pose& frame = state.frames[term.frame.value];
-    c.add(linearise_attitude(frame, term.prior).by_frame * c.move(frame));
+    c.add(linearise_attitude(frame, comparable(term.prior)).by_frame * c.move(frame));
   }
   for (const auto& term : problem.lines) {
     Component& c = all[components.of(term.frame.value)];

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "adjust/line_terms.h"
+#include "adjust/prior_loss.h"
 #include "adjust/residual_squares.h"
 #include "adjust/vertical_terms.h"
 
@@ -126,11 +127,11 @@ double other_cost(const TileProblem& problem, const TileState& state) {
   double sum = 0;
   for (const auto& term : problem.positions) {
     const double s = linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm();
-    sum += problem.position_loss.evaluate(s)[0];
+    sum += loss_of(problem, term).evaluate(s)[0];
   }
   for (const auto& term : problem.attitudes)
-    sum += problem.attitude_loss.evaluate(
-        linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm())[0];
+    sum += loss_of(problem, term)
+               .evaluate(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm())[0];
   for (const auto& term : problem.relatives) {
     const auto r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual;
     sum += problem.relative_loss.evaluate(r.squaredNorm())[0];

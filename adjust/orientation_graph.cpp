@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "io/error.h"
+#include "io/held_priors.h"
 
 namespace megablock {
 
@@ -43,8 +44,11 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
     if (rows.frame[frame] < 0) {
       rows.frame[frame] = graph.frame_count();
       OrientationGraph::FrameNode node{frame, {}, {}, {}};
-      if (options.observations.use_position_priors) node.position = block.frames[frame].position_prior;
-      if (options.observations.use_attitude_priors) node.attitude = block.frames[frame].attitude_prior;
+      const Frame& given = block.frames[frame];
+      if (options.observations.use_position_priors && given.position_prior)
+        node.position = comparable(*given.position_prior);
+      if (options.observations.use_attitude_priors && given.attitude_prior)
+        node.attitude = comparable(*given.attitude_prior);
       if (start.oriented[frame]) {
         constexpr double kSigma = 0.01;  // metres
         node.given = start.frames[frame];

@@ -12,6 +12,7 @@
 #include "adjust/tile_adjustment.h"
 #include "geometry/triangulation.h"
 #include "io/error.h"
+#include "io/held_priors.h"
 
 namespace megablock {
 
@@ -146,6 +147,19 @@ class PointSettler {
   std::vector<double> residuals_;  // sigmas
 };
 
+// How far the rays of frames with held positions may miss for the errors that their attitude priors allow, in sigmas of
+// the images: such poses are the priors themselves.
+double allowed_by_attitudes(const TileProblem& problem, const TileState& state) {
+  constexpr double kWide = 4;  // sigmas of the attitudes
+  std::vector<std::uint8_t> placed(problem.frames.size(), 0);
+  for (const auto& term : problem.positions) placed[term.frame.value] = held(term.prior);
+  double turn = 0, focal = 0;
+  for (const auto& term : problem.attitudes)
+    if (placed[term.frame.value]) turn = std::max(turn, term.prior.sigma_rad.maxCoeff());
+  for (const Intrinsics& camera : state.cameras) focal = std::max(focal, camera[kFocal]);
+  return kWide * turn * focal / problem.image_sigma_px;
+}
+
 }  // namespace
 
 void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options) {
@@ -156,9 +170,10 @@ void triangulate_points(TileProblem& problem, TileState& state, const AdjustOpti
                         const std::vector<std::uint8_t>& which) {
   state.points.resize(problem.points.size(), kNowhere);
   constexpr double kAnything = 1e3;  // sigmas: only rays that have nothing to do with the others are left out
+  const double anything = std::max(kAnything, allowed_by_attitudes(problem, state));
   PointSettler settler(problem, state, options.min_intersection_deg);
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
-    if (which[p] && problem.active(p)) settler.intersect(p, kAnything);
+    if (which[p] && problem.active(p)) settler.intersect(p, anything);
 }
 
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,

@@ -7,6 +7,7 @@
 #include "adjust/datum.h"
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/prior_loss.h"
 #include "adjust/residual_squares.h"
 #include "adjust/tile_adjustment.h"
 #include "adjust/vertical_terms.h"
@@ -41,10 +42,10 @@ void add_priors(const TileProblem& problem, const TileState& state, ResidualSum&
   };
   for (const auto& term : problem.positions)
     add(linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
-        problem.position_loss);
+        loss_of(problem, term));
   for (const auto& term : problem.attitudes)
     add(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
-        problem.attitude_loss);
+        loss_of(problem, term));
   for (const auto& term : problem.lines) {
     const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
     add(r * r, 1, problem.line_loss);

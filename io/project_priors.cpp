@@ -5,6 +5,7 @@
 #include "geometry/angles.h"
 #include "io/crs.h"
 #include "io/error.h"
+#include "io/held_priors.h"
 #include "io/project_sections.h"
 
 namespace megablock {
@@ -20,13 +21,21 @@ struct GpsOptions {
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
 };
 
+// A sigma, of which 0 means: held.
+std::optional<double> read_sigma(YamlReader& reader, const std::string& key, double held) {
+  const auto sigma = reader.number(key);
+  if (sigma && !(*sigma >= 0))
+    throw InputError(reader.where(key) + ": " + key + " must be greater than 0, or 0 for what is held");
+  return sigma && *sigma < held ? held : sigma;
+}
+
 GpsOptions read_gps_options(YamlReader& top) {
   GpsOptions options;
   auto reader = top.mapping("gps");
   if (!reader) return options;
   options.use = reader->flag("use").value_or(true);
-  options.sigma_horizontal = reader->positive_number("sigma_horizontal_m");
-  options.sigma_vertical = reader->positive_number("sigma_vertical_m");
+  options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kHeldPositionSigma);
+  options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kHeldPositionSigma);
   if (const auto arm = reader->numbers("lever_arm_m", 3)) options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
   reader->finish();
   return options;
@@ -93,6 +102,11 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   for (const auto& position : positions)
     if (position) known.push_back(*position);
   const bool from_images = !scanned.empty();  // else a given block with a frame of its own
+  for (Frame& frame : block.frames) {
+    if (!frame.position_prior) continue;
+    if (options.sigma_horizontal) frame.position_prior->sigma.head<2>().setConstant(*options.sigma_horizontal);
+    if (options.sigma_vertical) frame.position_prior->sigma.z() = *options.sigma_vertical;
+  }
   if (origin && !from_images)
     throw InputError(top.where("origin") + ": 'origin' cannot be given with 'block', which has its own ground frame");
   if (ground && from_images)
@@ -115,12 +129,14 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
   std::optional<double> sigma_deg;
   if (auto reader = top.mapping("attitude")) {
     use = reader->flag("use").value_or(true);
-    sigma_deg = reader->positive_number("sigma_deg");
+    sigma_deg = read_sigma(*reader, "sigma_deg", kHeldAttitudeSigma * kDegreesPerRadian);
     reader->finish();
   }
   Block& block = project.block;
   if (!use)
     for (Frame& frame : block.frames) frame.attitude_prior.reset();
+  for (Frame& frame : block.frames)
+    if (frame.attitude_prior && sigma_deg) frame.attitude_prior->sigma_rad.setConstant(*sigma_deg * kDegree);
   if (!use || scanned.empty() || !block.ground.georeferenced) return;
   const Georeference georeference(block.ground);
   const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kDegree;

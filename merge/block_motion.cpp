@@ -38,6 +38,19 @@ BlockMotion motion_of(const MotionSums::Row& sums) {
   return motion;
 }
 
+// Held positions are not carried along: what would move them is left to the step, and the rest turns about them.
+BlockMotion allowed(const BlockComponent& component, const BlockMotion& motion) {
+  if (component.movable == Matrix77::Identity()) return motion;
+  Eigen::Matrix<double, 7, 1> parameters;
+  parameters << motion.rotation, motion.tangent(component.centre) / component.extent, motion.scale;
+  parameters = component.movable * parameters;
+  BlockMotion result{component.centre, parameters.head<3>(), component.extent * parameters.segment<3>(3),
+                     parameters[6]};
+  result.shift = result.tangent(component.pivot);
+  result.centre = component.pivot;
+  return result;
+}
+
 // A component's motion, ready to move things.
 class Mover {
  public:
@@ -120,7 +133,7 @@ std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vecto
   for (const MotionSums& tile : tiles)
     for (std::size_t i = 0; i < tile.rows.size(); ++i) rows[at(tile.components[i])] += tile.rows[i];
   std::vector<BlockMotion> motions;
-  for (const MotionSums::Row& row : rows) motions.push_back(motion_of(row));
+  for (std::size_t c = 0; c < rows.size(); ++c) motions.push_back(allowed(gauge.components[c], motion_of(rows[c])));
   return motions;
 }
 

@@ -69,6 +69,16 @@ Eigen::MatrixXd free_directions(const Matrix77& normal) {
   return orthonormal_basis(directions);
 }
 
+// Projection on the directions of (phi, t, s) along which held positions stay where they are.
+Matrix77 movable_directions(const Matrix77& held) {
+  Matrix77 movable = Matrix77::Identity();
+  const SymmetricEigen movement = symmetric_eigen(held);
+  for (int i = 0; i < 7; ++i)
+    if (movement.values(i) > kNullDirection * movement.values(6))
+      movable -= movement.vectors.col(i) * movement.vectors.col(i).transpose();
+  return movable;
+}
+
 BlockComponent component_of(const PartGroup& group) {
   BlockComponent c;
   c.lowest_frame = group.lowest_frame;
@@ -82,11 +92,15 @@ BlockComponent component_of(const PartGroup& group) {
     extent = std::max(extent, (part->extreme_centres.colwise() - c.centre).colwise().norm().maxCoeff());
   const bool one_place = extent <= kOnePlace * (1 + c.centre.norm());
   if (!one_place) c.extent = extent;
-  Matrix77 normal = Matrix77::Zero();
+  Matrix77 normal = Matrix77::Zero(), held = Matrix77::Zero();
   for (const GaugePart* part : group.parts) {
     const Matrix77 change = change_of_reference(*part, c);
     normal += change.transpose() * part->normal * change;
+    held += change.transpose() * part->held * change;
   }
+  c.movable = movable_directions(held);
+  c.pivot = c.centre;
+  if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
   if (one_place) normal(6, 6) += kNoScale;  // a frame alone, say, known by its position only
   const Eigen::MatrixXd free = free_directions(normal);
   c.defect = free.cols();

@@ -45,6 +45,7 @@ struct GaugePart {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // of `normal`
   double extent = 1;                                 // of `normal`, metres
   Matrix77 normal = Matrix77::Zero();                // sum (J N)'(J N) over the part's residuals
+  Matrix77 held = Matrix77::Zero();                  // sum N_C'N_C over held positions, N_C their rows of N
 };
 
 // Of one tile, parts by lowest frame.
@@ -67,7 +68,10 @@ struct BlockComponent {
   std::int64_t lowest_frame = -1;
   std::int64_t defect = 0;                 // 0 (complete) to 7
   Matrix77 directions = Matrix77::Zero();  // first `defect` columns: combinations of (phi, t, s) that are free
-  std::int64_t first_column = 0;           // of its further right-hand sides
+  // Projection on the combinations that move no held position: what a step may move as a whole (block_motion.h).
+  Matrix77 movable = Matrix77::Identity();
+  Eigen::Vector3d pivot = Eigen::Vector3d::Zero();  // about which: centroid of the held positions, else the centre
+  std::int64_t first_column = 0;                    // of its further right-hand sides
   Matrix67 move(const Eigen::Vector3d& centre_of_frame) const;  // N of a frame, restricted to the free directions
   Matrix37 move_point(const Eigen::Vector3d& position) const;
   Eigen::Matrix<double, 6, 1> weights() const;  // W

@@ -4,6 +4,7 @@
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
 #include "adjust/vertical_terms.h"
+#include "io/held_priors.h"
 #include "merge/gauge.h"
 #include "merge/unknowns.h"
 
@@ -75,11 +76,14 @@ class PartBuilder {
   void add_frame_priors() {
     for (const auto& term : problem_.positions) {
       GaugePart& part = part_of(term.frame);
-      add(part, linearise_position(state_.frames[at(term.frame.value)], term.prior).by_frame * move(part, term.frame));
+      const Matrix67 moved = move(part, term.frame);
+      add(part, linearise_position(state_.frames[at(term.frame.value)], comparable(term.prior)).by_frame * moved);
+      if (held(term.prior)) part.held += moved.bottomRows<3>().transpose() * moved.bottomRows<3>();
     }
     for (const auto& term : problem_.attitudes) {
       GaugePart& part = part_of(term.frame);
-      add(part, linearise_attitude(state_.frames[at(term.frame.value)], term.prior).by_frame * move(part, term.frame));
+      add(part, linearise_attitude(state_.frames[at(term.frame.value)], comparable(term.prior)).by_frame *
+                    move(part, term.frame));
     }
   }
 
@@ -157,7 +161,7 @@ Bytes TileGauge::to_bytes() const {
     out.value(part.extent);
     for (const double* v : {part.lowest_centre.data(), part.centre.data()}) out.values(std::vector<double>(v, v + 3));
     out.values(std::vector<double>(part.extreme_centres.data(), part.extreme_centres.data() + 18));
-    out.values(std::vector<double>(part.normal.data(), part.normal.data() + 49));
+    for (const Matrix77* m : {&part.normal, &part.held}) out.values(std::vector<double>(m->data(), m->data() + 49));
   }
   return out.take();
 }
@@ -182,6 +186,7 @@ TileGauge TileGauge::from_bytes(const Bytes& bytes) {
     fill(part.centre.data(), 3);
     fill(part.extreme_centres.data(), 18);
     fill(part.normal.data(), 49);
+    fill(part.held.data(), 49);
     gauge.parts.push_back(part);
   }
   if (!in.at_end()) throw StoreError("merge: a tile's datum has the wrong size");

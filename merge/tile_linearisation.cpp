@@ -1,6 +1,7 @@
 #include "merge/tile_linearisation.h"
 
 #include "adjust/line_terms.h"
+#include "adjust/prior_loss.h"
 #include "adjust/vertical_terms.h"
 
 namespace megablock {
@@ -32,7 +33,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     out.residual = r.residual;
     out.kinds = kPositionKinds;
     out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(problem.position_loss, pass);
+    out.weight(loss_of(problem, term), pass);
     visit(out);
   }
   for (std::int64_t i : plan.attitudes[cell]) {
@@ -42,7 +43,7 @@ void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileSta
     out.residual = r.residual;
     out.kinds.fill(ObservationKind::kAttitude);
     out.add_block(plan.unknown_of_frame[term.frame.value], r.by_frame);
-    out.weight(problem.attitude_loss, pass);
+    out.weight(loss_of(problem, term), pass);
     visit(out);
   }
   for (std::int64_t i : plan.lines[cell]) {

@@ -6,6 +6,7 @@
 
 #include "adjust/linearise.h"
 #include "io/error.h"
+#include "io/held_priors.h"
 #include "merge/block_motion.h"
 #include "merge/gauge.h"
 #include "merge/global_adjustment.h"
@@ -61,10 +62,13 @@ class LoneTile : public TreeRunner {
 
 // Damping that a start deserves. Where residuals are many sigmas, steps without damping go astray: measured on street
 // rigs 2 m and 1 degree off, a tenth of them ended in another minimum. Where they are a few sigmas, damping only holds
-// back the weak modes.
+// back the weak modes; so it does where all positions are held, and the attitudes' errors are all that is to be found.
 double initial_lambda(const TileProblem& problem, const TilePlan& plan, double cost) {
   constexpr double kPoor = 10;  // cost per observation; half is what noise costs
   constexpr double kFar = 1e-2, kNear = 1e-10;
+  const auto held_frames = std::count_if(problem.positions.begin(), problem.positions.end(),
+                                         [](const auto& term) { return held(term.prior); });
+  if (held_frames == std::ssize(problem.frames)) return kNear;
   std::int64_t observations = 0;
   for (const auto& cell : plan.points)
     for (const std::int64_t point : cell)

@@ -171,6 +171,10 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
     if (!seam.note.empty()) job.notes.push_back(seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
     job.notes.push_back(line);
+  for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
+    job.notes.push_back(line);
+    if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());
+  }
   return_freed_memory();  // fronts, tiles
   BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
   result.stages = statistics_of(job, event);

@@ -52,6 +52,7 @@ void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adj
   for (const Camera& camera : job.block.cameras)
     adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.intrinsics.size(), camera.intrinsics.size()));
   std::filesystem::create_directories(job.store.path("merge/parts"));
+  const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
     for (std::size_t f = 0; f < tile.problem.frames.size(); ++f)
       if (!covariance.frames[f].isZero(0)) adjusted.frame_covariance[tile.problem.frames[f]] = covariance.frames[f];
@@ -60,6 +61,12 @@ void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adj
     const auto t = static_cast<std::size_t>(tile.tile);
     const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
     adjusted.parts.push_back(write_part(part_path(job, tile.tile), tile, tracks, covariance));
+    if (tile.problem.frames.empty()) return;
+    const std::int32_t component = inputs.tiles.component[tile.problem.frames.front()];
+    if (component < 0 || references[static_cast<std::size_t>(component)].length <= 0) return;
+    adjusted.parts.back().component = component;
+    adjusted.parts.back().motion =
+        common_motion(tile.problem, tile.state, references[static_cast<std::size_t>(component)]);
   });
 }
 
@@ -83,6 +90,18 @@ void gather_covariances(Job& job, Adjusted& adjusted) {
   if (!job.is_first_rank()) send_covariances(job, adjusted, kTag);
   for (int r = 1; job.is_first_rank() && r < job.ranks.size(); ++r) receive_covariances(job, r, kTag, adjusted);
   job.ranks.flush_sends();
+}
+
+std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts) {
+  const std::vector<MotionReference> references = motion_references(block, tiles);
+  std::vector<CommonMotion> motions(references.size());
+  for (const TilePart& part : parts)
+    if (part.component >= 0) motions[static_cast<std::size_t>(part.component)].add(part.motion);
+  std::vector<std::string> lines;
+  for (std::size_t c = 0; c < references.size(); ++c)
+    for (const std::string& line : describe(judge(motions[c], references[c])))
+      lines.push_back((references.size() > 1 ? "part " + std::to_string(c + 1) + ": " : "") + line);
+  return lines;
 }
 
 MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {

@@ -51,6 +51,9 @@ void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adj
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);
 void gather_covariances(Job& job, Adjusted& adjusted);
 
+// What attitude priors alone tell of the orientation (common_motion.h), a line per case and part of the block.
+std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts);
+
 // After gather_covariances().
 MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block);
 

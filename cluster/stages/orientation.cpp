@@ -13,6 +13,7 @@
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
+#include "io/held_priors.h"
 #include "io/unit_files.h"
 #include "match/tracks.h"
 
@@ -146,11 +147,24 @@ std::vector<VerifiedPair> pairs_of_generation(const Job& job, const std::vector<
   return pairs;
 }
 
+// What is held is not a matter of the orientation, which only comes near it.
+BlockState held_in_place(const Job& job, BlockState state) {
+  BlockState placed = state;
+  place_held_frames(job.block, placed);
+  const ObservationOptions& use = job.settings.adjustment.observations;
+  for (FrameIndex f(0); job.block.frames.contains(f); ++f.value) {
+    if (use.use_attitude_priors) state.frames[f].rotation = placed.frames[f].rotation;
+    if (use.use_position_priors) state.frames[f].centre = placed.frames[f].centre;
+  }
+  return state;
+}
+
 }  // namespace
 
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   BlockState start = initial_state(job.block);
-  if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) return start;
+  if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; }))
+    return held_in_place(job, std::move(start));
   if (matches.empty())
     throw AgreedError<InputError>(
         "images without pose cannot be oriented from given tie points alone; give poses in the project file");
@@ -183,7 +197,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
     previous = job.store.seal(unit.name)->content_hash;
     images_before = job.generations[g];
   }
-  return grow(state, job.block);
+  return held_in_place(job, grow(state, job.block));
 }
 
 }  // namespace megablock

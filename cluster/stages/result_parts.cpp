@@ -224,6 +224,8 @@ Bytes TilePart::to_bytes() const {
     writer.values(point.kept);
   }
   for (const std::vector<Eigen::Vector2d>& measured : control_measured) write_matrices(writer, measured);
+  writer.value(component);
+  writer.values(motion.to_values());
   return writer.take();
 }
 
@@ -244,6 +246,8 @@ TilePart TilePart::from_bytes(const Bytes& bytes) {
   }
   for (std::size_t i = 0; i < part.control_rows.size(); ++i)
     part.control_measured.push_back(read_matrices<Eigen::Vector2d>(reader));
+  part.component = reader.value<std::int32_t>();
+  part.motion = CommonMotion::from_values(reader.values<double>());
   return part;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "adjust/common_motion.h"
 #include "io/track_batches.h"
 #include "merge/condense.h"
 #include "merge/tile_store.h"
@@ -20,6 +21,8 @@ struct TilePart {
   std::vector<std::int64_t> control_rows;  // in block.control_points
   std::vector<BlockResult::ControlResult> control;
   std::vector<std::vector<Eigen::Vector2d>> control_measured;  // px, corrected as they were adjusted
+  std::int32_t component = -1;  // of the block; -1: nothing to judge of its motion
+  CommonMotion motion;
   Bytes to_bytes() const;
   static TilePart from_bytes(const Bytes& bytes);
 };

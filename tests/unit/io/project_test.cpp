@@ -7,6 +7,7 @@
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/hash.h"
+#include "io/held_priors.h"
 
 namespace megablock {
 namespace {
@@ -111,6 +112,9 @@ TEST(Project, GpsOptionsAndOriginOverride) {
   EXPECT_NEAR(prior.position.z(), 150 - 5.24, 0.05) << "150 m up, minus the curvature over 8.2 km (d^2 / 2R)";
   for (const Frame& f : read_text(folder, "images: images\ngps: {use: false}\n").block.frames)
     EXPECT_FALSE(f.position_prior);
+  for (const Frame& f :
+       read_text(folder, "images: images\ngps: {sigma_horizontal_m: 0, sigma_vertical_m: 0}\n").block.frames)
+    EXPECT_TRUE(held(*f.position_prior));
   // A running job's ground frame wins over both.
   const GroundFrame running{true, 46.9, -92, 0, "EPSG:4979"};
   EXPECT_EQ(read_project(folder / "block.yaml", running).block.ground.latitude_deg, 46.9);
@@ -191,6 +195,8 @@ TEST(Project, GimbalAnglesBecomeAttitudesInTheBlock) {
                   .block.frames[frame(0)]
                   .attitude_prior->sigma_rad.z(),
               1 * kDegree, 1e-9);
+  for (const Frame& f : read_text(folder, "images: images\nattitude: {sigma_deg: 0}\n").block.frames)
+    EXPECT_TRUE(held(*f.attitude_prior));
 }
 
 TEST(Project, BadFilesAndCopiesAreLeftOut) {

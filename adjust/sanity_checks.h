@@ -1,0 +1,32 @@
+// What must hold of a solved block that nothing was told of (KP-17): the images of one overpass stand on a line at even
+// distances; a scene known to be flat lies on one level.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace megablock {
+
+// Centres in the order of their acquisition, three or more (fewer: nothing to check, all zero).
+struct StripCheck {
+  static constexpr double kLimit = 0.05;  // of the mean spacing
+  double off_line = 0;                    // largest distance from their line, over the mean spacing
+  double uneven = 0;                      // largest deviation of a spacing from the mean, over it
+  bool sound() const { return off_line <= kLimit && uneven <= kLimit; }
+};
+StripCheck check_strip(const std::vector<Eigen::Vector3d>& centres);
+
+// Points of a scene that is known to be almost flat, level or not. Two levels: distances from the plane of most of them
+// fall into two groups, farther apart than four times the scatter within, of which the smaller has a twentieth of the
+// points at least. Evenly spread distances (3.5) and a normal distribution (2.6) do not.
+struct LevelCheck {
+  static constexpr double kLimit = 4;
+  double separation = 0;  // of the groups' means, over the rms of their scatters
+  double step = 0;        // between the groups' means, as the coordinates
+  double smaller_share = 0;
+  bool sound() const;
+};
+// Fewer than ten points: nothing to check, all zero. Deterministic.
+LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& points);
+
+}  // namespace megablock

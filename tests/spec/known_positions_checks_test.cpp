@@ -1,0 +1,240 @@
+// Acceptance tests of "Bundle adjustment with known positions" (A. Barrier, S. Martin): tiles against one problem, and
+// what tells of a result that no truth is known of.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "adjust/sanity_checks.h"
+#include "adjust/subset_check.h"
+#include "known_positions_scene.h"
+#include "merge/tile_solver.h"
+#include "reached.h"
+#include "tests/unit/adjust/single_tile.h"
+#include "tests/unit/merge/turned_frames.h"
+
+namespace megablock {
+namespace {
+
+// Ten cameras of which point j is seen by six in a row, from camera first[j % groups] on.
+KnownPositionsOptions ten_cameras(KnownPositionsOptions options) {
+  options.cameras = 10;
+  return options;
+}
+SimulatedBlock seen_in_part(const KnownPositionsScene& scene, const std::vector<std::int64_t>& first) {
+  SimulatedBlock block = scene.block();
+  const TrackSet all = std::exchange(block.tracks, TrackSet{});
+  block.tracks.begin.push_back(0);
+  for (std::size_t j = 0; j < all.id.size(); ++j) {
+    const std::int64_t from = first[j % first.size()];
+    block.tracks.id.push_back(all.id[j]);
+    for (auto o = static_cast<std::size_t>(all.begin[j]); o < static_cast<std::size_t>(all.begin[j + 1]); ++o) {
+      if (all.image[o].value < from || all.image[o].value >= from + 6) continue;
+      block.tracks.image.push_back(all.image[o]);
+      block.tracks.x.push_back(all.x[o]);
+      block.tracks.y.push_back(all.y[o]);
+      block.tracks.feature.push_back(-1);
+    }
+    block.tracks.begin.push_back(block.tracks.observation_count());
+  }
+  return block;
+}
+
+AdjustOptions tile_options(const KnownPositionsScene& scene) {
+  AdjustOptions options;
+  options.observations.image_sigma_px = scene.options.image_sigma_px;
+  options.estimate_image_sigma = false;
+  options.min_intersection_deg = 0.1;
+  return options;
+}
+
+void adjust_exactly(SerialRunner& runner) {
+  GlobalOptions exact;
+  exact.max_decrement = 1e-9;
+  GlobalState state = start_global(exact);
+  adjust_globally(runner, exact, state);
+  EXPECT_TRUE(state.outcome == GlobalOutcome::kConverged || state.outcome == GlobalOutcome::kRoundingFloor)
+      << describe(state);
+}
+
+double largest_angle(const std::vector<Pose>& a, const std::vector<Pose>& b) {
+  double angle = 0;
+  for (std::size_t f = 0; f < b.size(); ++f)
+    angle = std::max(angle, rotation_log<double>(a[f].rotation.conjugate() * b[f].rotation).norm());
+  return angle;
+}
+
+TEST(KnownPositions, TKP16TilesGiveTheSameAsOneProblem) {
+  for (const bool drone : {false, true}) {
+    const KnownPositionsScene scene(
+        ten_cameras(drone ? KnownPositionsOptions::drone(300, 5) : KnownPositionsOptions::satellite(300, 0.1, 5)));
+    SimulatedBlock block = seen_in_part(scene, {0, 2, 4});
+    SingleTile lone(block, tile_options(scene));
+    triangulate_points(lone.problem, lone.state, lone.options);
+    block.truth = initial_state(block.block);  // where the tiles start
+    block.points = lone.state.points;
+    const TiledBlock tiled(block, 4, lone.options.observations, 0);
+    ASSERT_GE(tiled.tiles.tile_count, 3);
+    SerialRunner several(tiled.tiles.tree, tiled.problems, tiled.states);
+    adjust_exactly(several);
+    MergeTree one;
+    one.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
+    SerialRunner serial(one, {tiled.whole}, {tiled.whole_state});
+    adjust_exactly(serial);
+    const TileState together = tiled.gathered(several.problems(), several.states()), &whole = serial.states()[0];
+    expect_at_most(largest_angle(together.frames, whole.frames), 1e-10,
+                   std::string(drone ? "drone" : "satellite") + ", attitudes of the tiles off one problem's, rad");
+    for (std::size_t f = 0; f < whole.frames.size(); ++f)
+      EXPECT_LE((whole.frames[f].centre - scene.centres[f]).norm(), 1e-9) << "held position " << f;
+
+    // The verdict is a sum over tiles.
+    const MotionReference reference = motion_references(block.block, tiled.tiles).at(0);
+    CommonMotion sum;
+    for (std::size_t t = 0; t < several.problems().size(); ++t)
+      sum.add(
+          CommonMotion::from_values(common_motion(several.problems()[t], several.states()[t], reference).to_values()));
+    const MotionVerdict of_tiles = judge(sum, reference),
+                        of_whole = judge(common_motion(tiled.whole, whole, reference), reference);
+    EXPECT_EQ(of_tiles.weak, of_whole.weak);
+    EXPECT_EQ(of_tiles.weak > 0, !drone);
+    EXPECT_NEAR(of_tiles.common_sigma_rad, of_whole.common_sigma_rad, 0.2 * of_whole.common_sigma_rad);
+  }
+}
+
+TEST(KnownPositions, TKP14PointSubsetsAgreeAndSayWhatTheyShare) {
+  for (const bool drone : {true, false}) {
+    KnownPositionsOptions options =
+        drone ? KnownPositionsOptions::drone(1001, 14) : KnownPositionsOptions::satellite(1001, 0.1, 14);
+    options.image_sigma_px = 0.1;
+    const KnownPositionsScene scene(options);
+    SingleTile tile(scene.block(), tile_options(scene));
+    triangulate_points(tile.problem, tile.state, tile.options);
+    ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
+    const MotionReference reference = motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
+    const SubsetCheck check = check_point_subsets(tile.problem, tile.state, 0, 5, reference, solve_by_condensation);
+    double squares = 0;
+    for (std::size_t f = 0; f < scene.centres.size(); ++f)
+      squares += rotation_log<double>(rotation_from(scene.true_angles[f]).conjugate() * tile.state.frames[f].rotation)
+                     .squaredNorm();
+    const double error = std::sqrt(squares / (3 * static_cast<double>(scene.centres.size())));
+    const std::string what = drone ? "drone, " : "satellite, ";
+    std::printf("[ reached  ] %strue error %.3g rad per axis, stated sigma %.3g\n", what.c_str(), error,
+                check.rotation_sigma_rad());
+    if (drone) {
+      expect_at_most(check.rotation_spread_rad, 1e-5, what + "spread of the attitudes, rad");
+      expect_at_most(check.image_spread_px, 0.02, what + "spread of the reference point, px");
+      EXPECT_EQ(check.common_sigma_rad, 0);
+    } else {
+      expect_at_most(check.rotation_spread_rad, 1e-6, what + "spread of the attitudes, rad");
+      expect_at_least(check.common_sigma_rad, 0.8 * 1e-5 / std::sqrt(6), what + "sigma of what subsets share, rad");
+      expect_at_most(check.common_sigma_rad, 1.2 * 1e-5 / std::sqrt(6), what + "sigma of what subsets share, rad");
+    }
+    expect_at_most(error, 3 * check.rotation_sigma_rad(), what + "true error of the attitudes, rad");
+  }
+}
+
+// Two tiles that share cameras 4 and 5.
+struct TwoTiles {
+  KnownPositionsScene scene;
+  SimulatedBlock block;
+  explicit TwoTiles(std::uint64_t seed)
+      : scene([&] {
+          KnownPositionsOptions options = ten_cameras(KnownPositionsOptions::drone(400, seed));
+          options.image_sigma_px = 0.1;
+          return options;
+        }()),
+        block(seen_in_part(scene, {0, 4})) {}
+};
+
+TEST(KnownPositions, TKP15TilesAgreeAboutTheCamerasTheyShare) {
+  const TwoTiles two(15);
+  std::array<TileState, 2> states;
+  std::array<TileCovariance, 2> covariances;
+  for (std::size_t t = 0; t < 2; ++t) {
+    SingleTile tile(two.block, tile_options(two.scene));
+    for (std::size_t p = 0; p < tile.problem.points.size(); ++p)
+      if (p % 2 != t)
+        std::fill(tile.problem.kept.begin() + tile.problem.begin[p],
+                  tile.problem.kept.begin() + tile.problem.begin[p + 1], 0);
+    triangulate_points(tile.problem, tile.state, tile.options);
+    ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
+    MergeTree one;
+    one.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
+    SerialRunner runner(one, {tile.problem}, {tile.state});
+    adjust_exactly(runner);
+    runner.final_up();
+    covariances[t] = runner.covariances().at(0);
+    states[t] = runner.states()[0];
+  }
+  double worst = 0;
+  for (const std::size_t camera : {4u, 5u}) {
+    const Eigen::Vector3d difference =
+        rotation_log<double>(states[0].frames[camera].rotation.conjugate() * states[1].frames[camera].rotation);
+    for (int k = 0; k < 3; ++k)
+      worst = std::max(worst, std::abs(difference[k]) /
+                                  std::sqrt(covariances[0].frames[camera](k, k) + covariances[1].frames[camera](k, k)));
+  }
+  expect_at_most(worst, 3, "difference of the shared cameras over its sigma");
+}
+
+TEST(KnownPositions, TKP15CorruptedTileIsNamed) {
+  const TwoTiles two(16);
+  SingleTile lone(two.block, tile_options(two.scene));
+  TiledBlock tiled(two.block, 5, lone.options.observations, 0);
+  ASSERT_EQ(tiled.tiles.tile_count, 2);
+  const auto checked = [&] {
+    SerialRunner runner(tiled.tiles.tree, tiled.problems, tiled.states);
+    adjust_exactly(runner);
+    runner.final_up();
+    const bool alarm =
+        std::any_of(runner.seams().begin(), runner.seams().end(), [](const SeamReport& seam) { return seam.alarm(); });
+    return std::pair{alarm, describe_disagreements(runner.tile_checks())};
+  };
+  const auto sound = checked();
+  EXPECT_FALSE(sound.first);
+  EXPECT_THAT(sound.second, testing::IsEmpty());
+  const SharedFrames shared = most_shared_frames(tiled, 1);
+  for (const FrameIndex frame : shared.frames) turn_frame(tiled, frame, {0, 1e-4, 0}, tiled.problems[1]);
+  const auto corrupted = checked();
+  EXPECT_TRUE(corrupted.first);
+  EXPECT_THAT(corrupted.second, testing::Not(testing::IsEmpty()));
+  for (const std::string& line : corrupted.second) std::printf("[ reached  ] %s\n", line.c_str());
+}
+
+TEST(KnownPositions, TKP17StripsAreStraightAndEven) {
+  std::vector<Eigen::Vector3d> strip;
+  for (int i = 0; i < 3; ++i)
+    strip.push_back(Eigen::Vector3d(700e3, 20e3, 694e3) + i * Eigen::Vector3d(30e3, -52e3, 4e3));
+  EXPECT_TRUE(check_strip(strip).sound());
+  const double spacing = (strip[1] - strip[0]).norm();
+  const Eigen::Vector3d along = (strip[1] - strip[0]).normalized(), across = along.unitOrthogonal();
+  for (const double share : {0.04, 0.08}) {
+    std::vector<Eigen::Vector3d> uneven = strip, bent = strip;
+    uneven[1] += share * spacing * along;
+    bent[1] += 1.5 * share * spacing * across;  // a third of it is taken by the line itself
+    EXPECT_EQ(check_strip(uneven).sound(), share < 0.05) << check_strip(uneven).uneven;
+    EXPECT_EQ(check_strip(bent).sound(), share < 0.05) << check_strip(bent).off_line;
+  }
+  EXPECT_TRUE(check_strip({strip[0], strip[2]}).sound());
+  EXPECT_FALSE(check_strip({strip[0], strip[0], strip[0]}).sound());
+}
+
+TEST(KnownPositions, TKP17FlatSceneOnTwoLevelsIsFlagged) {
+  std::mt19937_64 random(17);
+  std::uniform_real_distribution<double> place(-500, 500);
+  std::normal_distribution<double> noise(0, 0.3);
+  for (const double share : {0.0, 0.2, 0.5})
+    for (int run = 0; run < 20; ++run) {
+      std::vector<Eigen::Vector3d> points;
+      for (int i = 0; i < 400; ++i) {
+        const double x = place(random), y = place(random), step = x < -500 + 1000 * share ? 5 : 0;
+        points.emplace_back(x, y, 0.02 * x - 0.01 * y + step + noise(random));
+      }
+      const LevelCheck check = check_one_level(points);
+      EXPECT_EQ(check.sound(), share == 0) << share << ": " << check.separation;
+      if (share > 0) {
+        EXPECT_NEAR(check.step, 5, 0.5);
+      }
+    }
+}
+
+}  // namespace
+}  // namespace megablock

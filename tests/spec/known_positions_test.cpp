@@ -1,0 +1,158 @@
+// Acceptance tests of "Bundle adjustment with known positions" (A. Barrier, S. Martin) that run through the adjustment:
+// held positions, priors of the attitudes. Scenes and measures: known_positions_scene.h.
+#include <gtest/gtest.h>
+
+#include "adjust/common_motion.h"
+#include "geometry/median.h"
+#include "known_positions_scene.h"
+#include "merge/tile_solver.h"
+#include "reached.h"
+#include "tests/unit/adjust/single_tile.h"
+
+namespace megablock {
+namespace {
+
+AdjustOptions adjustment_of(const KnownPositionsScene& scene) {
+  AdjustOptions options;
+  options.observations.image_sigma_px = scene.options.image_sigma_px;
+  options.estimate_image_sigma = false;
+  options.min_intersection_deg = 0.1;
+  return options;
+}
+
+std::vector<XyzAngles> angles_of(const TileState& state) {
+  std::vector<XyzAngles> result;
+  for (const Pose& pose : state.frames) result.push_back(xyz_angles(pose.rotation));
+  return result;
+}
+KnownPositionsScene::Images images_of(const KnownPositionsScene& scene, const TileState& state) {
+  KnownPositionsScene::Images result;
+  for (std::size_t j = 0; j < scene.points.size(); ++j) {
+    result.emplace_back();
+    for (const Pose& pose : state.frames)
+      result.back().push_back(scene.focal * to_inside(pose, state.points[j]).hnormalized());
+  }
+  return result;
+}
+MotionVerdict verdict_of(const SingleTile& tile) {
+  const MotionReference reference = motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
+  return judge(common_motion(tile.problem, tile.state, reference), reference);
+}
+
+// Mean errors of several runs before and after, as the report averages.
+struct Runs {
+  int runs = 0, most_iterations = 0, collinear = 0, weak_common = 0;
+  double angles_before = 0, angles_after = 0, worst_angles = 0, images_before = 0, images_after = 0;
+  double chi2_per_freedom = 0, point_rms = 0;
+  std::vector<double> point_rms_of_runs;
+
+  void add(const KnownPositionsScene& scene, const SingleTile& tile, const AdjustSummary& summary) {
+    ++runs;
+    most_iterations = std::max(most_iterations, summary.iterations);
+    const double after = scene.angle_error(angles_of(tile.state));
+    angles_before += scene.angle_error(scene.angles);
+    angles_after += after;
+    worst_angles = std::max(worst_angles, after);
+    images_before += scene.image_error(scene.images);
+    images_after += scene.image_error(images_of(scene, tile.state));
+    chi2_per_freedom += summary.sigma0 * summary.sigma0;
+    point_rms_of_runs.push_back(scene.point_rms(tile.state.points));
+    point_rms += point_rms_of_runs.back();
+    const MotionVerdict verdict = verdict_of(tile);
+    collinear += verdict.collinear;
+    weak_common += verdict.weak_common_rotation();
+  }
+  double angle_gain() const { return angles_before / angles_after; }
+  double image_gain() const { return images_before / images_after; }
+  double mean(double sum) const { return sum / runs; }
+};
+
+// By the tile's adjustment, from the measured attitudes.
+template <typename Options>
+Runs adjusted(int runs, Options options) {
+  Runs result;
+  for (int seed = 1; seed <= runs; ++seed) {
+    const KnownPositionsScene scene(options(static_cast<std::uint64_t>(seed)));
+    SingleTile tile(scene.block(), adjustment_of(scene));
+    const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
+    result.add(scene, tile, summary);
+  }
+  return result;
+}
+
+double redundancy_ratio(double cameras, double points) {
+  return std::sqrt(2 * cameras * points / (3 * points + 3 * cameras));
+}
+
+TEST(KnownPositions, TKP06bPriorsHelpAnglesAndImagesAtOnce) {
+  const Runs runs = adjusted(15, [](std::uint64_t seed) { return KnownPositionsOptions::satellite(100, 0.1, seed); });
+  expect_at_least(runs.angle_gain(), 2, "satellite, angle error divided by");
+  const double expected = redundancy_ratio(6, 100);
+  expect_at_least(runs.image_gain(), 0.95 * expected, "satellite, image error divided by");
+  expect_at_most(runs.image_gain(), 1.05 * 2, "satellite, image error divided by");
+  expect_at_most(std::abs(runs.mean(runs.chi2_per_freedom) - 1), 0.05, "satellite, chi2/dof off 1 by");
+}
+
+TEST(KnownPositions, TKP16DroneConvergesInFewIterations) {
+  for (const int points : {100, 500}) {
+    Runs runs;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      const KnownPositionsScene scene(KnownPositionsOptions::drone(points, seed));
+      SingleTile tile(scene.block(), adjustment_of(scene));
+      triangulate_points(tile.problem, tile.state, tile.options);
+      const AdjustSummary summary = solve_by_condensation(tile.problem, tile.state, {});
+      runs.add(scene, tile, summary);
+    }
+    const std::string what = "drone, " + std::to_string(points) + " points, ";
+    expect_at_most(runs.mean(runs.angles_after), 1e-6, what + "mean angle error, rad");
+    expect_at_most(runs.worst_angles, 2e-6, what + "worst angle error, rad");
+    expect_at_least(runs.angle_gain(), 1e4, what + "angle error divided by");
+    expect_at_most(std::abs(runs.image_gain() / 2 - 1), 0.05, what + "image error divided by, off 2 by");
+    expect_at_most(runs.most_iterations, 10, what + "iterations");
+    expect_at_most(std::abs(runs.mean(runs.chi2_per_freedom) - 1), 0.05, what + "chi2/dof off 1 by");
+  }
+}
+
+TEST(KnownPositions, TKP16WholeTileAdjustmentFindsTheDrone) {
+  const Runs runs = adjusted(20, [](std::uint64_t seed) { return KnownPositionsOptions::drone(100, seed); });
+  expect_at_least(runs.angle_gain(), 1e4, "drone, angle error divided by");
+  expect_at_most(runs.worst_angles, 2e-6, "drone, worst angle error, rad");
+}
+
+// The verdict is of what the attitude priors alone tell: the rotation about the line, a common rotation.
+TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
+  struct Case {
+    bool drone, collinear;
+    int control;
+    double least_gain, largest_rms;
+    bool line_flagged, common_flagged;
+    int runs;
+  };
+  const Case cases[] = {{true, true, 0, 3, 1, true, false, 20},          {true, true, 1, 100, 0.015, false, false, 20},
+                        {true, true, 2, 100, 0.015, false, false, 20},   {true, true, 4, 200, 0.008, false, false, 20},
+                        {true, false, 0, 1000, 0.002, false, false, 20}, {false, false, 0, 2, 7, false, true, 200},
+                        {false, false, 1, 2.5, 2.5, false, true, 200},   {false, true, 0, 1.5, 1000, true, true, 20},
+                        {false, true, 1, 2.5, 4, false, true, 20}};
+  for (const Case& c : cases) {
+    const Runs runs = adjusted(c.runs, [&](std::uint64_t seed) {
+      KnownPositionsOptions options =
+          c.drone ? KnownPositionsOptions::drone(200, seed) : KnownPositionsOptions::satellite(200, 0.1, seed);
+      options.image_sigma_px = 0.1;
+      options.collinear = c.collinear;
+      options.control_points = c.control;
+      return options;
+    });
+    const std::string what = std::string(c.drone ? "drone" : "satellite") +
+                             (c.collinear ? ", collinear, " : ", spread, ") + std::to_string(c.control) +
+                             " control points: ";
+    expect_at_least(runs.angle_gain(), c.least_gain, what + "angle error divided by");
+    expect_at_most(runs.mean(runs.point_rms), c.largest_rms, what + "rms of the points, m");
+    std::printf("[ reached  ] %smedian rms %.4g m, largest %.4g\n", what.c_str(), median(runs.point_rms_of_runs),
+                *std::max_element(runs.point_rms_of_runs.begin(), runs.point_rms_of_runs.end()));
+    EXPECT_EQ(runs.collinear, c.line_flagged ? c.runs : 0) << what;
+    EXPECT_EQ(runs.weak_common, c.common_flagged ? c.runs : 0) << what;
+  }
+}
+
+}  // namespace
+}  // namespace megablock
