@@ -1,5 +1,6 @@
 #include "adjust/sanity_checks.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,7 +12,8 @@ namespace megablock {
 
 namespace {
 
-// Plane through three of the points from which half of all are nearest.
+// Plane through three of the points from which three tenths of all are nearest: of two levels with half of them each,
+// one.
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset = 0;
@@ -31,7 +33,7 @@ Plane plane_of_most(const std::vector<Eigen::Vector3d>& points) {
     Plane plane{across.normalized(), 0};
     plane.offset = plane.normal.dot(a);
     for (std::size_t i = 0; i < points.size(); ++i) distances[i] = std::abs(plane.distance(points[i]));
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(3 * distances.size() / 10);
     std::nth_element(distances.begin(), middle, distances.end());
     if (*middle < least) {
       least = *middle;

@@ -16,9 +16,9 @@ struct StripCheck {
 };
 StripCheck check_strip(const std::vector<Eigen::Vector3d>& centres);
 
-// Points of a scene that is known to be almost flat, level or not. Two levels: distances from the plane of most of them
-// fall into two groups, farther apart than four times the scatter within, of which the smaller has a twentieth of the
-// points at least. Evenly spread distances (3.5) and a normal distribution (2.6) do not.
+// Points of a scene that is known to be almost flat, level or not. Two levels: distances from the plane of the larger
+// level fall into two groups, farther apart than four times the scatter within, of which the smaller has a twentieth of
+// the points at least. Evenly spread distances (3.5) and a normal distribution (2.6) do not.
 struct LevelCheck {
   static constexpr double kLimit = 4;
   double separation = 0;  // of the groups' means, over the rms of their scatters
