@@ -8,6 +8,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/vertical_terms.h"
 #include "geometry/angles.h"
 #include "geometry/decompositions.h"
 
@@ -86,6 +87,12 @@ class MotionSummation {
           linearise_line(state_.frames[frame], state_.frames[static_cast<std::size_t>(term.seen_by().value)], term);
       const Eigen::Matrix<double, 1, 6> together = r.by_frame + r.by_other;
       frames_[frame].known += together.transpose() * together;
+    }
+    for (const auto& term : problem_.verticals) {
+      const auto frame =
+          static_cast<std::size_t>(problem_.images[static_cast<std::size_t>(term.image.value)].frame.value);
+      const VerticalResidual r = linearise_vertical(problem_, state_, term);
+      frames_[frame].known += r.by_frame.transpose() * r.by_frame;
     }
     for (const auto& term : problem_.attitudes) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
