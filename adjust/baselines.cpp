@@ -6,7 +6,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "adjust/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 
@@ -191,7 +191,7 @@ std::vector<LengthRatio> length_ratios(std::size_t images, const std::vector<Mea
 // Logarithms of the lengths of the largest connected part; empty for the others.
 std::vector<std::optional<double>> solve_lengths(std::size_t count, const std::vector<LengthRatio>& ratios) {
   DisjointSets sets(static_cast<std::int32_t>(count));
-  for (const auto& r : ratios) sets.join(r.e, r.f);
+  for (const auto& r : ratios) sets.unite(r.e, r.f);
   std::vector<std::int32_t> size(count, 0);
   for (std::size_t e = 0; e < count; ++e) ++size[row(sets.find(static_cast<std::int32_t>(e)))];
   const auto largest = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
@@ -273,7 +273,7 @@ class CentreNetwork {
         unknown_(row(nodes), -1),
         centre_(row(nodes), Eigen::Vector3d::Zero()) {
     DisjointSets sets(nodes);
-    for (const auto& d : differences) sets.join(d.a, d.b);
+    for (const auto& d : differences) sets.unite(d.a, d.b);
     std::vector<std::int32_t> size(row(nodes), 0);
     std::vector<std::uint8_t> anchored(row(nodes), 0);
     bool any_prior = false;

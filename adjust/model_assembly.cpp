@@ -8,7 +8,7 @@
 #include <map>
 #include <numeric>
 
-#include "adjust/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "geometry/chi_square.h"
 #include "geometry/median.h"
 #include "geometry/rotation.h"
@@ -295,7 +295,7 @@ class Assembly {
     DisjointSets joined(static_cast<std::int32_t>(models_.size()));
     std::vector<std::vector<std::size_t>> tree(models_.size());
     for (const std::size_t l : order)
-      if (joined.join(links_[l].a, links_[l].b))
+      if (joined.unite(links_[l].a, links_[l].b))
         for (const std::int32_t m : {links_[l].a, links_[l].b}) tree[nth(m)].push_back(l);
     similarity_.assign(models_.size(), Similarity());
     reference_.assign(models_.size(), -1);
@@ -389,7 +389,7 @@ class Assembly {
   void find_parts() {
     DisjointSets joined(static_cast<std::int32_t>(models_.size()));
     for (const ModelLink& link : links_)
-      if (link.kept) joined.join(link.a, link.b);
+      if (link.kept) joined.unite(link.a, link.b);
     for (std::int32_t m = 0; m < std::ssize(models_); ++m) reference_[nth(m)] = joined.find(m);
     std::vector<Similarity> back(models_.size());
     for (std::int32_t m = 0; m < std::ssize(models_); ++m)

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "adjust/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "adjust/orientation_graph.h"
 #include "geometry/angles.h"
 
@@ -117,7 +117,7 @@ std::vector<std::uint8_t> reachable(std::int32_t nodes, const Edges& edges, cons
                                     const Priors& priors) {
   DisjointSets sets(nodes);
   for (std::size_t e = 0; e < edges.size(); ++e)
-    if (kept[e]) sets.join(edges[e].a, edges[e].b);
+    if (kept[e]) sets.unite(edges[e].a, edges[e].b);
   std::vector<std::int32_t> size(row(nodes), 0);
   std::vector<std::uint8_t> anchored(row(nodes), 0);
   bool any_held = false;
@@ -144,10 +144,10 @@ std::vector<Eigen::Quaterniond> tree_start(std::int32_t nodes, const Edges& edge
   DisjointSets sets(nodes);
   std::int32_t first_held = -1;
   for (std::int32_t i = 0; i < nodes; ++i)
-    if (held(priors, row(i))) first_held < 0 ? void(first_held = i) : void(sets.join(first_held, i));
+    if (held(priors, row(i))) first_held < 0 ? void(first_held = i) : void(sets.unite(first_held, i));
   std::vector<std::uint8_t> in_tree(edges.size(), 0);
   for (std::int32_t e : order)
-    if (sets.join(edges[row(e)].a, edges[row(e)].b)) in_tree[row(e)] = 1;
+    if (sets.unite(edges[row(e)].a, edges[row(e)].b)) in_tree[row(e)] = 1;
 
   const auto neighbours = adjacency(nodes, edges, in_tree);
   std::vector<Eigen::Quaterniond> rotation(row(nodes), Eigen::Quaterniond::Identity());

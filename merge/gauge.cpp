@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "adjust/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "geometry/decompositions.h"
 #include "geometry/rotation.h"
 #include "merge/unknowns.h"
@@ -192,7 +192,7 @@ BlockGauge make_gauge(const std::vector<TileGauge>& tiles) {
   DisjointSets rows(static_cast<std::int32_t>(all.size()));
   for (std::size_t s = 1; s < shared.size(); ++s)
     if (shared[s].first == shared[s - 1].first)
-      rows.join(static_cast<std::int32_t>(shared[s].second), static_cast<std::int32_t>(shared[s - 1].second));
+      rows.unite(static_cast<std::int32_t>(shared[s].second), static_cast<std::int32_t>(shared[s - 1].second));
 
   std::vector<PartGroup> groups(all.size());  // by first part; others stay empty
   for (std::size_t i = 0; i < all.size(); ++i) {

@@ -3,7 +3,7 @@
 #include <numeric>
 #include <utility>
 
-#include "adjust/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "adjust/owner.h"
 #include "merge/condense.h"
 #include "partition/separators.h"
@@ -124,7 +124,7 @@ FrameGraph graph_of(const TileProblem& problem) {
 void number_parts(const FrameGraph& graph, TilePlan& plan) {
   DisjointSets sets(static_cast<std::int32_t>(graph.frame_count));
   for (const auto& edge : graph.edges)
-    sets.join(static_cast<std::int32_t>(edge.a.value), static_cast<std::int32_t>(edge.b.value));
+    sets.unite(static_cast<std::int32_t>(edge.a.value), static_cast<std::int32_t>(edge.b.value));
   plan.part_of_frame.assign(static_cast<std::size_t>(graph.frame_count), -1);
   for (std::int32_t f = 0; f < graph.frame_count; ++f) {
     if (plan.unknown_of_frame[static_cast<std::size_t>(f)] < 0) continue;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "partition/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 
 namespace megablock {
 

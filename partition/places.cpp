@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "io/error.h"
-#include "partition/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 
 namespace megablock {
 

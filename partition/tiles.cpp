@@ -6,7 +6,7 @@
 #include <string>
 
 #include "io/error.h"
-#include "partition/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "partition/separators.h"
 
 namespace megablock {

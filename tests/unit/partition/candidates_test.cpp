@@ -11,7 +11,7 @@
 #include "geometry/angles.h"
 #include "io/error.h"
 #include "partition/cells.h"
-#include "partition/disjoint_sets.h"
+#include "io/disjoint_sets.h"
 #include "partition/kd_tree.h"
 
 namespace megablock {
