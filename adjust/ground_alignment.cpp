@@ -96,9 +96,11 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
 GroundAngles known_angles(const OrientationGraph& graph) {
   for (const auto& frame : graph.frames)
     if (frame.given || frame.attitude) return GroundAngles::kAll;
-  for (const auto& image : graph.images)
-    if (image.vertical != nullptr) return GroundAngles::kLevel;
-  return GroundAngles::kNone;
+  // One or two could be wrong, and nothing would show it.
+  constexpr std::ptrdiff_t kVerticals = 3;
+  const auto seen = std::count_if(graph.images.begin(), graph.images.end(),
+                                  [](const auto& image) { return image.vertical != nullptr; });
+  return seen >= kVerticals ? GroundAngles::kLevel : GroundAngles::kNone;
 }
 
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
@@ -131,7 +133,7 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   Eigen::Quaterniond rotation;
   if (known_angles == GroundAngles::kLevel) {
     rotation = line ? turn_about(up, similarity->rotation.conjugate() * axis, axis)
-                    : similarity->rotation * without_twist(similarity->rotation, up).conjugate();
+                    : without_twist(similarity->rotation, up).conjugate() * similarity->rotation;
   } else if (known_angles == GroundAngles::kAll) {
     // Left factor about the axis is what the positions leave open: take it out of the rotation.
     rotation = without_twist(similarity->rotation, similarity->rotation.conjugate() * axis);
@@ -189,7 +191,7 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
       up = Eigen::Vector3d::UnitZ();
       east = (farthest - up * farthest.z()).normalized();
     }
-    if (up.allFinite() && east.allFinite()) {
+    if (up.allFinite() && east.norm() > 0.5) {  // not of centres one above the other
       Eigen::Matrix3d rotation;
       rotation << east.transpose(), up.cross(east).transpose(), up.transpose();
       result.rotation = Eigen::Quaterniond(rotation).normalized();

@@ -9,7 +9,7 @@ namespace megablock {
 
 // What of the averaged rotations refers to the ground already.
 enum class GroundAngles { kNone, kLevel, kAll };
-// By attitude priors and given poses, or by verticals.
+// By attitude priors and given poses, or by the verticals of three images or more.
 GroundAngles known_angles(const OrientationGraph& graph);
 
 // Similarity that brings the oriented frames onto the known positions (priors and given poses), robustly; empty with

@@ -184,6 +184,32 @@ TEST(GroundAlignment, PositionsOnALineLeaveTheRollToGravity) {
   EXPECT_NEAR(kept->scale, 0.5, 0.01);
 }
 
+// Positions that lie wrong by 10 degrees turn the heading of a level block, by whatever it is, and never its level.
+TEST(GroundAlignment, PositionsTurnOnlyTheHeadingOfALevelBlock) {
+  const Line line({});
+  OrientationGraph graph = line.graph;
+  OrientationValues level = line.values();
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  for (const double heading : {0.0, 90.0, 180.0}) {
+    const Similarity wrong{
+        1,
+        rotation_exp<double>({10 * kDegree, 0, 0}) * rotation_exp<double>(Eigen::Vector3d(heading * kDegree * up)),
+        {}};
+    for (std::size_t f = 0; f < level.frames.size(); ++f) {
+      level.frames[f]->centre = 10 * Eigen::Vector3d(static_cast<double>(f % 5), static_cast<double>(f / 5), 0);
+      PositionPrior known;
+      known.position = wrong(level.frames[f]->centre);
+      known.sigma.setConstant(0.02);
+      graph.frames[f].position = known;
+    }
+    const auto ground = similarity_to_ground(graph, level, 3, GroundAngles::kLevel);
+    ASSERT_TRUE(ground);
+    EXPECT_LT((ground->rotation * up - up).norm(), 1e-6) << heading;
+    const Eigen::Quaterniond rest = rotation_exp<double>(Eigen::Vector3d(-heading * kDegree * up)) * ground->rotation;
+    EXPECT_LT(rotation_angle(rest, Eigen::Quaterniond::Identity()), 1 * kDegree) << heading;
+  }
+}
+
 TEST(GroundAlignment, FreeFrameIsCentredUprightAndOfUnitBaseline) {
   const Line line({});
   OrientationValues values = line.values();
