@@ -21,7 +21,7 @@ void add_diagnose(CLI::App& app, std::function<int()>& action) {
       "Example: megablock partition block.yaml -j job && megablock diagnose job\n"
       "         megablock diagnose job --json > diagnostics.json");
   command->add_option("job", options->job, "Job directory")->required();
-  command->add_flag("--json", options->json, "Everything as JSON");
+  command->add_flag("--json", options->json, "As JSON: all that is outside what is asked, with its places");
   command->callback([=, &action] {
     action = [options] {
       const JobDiagnostics job = diagnose_job(JobStore(options->job));

@@ -24,10 +24,17 @@ constexpr double kUsualOverlap = 0.75;       // taken where no ground is known
 constexpr double kStreetFactor = 2;          // vehicles stop and turn
 constexpr double kNeighbourFootprints = 4;   // how far a neighbouring line is sought, larger footprint sides
 constexpr double kParallel = 0.9;            // cosine between neighbouring lines
+constexpr double kSameLine = 0.1;            // lines so close, larger footprint sides, are one flown twice
+constexpr double kSamePlace = 0.7;           // exposures of theirs so close along them, usual steps, stand side by side
 constexpr std::size_t kAround = 64;          // exposures that are asked whether a place is inside the block
-constexpr std::int64_t kMostMissing = 1000;  // exposures that are proposed in one gap
+constexpr std::int64_t kMostMissing = 1000;  // exposures, or lines, that are missing in one gap
 
 double unknown() { return BlockDiagnostics::kUnknown; }
+
+// Exposures or lines that fit into a gap of so many usual distances: one at least, kMostMissing at most.
+std::int64_t missing_in(double usual_distances) {
+  return std::llround(std::clamp(usual_distances - 1, 1.0, static_cast<double>(kMostMissing)));
+}
 
 class Diagnosis {
  public:
@@ -159,6 +166,7 @@ class Diagnosis {
     std::vector<double> steps;
     for (const FlightLine& line : lines_)
       for (std::size_t i = 0; i + 1 < line.size(); ++i) steps.push_back(distance(line[i], line[i + 1]));
+    std::erase(steps, 0.0);  // cameras at one place that are frames of their own
     if (steps.empty()) return;
     found_.usual_step_m = median(std::move(steps));
     const double factor = found_.requested.gap_factor * (found_.aerial ? 1 : kStreetFactor);
@@ -174,7 +182,7 @@ class Diagnosis {
     }
   }
 
-  // Of an exposure: the direction of its line, turned so that both directions of flight are the same.
+  // Of an exposure: the direction of its line, turned so that parallel lines have one, whichever way they were flown.
   struct OnLine {
     FrameIndex frame;
     std::int64_t line;
@@ -182,38 +190,73 @@ class Diagnosis {
     double to_left = unknown();  // distance to the next line
   };
 
+  // Whether (1) or not (-1) each line was flown the way that stands for the lines parallel to it. The first way is
+  // east; a line that is parallel to none so far adds its own, turned to the one most like it. The sign is taken once
+  // for a line, never for an exposure: across the first way it is that of noise.
+  std::vector<double> signs_of_lines() const {
+    std::vector<double> signs;
+    std::vector<Eigen::Vector2d> ways = {Eigen::Vector2d::UnitX()};
+    for (const FlightLine& line : lines_) {
+      const Eigen::Vector2d flown = (place(line.back()) - place(line.front())).normalized();
+      double cosine = 0;
+      for (const Eigen::Vector2d& way : ways)
+        if (std::abs(way.dot(flown)) > std::abs(cosine)) cosine = way.dot(flown);
+      signs.push_back(cosine < 0 ? -1 : 1);
+      if (std::abs(cosine) <= kParallel && !flown.isZero()) ways.emplace_back(signs.back() * flown);
+    }
+    return signs;
+  }
+
   std::vector<OnLine> exposures_on_lines() const {
+    const std::vector<double> signs = signs_of_lines();
     std::vector<OnLine> on;
     for (std::size_t l = 0; l < lines_.size(); ++l) {
       const FlightLine& line = lines_[l];
       for (std::size_t i = 0; i < line.size(); ++i) {
         Eigen::Vector2d along = place(line[std::min(i + 1, line.size() - 1)]) - place(line[i > 0 ? i - 1 : 0]);
         if (along.isZero()) along = place(line.back()) - place(line.front());
-        along.normalize();
-        if (along.x() < 0 || (along.x() == 0 && along.y() < 0)) along = -along;
+        if (along.isZero()) continue;
+        along = signs[l] * along.normalized();
         if (along.allFinite()) on.push_back({line[i], static_cast<std::int64_t>(l), along});
       }
     }
     return on;
   }
 
-  void find_missing_lines() {
-    std::vector<OnLine> on = exposures_on_lines();
+  // Distances to the next line on the left. Of a line flown twice the one listed first looks for both.
+  void look_left(std::vector<OnLine>& on) const {
     std::vector<Eigen::Vector2d> places;
     for (const OnLine& o : on) places.push_back(place(o.frame));
     const KdTree tree(places);
-    std::vector<double> distances;
+    const double close = kSameLine * largest_side_;
     for (std::size_t i = 0; i < on.size(); ++i) {
       const Eigen::Vector2d u = on[i].along, left(-u.y(), u.x());
-      const auto beside = [&](std::int64_t other) {
-        const auto& o = on[static_cast<std::size_t>(other)];
-        const Eigen::Vector2d d = places[static_cast<std::size_t>(other)] - places[i];
-        return o.line != on[i].line && left.dot(d) > std::abs(u.dot(d)) && std::abs(u.dot(o.along)) > kParallel;
+      const auto to = [&](std::int64_t other) -> Eigen::Vector2d {
+        return places[static_cast<std::size_t>(other)] - places[i];
       };
+      const auto parallel = [&](std::int64_t other) {
+        const OnLine& o = on[static_cast<std::size_t>(other)];
+        return o.line != on[i].line && std::abs(u.dot(o.along)) > kParallel;
+      };
+      const auto looks_for_this = [&](std::int64_t other) {
+        return on[static_cast<std::size_t>(other)].line < on[i].line && parallel(other) &&
+               std::abs(left.dot(to(other))) <= close && std::abs(u.dot(to(other))) < kSamePlace * found_.usual_step_m;
+      };
+      const auto beside = [&](std::int64_t other) {
+        return left.dot(to(other)) > std::max(close, std::abs(u.dot(to(other)))) && parallel(other);
+      };
+      if (!tree.nearest(places[i], 1, largest_side_, looks_for_this).empty()) continue;
       for (const auto& n : tree.nearest(places[i], 1, kNeighbourFootprints * largest_side_, beside))
-        on[i].to_left = left.dot(places[static_cast<std::size_t>(n.point)] - places[i]);
-      if (std::isfinite(on[i].to_left)) distances.push_back(on[i].to_left);
+        on[i].to_left = left.dot(to(n.point));
     }
+  }
+
+  void find_missing_lines() {
+    std::vector<OnLine> on = exposures_on_lines();
+    look_left(on);
+    std::vector<double> distances;
+    for (const OnLine& o : on)
+      if (std::isfinite(o.to_left)) distances.push_back(o.to_left);
     if (distances.empty()) return;
     const double usual = median(std::move(distances));
     found_.line_distance_m = usual;
@@ -233,7 +276,7 @@ class Diagnosis {
     for (const OnLine& o : beside) widths.push_back(o.to_left);
     const double width = median(std::move(widths));
     const auto across = [](const OnLine& o) { return Eigen::Vector2d(-o.along.y(), o.along.x()); };
-    const std::int64_t missing = std::max<std::int64_t>(1, std::llround(width / usual) - 1);
+    const std::int64_t missing = missing_in(width / usual);
     const auto middle = [&](const OnLine& o) -> Eigen::Vector2d { return place(o.frame) + width / 2 * across(o); };
     found_.gaps.push_back({true, beside.front().frame, beside.back().frame, middle(beside.front()),
                            middle(beside.back()), missing, width});
@@ -258,7 +301,7 @@ class Diagnosis {
   // Exposures that the usual distance would have put between two; 0 where they are not far apart.
   std::int64_t missing_between(FrameIndex a, FrameIndex b, double factor) const {
     const double steps = distance(a, b) / found_.usual_step_m;
-    return steps > factor ? std::max<std::int64_t>(1, std::llround(steps) - 1) : 0;
+    return steps > factor ? missing_in(steps) : 0;
   }
 
   void find_pairs() {
@@ -290,9 +333,8 @@ class Diagnosis {
   std::vector<BlockDiagnostics::Proposal> between(FrameIndex before, FrameIndex after, std::int64_t missing) const {
     const Pose &a = state_.frames[before], &b = state_.frames[after];
     std::vector<BlockDiagnostics::Proposal> exposures;
-    const std::int64_t count = std::min(missing, kMostMissing);
-    for (std::int64_t k = 1; k <= count; ++k) {
-      const double share = static_cast<double>(k) / static_cast<double>(count + 1);
+    for (std::int64_t k = 1; k <= missing; ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(missing + 1);
       exposures.push_back({a.centre + share * (b.centre - a.centre), a.rotation.slerp(share, b.rotation)});
     }
     return exposures;

@@ -5,7 +5,7 @@
 //             gap_factor times the usual one (twice as much along streets, where vehicles stop and turn).
 //   lines     From each exposure of a line the nearest one of another, parallel line is sought to its left within 45
 //             degrees. Distances across the lines of more than gap_factor times the usual one are gaps; neighbouring
-//             exposures of a line that see the same gap form one.
+//             exposures of a line that see the same gap form one. Lines closer than a tenth of a footprint are one.
 //   ground    Footprints are counted in a grid of an eighth of their side. Ground that fewer than min_images see is a
 //             gap if it lies in a row or column of the grid between ground that enough images see, at most three
 //             footprints apart, and the exposures around it lie on all sides of it: the rim of the block is none.

@@ -214,7 +214,7 @@ class DiagnosticsText {
           "muted");
     return paragraph(
         fmt::format("{} flight {}; {} m between exposures, {} m between lines, {} m above ground (medians). "
-                    "All figures: <code>diagnostics.json</code>.",
+                    "All that is outside what is asked: <code>diagnostics.json</code>.",
                     count(d_.lines), d_.lines == 1 ? "line" : "lines", significant(d_.usual_step_m),
                     significant(d_.line_distance_m), significant(d_.height_m)),
         "muted");

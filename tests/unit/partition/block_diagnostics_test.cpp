@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "io/error.h"
 #include "partition/flight_lines.h"
@@ -129,23 +130,75 @@ TEST(BlockDiagnostics, BasesOverlapsAndTwoMissingExposures) {
   EXPECT_TRUE(d.thin_ground.empty());  // a single line has rim on both sides
 }
 
+// Lines flown to and fro, one of them and one exposure missing.
+Survey turned_survey(double turn, double noise) {
+  Survey survey;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> error(-noise, noise);
+  for (int line = 0; line < 5; ++line)
+    for (int k = 0; k < 8; ++k) {
+      const int i = line % 2 == 0 ? k : 7 - k;
+      if (line == 2 || (line == 3 && i == 4)) continue;
+      const double x = 16 * i + error(random), y = 42 * line + error(random);
+      const Eigen::Vector2d p = Eigen::Rotation2Dd(turn) * Eigen::Vector2d(x, y);
+      survey.add(p.x(), p.y(), turn + (line % 2) * std::numbers::pi, line);
+    }
+  return survey;
+}
+
 TEST(BlockDiagnostics, RotatedBlockHasTheSameGaps) {
-  for (const double turn : {0.3, 1.0, 2.5}) {
-    Survey survey;
-    const Eigen::Rotation2Dd rotation(turn);
-    for (int line = 0; line < 5; ++line)
-      for (int i = 0; i < 8; ++i) {
-        if (line == 2 || (line == 3 && i == 4)) continue;
-        const Eigen::Vector2d p = rotation * Eigen::Vector2d(16 * i, 42 * line);
-        survey.add(p.x(), p.y(), turn, line);
+  for (const double turn : {0.3, 1.0, 2.5, std::numbers::pi / 2, std::numbers::pi})
+    for (const double noise : {0., 1.}) {
+      const BlockDiagnostics d = turned_survey(turn, noise).found();
+      ASSERT_EQ(d.gaps.size(), 2u) << turn << " " << noise;
+      EXPECT_FALSE(d.gaps[0].line);
+      EXPECT_TRUE(d.gaps[1].line);
+      EXPECT_EQ(d.gaps[1].missing, 1);
+      EXPECT_NEAR(d.gaps[1].distance_m, 84, 1e-9 + 3 * noise);
+      EXPECT_NEAR((d.gaps[1].to - d.gaps[1].from).norm(), 7 * 16, 1e-9 + 14 * noise);  // whole: ends turn by noise
+      if (noise == 0) {
+        EXPECT_EQ(d.proposals.size(), 9u);
       }
-    const BlockDiagnostics d = survey.found();
-    ASSERT_EQ(d.gaps.size(), 2u) << turn;
-    EXPECT_FALSE(d.gaps[0].line);
-    EXPECT_TRUE(d.gaps[1].line);
-    EXPECT_NEAR(d.gaps[1].distance_m, 84, 1e-9);
-    EXPECT_EQ(d.proposals.size(), 9u);
-  }
+    }
+}
+
+TEST(BlockDiagnostics, TwoCamerasAtOnePlaceAreNoStep) {
+  Survey survey;
+  for (const int i : {0, 1, 2, 5, 6, 7})
+    for (int camera = 0; camera < 2; ++camera) survey.add(16 * i, 0);
+  const BlockDiagnostics d = survey.found();
+  EXPECT_DOUBLE_EQ(d.usual_step_m, 16);
+  ASSERT_EQ(d.gaps.size(), 1u);
+  EXPECT_EQ(d.gaps[0].before, FrameIndex(5));
+  EXPECT_EQ(d.gaps[0].missing, 2);
+  EXPECT_EQ(d.proposals.size(), 2u);
+}
+
+TEST(BlockDiagnostics, TinyStepsDoNotProposeMillions) {
+  Survey survey;
+  for (const double x : {0., 0.001, 0.002, 1000.}) survey.add(x, 0);
+  const BlockDiagnostics d = survey.found();
+  ASSERT_EQ(d.gaps.size(), 1u);
+  EXPECT_EQ(d.gaps[0].missing, 1000);
+  EXPECT_EQ(d.proposals.size(), 1000u);
+}
+
+TEST(BlockDiagnostics, LinesFlownTwiceAreOneBesideAMissingLine) {
+  Survey survey;
+  for (const int line : {0, 1, 3, 4})
+    for (int again = 0; again < 2; ++again)
+      for (int k = 0; k < 8; ++k) {
+        const int i = again ? 7 - k : k;
+        survey.add(16 * i + 0.5 * again, 42 * line + 3 * again, again * std::numbers::pi, 2 * line + again);
+      }
+  const BlockDiagnostics d = survey.found();
+  EXPECT_EQ(d.lines, 8);
+  EXPECT_NEAR(d.line_distance_m, 42, 1e-9);
+  ASSERT_EQ(d.gaps.size(), 1u);
+  EXPECT_TRUE(d.gaps[0].line);
+  EXPECT_EQ(d.gaps[0].missing, 1);
+  EXPECT_NEAR(d.gaps[0].distance_m, 84, 1e-9);
+  EXPECT_EQ(d.proposals.size(), 8u);
 }
 
 TEST(BlockDiagnostics, StreetsHaveInterruptionsAndLinksOnly) {
