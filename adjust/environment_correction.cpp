@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
 
 #include "geometry/environment.h"
 #include "geometry/median.h"
@@ -51,6 +52,15 @@ void check_environment(const EnvironmentOptions& options, const Block& block) {
     throw InputError(
         "environment.earth_curvature: the block is georeferenced, and its frame (east, north, up about the origin) is "
         "not curved; leave the option out");
+  // A free frame has any tilt and unit: neither a vertical nor heights.
+  const bool placed = std::any_of(block.frames.begin(), block.frames.end(),
+                                  [](const Frame& frame) { return frame.position_prior || frame.given_pose; }) ||
+                      std::any_of(block.control_points.begin(), block.control_points.end(),
+                                  [](const ControlPoint& point) { return point.role == PointRole::kControl; });
+  if (options.any() && !placed)
+    throw InputError(std::string("environment.") + (options.refraction ? "refraction" : "earth_curvature") +
+                     ": the block has neither positions nor control points, so that its vertical and its heights are "
+                     "not known; give positions or control points, or leave the option out");
 }
 
 void correct_measurements(const EnvironmentOptions& options, const GroundFrame& ground, const TileState& at,

@@ -15,7 +15,9 @@ struct EnvironmentOptions {
   void check() const {}  // all values are possible; see check_environment
 };
 
-// InputError when the curvature is asked for and the block is georeferenced.
+// InputError when the curvature is asked for and the block is georeferenced, and when anything is asked for and the
+// block has neither positions (of frames, observed or approximate) nor control points: its vertical and heights are not
+// known.
 void check_environment(const EnvironmentOptions& options, const Block& block);
 
 // Corrects every measurement of the problem, tie points' in units of 2^-10 px as they are stored. Where rays come from

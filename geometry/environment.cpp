@@ -51,7 +51,8 @@ Eigen::Vector2d turned(const EnvironmentEffect& effect, const Intrinsics& camera
 
 double refraction_constant(double camera_height_m, double ground_height_m) {
   if (!(camera_height_m > ground_height_m)) return 0;
-  const double camera = 1e-3 * camera_height_m, ground = 1e-3 * ground_height_m;
+  const double lift = std::max(0.0, -ground_height_m);  // the formula has a pole where the camera is at sea level
+  const double camera = 1e-3 * (camera_height_m + lift), ground = 1e-3 * (ground_height_m + lift);
   return 1e-6 * (refraction_term(camera) - refraction_term(ground) * (ground / camera));
 }
 

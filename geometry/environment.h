@@ -31,7 +31,8 @@ struct EnvironmentEffect {
   double curvature = 0;   // c
 };
 
-// Heights above sea level, metres; 0 where the camera is not above the ground.
+// Heights above sea level, metres, not above some other level: the air thins with them. 0 where the camera is not above
+// the ground. Ground below the sea counts as at sea level, and the camera as that much higher.
 double refraction_constant(double camera_height_m, double ground_height_m);
 // Height of the camera above the ground point, metres; 0 where it is not above it.
 double curvature_constant(double height_above_ground_m);

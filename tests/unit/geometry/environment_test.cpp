@@ -53,6 +53,17 @@ TEST(Environment, RefractionIsThatOfTheStandardAtmosphere) {
     EXPECT_NEAR(refraction_constant(camera, ground) / integrated(camera, ground), 1, 0.25) << camera << ' ' << ground;
 }
 
+TEST(Environment, RefractionOverGroundBelowTheSea) {
+  EXPECT_NEAR(refraction_constant(0.5, -3000), 3.0e-5, 0.1e-5);
+  EXPECT_EQ(refraction_constant(600, -400), refraction_constant(1000, 0));
+  for (const double ground : {-3000., -400., -1e-3, 0., 1e-3, 0.5})
+    for (const double height : {1e-6, 0.5, 100., 3000.}) {
+      const double constant = refraction_constant(ground + height, ground);
+      EXPECT_GE(constant, 0) << ground << ' ' << height;
+      EXPECT_LE(constant, 2e-8 * height) << ground << ' ' << height;  // K < (H - h) (H + h) / H 1e-5 per kilometre
+    }
+}
+
 TEST(Environment, RayToAPointOnTheCurvedEarth) {
   const double height = 2500;
   for (const double distance : {10., 1000., 5000.}) {

@@ -1,0 +1,41 @@
+#include "adjust/environment_correction.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/error.h"
+
+namespace megablock {
+namespace {
+
+TEST(EnvironmentCorrection, NeedsPositionsOrControlPoints) {
+  Block free;
+  free.frames.push_back(Frame{});
+  const auto refused = [](const EnvironmentOptions& options, const Block& block) {
+    try {
+      check_environment(options, block);
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("give positions or control points, or leave the option out"));
+      return true;
+    }
+    return false;
+  };
+  Block check_only = free, controlled = free, positioned = free, posed = free;
+  controlled.control_points.resize(1);
+  check_only.control_points.resize(1);
+  check_only.control_points[0].role = PointRole::kCheck;
+  positioned.frames[FrameIndex(0)].position_prior = PositionPrior{};
+  posed.frames[FrameIndex(0)].given_pose = Pose{};
+  for (const EnvironmentOptions& options :
+       {EnvironmentOptions{true, false}, EnvironmentOptions{false, true}, EnvironmentOptions{true, true}}) {
+    EXPECT_TRUE(refused(options, free));
+    EXPECT_TRUE(refused(options, check_only));
+    EXPECT_FALSE(refused(options, controlled));
+    EXPECT_FALSE(refused(options, positioned));
+    EXPECT_FALSE(refused(options, posed));
+  }
+  EXPECT_FALSE(refused({}, free));
+}
+
+}  // namespace
+}  // namespace megablock
