@@ -8,6 +8,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/straight_line.h"
 #include "adjust/vertical_terms.h"
 #include "geometry/angles.h"
 #include "geometry/decompositions.h"
@@ -160,14 +161,12 @@ struct PlaceLine {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();  // middle: from c
 };
 PlaceLine line_of(const CommonMotion& motion) {
-  constexpr double kNarrow = 0.03;  // width over length
   if (motion.frames < 2) return {};
   PlaceLine line;
   line.middle = motion.places / motion.frames;
-  const SymmetricEigen scatter =
-      symmetric_eigen(motion.squared_places - motion.frames * line.middle * line.middle.transpose());
-  if (scatter.values(1) > kNarrow * kNarrow * scatter.values(2)) return {};
-  line.direction = scatter.vectors.col(2);
+  const auto direction = straight_line(motion.squared_places - motion.frames * line.middle * line.middle.transpose());
+  if (!direction) return {};
+  line.direction = *direction;
   return line;
 }
 

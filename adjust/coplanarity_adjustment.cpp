@@ -10,6 +10,7 @@
 #include <limits>
 #include <set>
 
+#include "adjust/straight_line.h"
 #include "geometry/chi_square.h"
 #include "geometry/decompositions.h"
 #include "geometry/triangulation.h"
@@ -173,25 +174,35 @@ CoplanarityNetwork brought_together(const CoplanarityNetwork& network, std::vect
     }
     const auto point = intersect_rays(rays);
     if (!point) continue;
-    met[j] = 1;
+    std::vector<Eigen::Vector2d> image;
     for (auto o = static_cast<std::size_t>(network.begin[j]); o < static_cast<std::size_t>(network.begin[j + 1]); ++o) {
       const auto camera = static_cast<std::size_t>(network.camera[o]);
       const Eigen::Vector3d inside = rotation_from(network.angles[camera]) * (*point - network.centres[camera]);
-      if (!(inside.z() > 0)) met[j] = 0;
-      result.image[o] = network.focal_px * inside.head<2>() / inside.z();
+      if (!(inside.z() > 0)) break;
+      image.push_back(network.focal_px * inside.hnormalized());
     }
+    if (image.size() < rays.size()) continue;
+    met[j] = 1;
+    std::copy(image.begin(), image.end(), result.image.begin() + network.begin[j]);
   }
   return result;
 }
 
+// The cameras of every point that three or more see. Two are always on a line, with 2K - 3 = K - 1 conditions.
 bool on_one_line(const CoplanarityNetwork& network) {
-  constexpr double kNarrow = 1e-6;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& c : network.centres) mean += c / static_cast<double>(network.centres.size());
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& c : network.centres) scatter += (c - mean) * (c - mean).transpose();
-  const SymmetricEigen eigen = symmetric_eigen(scatter);
-  return eigen.values(1) <= kNarrow * kNarrow * eigen.values(2);
+  bool any = false;
+  for (std::size_t j = 0; j + 1 < network.begin.size(); ++j) {
+    const auto first = static_cast<std::size_t>(network.begin[j]), end = static_cast<std::size_t>(network.begin[j + 1]);
+    if (end - first < 3) continue;
+    any = true;
+    const auto centre = [&](std::size_t o) { return network.centres[static_cast<std::size_t>(network.camera[o])]; };
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (std::size_t o = first; o < end; ++o) mean += centre(o) / static_cast<double>(end - first);
+    Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+    for (std::size_t o = first; o < end; ++o) scatter += (centre(o) - mean) * (centre(o) - mean).transpose();
+    if (!straight_line(scatter)) return false;
+  }
+  return any;
 }
 
 // The equations of one point, every row divided by |m| |d_1| |d_2|.
@@ -228,16 +239,21 @@ PointEquations point_equations(const CoplanarityNetwork& network, const FreeColu
   return result;
 }
 
+constexpr double kAngles = 1e-6;  // of the largest singular value, from normal equations of the angles
+
 std::int64_t rank_of(const Eigen::VectorXd& values, double tolerance) {
   std::int64_t rank = 0;
   while (rank < values.size() && values(rank) > tolerance * values(0) && values(rank) > 0) ++rank;
   return rank;
 }
 
-std::vector<double> singular_values_of_angles(const CoplanarityNetwork& network, const FreeColumns& free) {
+// Of the points that met.
+std::vector<double> singular_values_of_angles(const CoplanarityNetwork& network, const FreeColumns& free,
+                                              const std::vector<std::uint8_t>& met) {
   if (free.angles == 0) return {};
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(free.angles, free.angles);
-  for (std::int64_t j = 0; j < network.point_count(); ++j)
+  for (std::int64_t j = 0; j < network.point_count(); ++j) {
+    if (!met[static_cast<std::size_t>(j)]) continue;
     visit_pairs(network, j, [&](std::size_t a, std::size_t b) {
       std::vector<std::pair<std::int64_t, double>> entries;
       visit_derivatives(network, free, a, b, determinant(network, a, b), [&](std::int64_t column, double value) {
@@ -246,10 +262,22 @@ std::vector<double> singular_values_of_angles(const CoplanarityNetwork& network,
       for (const auto& [r, x] : entries)
         for (const auto& [c, y] : entries) normal(r, c) += x * y;
     });
+  }
   const SymmetricEigen eigen = symmetric_eigen(normal);
   std::vector<double> values;
   for (Eigen::Index i = eigen.values.size(); i-- > 0;) values.push_back(std::sqrt(std::max(0.0, eigen.values(i))));
   return values;
+}
+
+// Directions that neither the equations nor the forcing determine. What is forced (or held) takes no part: the images
+// with forced angles have B alone, the angles with forced images A.
+std::int64_t open_directions(const CoplanarityDiagnosis& diagnosis, const FreeColumns& free,
+                             const CoplanarityOptions& options) {
+  if (!options.forced()) return diagnosis.nullity();
+  if (options.forcing_angles > 0 && options.forcing_images > 0) return 0;
+  if (options.forcing_angles > 0) return free.count - free.angles - diagnosis.image_rank;
+  const auto& values = diagnosis.angle_values;
+  return free.angles - rank_of(Eigen::VectorXd::Map(values.data(), std::ssize(values)), kAngles);
 }
 
 }  // namespace
@@ -298,8 +326,7 @@ double CoplanarityDiagnosis::angle_condition() const {
 
 CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   network.check();
-  constexpr double kRank = 1e-9;    // of the largest singular value, exact rays
-  constexpr double kAngles = 1e-6;  // the same, from normal equations
+  constexpr double kRank = 1e-9;  // of the largest singular value, exact rays
   std::vector<std::uint8_t> met;
   const CoplanarityNetwork exact = brought_together(network, met);
   const FreeColumns free(network);
@@ -307,7 +334,7 @@ CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   result.rows = pair_count(network);
   result.columns = free.count;
   result.collinear = on_one_line(network);
-  result.angle_values = singular_values_of_angles(exact, free);
+  result.angle_values = singular_values_of_angles(exact, free, met);
 
   // What is left of A where the image coordinates have taken theirs: U_0'A with B = U S V', U_0 beyond the rank.
   Eigen::MatrixXd left = Eigen::MatrixXd::Zero(free.angles, free.angles), whole = left;
@@ -339,12 +366,13 @@ CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, con
   solution.network = network;
   solution.mean_before = mean_determinant(network);
   const FreeColumns free(network);
-  solution.rank_deficient = !options.forced() && solution.diagnosis.nullity() > 0;
+  solution.open_directions = open_directions(solution.diagnosis, free, options);
+  solution.rank_deficient = solution.open_directions > 0;
   if (solution.rank_deficient && options.solver == CoplanarityOptions::Solver::kDirect)
     throw ComputeError(
         fmt::format("coplanarity: the equations determine {} of {} parameters; hold some, force them, or "
                     "take the solution of least norm (lsqr)",
-                    solution.diagnosis.rank, solution.diagnosis.columns));
+                    free.count - solution.open_directions, free.count));
   Eigen::VectorXd total = Eigen::VectorXd::Zero(free.count);
   for (int step = 0; step < options.steps; ++step) {
     const Equations system = equations(solution.network, free, options, total);
@@ -376,10 +404,10 @@ std::vector<std::string> CoplanaritySolution::remarks() const {
   if (rank_deficient)
     lines.push_back(
         fmt::format("rank-deficient: {} of {} parameters are determined, the solution is one of many and "
-                    "need not be nearer to the truth; give priors (forcing)",
-                    diagnosis.rank, diagnosis.columns));
+                    "need not be nearer to the truth; give priors (forcing) to angles and images",
+                    diagnosis.columns - open_directions, diagnosis.columns));
   if (diagnosis.collinear)
-    lines.push_back("the cameras lie on one line: their rays are only brought into planes through it");
+    lines.push_back("the cameras of every point lie on one line: their rays are only brought into planes through it");
   if (held_contradicted)
     lines.push_back(
         fmt::format("the held angles contradict the images: corrections of {:.3g} times their sigmas; "

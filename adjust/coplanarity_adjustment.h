@@ -55,12 +55,13 @@ struct CoplanarityOptions {
 };
 
 // What the equations determine, at the rays brought together (so that noise makes no ranks), images and angles as far
-// as they are free.
+// as they are free. Points whose rays do not meet in front of their cameras are left out.
 struct CoplanarityDiagnosis {
   std::int64_t rows = 0, columns = 0, rank = 0;  // of (A B)
   std::int64_t image_rank = 0;                   // of B
-  bool collinear = false;                        // the cameras of every point lie on one line
-  std::vector<double> angle_values;              // singular values of A (free angles), descending
+  // The cameras of every point that three or more see lie on one line (straight_line.h); false without such points.
+  bool collinear = false;
+  std::vector<double> angle_values;  // singular values of A (free angles), descending
   std::int64_t nullity() const { return columns - rank; }
   double angle_condition() const;  // infinite where A is singular; 1 without free angles
 };
@@ -71,7 +72,8 @@ struct CoplanaritySolution {
   double mean_before = 0, mean_after = 0;  // of |F|
   std::int64_t iterations = 0;             // of LSQR, all steps
   CoplanarityDiagnosis diagnosis;
-  bool rank_deficient = false;               // unforced and not determined: one of many solutions
+  std::int64_t open_directions = 0;          // of the parameters: neither determined nor forced
+  bool rank_deficient = false;               // there are some: one of many solutions
   bool held_contradicted = false;            // with held angles: the corrections are larger than the sigmas allow
   double chi2_per_freedom = 0;               // of the corrections, by the stated sigmas
   std::vector<std::string> remarks() const;  // one line each

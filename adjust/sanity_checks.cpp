@@ -73,8 +73,11 @@ bool LevelCheck::sound() const {
   return separation <= kLimit || smaller_share < kFewest;
 }
 
-LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& points) {
+LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& given) {
   LevelCheck check;
+  std::vector<Eigen::Vector3d> points;
+  for (const Eigen::Vector3d& point : given)
+    if (point.allFinite()) points.push_back(point);
   constexpr std::size_t kFewest = 10;
   if (points.size() < kFewest) return check;
   const Plane plane = plane_of_most(points);

@@ -26,7 +26,7 @@ struct LevelCheck {
   double smaller_share = 0;
   bool sound() const;
 };
-// Fewer than ten points: nothing to check, all zero. Deterministic.
+// Points that are not finite are left out; fewer than ten others: nothing to check, all zero. Deterministic.
 LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace megablock
