@@ -183,12 +183,15 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
   const PartTracks tracks(std::move(files), result.sigma_scaled ? result.variance_factor : 1);
   // Both go through all tracks, while the other ranks have nothing left to do.
-  std::future<Report> report = std::async(std::launch::async, [&] { return Report(result, tracks); });
+  auto gathered = std::async(std::launch::async, [&] {
+    Report report(result, tracks);
+    return std::pair(std::move(report), diagnose_result(result, tracks, job.settings.diagnostics));
+  });
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  const BlockDiagnostics diagnostics = diagnose_result(result, tracks, job.settings.diagnostics);
+  auto [report, diagnostics] = gathered.get();
   job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
   const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics};
-  job.store.write_text("result/report.html", report.get().html(std::move(result), context));
+  job.store.write_text("result/report.html", std::move(report).html(std::move(result), context));
 }
 
 }  // namespace
