@@ -187,7 +187,7 @@ Score meaningful(const Residual& squared_residual, std::size_t size, std::size_t
 template <SampleEstimator Estimator>
 std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator, const RansacOptions& options,
                                                               std::span<const typename Estimator::Model> starts = {}) {
-  using Model = typename Estimator::Model;
+  using Found = typename Estimator::Model;
   using ransac_detail::Score;
   constexpr std::size_t kSize = Estimator::kSampleSize;
   constexpr int kRounds = 4;  // of local optimisation
@@ -197,9 +197,9 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
 
   std::optional<FalseAlarms> alarms;
   if (options.threshold == 0) alarms.emplace(size, kSize);
-  std::optional<Model> best;
+  std::optional<Found> best;
   Score best_score;
-  const auto consider = [&](const Model& model) {
+  const auto consider = [&](const Found& model) {
     Score score;
     if (!alarms) {
       score = ransac_detail::supported(estimator.squared_residuals(model), size, options.threshold, best_score);
@@ -219,14 +219,14 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
   if (options.inlier_share > 0) draws_suffice(options.inlier_share);
   const auto improve = [&] {
     for (int round = 0; round < kRounds && best_score.inliers > kSize; ++round) {
-      const std::optional<Model> refined = estimator.refine(*best, best_score.threshold);
+      const std::optional<Found> refined = estimator.refine(*best, best_score.threshold);
       if (!refined || !consider(*refined)) break;
     }
     draws_suffice(static_cast<double>(best_score.inliers) / static_cast<double>(size));
   };
 
   bool better = false;
-  for (const Model& start : starts) better |= consider(start);
+  for (const Found& start : starts) better |= consider(start);
   if (better) improve();
   std::mt19937_64 random(options.seed);
   int draws = 0;
@@ -239,11 +239,11 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
       k += !again;
     }
     better = false;
-    for (const Model& model : estimator.solve(rows)) better |= consider(model);
+    for (const Found& model : estimator.solve(rows)) better |= consider(model);
     if (better) improve();
   }
   if (!best) return std::nullopt;
-  RansacResult<Model> result{*best, consensus_of(estimator, *best, best_score.threshold), best_score.threshold};
+  RansacResult<Found> result{*best, consensus_of(estimator, *best, best_score.threshold), best_score.threshold};
   result.log10_nfa = alarms ? -best_score.value : 0;
   result.draws = draws;
   return result;

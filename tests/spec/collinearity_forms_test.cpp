@@ -1,5 +1,5 @@
-// Acceptance tests of ../shared/spec/known-positions-and-collinearity.md that concern solvers: T-KP01, T-KP02, T-KP03,
-// T-CP01, T-CP03/04, T-CP05, T-CP06.
+// Acceptance tests that concern solvers: T-KP01, T-KP02, T-KP03 (A. Barrier, S. Martin, "Bundle adjustment with known
+// positions"), T-CP01, T-CP03/04, T-CP05, T-CP06 (a course of image formulas).
 #include <gtest/gtest.h>
 
 #include "geometry/camera_matrix.h"

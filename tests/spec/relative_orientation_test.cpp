@@ -1,4 +1,4 @@
-// Acceptance tests of ../shared/spec/direct-orientation.md that concern the solvers of relative orientation. Protocol
+// Acceptance tests of direct orientation (Kalantari 2009) that concern the solvers of relative orientation. Protocol
 // (X12, X16, X17): best of 100 draws by truncated quadratic support within two sigmas among 600 of 2000 points, 60
 // repetitions, means of the errors in degrees; "refined" is least squares on the Sampson residuals from there.
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Acceptance tests of ../shared/spec/direct-orientation.md that concern similarities (M50). Protocol X20: 1000 points
+// Acceptance tests of direct orientation (Kalantari 2009) that concern similarities (M50). Protocol X20: 1000 points
 // in a cube of side 2000, noise in both systems; rotations about X, Y, Z of 0 to 80 deg, translations of 0 to 6000
 // along each axis, scales of 0.5 to 2, one at a time: 27 configurations.
 #include <gtest/gtest.h>

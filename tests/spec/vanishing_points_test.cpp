@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "geometry/camera.h"
+#include "geometry/rotation.h"
 #include "geometry/vanishing_circles.h"
 #include "geometry/vertical.h"
 #include "tests/unit/geometry/segment_scenes.h"
@@ -335,7 +336,7 @@ TEST(Spec, AT24Vertical) {
   EXPECT_EQ(exif, 1);
 }
 
-// Issue 5: waits for the photographs; on others verticals are only plausible (tests/real/verticals_test.cpp).
+// Waits for the photographs; on others verticals are only plausible (tests/real/verticals_test.cpp).
 TEST(Spec, AT25VerticalsOfPhotographs) {
   GTEST_SKIP() << "the photographs of entry-P10 (Strecha et al. 2008) are not available";
 }

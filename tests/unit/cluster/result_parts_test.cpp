@@ -53,8 +53,10 @@ Part made_up_part(std::int64_t number, std::int64_t count, std::int64_t keys) {
   problem.kept.push_back(0);
   problem.begin.push_back(problem.begin.back() + 1);
   part.covariance.points.push_back(Eigen::Matrix3d::Identity());
-  problem.x.assign(problem.image.size(), 0);
-  problem.y.assign(problem.image.size(), 0);
+  for (const std::int32_t x : part.tracks.x) problem.x.push_back(from_fixed_pixel(x));
+  for (const std::int32_t y : part.tracks.y) problem.y.push_back(from_fixed_pixel(y));
+  problem.x.push_back(0);
+  problem.y.push_back(0);
   return part;
 }
 
