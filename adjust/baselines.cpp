@@ -6,9 +6,9 @@
 #include <cmath>
 #include <tuple>
 
-#include "io/disjoint_sets.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
+#include "io/disjoint_sets.h"
 
 namespace megablock {
 

@@ -8,10 +8,10 @@
 #include <map>
 #include <numeric>
 
-#include "io/disjoint_sets.h"
 #include "geometry/chi_square.h"
 #include "geometry/median.h"
 #include "geometry/rotation.h"
+#include "io/disjoint_sets.h"
 #include "io/error.h"
 
 namespace megablock {

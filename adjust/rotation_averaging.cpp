@@ -6,9 +6,9 @@
 #include <numeric>
 #include <tuple>
 
-#include "io/disjoint_sets.h"
 #include "adjust/orientation_graph.h"
 #include "geometry/angles.h"
+#include "io/disjoint_sets.h"
 
 namespace megablock {
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "io/disjoint_sets.h"
 #include "geometry/decompositions.h"
 #include "geometry/rotation.h"
+#include "io/disjoint_sets.h"
 #include "merge/unknowns.h"
 
 namespace megablock {

@@ -3,8 +3,8 @@
 #include <numeric>
 #include <utility>
 
-#include "io/disjoint_sets.h"
 #include "adjust/owner.h"
+#include "io/disjoint_sets.h"
 #include "merge/condense.h"
 #include "partition/separators.h"
 #include "partition/tiles.h"

@@ -4,8 +4,8 @@
 #include <map>
 #include <tuple>
 
-#include "io/error.h"
 #include "io/disjoint_sets.h"
+#include "io/error.h"
 
 namespace megablock {
 

@@ -5,8 +5,8 @@
 #include <set>
 #include <string>
 
-#include "io/error.h"
 #include "io/disjoint_sets.h"
+#include "io/error.h"
 #include "partition/separators.h"
 
 namespace megablock {

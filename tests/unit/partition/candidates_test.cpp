@@ -9,9 +9,9 @@
 #include <set>
 
 #include "geometry/angles.h"
+#include "io/disjoint_sets.h"
 #include "io/error.h"
 #include "partition/cells.h"
-#include "io/disjoint_sets.h"
 #include "partition/kd_tree.h"
 
 namespace megablock {
