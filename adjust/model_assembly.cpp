@@ -2,12 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 
+#include "adjust/shared_places.h"
+#include "adjust/similarity_equations.h"
 #include "geometry/chi_square.h"
 #include "geometry/median.h"
 #include "geometry/rotation.h"
@@ -22,10 +23,6 @@ void AssemblyOptions::check() const {
 }
 
 namespace {
-
-using Block7 = SimilarityCovariance;
-
-std::size_t nth(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 // Median of a chi-square variable.
 double chi_square_median(int degrees) { return chi_square_quantile(0.5, degrees); }
@@ -47,113 +44,6 @@ Block7 step_through(const Similarity& m) {
   return result;
 }
 
-// Normal equations of seven unknowns a model; those of held models are left out.
-class NormalEquations {
- public:
-  explicit NormalEquations(const std::vector<std::uint8_t>& held) : row_(held.size(), -1), right_(held.size()) {
-    for (std::size_t m = 0; m < held.size(); ++m)
-      if (!held[m]) row_[m] = rows_++;
-    clear();
-  }
-  void clear() {
-    blocks_.clear();
-    std::fill(right_.begin(), right_.end(), SimilarityStep::Zero());
-  }
-  // Rows of m, columns of n.
-  void add(std::int32_t m, std::int32_t n, const Block7& block) {
-    if (row_[nth(m)] < row_[nth(n)] || row_[nth(n)] < 0) return;  // the lower triangle
-    blocks_.try_emplace({row_[nth(m)], row_[nth(n)]}, Block7::Zero()).first->second += block;
-  }
-  void add(std::int32_t m, const SimilarityStep& right) { right_[nth(m)] += right; }
-
-  // Steps of all models, zero for held ones. False: not determined.
-  bool factorise() {
-    if (rows_ == 0) return true;
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(49 * blocks_.size());
-    for (const auto& [key, block] : blocks_)
-      for (int i = 0; i < 7; ++i)
-        for (int j = 0; j < (key.first == key.second ? i + 1 : 7); ++j)
-          entries.emplace_back(7 * key.first + i, 7 * key.second + j, block(i, j));
-    Eigen::SparseMatrix<double> matrix(7 * rows_, 7 * rows_);
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    factor_.compute(matrix);
-    return factor_.info() == Eigen::Success && factor_.vectorD().allFinite() && factor_.vectorD().minCoeff() > 0;
-  }
-  std::vector<SimilarityStep> solution() const {
-    std::vector<SimilarityStep> steps(row_.size(), SimilarityStep::Zero());
-    if (rows_ == 0) return steps;
-    Eigen::VectorXd right(7 * rows_);
-    for (std::size_t m = 0; m < row_.size(); ++m)
-      if (row_[m] >= 0) right.segment<7>(7 * row_[m]) = right_[m];
-    const Eigen::VectorXd all = factor_.solve(right);
-    for (std::size_t m = 0; m < row_.size(); ++m)
-      if (row_[m] >= 0) steps[m] = all.segment<7>(7 * row_[m]);
-    return steps;
-  }
-  // Length of the steps of one model in the metric of its own normal equations.
-  double length(std::int32_t m, const SimilarityStep& step) const {
-    const auto found = blocks_.find({row_[nth(m)], row_[nth(m)]});
-    return found == blocks_.end() ? 0 : std::sqrt(std::max(0.0, step.dot(found->second * step)));
-  }
-  Block7 covariance(std::int32_t m) const {
-    if (row_[nth(m)] < 0) return Block7::Zero();
-    Eigen::Matrix<double, Eigen::Dynamic, 7> unit(7 * rows_, 7);
-    unit.setZero();
-    unit.middleRows<7>(7 * row_[nth(m)]).setIdentity();
-    const Eigen::Matrix<double, Eigen::Dynamic, 7> columns = factor_.solve(unit);
-    const Block7 result = columns.middleRows<7>(7 * row_[nth(m)]);
-    return 0.5 * (result + result.transpose());
-  }
-
- private:
-  std::vector<int> row_;
-  int rows_ = 0;
-  std::map<std::pair<int, int>, Block7> blocks_;
-  std::vector<SimilarityStep> right_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
-};
-
-// A point or an image and where it is in the models that hold it.
-struct SharedPlace {
-  struct Entry {
-    std::int32_t model, row;  // row of the model's points or images
-    Eigen::Vector3d position;
-    double sigma;
-    Eigen::Quaterniond rotation;
-    double rotation_sigma;  // 0: a point
-    bool kept;
-  };
-  std::vector<Entry> entries;  // by model
-  bool image = false;
-};
-
-void check_finite(const Model& model) {
-  const auto refuse = [&](const char* what, std::int64_t number, const char* why) {
-    throw InputError(fmt::format("assembly: model {}, {} {}: {}", model.number, what, number, why));
-  };
-  const auto twice = [&](std::vector<std::int64_t> numbers, const char* what) {
-    std::sort(numbers.begin(), numbers.end());
-    const auto found = std::adjacent_find(numbers.begin(), numbers.end());
-    if (found != numbers.end()) refuse(what, *found, "given twice");
-  };
-  std::vector<std::int64_t> points, images;
-  for (const ModelPoint& p : model.points) {
-    points.push_back(p.number);
-    if (!p.position.allFinite()) refuse("point", p.number, "its position is not finite");
-    if (!(p.sigma > 0) || !std::isfinite(p.sigma)) refuse("point", p.number, "its sigma must be positive");
-  }
-  for (const ModelImage& i : model.images) {
-    images.push_back(i.number);
-    if (!i.pose.centre.allFinite() || !i.pose.rotation.coeffs().allFinite())
-      refuse("image", i.number, "its pose is not finite");
-    if (!(i.centre_sigma > 0 && i.rotation_sigma > 0) || !std::isfinite(i.centre_sigma + i.rotation_sigma))
-      refuse("image", i.number, "its sigmas must be positive");
-  }
-  twice(points, "point");
-  twice(images, "image");
-}
-
 // Models by their numbers, what they hold by its number and about its centroid.
 class Assembly {
  public:
@@ -163,13 +53,13 @@ class Assembly {
     std::sort(row_of_.begin(), row_of_.end(),
               [&](std::int32_t a, std::int32_t b) { return models[nth(a)].number < models[nth(b)].number; });
     for (const std::int32_t m : row_of_) {
-      check_finite(models[nth(m)]);
+      check(models[nth(m)]);
       if (!models_.empty() && models_.back().number == models[nth(m)].number)
         throw InputError(fmt::format("assembly: model {} is given twice", models[nth(m)].number));
       models_.push_back(models[nth(m)]);
       reduce(models_.back());
     }
-    find_places();
+    places_ = shared_places(models_);
   }
 
   AssembledModels run() {
@@ -195,42 +85,6 @@ class Assembly {
     for (ModelPoint& p : model.points) p.position -= centre;
     for (ModelImage& i : model.images) i.pose.centre -= centre;
     centres_.push_back(centre);
-  }
-
-  void find_places() {
-    struct Key {
-      std::int64_t number;
-      std::int32_t model, row;
-      bool image;
-      bool operator<(const Key& k) const {
-        return std::tie(image, number, model) < std::tie(k.image, k.number, k.model);
-      }
-    };
-    std::vector<Key> keys;
-    for (std::int32_t m = 0; m < std::ssize(models_); ++m) {
-      for (std::int32_t i = 0; i < std::ssize(models_[nth(m)].points); ++i)
-        keys.push_back({models_[nth(m)].points[nth(i)].number, m, i, false});
-      for (std::int32_t i = 0; i < std::ssize(models_[nth(m)].images); ++i)
-        keys.push_back({models_[nth(m)].images[nth(i)].number, m, i, true});
-    }
-    std::sort(keys.begin(), keys.end());
-    for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
-      SharedPlace place;
-      place.image = keys[begin].image;
-      for (; end < keys.size() && keys[end].number == keys[begin].number && keys[end].image == place.image; ++end) {
-        const Model& model = models_[nth(keys[end].model)];
-        if (place.image) {
-          const ModelImage& i = model.images[nth(keys[end].row)];
-          place.entries.push_back(
-              {keys[end].model, keys[end].row, i.pose.centre, i.centre_sigma, i.pose.rotation, i.rotation_sigma, true});
-        } else {
-          const ModelPoint& p = model.points[nth(keys[end].row)];
-          place.entries.push_back(
-              {keys[end].model, keys[end].row, p.position, p.sigma, Eigen::Quaterniond::Identity(), 0, true});
-        }
-      }
-      if (place.entries.size() > 1) places_.push_back(std::move(place));
-    }
   }
 
   void find_links() {
@@ -346,7 +200,7 @@ class Assembly {
     constexpr int kIterations = 100;
     constexpr double kSettled = 1e-3;  // sigmas
     const double narrow = chi_square_quantile(0.01, 7);
-    NormalEquations equations(held());
+    SimilarityEquations equations(held());
     for (int iteration = 0; iteration < kIterations; ++iteration) {
       const std::vector<double> squares = link_squares();
       const double width = narrow * inflation(squares, 7);
@@ -371,12 +225,12 @@ class Assembly {
     for (std::size_t l = 0; l < links_.size(); ++l) links_[l].kept = squares[l] <= limit;
   }
 
-  static std::vector<SimilarityStep> solved(NormalEquations& equations) {
+  static std::vector<SimilarityStep> solved(SimilarityEquations& equations) {
     if (!equations.factorise()) throw ComputeError("assembly: the models' links do not determine their similarities");
     return equations.solution();
   }
   // The longest step of a model.
-  double move_and_measure(const NormalEquations& equations, const std::vector<SimilarityStep>& steps) {
+  double move_and_measure(const SimilarityEquations& equations, const std::vector<SimilarityStep>& steps) {
     double longest = 0;
     for (std::int32_t m = 0; m < std::ssize(models_); ++m)
       longest = std::max(longest, equations.length(m, steps[nth(m)]));
@@ -500,7 +354,7 @@ class Assembly {
 
   void adjust() {
     constexpr double kSettled = 1e-6;  // sigmas
-    NormalEquations equations(held());
+    SimilarityEquations equations(held());
     for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
       const std::int64_t changed = iteration < options_.max_iterations / 2 ? screen() : 0;
       linearise(equations);
@@ -513,7 +367,7 @@ class Assembly {
     for (std::int32_t m = 0; m < std::ssize(models_); ++m) covariance_.push_back(equations.covariance(m));
   }
 
-  void linearise(NormalEquations& equations) {
+  void linearise(SimilarityEquations& equations) {
     equations.clear();
     weighted_squares_ = 0;
     redundancy_ = 0;
