@@ -1,6 +1,7 @@
 #include "geometry/collinearity.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <cmath>
@@ -93,6 +94,12 @@ std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> grou
     extent = std::max(extent, (ground[i] - origin).norm());
     size = std::max(size, (image[i] - middle).norm());
   }
+  // Of the ground alone: errors of the image hide that points in one plane leave the equations open.
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& m : ground) scatter += (m - origin) * (m - origin).transpose() / (extent * extent);
+  const double thinnest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(0);
+  constexpr double kPlane = 1e-5;  // of the extent
+  if (!(thinnest > kPlane * kPlane * static_cast<double>(count))) return std::nullopt;
   RowQr<12> equations;
   for (std::size_t i = 0; i < count; ++i) {
     Eigen::Vector4d m;

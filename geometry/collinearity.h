@@ -74,7 +74,8 @@ struct PhysicalParameters {
 std::optional<PhysicalParameters> nine_from(const ElevenParameters& image);
 
 // Direct linear transformation: (2) by least squares, O in the middle of the points. Empty for fewer than six points,
-// for points in one plane, and where something is not a number.
+// for points in one plane (their distance from it, root mean square, below 1e-5 of their extent), and where something
+// is not a number.
 std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> ground,
                                            std::span<const Eigen::Vector2d> image);
 

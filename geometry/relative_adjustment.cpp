@@ -106,6 +106,11 @@ double largest_sigma(const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
 
 }  // namespace
 
+Vector5 sampson_derivative(const RelativeOrientation& orientation, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  SampsonEquations equations(orientation);
+  return equations.at(a, b) ? equations.derivative() : Vector5::Zero();
+}
+
 double intersection_angle(const Eigen::Quaterniond& rotation, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector3d u = rotation * a.homogeneous(), v = b.homogeneous();
   return std::atan2(u.cross(v).norm(), u.dot(v));

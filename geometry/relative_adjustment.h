@@ -28,6 +28,10 @@ inline double sampson_residual(const Eigen::Matrix3d& essential, const Eigen::Ve
   return b.homogeneous().dot(line_b) / std::sqrt(d);
 }
 
+// By w and along axes_across of the base, as above.
+Eigen::Matrix<double, 5, 1> sampson_derivative(const RelativeOrientation& orientation, const Eigen::Vector2d& a,
+                                               const Eigen::Vector2d& b);
+
 // Angle between the two rays of a match, radians.
 double intersection_angle(const Eigen::Quaterniond& rotation, const Eigen::Vector2d& a, const Eigen::Vector2d& b);
 

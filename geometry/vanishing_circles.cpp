@@ -18,24 +18,40 @@ double circle_residual(const Eigen::Vector2d& centre, const Eigen::Vector2d& foo
   return (foot.squaredNorm() - 2 * centre.dot(foot)) / ((centre - foot).norm() + centre.norm());
 }
 
+// A vanishing point P = e / c by the direction e = (cos phi, sin phi) from the origin and the inverse c of its
+// distance, which passes zero where P passes through infinity. With u = c |H|^2 - e'H and g = e - 2 c H, |g|^2 = 1 + 4
+// c u, the residual is 2 u / (|g| + 1), up to the sign of c, and d(residual) = (du - residual^2 dc) / |g|.
+//
 // By (theta, rho) of the line, H = rho (-sin theta, cos theta): a foot near its vanishing point moves along the circle
 // when the line turns, farther than the circle is straight, so that a tangent there would mislead.
 struct CircleEquation {
   static constexpr int kUnknowns = 2, kEquations = 1, kMeasurements = 2, kConstraints = 0;
-  using State = Eigen::Vector2d;
-  void linearise(const State& centre, const Eigen::Vector2d& line, std::size_t,
+  using State = Eigen::Vector2d;  // phi, c
+  void linearise(const State& state, const Eigen::Vector2d& line, std::size_t,
                  GroupEquations<CircleEquation>& out) const {
     const Eigen::Vector2d along(std::cos(line(0)), std::sin(line(0))), across(-along.y(), along.x());
-    const Eigen::Vector2d foot = line(1) * across, from_foot = (centre - foot).normalized();
-    out.value(0) = circle_residual(centre, foot);
-    out.by_unknowns = (from_foot - centre.normalized()).transpose();
-    out.by_measurements << line(1) * from_foot.dot(along), -from_foot.dot(across);
+    const Eigen::Vector2d e(std::cos(state(0)), std::sin(state(0))), turned(-e.y(), e.x()), foot = line(1) * across;
+    const Eigen::Vector2d g = e - 2 * state(1) * foot;
+    const double length = g.norm(), residual = 2 * (state(1) * foot.squaredNorm() - e.dot(foot)) / (length + 1);
+    out.value(0) = residual;
+    out.by_unknowns << -turned.dot(foot) / length, (foot.squaredNorm() - residual * residual) / length;
+    out.by_measurements << line(1) * g.dot(along) / length, -g.dot(across) / length;
   }
-  void move(State& centre, const Eigen::Vector2d& step) const { centre += step; }
+  void move(State& state, const Eigen::Vector2d& step) const { state += step; }
+
+  static Eigen::Vector2d pixel(const State& state) {
+    return Eigen::Vector2d(std::cos(state(0)), std::sin(state(0))) / state(1);
+  }
+  static ImagePoint point(const State& state, const Eigen::Matrix2d& covariance) {
+    const Eigen::Vector2d p = pixel(state);
+    Eigen::Matrix2d by_state;
+    by_state << -p.y(), -p.x() / state(1), p.x(), -p.y() / state(1);
+    return {p, propagated(by_state, covariance)};
+  }
 };
 
 // Null vector (w, w P) of rows [|H|^2, -H'], each over the sigma that the line's own errors give |H|^2 - P'H for the P
-// before; the first time over |H|, so that the residual is rho - n'P, a distance.
+// before; the first time over |H|, so that the residual is rho - n'P, a distance. Result: the state of CircleEquation.
 std::optional<Eigen::Vector2d> null_vector_fit(std::span<const LineFoot> feet, int rounds) {
   if (feet.size() < 2) return std::nullopt;
   double size = 0;
@@ -59,9 +75,9 @@ std::optional<Eigen::Vector2d> null_vector_fit(std::span<const LineFoot> feet, i
     if (!(solver.eigenvalues()(1) > 1e-14 * solver.eigenvalues()(2))) return std::nullopt;
     solution = solver.eigenvectors().col(0);
   }
-  const Eigen::Vector2d point = solution.tail<2>() / solution(0) * size;
-  if (!point.allFinite() || point.norm() < 1e-9 * size) return std::nullopt;
-  return point;
+  const double away = solution.tail<2>().norm();
+  if (!solution.allFinite() || !(away > 1e-9 * std::abs(solution(0)))) return std::nullopt;
+  return Eigen::Vector2d(std::atan2(solution(2), solution(1)), solution(0) / away / size);
 }
 
 // Closer, a line may pass on either side of the origin (M35).
@@ -146,8 +162,8 @@ std::vector<FoundCircle> search_circles(const std::vector<LineFoot>& feet, std::
           own.push_back(feet[static_cast<std::size_t>(k)]);
         }
       const auto refined = null_vector_fit(own, 3);
-      if (!refined) break;
-      circle.point = *refined;
+      if (!refined || !CircleEquation::pixel(*refined).allFinite()) break;
+      circle.point = CircleEquation::pixel(*refined);
     }
     const std::size_t before = left.size();
     std::erase_if(left, [&](int k) {
@@ -172,16 +188,18 @@ std::optional<ImagePoint> fit_vanishing_circle(std::span<const ImageLine> lines)
     measured.emplace_back(line.theta, line.rho);
     covariances.push_back(line.covariance);
   }
-  const auto fit =
-      fit_gauss_helmert(CircleEquation(), Eigen::Vector2d(0.5 * *start), std::span<const Eigen::Vector2d>(measured),
-                        std::span<const Eigen::Matrix2d>(covariances));
+  const auto fit = fit_gauss_helmert(CircleEquation(), *start, std::span<const Eigen::Vector2d>(measured),
+                                     std::span<const Eigen::Matrix2d>(covariances));
   if (!fit) return std::nullopt;
-  return ImagePoint{2 * fit->state, 4 * fit->covariance};
+  const ImagePoint point = CircleEquation::point(fit->state, fit->covariance);
+  if (!point.pixel.allFinite() || !point.covariance.allFinite()) return std::nullopt;
+  return point;
 }
 
 std::optional<Eigen::Vector2d> fit_vanishing_circle_algebraic(std::span<const ImageLine> lines) {
-  const std::vector<LineFoot> feet = feet_of(lines);
-  return null_vector_fit(feet, 1);
+  const auto state = null_vector_fit(feet_of(lines), 1);
+  if (!state || !CircleEquation::pixel(*state).allFinite()) return std::nullopt;
+  return CircleEquation::pixel(*state);
 }
 
 std::vector<CirclePoint> find_vanishing_points_by_circles(std::span<const ImageLine> lines, int width, int height,

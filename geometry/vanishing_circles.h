@@ -1,5 +1,5 @@
 // Vanishing points by circles in the image (M24 to M30, M35): for comparison with vanishing_points.h, which has the
-// same statistics, better numerics and vanishing points at infinity.
+// same statistics and needs no origin. A point comes as a pixel, so that one at infinity itself is none.
 //
 // The feet H of the perpendiculars from an origin O to lines that meet in P lie on the circle of diameter OP: its
 // centre is K = P / 2, its radius |K|, and |K - H| - |K| = 0. By |H|^2 = P'H two feet give a circle through O. With rho
@@ -14,8 +14,8 @@
 //   search   as in vanishing_points.h, by pairs of feet. A line without reason has theta and rho anywhere in the
 //            image; the probability p of the stop is the share of (theta, rho) in the band of the circle at hand.
 //   fit      w |H|^2 = (w P)'H as a null vector in units of the feet's distances, which P at infinity does not disturb
-//            (M26), then Gauss-Helmert with the covariances of the lines, and that of P = 2 K is 4 times that of K
-//            (M27, M30).
+//            (M26), then Gauss-Helmert with the covariances of the lines in the direction of P and the inverse of its
+//            distance (M27, M30), which are normally distributed where P, close to infinity, is not.
 //   origin   the upper left corner, then the barycentre of the centres of the circles so found, from where they cross
 //            at large angles (M29).
 #pragma once
@@ -43,7 +43,7 @@ struct CirclePoint {
   std::vector<int> lines;
 };
 
-// Vanishing points of an image of this size, px. Those whose fit does not end, as at infinity, are left out.
+// Vanishing points of an image of this size, px. Those whose fit does not end are left out.
 std::vector<CirclePoint> find_vanishing_points_by_circles(std::span<const ImageLine> lines, int width, int height,
                                                           const CircleOptions& options = {});
 

@@ -82,12 +82,11 @@ TEST(Spec, AT29SimilarityFromThreePointsIsExact) {
       errors.add(*found, truth);
     }
   }
-  for (double& t : errors.translation) t /= 2000;
-  expect_at_most(median(errors.rotation_deg), 1e-8, "median rotation, deg");
-  expect_at_most(median(errors.scale), 1e-12, "median scale");
-  expect_at_most(median(errors.translation), 1e-9, "median translation, relative");
-  std::printf("[ reached  ] largest %.2g deg, %.2g, %.2g\n", largest(errors.rotation_deg), largest(errors.scale),
-              largest(errors.translation));
+  for (double& t : errors.translation) t /= 2000;  // of the cube, as a translation may be zero
+  std::printf("[ reached  ] median rotation %.2g deg\n", median(errors.rotation_deg));
+  expect_at_most(largest(errors.rotation_deg), 1e-8, "largest rotation, deg");
+  expect_at_most(largest(errors.scale), 1e-12, "largest scale");
+  expect_at_most(largest(errors.translation), 1e-9, "largest translation, relative");
 }
 
 TEST(Spec, AT30SimilarityFromNoisyPoints) {
@@ -135,10 +134,12 @@ TEST(Spec, AT31SimilarityWithBlunders) {
         if (middle < least) best = candidate, least = middle;
       }
       ASSERT_TRUE(best);
-      // Least squares over what fits until nothing changes: within 5 sigmas of a coordinate, chi-distributed.
+      // Least squares over what fits. What is more than 5 sigmas off the truth has to go, and the threshold is about
+      // the similarity found: 4.5 sigmas of a coordinate, which 1.5e-4 of the good points exceed.
+      const double narrow = 4.5 * sigma_pair;
       std::vector<double> weights(1000, 0);
-      double threshold = std::max(5 * sigma_pair, 3 * least);
-      for (int round = 0; round < 10; ++round, threshold = 5 * sigma_pair) {
+      double threshold = std::max(narrow, 3 * least);
+      for (int round = 0; round < 10; ++round, threshold = narrow) {
         for (std::size_t i = 0; i < 1000; ++i)
           weights[i] = ((*best)(clouds.from[i]) - clouds.to[i]).norm() < threshold ? 1 : 0;
         best = fit_similarity(clouds.from, clouds.to, weights);
@@ -147,8 +148,7 @@ TEST(Spec, AT31SimilarityWithBlunders) {
       errors.add(*best, truth);
       for (std::size_t i = 0; i < 1000; ++i) {
         const double off = (truth(clouds.from[i]) - clouds.to[i]).norm();
-        // Half a sigma more, as the threshold is about the found similarity.
-        if (i < 300 && off > 5.5 * sigma_pair) blunders += 1, kept += weights[i] > 0;
+        if (i < 300 && off > 5 * sigma_pair) blunders += 1, kept += weights[i] > 0;
         if (i >= 300) good += 1, lost += weights[i] == 0;
       }
     }
