@@ -217,18 +217,15 @@ class Assembly {
         equations.add(link.b, -weighted * e);
         equations.add(link.a, through.transpose() * weighted * e);
       }
-      const std::vector<SimilarityStep> steps = solved(equations);
-      if (move_and_measure(equations, steps) < kSettled * std::sqrt(width / narrow)) break;
+      if (equations.factorise() >= 0)
+        throw ComputeError("assembly: the models' links do not determine their similarities");
+      if (move_and_measure(equations, equations.solution()) < kSettled * std::sqrt(width / narrow)) break;
     }
     const std::vector<double> squares = link_squares();
     const double limit = inflation(squares, 7) * chi_square_quantile(options_.links.rejection_probability, 7);
     for (std::size_t l = 0; l < links_.size(); ++l) links_[l].kept = squares[l] <= limit;
   }
 
-  static std::vector<SimilarityStep> solved(SimilarityEquations& equations) {
-    if (!equations.factorise()) throw ComputeError("assembly: the models' links do not determine their similarities");
-    return equations.solution();
-  }
   // The longest step of a model.
   double move_and_measure(const SimilarityEquations& equations, const std::vector<SimilarityStep>& steps) {
     double longest = 0;
@@ -306,29 +303,40 @@ class Assembly {
     return rotation_log<double>(e.rotation.conjugate() * rotation * similarity_[nth(e.model)].rotation);
   }
 
-  // Squares of the misfit of an entry over their expectation were the similarities known; the larger of place and
-  // attitude.
-  double squares(const SharedPlace::Entry& e, const Mean& m) const {
+  // Squares of the misfit of an entry over their expectation were the similarities known.
+  struct Misfit {
+    double place = 0, turn = 0;
+  };
+  Misfit misfit(const SharedPlace::Entry& e, const Mean& m) const {
     constexpr double kAlone = 1e-12;
-    const double free = 1 - weight(e) / m.weight;
-    double result = (in_model(e, m.position) - e.position).squaredNorm() / (e.sigma * e.sigma * std::max(kAlone, free));
+    const double free = std::max(kAlone, 1 - weight(e) / m.weight);
+    Misfit result{(in_model(e, m.position) - e.position).squaredNorm() / (e.sigma * e.sigma * free)};
     if (e.rotation_sigma > 0) {
       const double turn_free = std::max(kAlone, 1 - rotation_weight(e) / m.rotation_weight);
-      result = std::max(result, turn_in_model(e, m.rotation).squaredNorm() * rotation_weight(e) / turn_free);
+      result.turn = turn_in_model(e, m.rotation).squaredNorm() * rotation_weight(e) / turn_free;
     }
     return result;
+  }
+  // Limits of good places and attitudes.
+  Misfit limits() const {
+    std::vector<double> all_places, turns;
+    for (const SharedPlace& place : places_) {
+      if (!any_kept(place)) continue;
+      const Mean m = mean(place);
+      for (const auto& e : place.entries) {
+        if (!e.kept) continue;
+        const Misfit misfit = this->misfit(e, m);
+        all_places.push_back(misfit.place);
+        if (place.image) turns.push_back(misfit.turn);
+      }
+    }
+    const double good = chi_square_quantile(options_.links.rejection_probability, 3);
+    return {good * inflation(all_places, 3), good * inflation(turns, 3)};
   }
 
   // Tests every entry anew; how many changed.
   std::int64_t screen() {
-    std::vector<double> all;
-    for (const SharedPlace& place : places_) {
-      if (!any_kept(place)) continue;
-      const Mean m = mean(place);
-      for (const auto& e : place.entries)
-        if (e.kept) all.push_back(squares(e, m));
-    }
-    const double limit = inflation(all, 3) * chi_square_quantile(options_.links.rejection_probability, 3);
+    const Misfit limit = limits();
     std::int64_t changed = 0;
     for (SharedPlace& place : places_) {
       const std::vector<SharedPlace::Entry> before = place.entries;
@@ -336,9 +344,13 @@ class Assembly {
       for (std::size_t left = place.entries.size(); left > 1;) {
         const Mean m = mean(place);
         SharedPlace::Entry* worst = nullptr;
-        double largest = limit;
-        for (auto& e : place.entries)
-          if (const double s = e.kept ? squares(e, m) : 0; s > largest) worst = &e, largest = s;
+        double largest = 1;
+        for (auto& e : place.entries) {
+          if (!e.kept) continue;
+          const Misfit misfit = this->misfit(e, m);
+          const double over = std::max(misfit.place / limit.place, misfit.turn / limit.turn);
+          if (over > largest) worst = &e, largest = over;
+        }
         if (worst == nullptr) break;
         worst->kept = false;
         if (--left == 1)
@@ -354,17 +366,62 @@ class Assembly {
 
   void adjust() {
     constexpr double kSettled = 1e-6;  // sigmas
+    const std::vector<std::int32_t> linked = reference_;
     SimilarityEquations equations(held());
-    for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
-      const std::int64_t changed = iteration < options_.max_iterations / 2 ? screen() : 0;
-      linearise(equations);
-      const std::vector<SimilarityStep> steps = solved(equations);
-      if (move_and_measure(equations, steps) < kSettled && changed == 0) break;
+    converged_ = false;
+    while (iterations_ < options_.max_iterations && !converged_) {
+      const std::int64_t changed = iterations_ < options_.max_iterations / 2 ? screen() : 0;
+      ++iterations_;
+      factorise(equations);
+      converged_ = move_and_measure(equations, equations.solution()) < kSettled && changed == 0;
     }
+    factorise(equations);
+    find_lost(linked);
+    if (options_.covariances) covariance_ = equations.covariances();
+  }
+
+  // Where they leave similarities open, of fewer models.
+  void factorise(SimilarityEquations& equations) {
     linearise(equations);
-    if (!options_.covariances) return;
-    solved(equations);
-    for (std::int32_t m = 0; m < std::ssize(models_); ++m) covariance_.push_back(equations.covariance(m));
+    for (std::int32_t open; (open = equations.factorise()) >= 0;) {
+      take_apart(open);
+      equations.hold(held());
+      linearise(equations);
+    }
+  }
+
+  // By the equations that two models still have in common; where that joins them all, the open model goes alone.
+  void take_apart(std::int32_t open) {
+    std::map<std::pair<std::int32_t, std::int32_t>, int> common;
+    for (const SharedPlace& place : places_)
+      for (std::size_t i = 0; i < place.entries.size(); ++i)
+        for (std::size_t j = i + 1; j < place.entries.size(); ++j)
+          if (place.entries[i].kept && place.entries[j].kept)
+            common[{place.entries[i].model, place.entries[j].model}] += place.image ? 6 : 3;
+    DisjointSets joined(static_cast<std::int32_t>(models_.size()));
+    for (const auto& [pair, equations] : common)
+      if (equations >= 7) joined.unite(pair.first, pair.second);
+    bool split = false;
+    for (ModelLink& link : links_) {
+      if (!link.kept || joined.find(link.a) == joined.find(link.b)) continue;
+      link.kept = false;
+      split = true;
+    }
+    for (ModelLink& link : links_)
+      if (!split && (link.a == open || link.b == open)) link.kept = false;
+    find_parts();
+  }
+
+  // Of each part as it was linked the largest piece is the part, all others are lost to it.
+  void find_lost(const std::vector<std::int32_t>& linked) {
+    std::map<std::int32_t, std::map<std::int32_t, int>> pieces;
+    for (std::size_t m = 0; m < linked.size(); ++m) ++pieces[linked[m]][reference_[m]];
+    for (std::size_t m = 0; m < linked.size(); ++m) {
+      const auto& of_part = pieces[linked[m]];
+      const auto largest = std::max_element(of_part.begin(), of_part.end(),
+                                            [](const auto& a, const auto& b) { return a.second < b.second; });
+      if (reference_[m] != largest->first) lost_.push_back(models_[m].number);
+    }
   }
 
   void linearise(SimilarityEquations& equations) {
@@ -436,12 +493,19 @@ class Assembly {
     for (ModelLink link : links_) {
       Similarity& s = link.similarity;
       s.translation += centres_[nth(link.a)] - s.scale * (s.rotation * centres_[nth(link.b)]);
+      // xi about the centroid of b, as of xi about its origin.
+      Block7 about_centroid = Block7::Identity();
+      about_centroid.bottomLeftCorner<3, 4>() << -skew(centres_[nth(link.b)]), centres_[nth(link.b)];
+      link.information = about_centroid.transpose() * link.information * about_centroid;
       link.a = row_of_[nth(link.a)];
       link.b = row_of_[nth(link.b)];
       result.links.push_back(link);
     }
     for (const SharedPlace& place : places_)
       for (const auto& e : place.entries) ++result.shared, result.rejected += !e.kept;
+    result.lost = lost_;
+    result.iterations = iterations_;
+    result.converged = converged_;
     result.redundancy = redundancy_;
     if (redundancy_ > 0) result.sigma0 = std::sqrt(weighted_squares_ / static_cast<double>(redundancy_));
     return result;
@@ -456,6 +520,9 @@ class Assembly {
   std::vector<Similarity> similarity_;   // [models] of what is about the centre
   std::vector<std::int32_t> reference_;  // [models] the model whose frame is the part's
   std::vector<Block7> covariance_;       // [models] of xi
+  std::vector<std::int64_t> lost_;
+  int iterations_ = 0;
+  bool converged_ = true;
   double weighted_squares_ = 0;
   std::int64_t redundancy_ = 0;
 };

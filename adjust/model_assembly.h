@@ -14,7 +14,8 @@
 //     in units of each model, so that no scale shrinks. X and A are eliminated: with errors alike on all axes their
 //     normal matrices are multiples of the unit matrix, and X_i is the mean of S_m x_mi with weights 1/(s_m
 //     sigma_mi)^2. What is left, seven unknowns a model, is solved by sparse Cholesky factorisation. Points and images
-//     are tested in every round, both ways, and the worst of a place is left out first.
+//     are tested in every round, both ways, and the worst of a place is left out first. What is then no longer held
+//     together is taken apart, and the rest goes on without it.
 //
 // The frame is that of the model with the lowest number in each part that hangs together; its similarity is the
 // identity. Models, points and images are taken in the order of their numbers: the result has the same bits in whatever
@@ -28,7 +29,7 @@ namespace megablock {
 struct AssemblyOptions {
   LinkOptions links;
   bool joint = true;        // false: only chained along the spanning tree (steps 1 and 2), for comparison
-  bool covariances = true;  // one solution of the normal equations per unknown
+  bool covariances = true;  // by the entries of the inverse that the factor has: about the time of two iterations
   int max_iterations = 30;  // of the joint adjustment
   void check() const;       // throws InputError
 };
@@ -37,14 +38,17 @@ struct AssembledModels {
   std::vector<Similarity> similarity;            // [models] model -> frame of its part
   std::vector<SimilarityCovariance> covariance;  // [models] of steps as in similarity.h, for sigmas as they were given
   std::vector<std::int64_t> part;                // [models] number of the model whose frame is the part's
+  std::vector<std::int64_t> lost;                // numbers of models that links join to others, and places do not
   std::vector<ModelLink> links;                  // a, b: rows of the models given; similarity b -> a as adjusted alone
   std::int64_t shared = 0, rejected = 0;         // points and images in models, of those that models share
   std::int64_t redundancy = 0;
-  double sigma0 = 0;  // sqrt(weighted squares / redundancy)
+  double sigma0 = 0;      // sqrt(weighted squares / redundancy)
+  int iterations = 0;     // of the joint adjustment
+  bool converged = true;  // false: ended by max_iterations
 };
 
 // Throws InputError for numbers that are not finite, sigmas that are not positive, numbers given twice; ComputeError
-// when the adjustment has no solution. Models that nothing links are parts of their own.
+// when the adjustment diverges. Models that nothing links are parts of their own.
 AssembledModels assemble_models(const std::vector<Model>& models, const AssemblyOptions& options = {});
 
 }  // namespace megablock

@@ -66,13 +66,13 @@ class LinkFit {
     const auto start = best_sample();
     if (!start) return std::nullopt;
     Similarity s = *start;
-    const double inflation =
-        options_.scale_sigmas ? std::max(1.0, median(all_squares(s)) / chi_square_quantile(0.5, 3)) : 1.0;
-    limit_ *= inflation;
+    take_factors(s, equations(std::vector<std::uint8_t>(places_.size(), 1)));
     std::vector<std::uint8_t> agrees = agreeing(s, kWide * kWide * limit_);
     ModelLink link;
     for (int round = 0; round < kRounds; ++round) {
       if (!solve(agrees, s, link.information)) return std::nullopt;
+      // A sample's misfits are larger than those of least squares.
+      if (round < kRounds / 2) take_factors(s, equations(agrees));
       // Narrower with every round.
       const double factor = std::max(1.0, kWide / std::pow(2, round));
       const std::vector<std::uint8_t> next = agreeing(s, factor * factor * limit_);
@@ -84,7 +84,6 @@ class LinkFit {
     if (equations(agrees) < 7 + options_.min_redundancy || link.agreeing < options_.min_share * link.shared)
       return std::nullopt;
     link.similarity = s;
-    link.information /= inflation;
     return link;
   }
 
@@ -107,16 +106,39 @@ class LinkFit {
     return count;
   }
 
+  // By how much the variances of places and of attitudes are larger than their sigmas say, each by its own median. Of
+  // `used` equations seven go into the similarity.
+  void take_factors(const Similarity& s, int used) {
+    if (!options_.scale_sigmas) return;
+    std::vector<double> places, turns;
+    for (const Place& place : places_) places.push_back(place_factor_ * place_squares(s, place));
+    for (const Turn& turn : turns_) turns.push_back(turn_factor_ * turn_squares(s, turn));
+    const double typical = chi_square_quantile(0.5, 3) * (used - 7) / used;
+    place_factor_ = std::max(1.0, middle_of(places) / typical);
+    turn_factor_ = std::max(1.0, middle_of(turns) / typical);
+  }
+  // Unlike median() the mean of both middle ones: few images are in both models.
+  static double middle_of(std::vector<double> values) {
+    const double upper = median(values);
+    for (double& value : values) value = -value;
+    return 0.5 * (upper - median(std::move(values)));
+  }
+
+  double place_variance(const Similarity& s, const Place& place) const {
+    return place_factor_ * (place.sigma_b * place.sigma_b + place.sigma_a * place.sigma_a / (s.scale * s.scale));
+  }
   double place_squares(const Similarity& s, const Place& place) const {
-    const double variance = place.sigma_b * place.sigma_b + place.sigma_a * place.sigma_a / (s.scale * s.scale);
-    return (s.rotation.conjugate() * (place.a - s.translation) / s.scale - place.b).squaredNorm() / variance;
+    return (s.rotation.conjugate() * (place.a - s.translation) / s.scale - place.b).squaredNorm() /
+           place_variance(s, place);
+  }
+  double turn_variance(const Turn& turn) const { return turn_factor_ * turn.sigma * turn.sigma; }
+  double turn_squares(const Similarity& s, const Turn& turn) const {
+    return std::pow(rotation_angle(s.rotation, turn.rotation), 2) / turn_variance(turn);
   }
   // The larger of place and attitude of an image.
   double squares(const Similarity& s, std::size_t i) const {
     const double place = place_squares(s, places_[i]);
-    if (i < first_image_) return place;
-    const Turn& turn = turns_[i - first_image_];
-    return std::max(place, std::pow(rotation_angle(s.rotation, turn.rotation) / turn.sigma, 2));
+    return i < first_image_ ? place : std::max(place, turn_squares(s, turns_[i - first_image_]));
   }
   std::vector<double> all_squares(const Similarity& s) const {
     std::vector<double> result(places_.size());
@@ -183,14 +205,14 @@ class LinkFit {
         if (!agrees[i]) continue;
         const Place& place = places_[i];
         const Eigen::Vector3d z = s.rotation.conjugate() * (place.a - s.translation) / s.scale;
-        const double weight = 1 / (place.sigma_b * place.sigma_b + place.sigma_a * place.sigma_a / (s.scale * s.scale));
+        const double weight = 1 / place_variance(s, place);
         const Eigen::Matrix<double, 3, 7> by_step = by_model_step(z);
         information += weight * by_step.transpose() * by_step;
         right -= weight * by_step.transpose() * (z - place.b);
         if (i < first_image_) continue;
         const Turn& turn = turns_[i - first_image_];
-        information.topLeftCorner<3, 3>().diagonal().array() += 1 / (turn.sigma * turn.sigma);
-        right.head<3>() += rotation_log<double>(s.rotation.conjugate() * turn.rotation) / (turn.sigma * turn.sigma);
+        information.topLeftCorner<3, 3>().diagonal().array() += 1 / turn_variance(turn);
+        right.head<3>() += rotation_log<double>(s.rotation.conjugate() * turn.rotation) / turn_variance(turn);
       }
       // Unit diagonal, so that what the points leave open shows.
       const SimilarityStep size = information.diagonal().cwiseSqrt();
@@ -210,9 +232,10 @@ class LinkFit {
   }
 
   const LinkOptions& options_;
-  double limit_;               // of the squares of three equations
-  std::vector<Place> places_;  // points, then the centres of images
-  std::vector<Turn> turns_;    // of these
+  double limit_;                               // of the squares of three equations
+  double place_factor_ = 1, turn_factor_ = 1;  // of the variances
+  std::vector<Place> places_;                  // points, then the centres of images
+  std::vector<Turn> turns_;                    // of these
   std::size_t first_image_ = 0;
   std::mt19937_64 random_;
 };

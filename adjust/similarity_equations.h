@@ -21,7 +21,12 @@ inline std::size_t nth(std::int32_t i) { return static_cast<std::size_t>(i); }
 // Normal equations of seven unknowns a model; those of held models are left out.
 class SimilarityEquations {
  public:
-  explicit SimilarityEquations(const std::vector<std::uint8_t>& held) : row_(held.size(), -1), right_(held.size()) {
+  explicit SimilarityEquations(const std::vector<std::uint8_t>& held) { hold(held); }
+  // Begins anew with these models held.
+  void hold(const std::vector<std::uint8_t>& held) {
+    row_.assign(held.size(), -1);
+    right_.resize(held.size());
+    rows_ = 0;
     for (std::size_t m = 0; m < held.size(); ++m)
       if (!held[m]) row_[m] = rows_++;
     clear();
@@ -37,9 +42,9 @@ class SimilarityEquations {
   }
   void add(std::int32_t m, const SimilarityStep& right) { right_[nth(m)] += right; }
 
-  // Steps of all models, zero for held ones. False: not determined.
-  bool factorise() {
-    if (rows_ == 0) return true;
+  // The model at which it ends where the similarities are not determined, -1 where they are.
+  std::int32_t factorise() {
+    if (rows_ == 0) return -1;
     std::vector<Eigen::Triplet<double>> entries;
     entries.reserve(49 * blocks_.size());
     for (const auto& [key, block] : blocks_)
@@ -49,8 +54,17 @@ class SimilarityEquations {
     Eigen::SparseMatrix<double> matrix(7 * rows_, 7 * rows_);
     matrix.setFromTriplets(entries.begin(), entries.end());
     factor_.compute(matrix);
-    return factor_.info() == Eigen::Success && factor_.vectorD().allFinite() && factor_.vectorD().minCoeff() > 0;
+    constexpr double kOpen = 1e-14;  // share of a diagonal element that the others leave
+    const Eigen::VectorXd diagonal = matrix.diagonal();
+    const auto& row = factor_.permutationPinv().indices();
+    for (int i = 0; i < diagonal.size(); ++i) {
+      if (factor_.vectorD()(i) > kOpen * diagonal(row[i])) continue;
+      const auto open = std::find(row_.begin(), row_.end(), row[i] / 7);
+      return static_cast<std::int32_t>(open - row_.begin());
+    }
+    return -1;
   }
+  // Steps of all models, zero for held ones; after factorise().
   std::vector<SimilarityStep> solution() const {
     std::vector<SimilarityStep> steps(row_.size(), SimilarityStep::Zero());
     if (rows_ == 0) return steps;
@@ -67,17 +81,68 @@ class SimilarityEquations {
     const auto found = blocks_.find({row_[nth(m)], row_[nth(m)]});
     return found == blocks_.end() ? 0 : std::sqrt(std::max(0.0, step.dot(found->second * step)));
   }
-  Block7 covariance(std::int32_t m) const {
-    if (row_[nth(m)] < 0) return Block7::Zero();
-    Eigen::Matrix<double, Eigen::Dynamic, 7> unit(7 * rows_, 7);
-    unit.setZero();
-    unit.middleRows<7>(7 * row_[nth(m)]).setIdentity();
-    const Eigen::Matrix<double, Eigen::Dynamic, 7> columns = factor_.solve(unit);
-    const Block7 result = columns.middleRows<7>(7 * row_[nth(m)]);
-    return 0.5 * (result + result.transpose());
+  // Of all models, zero for held ones: the blocks of the inverse on its diagonal, from those entries alone that the
+  // factor has (K. Takahashi, J. Fagan, M.-S. Chin, "Formation of a sparse bus impedance matrix", 1973). After
+  // factorise().
+  std::vector<Block7> covariances() const {
+    std::vector<Block7> result(row_.size(), Block7::Zero());
+    if (rows_ == 0) return result;
+    const SelectedInverse inverse = selected_inverse();
+    const auto& place = factor_.permutationP().indices();
+    for (std::size_t m = 0; m < row_.size(); ++m) {
+      if (row_[m] < 0) continue;
+      for (int i = 0; i < 7; ++i)
+        for (int j = 0; j <= i; ++j)
+          result[m](i, j) = result[m](j, i) = inverse(place[7 * row_[m] + i], place[7 * row_[m] + j]);
+    }
+    return result;
   }
 
  private:
+  // Z = (L D L')^-1 where L has entries, lower triangle: of column j, with the rows R below its diagonal,
+  //
+  //     Z_Rj = -Z_RR L_Rj,     Z_jj = 1 / d_j - L_Rj' Z_Rj
+  //
+  // and Z_RR lies in the columns of R, which come after j.
+  struct SelectedInverse {
+    Eigen::SparseMatrix<double> below;  // strictly lower
+    Eigen::VectorXd diagonal;
+    double operator()(int i, int j) const { return i == j ? diagonal(i) : below.coeff(std::max(i, j), std::min(i, j)); }
+  };
+  SelectedInverse selected_inverse() const {
+    SelectedInverse z{factor_.matrixL().nestedExpression(), factor_.vectorD().cwiseInverse()};
+    using Column = Eigen::SparseMatrix<double>::InnerIterator;
+    const auto columns = static_cast<int>(z.below.cols());
+    std::vector<int> rows, place(nth(columns), -1);
+    std::vector<double> l, sum;
+    for (int j = columns - 1; j >= 0; --j) {
+      rows.clear();
+      l.clear();
+      for (Column entry(z.below, j); entry; ++entry) {
+        place[nth(entry.row())] = static_cast<int>(rows.size());
+        rows.push_back(entry.row());
+        l.push_back(entry.value());
+      }
+      sum.assign(rows.size(), 0);
+      for (std::size_t a = 0; a < rows.size(); ++a) {
+        sum[a] += z.diagonal(rows[a]) * l[a];
+        for (Column entry(z.below, rows[a]); entry; ++entry) {
+          if (place[nth(entry.row())] < 0) continue;
+          const std::size_t b = nth(place[nth(entry.row())]);
+          sum[a] += entry.value() * l[b];
+          sum[b] += entry.value() * l[a];
+        }
+      }
+      std::size_t a = 0;
+      for (Column entry(z.below, j); entry; ++entry, ++a) {
+        entry.valueRef() = -sum[a];
+        z.diagonal(j) += l[a] * sum[a];
+        place[nth(entry.row())] = -1;
+      }
+    }
+    return z;
+  }
+
   std::vector<int> row_;
   int rows_ = 0;
   std::map<std::pair<int, int>, Block7> blocks_;

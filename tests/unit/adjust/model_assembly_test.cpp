@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "adjust/similarity_equations.h"
 #include "io/error.h"
 #include "tests/unit/adjust/model_grid.h"
 
@@ -129,6 +130,117 @@ TEST(ModelAssembly, OrderOfModelsAndPointsDoesNotMatter) {
     }
     EXPECT_EQ(first.sigma0, other.sigma0);
   }
+}
+
+// What a link says of its errors, about the origin of its model, whose sigmas are too small by factors of their own.
+TEST(ModelAssembly, InformationOfLinksIsThatOfTheirErrors) {
+  for (const bool images : {false, true}) {
+    constexpr int kPairs = 300;
+    double squares = 0;
+    for (int pair = 0; pair < kPairs; ++pair) {
+      model_grid::Options scene;
+      scene.rows = 1;
+      scene.columns = 2;
+      scene.images_per_side = images ? 12 : 0;
+      scene.sigma = 0.3;
+      scene.rotation_sigma = 5e-4;
+      scene.seed = static_cast<unsigned>(500 + pair);
+      ModelGrid grid(scene);
+      for (Model& model : grid.models) {
+        if (images) model.points.clear();
+        for (ModelPoint& p : model.points) p.sigma /= 3;
+        for (ModelImage& i : model.images) i.centre_sigma /= 3, i.rotation_sigma /= 5;
+      }
+      AssemblyOptions options;
+      options.links.scale_sigmas = true;
+      const AssembledModels found = assemble_models(grid.models, options);
+      ASSERT_EQ(found.links.size(), 1u);
+      const ModelLink& link = found.links.front();
+      const SimilarityStep error =
+          step_of(link.similarity.inverse() * (grid.gauges[nth(link.a)] * grid.gauges[nth(link.b)].inverse()));
+      squares += error.dot(link.information * error) / 7 / kPairs;
+    }
+    std::printf("[ reached  ] links by %s: normalised error %.3f\n", images ? "images" : "points", std::sqrt(squares));
+    EXPECT_NEAR(std::sqrt(squares), 1, 0.1);
+  }
+}
+
+TEST(ModelAssembly, CovariancesAreBlocksOfTheInverse) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  constexpr int kModels = 9;
+  std::vector<std::uint8_t> held(kModels, 0);
+  held[2] = 1;
+  SimilarityEquations equations(held);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(7 * kModels, 7 * kModels);
+  const auto add = [&](int m, int n, const Block7& block) {
+    equations.add(m, n, block);
+    dense.block<7, 7>(7 * m, 7 * n) += block;
+  };
+  for (int m = 0; m < kModels; ++m)
+    for (const int n : {m, (m + 1) % kModels, (m + 3) % kModels}) {
+      const Block7 block = Block7::NullaryExpr([&](auto, auto) { return normal(random); });
+      if (m == n) {
+        add(m, m, block * block.transpose() + 60 * Block7::Identity());
+      } else {
+        add(m, n, block);
+        add(n, m, block.transpose());
+      }
+    }
+  for (int i = 14; i < 21; ++i) {
+    dense.row(i).setZero();
+    dense.col(i).setZero();
+    dense(i, i) = 1;
+  }
+  ASSERT_EQ(equations.factorise(), -1);
+  const Eigen::MatrixXd inverse = dense.inverse();
+  const std::vector<Block7> found = equations.covariances();
+  for (int m = 0; m < kModels; ++m) {
+    const Block7 expected = held[nth(m)] ? Block7::Zero() : Block7(inverse.block<7, 7>(7 * m, 7 * m));
+    EXPECT_LT((found[nth(m)] - expected).norm(), 1e-14) << m;
+  }
+}
+
+// One model is two hundred times worse than its sigmas say: its links, which find the size of their errors themselves, hold,
+// and not one of its places agrees with the others.
+TEST(ModelAssembly, GoesOnWithoutAModelThatLosesItsPlaces) {
+  model_grid::Options scene = small_grid();
+  scene.images_per_side = 0;
+  ModelGrid grid(scene);
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  const std::size_t bad = 4;
+  for (ModelPoint& p : grid.models[bad].points)
+    p.position += 200 * p.sigma * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  AssemblyOptions options;
+  options.links.scale_sigmas = true;
+  const AssembledModels found = assemble_models(grid.models, options);
+  EXPECT_EQ(found.lost, std::vector<std::int64_t>{grid.models[bad].number});
+  EXPECT_EQ(found.part[bad], grid.models[bad].number);
+  EXPECT_EQ(found.similarity[bad].scale, 1);
+  EXPECT_TRUE(found.converged);
+  for (const ModelLink& link : found.links)
+    EXPECT_EQ(link.kept, nth(link.a) != bad && nth(link.b) != bad) << link.a << ' ' << link.b;
+  for (std::size_t m = 0; m < grid.models.size(); ++m)
+    if (m != bad) {
+      EXPECT_EQ(found.part[m], grid.models[0].number);
+      const Similarity truth = grid.gauges[0] * grid.gauges[m].inverse();
+      EXPECT_NEAR(found.similarity[m].scale / truth.scale, 1, 1e-3) << m;
+    }
+  EXPECT_NEAR(found.sigma0, 1, 0.1);
+}
+
+TEST(ModelAssembly, SaysThatItHasNotConverged) {
+  const ModelGrid grid(small_grid());
+  AssemblyOptions options;
+  const AssembledModels whole = assemble_models(grid.models, options);
+  EXPECT_TRUE(whole.converged);
+  EXPECT_TRUE(whole.lost.empty());
+  EXPECT_LT(whole.iterations, options.max_iterations);
+  options.max_iterations = 1;
+  const AssembledModels once = assemble_models(grid.models, options);
+  EXPECT_FALSE(once.converged);
+  EXPECT_EQ(once.iterations, 1);
 }
 
 // A street: the images that pieces share stand on a line, and only their attitudes say how it turns about that line.
