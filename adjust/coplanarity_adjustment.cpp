@@ -205,38 +205,58 @@ bool on_one_line(const CoplanarityNetwork& network) {
   return any;
 }
 
+// Columns of the free parameters of one point alone: angles of the cameras that see it, its image coordinates.
+std::vector<std::int64_t> free_columns(const CoplanarityNetwork& network, const FreeColumns& free, std::int64_t point,
+                                       bool angles) {
+  std::vector<std::int64_t> columns;
+  const auto end = static_cast<std::size_t>(network.begin[static_cast<std::size_t>(point) + 1]);
+  for (auto o = static_cast<std::size_t>(network.begin[static_cast<std::size_t>(point)]); o < end; ++o)
+    for (std::size_t k = 0; k < (angles ? 3u : 2u); ++k) {
+      const std::int64_t column =
+          angles ? free.angle[3 * static_cast<std::size_t>(network.camera[o]) + k] : free.image[2 * o + k];
+      if (column >= 0) columns.push_back(column);
+    }
+  std::sort(columns.begin(), columns.end());
+  return columns;
+}
+
 // The equations of one point, every row divided by |m| |d_1| |d_2|.
 struct PointEquations {
-  Eigen::MatrixXd by_angles, by_images;  // [pairs x free angles], [pairs x free coordinates of the point]
+  std::vector<std::int64_t> angles;      // columns of the free angles of its cameras
+  Eigen::MatrixXd by_angles, by_images;  // [pairs x these], [pairs x free coordinates of the point]
 };
 PointEquations point_equations(const CoplanarityNetwork& network, const FreeColumns& free, std::int64_t point) {
-  const auto first = static_cast<std::size_t>(network.begin[static_cast<std::size_t>(point)]);
   const std::int64_t views =
       network.begin[static_cast<std::size_t>(point) + 1] - network.begin[static_cast<std::size_t>(point)];
-  std::vector<std::int64_t> local(static_cast<std::size_t>(2 * views), -1);
-  std::int64_t columns = 0;
-  for (std::size_t k = 0; k < local.size(); ++k)
-    if (free.image[2 * first + k] >= 0) local[k] = columns++;
-  const std::int64_t lowest = [&] {
-    for (std::size_t k = 0; k < local.size(); ++k)
-      if (local[k] == 0) return free.image[2 * first + k];
-    return std::int64_t{0};
-  }();
-  PointEquations result{Eigen::MatrixXd::Zero(views * (views - 1) / 2, free.angles),
-                        Eigen::MatrixXd::Zero(views * (views - 1) / 2, columns)};
+  PointEquations result;
+  result.angles = free_columns(network, free, point, true);
+  const std::vector<std::int64_t> images = free_columns(network, free, point, false);
+  result.by_angles = Eigen::MatrixXd::Zero(views * (views - 1) / 2, std::ssize(result.angles));
+  result.by_images = Eigen::MatrixXd::Zero(views * (views - 1) / 2, std::ssize(images));
+  const auto place = [](const std::vector<std::int64_t>& columns, std::int64_t column) {
+    return std::lower_bound(columns.begin(), columns.end(), column) - columns.begin();
+  };
   std::int64_t row = 0;
   visit_pairs(network, point, [&](std::size_t a, std::size_t b) {
     const auto length = [&](std::size_t o) { return std::hypot(1.0, network.image[o].norm() / network.focal_px); };
     const double scale = 1 / (base_of(network, a, b).norm() * length(a) * length(b));
     visit_derivatives(network, free, a, b, determinant(network, a, b), [&](std::int64_t column, double value) {
       if (column < free.angles)
-        result.by_angles(row, column) = scale * value;
-      else  // free coordinates of a point are successive columns
-        result.by_images(row, column - lowest) = scale * network.focal_px * value;
+        result.by_angles(row, place(result.angles, column)) = scale * value;
+      else
+        result.by_images(row, place(images, column)) = scale * network.focal_px * value;
     });
     ++row;
   });
   return result;
+}
+
+// normal += A'A of rows that concern some columns alone.
+void add_normal(const Eigen::MatrixXd& rows, const std::vector<std::int64_t>& columns, Eigen::MatrixXd& normal) {
+  const Eigen::MatrixXd squared = rows.transpose() * rows;
+  for (std::size_t r = 0; r < columns.size(); ++r)
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      normal(columns[r], columns[c]) += squared(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
 }
 
 constexpr double kAngles = 1e-6;  // of the largest singular value, from normal equations of the angles
@@ -348,8 +368,8 @@ CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
       result.image_rank += rank;
       remaining = svd.u.rightCols(svd.u.cols() - rank).transpose() * point.by_angles;
     }
-    left += remaining.transpose() * remaining;
-    whole += point.by_angles.transpose() * point.by_angles;
+    add_normal(remaining, point.angles, left);
+    add_normal(point.by_angles, point.angles, whole);
   }
   result.rank = result.image_rank;
   if (free.angles == 0) return result;

@@ -13,6 +13,7 @@
 #include "cluster/calibrate_command.h"
 #include "cluster/collective.h"
 #include "cluster/communicator.h"
+#include "cluster/coplanarity_command.h"
 #include "cluster/diagnose_command.h"
 #include "cluster/diagnostics.h"
 #include "cluster/exit_codes.h"
@@ -371,6 +372,7 @@ int command_line(int argc, char** argv) {
     add_status(app, by_one);
     add_report(app, by_one);
     add_diagnose(app, by_one);
+    add_coplanarity(app, by_one);
     add_export(app, by_one);
     add_measurements(app, by_one);
     add_import(app, by_one);

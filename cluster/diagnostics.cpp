@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
-#include "io/error.h"
-#include "io/unit_files.h"
+#include "cluster/job_so_far.h"
 #include "partition/block_diagnostics.h"
 #include "partition/link_weights.h"
 
@@ -63,15 +61,6 @@ BlockDiagnostics diagnose_with(TrackEvidence& evidence, const Block& block, cons
   return diagnose(block, state, evidence.ground_height(), evidence.graph(), options);
 }
 
-// The last generation's orientation, if it is of the block as it is now.
-std::optional<BlockState> oriented_state(const JobStore& store, const Block& block) {
-  std::vector<std::string> units = store.list("orient");
-  std::sort(units.begin(), units.end());
-  if (units.empty()) return std::nullopt;
-  BlockState state = read_orientation(store.verified_path(units.back())).state;
-  return state.frames.size() == block.frames.size() ? std::optional(std::move(state)) : std::nullopt;
-}
-
 }  // namespace
 
 BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
@@ -88,20 +77,10 @@ JobDiagnostics diagnose_job(const JobStore& store) {
     const BlockResult result = read_result_without_tracks(path);
     return {result.block, diagnose_result(result, StoredTracks(path), options), "the result"};
   }
-  if (!store.seal("block.h5")) throw InputError(store.directory() + ": the job holds no block yet; run it first");
-  JobDiagnostics job{read_block(store.verified_path("block.h5")), {}, "the given poses"};
-  BlockState state = state_of_priors(job.block);
-  if (auto oriented = oriented_state(store, job.block)) {
-    state = std::move(*oriented);
-    job.source = "the initial orientation";
-  }
+  const JobSoFar job = read_job_so_far(store);
   TrackEvidence evidence(job.block);
-  std::vector<std::string> units = store.list("tracks");
-  std::sort(units.begin(), units.end());
-  for (const std::string& unit : units)
-    if (unit.ends_with(".h5")) evidence.add(read_tracks(store.verified_path(unit)), {}, {});
-  job.found = diagnose_with(evidence, job.block, state, options);
-  return job;
+  visit_tracks(store, [&](const TrackSet& tracks) { evidence.add(tracks, {}, {}); });
+  return {job.block, diagnose_with(evidence, job.block, job.state, options), job.source};
 }
 
 }  // namespace megablock

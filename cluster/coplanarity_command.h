@@ -1,0 +1,14 @@
+// `megablock coplanarity`: attitudes of a job's frames by the determinant method (adjust/coplanarity_adjustment.h).
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace megablock {
+
+void add_coplanarity(CLI::App& app, std::function<int()>& action);
+
+}  // namespace megablock
