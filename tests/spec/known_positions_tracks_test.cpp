@@ -8,6 +8,7 @@
 #include <set>
 
 #include "io/error.h"
+#include "known_positions_scene.h"
 #include "match/common_tracks.h"
 #include "match/pair_matching.h"
 #include "match/tracks.h"
@@ -111,6 +112,80 @@ TEST(KnownPositionsTracks, TKP11FalseMergesDoNotPutAnImageTwiceIntoATrack) {
     for (std::size_t i = 1; i < track.size(); ++i) ASSERT_LT(track[i - 1].first, track[i].first);
   std::shuffle(pairs.begin(), pairs.end(), random);
   EXPECT_EQ(tracks_of(pairs), tracks);
+}
+
+// Every pair of the six images of a scene with all of its points, image coordinates with a noise of 0.1 px; row =
+// point. Kept is what the verification keeps at a threshold, everything without one.
+std::vector<VerifiedPair> verified_pairs(const KnownPositionsScene& scene, double max_residual_px) {
+  std::vector<VerifiedPair> pairs;
+  for (std::size_t a = 0; a < scene.centres.size(); ++a)
+    for (std::size_t b = a + 1; b < scene.centres.size(); ++b) {
+      PointPairs points;
+      for (const std::vector<Eigen::Vector2d>& image : scene.images) {
+        points.a.push_back(image[a] / scene.focal);
+        points.b.push_back(image[b] / scene.focal);
+      }
+      TwoViewOptions options;
+      options.max_residual = max_residual_px / scene.focal;
+      options.seed = 100 * a + b;
+      const std::vector<std::uint8_t> kept =
+          max_residual_px > 0 ? estimate_two_view(points, options).inlier : std::vector<std::uint8_t>(points.size(), 1);
+      VerifiedPair pair;
+      pair.a = ImageIndex(static_cast<std::int64_t>(a));
+      pair.b = ImageIndex(static_cast<std::int64_t>(b));
+      pair.model = PairModel::kEssential;
+      for (std::size_t i = 0; i < kept.size(); ++i)
+        if (kept[i]) pair.feature_a.push_back(static_cast<std::int32_t>(i));
+      pair.feature_b = pair.feature_a;
+      pairs.push_back(pair);
+    }
+  return pairs;
+}
+
+struct SurvivingTracks {
+  double matches = 0, tracks = 0, complete = 0;  // shares: of the matches; of the points, as tracks of six images, and
+                                                 // with the matches of all fifteen pairs
+};
+SurvivingTracks surviving_tracks(const KnownPositionsScene& scene, double max_residual_px) {
+  const std::vector<VerifiedPair> pairs = verified_pairs(scene, max_residual_px);
+  IndexedVector<ImageIndex, std::vector<Keypoint>> features(scene.centres.size());
+  std::int32_t place = 0;
+  for (auto& points : features)
+    for (std::size_t i = 0; i < scene.points.size(); ++i) points.push_back({++place, 2 * place, 3, 0});
+  const TrackSet tracks = build_tracks(features, pairs, {});
+  SurvivingTracks result;
+  const auto points = static_cast<double>(scene.points.size());
+  for (std::size_t t = 0; t < tracks.id.size(); ++t)
+    result.tracks += (tracks.begin[t + 1] - tracks.begin[t] == 6 ? 1 : 0) / points;
+  std::vector<std::size_t> times(scene.points.size(), 0);
+  for (const VerifiedPair& pair : pairs)
+    for (const std::int32_t point : pair.feature_a) ++times[static_cast<std::size_t>(point)];
+  for (const std::size_t count : times) {
+    result.matches += static_cast<double>(count) / static_cast<double>(pairs.size()) / points;
+    result.complete += (count == pairs.size() ? 1 : 0) / points;
+  }
+  return result;
+}
+
+// A threshold of twice the noise loses a match in twenty; half of the noise more than half of the matches, many times
+// more of the tracks.
+TEST(KnownPositionsTracks, TKP13TracksFallFasterThanMatchesWithTheThreshold) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const KnownPositionsScene scene(KnownPositionsOptions::satellite(600, 0.1, seed));
+    const SurvivingTracks all = surviving_tracks(scene, 0), usual = surviving_tracks(scene, 0.2),
+                          narrow = surviving_tracks(scene, 0.05);
+    for (const auto& [level, found] : {std::pair{"0.2 px", usual}, std::pair{"0.05 px", narrow}})
+      std::printf("[ reached  ] at %s: %.1f %% of the matches, %.1f %% of the tracks of six images, %.2f %% complete\n",
+                  level, 100 * found.matches, 100 * found.tracks, 100 * found.complete);
+    EXPECT_NEAR(all.tracks, 1, 1e-9);
+    EXPECT_LE(usual.tracks, all.tracks);
+    EXPECT_LT(narrow.tracks, usual.tracks);
+    EXPECT_LT(usual.complete, all.complete);
+    expect_at_least(usual.tracks, 0.98, "share of tracks that 0.2 px leave");
+    expect_at_most(narrow.complete / usual.complete, 0.25 * narrow.matches / usual.matches,
+                   "complete tracks at 0.05 px over those at 0.2 px");
+  }
+  EXPECT_GE(MatchOptions().max_residual_px, 0.2);
 }
 
 // Five times six images of which all have about as many matches in pairs, but few, fewer and hardly any tracks in
