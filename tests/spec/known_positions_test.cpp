@@ -2,6 +2,8 @@
 // held positions, priors of the attitudes. Scenes and measures: known_positions_scene.h.
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "adjust/common_motion.h"
 #include "geometry/median.h"
 #include "known_positions_scene.h"
@@ -130,7 +132,7 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
   };
   const Case cases[] = {{true, true, 0, 3, 1, true, false, 20},          {true, true, 1, 100, 0.015, false, false, 20},
                         {true, true, 2, 100, 0.015, false, false, 20},   {true, true, 4, 200, 0.008, false, false, 20},
-                        {true, false, 0, 1000, 0.002, false, false, 20}, {false, false, 0, 2, 7, false, true, 60},
+                        {true, false, 0, 1000, 0.002, false, false, 20}, {false, false, 0, 2, 7, false, true, 200},
                         {false, false, 1, 2.5, 2.5, false, true, 20},    {false, true, 0, 1.5, 1000, true, true, 20},
                         {false, true, 1, 2.5, 4, false, true, 20}};
   for (const Case& c : cases) {
@@ -146,9 +148,12 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
                              (c.collinear ? ", collinear, " : ", spread, ") + std::to_string(c.control) +
                              " control points: ";
     expect_at_least(runs.angle_gain(), c.least_gain, what + "angle error divided by");
-    // The median: of satellites the mean of 200 scenes is 7.7 m, led by a few with cameras nearly on a line (27 m).
+    // The median: a few scenes with cameras nearly on a line lead the mean. The published 6.4 m is the mean of twenty.
     expect_at_most(median(runs.point_rms_of_runs), c.largest_rms, what + "median rms of the points, m");
-    std::printf("[ reached  ] %smean rms %.4g m\n", what.c_str(), runs.mean(runs.point_rms));
+    std::printf("[ reached  ] %smean rms %.4g m, of every twenty scenes", what.c_str(), runs.mean(runs.point_rms));
+    for (auto first = runs.point_rms_of_runs.begin(); first != runs.point_rms_of_runs.end(); first += 20)
+      std::printf(" %.4g", std::accumulate(first, first + 20, 0.0) / 20);
+    std::printf("\n");
     EXPECT_EQ(runs.collinear, c.line_flagged ? c.runs : 0) << what;
     EXPECT_EQ(runs.weak_common, c.common_flagged ? c.runs : 0) << what;
   }
