@@ -159,5 +159,60 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
   }
 }
 
+// Mean over the points of the expected squared error of their positions: the best that an unbiased estimate can do with
+// these images and attitudes, from the normal equations at the truth by central differences.
+double expected_squared_error(const KnownPositionsScene& scene) {
+  const auto cameras = static_cast<Eigen::Index>(scene.centres.size());
+  const double image_weight = std::pow(scene.options.image_sigma_px, -2);
+  Eigen::MatrixXd angles =
+      std::pow(scene.options.angle_sigma_rad, -2) * Eigen::MatrixXd::Identity(3 * cameras, 3 * cameras);
+  std::vector<Eigen::Matrix3d> point_inverse;
+  std::vector<Eigen::MatrixXd> coupling;  // (angles x point) times that
+  for (const Eigen::Vector3d& point : scene.points) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::MatrixXd both(3 * cameras, 3);
+    for (Eigen::Index i = 0; i < cameras; ++i) {
+      const auto camera = static_cast<std::size_t>(i);
+      const auto seen = [&](const Eigen::Vector3d& turn, const Eigen::Vector3d& shift) -> Eigen::Vector2d {
+        XyzAngles a = scene.true_angles[camera];
+        a = {a.alpha + turn.x(), a.beta + turn.y(), a.gamma + turn.z()};
+        return scene.focal * (rotation_from(a) * (point + shift - scene.centres[camera])).hnormalized();
+      };
+      constexpr double kTurn = 1e-6, kShift = 1e-2;  // rad, m
+      Eigen::Matrix<double, 2, 3> by_angles, by_point;
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d zero = Eigen::Vector3d::Zero(), unit = Eigen::Vector3d::Unit(k);
+        by_angles.col(k) = (seen(kTurn * unit, zero) - seen(-kTurn * unit, zero)) / (2 * kTurn);
+        by_point.col(k) = (seen(zero, kShift * unit) - seen(zero, -kShift * unit)) / (2 * kShift);
+      }
+      angles.block<3, 3>(3 * i, 3 * i) += image_weight * by_angles.transpose() * by_angles;
+      normal += image_weight * by_point.transpose() * by_point;
+      both.middleRows(3 * i, 3) = image_weight * by_angles.transpose() * by_point;
+    }
+    point_inverse.push_back(normal.inverse());
+    coupling.emplace_back(both * point_inverse.back());
+    angles -= coupling.back() * both.transpose();
+  }
+  const Eigen::MatrixXd covariance = angles.inverse();
+  double sum = 0;
+  for (std::size_t j = 0; j < coupling.size(); ++j)
+    sum += point_inverse[j].trace() + (coupling[j].transpose() * covariance * coupling[j]).trace();
+  return sum / static_cast<double>(coupling.size());
+}
+
+// Whatever the mean of some scenes: over many, the points are as good as images and attitudes allow.
+TEST(KnownPositions, TKP20SatellitePointsAreAsGoodAsTheDataAllow) {
+  double reached = 0, expected = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const KnownPositionsScene scene(KnownPositionsOptions::satellite(200, 0.1, seed));
+    SingleTile tile(scene.block(), adjustment_of(scene));
+    adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
+    reached += std::pow(scene.point_rms(tile.state.points), 2) / 200;
+    expected += expected_squared_error(scene) / 200;
+  }
+  std::printf("[ reached  ] rms of 200 scenes %.4g m, expected %.4g m\n", std::sqrt(reached), std::sqrt(expected));
+  expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, "off the expected rms by");
+}
+
 }  // namespace
 }  // namespace megablock
