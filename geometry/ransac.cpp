@@ -14,6 +14,15 @@ void RansacOptions::check() const {
   if (!(inlier_share >= 0 && inlier_share <= 1))
     throw std::invalid_argument("ransac: the share of inliers must lie between 0 and 1");
   if (max_draws < 1) throw std::invalid_argument("ransac: at least one draw is needed");
+  if (min_draws > max_draws) throw std::invalid_argument("ransac: min_draws must not exceed max_draws");
+  if (keep < 1) throw std::invalid_argument("ransac: at least one model must be kept");
+}
+
+double number_of_samples(std::size_t observations, std::size_t sample_size) {
+  double number = observations >= sample_size ? 1 : 0;
+  for (std::size_t k = 0; k < sample_size; ++k)
+    number *= static_cast<double>(observations - k) / static_cast<double>(k + 1);
+  return number;
 }
 
 double draws_needed(std::size_t sample_size, double inlier_share, double confidence) {

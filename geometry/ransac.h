@@ -33,11 +33,13 @@
 // Nothing is allocated in a draw. The outcome depends on the estimator and the seed alone.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <random>
 #include <span>
@@ -51,6 +53,9 @@ struct RansacOptions {
   double confidence = 0.99;  // p
   double inlier_share = 0;   // w is known to be at least this; 0: not known
   int max_draws = 5000;
+  int min_draws = 0;     // where a single right sample may not be enough
+  double enumerate = 0;  // all samples are taken, one after the other, where there are no more than these
+  std::size_t keep = 1;  // models in the result: the best ones
   std::uint64_t seed = 0;
   void check() const;  // throws std::invalid_argument
 };
@@ -58,6 +63,9 @@ struct RansacOptions {
 // Draws after which one of `sample_size` right observations was among them with the probability `confidence`; at least
 // one, infinite for a share of zero.
 double draws_needed(std::size_t sample_size, double inlier_share, double confidence);
+
+// Of distinct observations, in any order.
+double number_of_samples(std::size_t observations, std::size_t sample_size);
 
 // Threshold below which a right observation's residual lies with this probability, when each of its `components` has
 // the standard deviation `sigma`.
@@ -113,9 +121,22 @@ struct RansacResult {
   double threshold = 0;  // the one given, or chosen
   double log10_nfa = 0;  // where it was chosen
   int draws = 0;
+  std::vector<Model> others{};  // the next best in order, of those that were scored; options.keep - 1 at most
 };
 
 namespace ransac_detail {
+
+// The next one of the ascending samples of `size` observations; false after the last.
+template <std::size_t N>
+bool next_sample(std::array<std::size_t, N>& rows, std::size_t size) {
+  for (std::size_t k = N; k-- > 0;) {
+    if (rows[k] == size - N + k) continue;
+    ++rows[k];
+    for (std::size_t j = k + 1; j < N; ++j) rows[j] = rows[j - 1] + 1;
+    return true;
+  }
+  return false;
+}
 
 struct Score {
   double value = 0, threshold = 0;
@@ -188,6 +209,7 @@ template <SampleEstimator Estimator>
 std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator, const RansacOptions& options,
                                                               std::span<const typename Estimator::Model> starts = {}) {
   using Found = typename Estimator::Model;
+  using Rows = std::array<std::size_t, Estimator::kSampleSize>;
   using ransac_detail::Score;
   constexpr std::size_t kSize = Estimator::kSampleSize;
   constexpr int kRounds = 4;  // of local optimisation
@@ -197,55 +219,77 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
 
   std::optional<FalseAlarms> alarms;
   if (options.threshold == 0) alarms.emplace(size, kSize);
-  std::optional<Found> best;
-  Score best_score;
+  struct Scored {
+    Score score;
+    Found model;
+  };
+  std::vector<Scored> best;  // first
+  best.reserve(options.keep + 1);
+  // True where the model is the best one now.
   const auto consider = [&](const Found& model) {
+    const Score to_beat = best.size() < options.keep ? Score{} : best.back().score;
     Score score;
     if (!alarms) {
-      score = ransac_detail::supported(estimator.squared_residuals(model), size, options.threshold, best_score);
+      score = ransac_detail::supported(estimator.squared_residuals(model), size, options.threshold, to_beat);
     } else if constexpr (requires { estimator.chance(1.0); }) {
       score = ransac_detail::meaningful(estimator.squared_residuals(model), size, kSize, options.max_threshold, *alarms,
                                         [&](double threshold) { return estimator.chance(threshold); });
     }
-    if (!(score.value > best_score.value)) return false;
-    best = model;
-    best_score = score;
-    return true;
+    if (!(score.value > to_beat.value)) return false;
+    if (best.size() == options.keep) best.pop_back();
+    const auto place =
+        std::find_if(best.begin(), best.end(), [&](const Scored& other) { return score.value > other.score.value; });
+    return best.insert(place, {score, model}) == best.begin();
   };
   double needed = options.max_draws;
   const auto draws_suffice = [&](double share) {
-    needed = std::min(needed, draws_needed(kSize, share, options.confidence));
+    needed = std::min(needed, std::max<double>(options.min_draws, draws_needed(kSize, share, options.confidence)));
   };
   if (options.inlier_share > 0) draws_suffice(options.inlier_share);
   const auto improve = [&] {
-    for (int round = 0; round < kRounds && best_score.inliers > kSize; ++round) {
-      const std::optional<Found> refined = estimator.refine(*best, best_score.threshold);
+    for (int round = 0; round < kRounds && best.front().score.inliers > kSize; ++round) {
+      const std::optional<Found> refined = estimator.refine(best.front().model, best.front().score.threshold);
       if (!refined || !consider(*refined)) break;
     }
-    draws_suffice(static_cast<double>(best_score.inliers) / static_cast<double>(size));
+    draws_suffice(static_cast<double>(best.front().score.inliers) / static_cast<double>(size));
   };
 
   bool better = false;
   for (const Found& start : starts) better |= consider(start);
   if (better) improve();
-  std::mt19937_64 random(options.seed);
-  int draws = 0;
-  for (; draws < needed; ++draws) {
-    std::array<std::size_t, kSize> rows;
-    for (std::size_t k = 0; k < kSize;) {
-      rows[k] = random() % size;
-      bool again = false;
-      for (std::size_t j = 0; j < k; ++j) again |= rows[j] == rows[k];
-      k += !again;
-    }
+  const auto attempt = [&](const Rows& rows) {
     better = false;
     for (const Found& model : estimator.solve(rows)) better |= consider(model);
     if (better) improve();
+  };
+  int draws = 0;
+  if (number_of_samples(size, kSize) <= options.enumerate) {
+    Rows rows;
+    std::iota(rows.begin(), rows.end(), std::size_t{0});
+    do {
+      attempt(rows);
+      ++draws;
+    } while (ransac_detail::next_sample(rows, size));
+  } else {
+    std::mt19937_64 random(options.seed);
+    for (; draws < needed; ++draws) {
+      Rows rows;
+      for (std::size_t k = 0; k < kSize;) {
+        rows[k] = random() % size;
+        bool again = false;
+        for (std::size_t j = 0; j < k; ++j) again |= rows[j] == rows[k];
+        k += !again;
+      }
+      attempt(rows);
+    }
   }
-  if (!best) return std::nullopt;
-  RansacResult<Found> result{*best, consensus_of(estimator, *best, best_score.threshold), best_score.threshold};
-  result.log10_nfa = alarms ? -best_score.value : 0;
+  if (best.empty()) return std::nullopt;
+  const Score& score = best.front().score;
+  RansacResult<Found> result{best.front().model, consensus_of(estimator, best.front().model, score.threshold),
+                             score.threshold};
+  result.log10_nfa = alarms ? -score.value : 0;
   result.draws = draws;
+  for (std::size_t k = 1; k < best.size(); ++k) result.others.push_back(best[k].model);
   return result;
 }
 

@@ -4,6 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "geometry/median.h"
+
 namespace megablock {
 
 namespace {
@@ -69,13 +71,14 @@ struct NormalEquations {
 
 // Geman-McClure: rho(r) = r^2 / (1 + r^2/s^2), weight 1 / (1 + r^2/s^2)^2; its reach is about 3 s.
 NormalEquations normal_equations(const RelativeOrientation& o, const PointPairs& points, double scale,
-                                 std::size_t stride) {
+                                 std::size_t stride, std::span<const double> weights) {
   SampsonEquations equations(o);
   NormalEquations sum;
   for (std::size_t i = 0; i < points.size(); i += stride) {
-    if (!equations.at(points.a[i], points.b[i])) continue;
-    const double r = equations.residual, q = 1 + r * r / (scale * scale), weight = 1 / (q * q);
-    sum.cost += r * r / q;
+    const double given = weights.empty() ? 1 : weights[i];
+    if (given == 0 || !equations.at(points.a[i], points.b[i])) continue;
+    const double r = equations.residual, q = 1 + r * r / (scale * scale), weight = given / (q * q);
+    sum.cost += given * r * r / q;
     if (weight < 1e-3) continue;
     const Vector5 j = equations.derivative();
     sum.normal.noalias() += weight * j * j.transpose();
@@ -124,11 +127,11 @@ Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base) {
 }
 
 RelativeOrientation adjust_orientation(const RelativeOrientation& start, const PointPairs& points,
-                                       const RelativeAdjustment& by) {
+                                       const RelativeAdjustment& by, std::span<const double> weights) {
   const std::size_t stride =
       by.max_pairs == 0 ? 1 : std::max<std::size_t>(1, (points.size() + by.max_pairs - 1) / by.max_pairs);
   RelativeOrientation o = start;
-  NormalEquations current = normal_equations(o, points, by.scale, stride);
+  NormalEquations current = normal_equations(o, points, by.scale, stride, weights);
   double damping = 1e-6;
   for (int iteration = 0; iteration < by.max_iterations; ++iteration) {
     Matrix5 damped = current.normal;
@@ -137,7 +140,7 @@ RelativeOrientation adjust_orientation(const RelativeOrientation& start, const P
     const Vector5 step = -damped.ldlt().solve(current.gradient);
     if (!step.allFinite()) break;
     const RelativeOrientation next = updated(o, step);
-    const NormalEquations there = normal_equations(next, points, by.scale, stride);
+    const NormalEquations there = normal_equations(next, points, by.scale, stride, weights);
     if (there.cost < current.cost) {
       o = next;
       current = there;
@@ -146,32 +149,59 @@ RelativeOrientation adjust_orientation(const RelativeOrientation& start, const P
       damping *= 100;
       if (damping > 1e6) break;
     }
-    if (step.norm() < 1e-9) break;
+    if (step.norm() < by.tolerance) break;
   }
   return o;
+}
+
+std::vector<double> leverage_weights(const RelativeOrientation& orientation, const PointPairs& points,
+                                     std::span<const std::uint8_t> inlier) {
+  constexpr double kMost = 3;  // times the median
+  SampsonEquations equations(orientation);
+  std::vector<Vector5> derivatives(points.size(), Vector5::Zero());
+  Matrix5 normal = Matrix5::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!inlier[i] || !equations.at(points.a[i], points.b[i])) continue;
+    derivatives[i] = equations.derivative();
+    normal.noalias() += derivatives[i] * derivatives[i].transpose();
+  }
+  normal.diagonal().array() += 1e-12 * normal.trace();
+  const Eigen::LDLT<Matrix5> factor(normal);
+  std::vector<double> weights(points.size(), 0), leverages;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (inlier[i]) {
+      weights[i] = derivatives[i].dot(factor.solve(derivatives[i]));
+      leverages.push_back(weights[i]);
+    }
+  if (leverages.empty()) return weights;
+  const double most = kMost * median(std::move(leverages));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (inlier[i]) weights[i] = weights[i] > most ? most / weights[i] : 1;
+  return weights;
 }
 
 double OrientationPrecision::rotation_sigma() const { return largest_sigma(covariance.topLeftCorner<3, 3>()); }
 double OrientationPrecision::base_sigma() const { return largest_sigma(covariance.bottomRightCorner<2, 2>()); }
 
 OrientationPrecision precision_of(const RelativeOrientation& orientation, const PointPairs& points,
-                                  std::span<const std::uint8_t> inlier, double scale, double min_sigma) {
+                                  std::span<const std::uint8_t> inlier, double scale, double min_sigma,
+                                  std::span<const double> weights) {
   SampsonEquations equations(orientation);
   Matrix5 normal = Matrix5::Zero();
   Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
-  double squares = 0, slopes = 0;
-  int count = 0;
+  double squares = 0, slopes = 0, count = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!inlier[i] || !equations.at(points.a[i], points.b[i])) continue;
+    const double weight = weights.empty() ? 1 : weights[i];
     const Vector5 j = equations.derivative();
-    normal.noalias() += j * j.transpose();
-    noise += equations.base_noise();
+    normal.noalias() += weight * j * j.transpose();
+    noise += weight * equations.base_noise();
     const double r = equations.residual, share = r * r / (scale * scale), q = 1 + share;
-    squares += r * r / (q * q * q * q);
-    slopes += (1 - 3 * share) / (q * q * q);
-    ++count;
+    squares += weight * r * r / (q * q * q * q);
+    slopes += weight * (1 - 3 * share) / (q * q * q);
+    count += weight;
   }
-  if (count < 6 || !(slopes > 0)) return {};
+  if (!(count >= 6) || !(slopes > 0)) return {};
   const double variance = std::max(min_sigma * min_sigma, squares * count / (slopes * slopes) * count / (count - 5));
   normal.bottomRightCorner<2, 2>() -= variance * noise;
   return precision_from(normal, variance);

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <numbers>
 #include <span>
+#include <vector>
 
 #include "geometry/point_pairs.h"
 #include "geometry/relative_orientation.h"
@@ -37,13 +38,22 @@ double intersection_angle(const Eigen::Quaterniond& rotation, const Eigen::Vecto
 
 struct RelativeAdjustment {
   double scale = 1e-3;        // of the Geman-McClure weights 1 / (1 + (r / scale)^2)^2, normalised units
-  int max_iterations = 30;    // of Levenberg-Marquardt; ends earlier where nothing changes
+  int max_iterations = 30;    // of Levenberg-Marquardt; ends earlier with a step below the tolerance
   std::size_t max_pairs = 0;  // at most so many of them, evenly taken from all; 0: all
+  double tolerance = 1e-9;    // radians
 };
 
-// From a start near enough: the minimum of the weighted squares.
+// From a start near enough: the minimum of the weighted squares. `weights` [pairs], besides those of the residuals;
+// empty: all one.
 RelativeOrientation adjust_orientation(const RelativeOrientation& start, const PointPairs& points,
-                                       const RelativeAdjustment& by);
+                                       const RelativeAdjustment& by, std::span<const double> weights = {});
+
+// Weights that bound what a single pair decides (C. Mallows 1975; F. Hampel et al., "Robust statistics", 1986, 6.3):
+// one where the leverage J' N^-1 J of an inlier is at most three times the median, beyond it in inverse proportion to
+// it; zero of what is no inlier. A wrong match has any parallax, and turns the base the more the larger it is: of 150
+// right matches and a wrong one with ten times their parallax that one decides.
+std::vector<double> leverage_weights(const RelativeOrientation& orientation, const PointPairs& points,
+                                     std::span<const std::uint8_t> inlier);
 
 // Two unit axes across the base.
 Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base);
@@ -58,13 +68,14 @@ struct OrientationPrecision {
   double base_sigma() const;
 };
 
-// Of an orientation adjusted with this scale of the weights to the pairs that are inliers: weights cost accuracy, wrong
-// matches among the inliers cost more. With psi = r / (1 + (r / scale)^2)^2 sigma^2 is mean(psi^2) / mean(psi')^2
-// (P. Huber, "Robust statistics", 1981, 7.6), at least `min_sigma` squared: matches are never exact. What the points'
-// own errors add to the parallaxes is taken from them, so that without a base it is open. Six inliers at least, else
-// all is.
+// Of an orientation adjusted with this scale of the weights, and these further ones (empty: all one), to the pairs that
+// are inliers: weights cost accuracy, wrong matches among the inliers cost more. With psi = r / (1 + (r / scale)^2)^2
+// sigma^2 is mean(psi^2) / mean(psi')^2 (P. Huber, "Robust statistics", 1981, 7.6), at least `min_sigma` squared:
+// matches are never exact. What the points' own errors add to the parallaxes is taken from them, so that without a base
+// it is open. Six inliers at least, else all is.
 OrientationPrecision precision_of(const RelativeOrientation& orientation, const PointPairs& points,
-                                  std::span<const std::uint8_t> inlier, double scale, double min_sigma);
+                                  std::span<const std::uint8_t> inlier, double scale, double min_sigma,
+                                  std::span<const double> weights = {});
 
 // The same of a rotation alone, of unit rays b ~ R a; the base is open. Two rays at least, else all is.
 OrientationPrecision precision_of_rotation(const Eigen::Quaterniond& rotation, std::span<const Eigen::Vector3d> a,

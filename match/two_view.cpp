@@ -24,6 +24,8 @@ constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
 constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
 // Below this share of all matches what verticals give is checked by five points.
 constexpr double kDoubtfulVertical = 0.25;
+// Steps of an adjustment below it change nothing that matters: radians, of orientations good to some 1e-4.
+constexpr double kSettled = 1e-7;
 // Of the best orientation's support, for a plane's other one to be its twin.
 constexpr double kTwinShare = 0.95;
 
@@ -35,6 +37,13 @@ RansacOptions sampling(const TwoViewOptions& options, int max_draws, double inli
   sampling.inlier_share = inlier_share;
   sampling.seed = options.seed;
   return sampling;
+}
+
+RelativeAdjustment adjustment(double scale) {
+  RelativeAdjustment by;
+  by.scale = scale;
+  by.tolerance = kSettled;
+  return by;
 }
 
 std::vector<std::size_t> rows_of(const std::vector<std::uint8_t>& inlier) {
@@ -59,7 +68,8 @@ InlierRays rays_of(const PointPairs& points, const std::vector<std::uint8_t>& in
 struct Hypothesis {
   RelativeOrientation orientation;
   Consensus support;
-  double scale = 0;  // of the weights of its adjustment
+  double scale = 0;               // of the weights of its adjustment
+  std::vector<double> weights{};  // further ones; empty: all one
 };
 
 class PairEstimation {
@@ -127,7 +137,7 @@ class PairEstimation {
                                             options_.vertical_b->direction);
       if (const auto found = ransac(estimator, sampling(options_, 1000))) {
         draws_ += found->draws;
-        starts.push_back(adjust_orientation(found->model, points_, {0.5 * options_.max_residual}));
+        starts.push_back(adjust_orientation(found->model, points_, adjustment(0.5 * options_.max_residual)));
         by_vertical_ = found->consensus.count >= needed_ &&
                        found->consensus.count >= kDoubtfulVertical * static_cast<double>(points_.size()) &&
                        agrees_with_verticals(starts.front(), found->consensus);
@@ -161,7 +171,7 @@ class PairEstimation {
   // Refines candidates over all points; the best by score comes first, one of each.
   void refine_all(std::span<const RelativeOrientation> candidates) {
     for (const RelativeOrientation& start : candidates) {
-      const RelativeOrientation refined = adjust_orientation(start, points_, {0.5 * options_.max_residual});
+      const RelativeOrientation refined = adjust_orientation(start, points_, adjustment(0.5 * options_.max_residual));
       Hypothesis before{start, consensus_of(five_points_, start, options_.max_residual), 0.5 * options_.max_residual};
       Hypothesis after{refined, consensus_of(five_points_, refined, options_.max_residual),
                        0.5 * options_.max_residual};
@@ -171,7 +181,8 @@ class PairEstimation {
                      [](const Hypothesis& p, const Hypothesis& q) { return p.support.score > q.support.score; });
   }
 
-  // Last refinement, with the weights' reach taken from the inliers' own scatter.
+  // Last refinement over the inliers, with the weights' reach taken from their own scatter, and what single ones decide
+  // bounded.
   Hypothesis polished(const Hypothesis& start) const {
     const Eigen::Matrix3d essential = essential_from(start.orientation);
     std::vector<double> residuals;
@@ -179,8 +190,10 @@ class PairEstimation {
       residuals.push_back(std::abs(sampson_residual(essential, points_.a[i], points_.b[i])));
     const double sigma = 1.4826 * median(std::move(residuals)), limit = options_.max_residual;
     const double scale = std::clamp(2 * sigma, 1e-3 * limit, 0.5 * limit);
-    const RelativeOrientation last = adjust_orientation(start.orientation, points_, {scale});
-    Hypothesis result{last, consensus_of(five_points_, last, limit), scale};
+    const std::vector<double> weights = leverage_weights(start.orientation, points_, start.support.inlier);
+    const RelativeOrientation last = adjust_orientation(start.orientation, points_, adjustment(scale), weights);
+    Hypothesis result{last, consensus_of(five_points_, last, limit), scale, {}};
+    result.weights = leverage_weights(last, points_, result.support.inlier);
     return result.support.score > 0.98 * start.support.score ? result : start;
   }
 
@@ -198,9 +211,10 @@ class PairEstimation {
     return result;
   }
 
-  void set_base(TwoView& result, const RelativeOrientation& o, double scale) const {
+  void set_base(TwoView& result, const RelativeOrientation& o, double scale,
+                std::span<const double> weights = {}) const {
     result.translation = o.base;
-    result.precision = precision_of(o, points_, result.inlier, scale, 1e-3 * options_.max_residual);
+    result.precision = precision_of(o, points_, result.inlier, scale, 1e-3 * options_.max_residual, weights);
     result.ill_conditioned = !(result.precision.base_sigma() <= options_.max_base_sigma_deg * kDegree);
   }
 
@@ -208,7 +222,7 @@ class PairEstimation {
     const Hypothesis best = polished(hypotheses_.front());
     TwoView result =
         finish(planar ? PairModel::kHomography : PairModel::kEssential, best.orientation.rotation, best.support);
-    set_base(result, best.orientation, best.scale);
+    set_base(result, best.orientation, best.scale, best.weights);
     result.by_vertical = by_vertical_;
     for (const Hypothesis& other : std::span(hypotheses_).subspan(1)) {
       if (!planar || other.support.score < kTwinShare * best.support.score) continue;
@@ -248,7 +262,7 @@ class PairEstimation {
     const FivePointEstimator estimator(points_, limit);
     std::optional<Hypothesis> best;
     for (const RelativeOrientation& start : orientations_of_essential(nearest_essential(found->model))) {
-      const RelativeOrientation refined = adjust_orientation(start, points_, {0.5 * limit});
+      const RelativeOrientation refined = adjust_orientation(start, points_, adjustment(0.5 * limit));
       for (const RelativeOrientation& o : {start, refined}) {
         Consensus support = consensus_of(estimator, o, limit);
         if (!best || support.score > best->support.score) best = {o, std::move(support)};

@@ -6,6 +6,7 @@
 #include <limits>
 #include <thread>
 
+#include "geometry/homography.h"
 #include "geometry/pair_estimators.h"
 #include "geometry/ransac.h"
 #include "match/two_view.h"
@@ -153,27 +154,70 @@ TwoView two_view(const PairSceneOptions& options, std::uint64_t seed, RelativeOr
                            {.max_residual = std::max(4 * options.noise_px, 1.0) / kSceneFocalPx, .seed = seed});
 }
 
-TEST(Spec, AT06PlanesKeepTheirTwin) {
-  int planes = 0, twins = 0, near = 0;
-  for (std::uint64_t seed = 0; seed < 30; ++seed) {
-    PairSceneOptions options;
-    options.plane = true;
-    options.base = {0.1, 0, 0};
-    options.noise_px = 0.5;
-    RelativeOrientation truth;
-    const TwoView found = two_view(options, seed, &truth, 2000);
-    planes += found.model == PairModel::kHomography;
-    twins += found.twin.has_value();
-    const auto error = [&](const RelativeOrientation& o) {
-      return rotation_error_deg(o, truth) + base_error_deg(o, truth);
-    };
-    double nearest = error({found.rotation, found.translation});
-    if (found.twin) nearest = std::min(nearest, error(*found.twin));
-    near += nearest < 9;
+// The orientations that the true plane has, refined, with their support, best first: what estimate_two_view should find
+// without sampling anything.
+std::vector<std::pair<double, RelativeOrientation>> orientations_of_true_plane(const TiltedPair& pair,
+                                                                               const Eigen::Vector3d& base,
+                                                                               double threshold) {
+  // Depth 2: X_b = R X_a + t = (R + t n' / 2) X_a with n the optical axis of a.
+  const Eigen::Matrix3d homography =
+      pair.scene.truth.rotation.toRotationMatrix() + 0.5 * base * Eigen::Vector3d::UnitZ().transpose();
+  const FivePointEstimator estimator(pair.points, threshold);
+  std::vector<std::pair<double, RelativeOrientation>> found;
+  for (const PlanarOrientation& planar : visible_orientations(homography, pair.scene.a)) {
+    const RelativeOrientation refined = adjust_orientation(planar.orientation, pair.points, {0.5 * threshold});
+    found.emplace_back(consensus_of(estimator, refined, threshold).score, refined);
   }
-  expect_at_most(30 - planes, 0, "planes not recognised, of 30");
-  expect_at_most(30 - near, 0, "planes of 30 where neither orientation is within 9 deg of the truth");
-  std::printf("[ reached  ] twins within 95 %% of the support: %d of 30\n", twins);
+  std::sort(found.begin(), found.end(), [](const auto& p, const auto& q) { return p.first > q.first; });
+  return found;
+}
+
+TEST(Spec, AT06PlanesKeepTheirTwin) {
+  constexpr double kNoisePx = 0.5, kTwinShare = 0.95;
+  double planes = 0, missed = 0, invented = 0, near = 0, expected = 0, pairs = 0;
+  // Along the plane no second orientation has all points in front of both images; with a part along its normal one has.
+  for (const Eigen::Vector3d& base :
+       {Eigen::Vector3d(0.1, 0, 0), Eigen::Vector3d(0.08, 0, 0.06), Eigen::Vector3d(0.24, 0, -0.18)})
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      PairSceneOptions options;
+      options.plane = true;
+      options.base = base;
+      options.noise_px = kNoisePx;
+      const TiltedPair pair = tilted_pair(options, 2000, seed);
+      const double threshold = 4 * kNoisePx / kSceneFocalPx;
+      const TwoView found = estimate_two_view(pair.points, {.max_residual = threshold, .seed = seed});
+      const auto right = orientations_of_true_plane(pair, base, threshold);
+      ++pairs;
+      planes += found.model == PairModel::kHomography;
+      const auto apart = [](const RelativeOrientation& p, const RelativeOrientation& q) {
+        return std::max(rotation_error_deg(p, q), base_error_deg(p, q));
+      };
+      const RelativeOrientation best{found.rotation, found.translation};
+      const bool twin = right.size() > 1 && right[1].first > kTwinShare * right[0].first &&
+                        apart(right[0].second, right[1].second) > 3;
+      expected += twin;
+      // Those reported are the two of the plane, in any order; the limit is that of the base's largest error.
+      constexpr double kSame = 9;
+      if (twin) {
+        const auto matches = [&](std::size_t i, std::size_t j) {
+          return found.twin && apart(best, right[i].second) < kSame && apart(*found.twin, right[j].second) < kSame;
+        };
+        missed += !matches(0, 1) && !matches(1, 0);
+      } else {
+        invented += found.twin.has_value();
+      }
+      double nearest = rotation_error_deg(best, pair.scene.truth) + base_error_deg(best, pair.scene.truth);
+      if (found.twin)
+        nearest = std::min(
+            nearest, rotation_error_deg(*found.twin, pair.scene.truth) + base_error_deg(*found.twin, pair.scene.truth));
+      near += nearest < kSame;
+    }
+  const std::string of = ", of " + std::to_string(static_cast<int>(pairs));
+  expect_at_most(pairs - planes, 0, "planes not recognised" + of);
+  expect_at_least(expected, 20, "pairs with two orientations within 5 percent of support" + of);
+  expect_at_most(missed, 0, "of these without the right twin");
+  std::printf("[ reached  ] of the others with a twin, just within 5 percent of what was found: %.0f\n", invented);
+  expect_at_most(pairs - near, 0, "planes where neither orientation is within 9 deg of the truth" + of);
 }
 
 TEST(Spec, AT07AlongTheNormalIsIllConditioned) {

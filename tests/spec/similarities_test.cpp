@@ -5,6 +5,8 @@
 
 #include "geometry/median.h"
 #include "geometry/minimal_similarity.h"
+#include "geometry/ransac.h"
+#include "geometry/similarity_estimator.h"
 #include "reached.h"
 #include "tests/unit/geometry/pair_scene.h"
 
@@ -123,33 +125,18 @@ TEST(Spec, AT31SimilarityWithBlunders) {
       // Of the difference of a pair of points.
       const double sigma_pair = sigma * std::sqrt(1 + truth.scale * truth.scale);
       for (std::size_t i = 0; i < 300; ++i) clouds.to[i] += length(random) * random_direction(random);
-      std::optional<Similarity> best;
-      double least = std::numeric_limits<double>::infinity();
-      for (int draw = 0; draw < 3 * 35; ++draw) {
-        const auto candidate = clouds.draw(random);
-        if (!candidate) continue;
-        std::vector<double> misfits;
-        for (std::size_t i = 0; i < 1000; ++i) misfits.push_back(((*candidate)(clouds.from[i]) - clouds.to[i]).norm());
-        const double middle = median(misfits);
-        if (middle < least) best = candidate, least = middle;
-      }
-      ASSERT_TRUE(best);
-      // Least squares over what fits. What is more than 5 sigmas off the truth has to go, and the threshold is about
-      // the similarity found: 4.5 sigmas of a coordinate, which 1.5e-4 of the good points exceed.
-      const double narrow = 4.5 * sigma_pair;
-      std::vector<double> weights(1000, 0);
-      double threshold = std::max(narrow, 3 * least);
-      for (int round = 0; round < 10; ++round, threshold = narrow) {
-        for (std::size_t i = 0; i < 1000; ++i)
-          weights[i] = ((*best)(clouds.from[i]) - clouds.to[i]).norm() < threshold ? 1 : 0;
-        best = fit_similarity(clouds.from, clouds.to, weights);
-        ASSERT_TRUE(best);
-      }
-      errors.add(*best, truth);
+      std::vector<SimilarityPair> pairs;
+      for (std::size_t i = 0; i < 1000; ++i) pairs.push_back({clouds.from[i], clouds.to[i], sigma, sigma});
+      // What is more than 5 sigmas off the truth has to go, and the threshold is about the similarity found: 4.5 sigmas
+      // of a coordinate, which 1.5e-4 of the good points exceed.
+      const auto found = ransac(SimilarityEstimator(pairs), {.threshold = 4.5, .max_draws = 3 * 35, .seed = random()});
+      ASSERT_TRUE(found);
+      const std::vector<std::uint8_t>& inlier = found->consensus.inlier;
+      errors.add(found->model, truth);
       for (std::size_t i = 0; i < 1000; ++i) {
         const double off = (truth(clouds.from[i]) - clouds.to[i]).norm();
-        if (i < 300 && off > 5 * sigma_pair) blunders += 1, kept += weights[i] > 0;
-        if (i >= 300) good += 1, lost += weights[i] == 0;
+        if (i < 300 && off > 5 * sigma_pair) blunders += 1, kept += inlier[i];
+        if (i >= 300) good += 1, lost += !inlier[i];
       }
     }
     const std::string name = "sigma " + std::to_string(sigma).substr(0, 3) + ": ";

@@ -86,6 +86,37 @@ TEST(Ransac, StartsAreBetterThanNothing) {
   EXPECT_GE(found->consensus.score, consensus_of(estimator, scene.truth, 0.03).score);
 }
 
+// Ten observations: 120 samples of three.
+TEST(Ransac, FewSamplesAreAllTaken) {
+  EXPECT_EQ(number_of_samples(10, 3), 120);
+  EXPECT_EQ(number_of_samples(3, 3), 1);
+  EXPECT_EQ(number_of_samples(2, 3), 0);
+  const LinearModelScene<3> scene(10, 0.5, 0.01, 4);
+  const LinearModelEstimator<3> estimator(scene);
+  const auto all = ransac(estimator, {.threshold = 0.05, .enumerate = 120});
+  ASSERT_TRUE(all);
+  EXPECT_EQ(all->draws, 120);
+  EXPECT_LT((all->model - scene.truth).norm(), 0.05);
+  EXPECT_EQ(ransac(estimator, {.threshold = 0.05, .enumerate = 120, .seed = 9})->model, all->model);
+  EXPECT_NE(ransac(estimator, {.threshold = 0.05, .enumerate = 119})->draws, 120);
+}
+
+TEST(Ransac, KeepsTheBestInOrder) {
+  const LinearModelScene<2> scene(40, 0.3, 0.05, 5);
+  const LinearModelEstimator<2> estimator(scene);
+  const RansacOptions options{.threshold = 0.1, .min_draws = 200, .keep = 8, .seed = 3};
+  const auto found = ransac(estimator, options);
+  ASSERT_TRUE(found);
+  EXPECT_GE(found->draws, 200);
+  ASSERT_EQ(found->others.size(), 7u);
+  double before = found->consensus.score;
+  for (const auto& other : found->others) {
+    const double score = consensus_of(estimator, other, 0.1).score;
+    EXPECT_LE(score, before);
+    before = score;
+  }
+}
+
 TEST(Ransac, BadInput) {
   const LinearModelScene<3> two(2, 0, 0, 1), three(3, 0, 0, 1);
   EXPECT_FALSE(ransac(LinearModelEstimator<3>(two), {.threshold = 1}));
