@@ -8,6 +8,7 @@
 
 #include "adjust/line_terms.h"
 #include "adjust/linearise.h"
+#include "adjust/prior_loss.h"
 #include "adjust/straight_line.h"
 #include "adjust/vertical_terms.h"
 #include "geometry/angles.h"
@@ -29,6 +30,11 @@ Matrix37 moved(const Eigen::Vector3d& point, const MotionReference& reference) {
   Matrix37 move;
   move << -skew<double>(arm), reference.length * Eigen::Matrix3d::Identity(), arm;
   return move;
+}
+
+template <typename Residual>
+double weight_of(const RobustLoss& loss, const Residual& residual) {
+  return loss.evaluate(residual.squaredNorm())[1];
 }
 
 // Normal equations of a frame and of what it shares with the movement of the ground.
@@ -69,36 +75,38 @@ class MotionSummation {
                                             state_.cameras[static_cast<std::size_t>(image.camera.value)], point,
                                             {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row]);
     if (!r.in_front) return;
+    const double weight = weight_of(problem_.image_loss, r.residual);
     const Eigen::Matrix<double, 2, 7> by_motion = r.by_point * move;
     FrameEquations& equations = frames_[frame];
-    equations.known += r.by_frame.transpose() * r.by_frame;
-    equations.coupling += r.by_frame.transpose() * by_motion;
-    motion_ += by_motion.transpose() * by_motion;
+    equations.known += weight * r.by_frame.transpose() * r.by_frame;
+    equations.coupling += weight * r.by_frame.transpose() * by_motion;
+    motion_ += weight * by_motion.transpose() * by_motion;
     equations.seen = true;
   }
   void add_priors() {
     for (const auto& term : problem_.positions) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
       const FrameResidual3 r = linearise_position(state_.frames[frame], term.prior);
-      frames_[frame].known += r.by_frame.transpose() * r.by_frame;
+      frames_[frame].known += weight_of(loss_of(problem_, term), r.residual) * r.by_frame.transpose() * r.by_frame;
     }
     for (const auto& term : problem_.lines) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
       const LineResidual r =
           linearise_line(state_.frames[frame], state_.frames[static_cast<std::size_t>(term.seen_by().value)], term);
       const Eigen::Matrix<double, 1, 6> together = r.by_frame + r.by_other;
-      frames_[frame].known += together.transpose() * together;
+      const double weight = problem_.line_loss.evaluate(r.residual * r.residual)[1];
+      frames_[frame].known += weight * together.transpose() * together;
     }
     for (const auto& term : problem_.verticals) {
       const auto frame =
           static_cast<std::size_t>(problem_.images[static_cast<std::size_t>(term.image.value)].frame.value);
       const VerticalResidual r = linearise_vertical(problem_, state_, term);
-      frames_[frame].known += r.by_frame.transpose() * r.by_frame;
+      frames_[frame].known += weight_of(problem_.vertical_loss, r.residual) * r.by_frame.transpose() * r.by_frame;
     }
     for (const auto& term : problem_.attitudes) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
       const FrameResidual3 r = linearise_attitude(state_.frames[frame], term.prior);
-      frames_[frame].attitude += r.by_frame.transpose() * r.by_frame;
+      frames_[frame].attitude += weight_of(loss_of(problem_, term), r.residual) * r.by_frame.transpose() * r.by_frame;
     }
     for (const auto& term : problem_.point_priors) {
       if (!problem_.active(term.point.value)) continue;

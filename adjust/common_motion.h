@@ -6,10 +6,11 @@
 //     G = M - sum W_f' R_f^-1 W_f,
 //
 // R_f the normal equations of the frame (6 x 6: its images, position, lines and verticals), W_f their coupling with m,
-// M those of m. It is a sum over tiles (a frame that two tiles see answers in each by itself, which errs to the careful
-// side), whatever the size of the block. With the attitude priors in R_f it is G_a. The share of m that the images,
-// positions and control points determine is the eigenvalue mu of G v = mu G_a v: near 1 where the priors do not matter,
-// 0 where nothing else is known. Two cases are told apart:
+// M those of m; observations have the weights that their robust losses leave them. It is a sum over tiles (a frame that
+// two tiles see answers in each by itself, which errs to the careful side), whatever the size of the block. With the
+// attitude priors in R_f it is G_a. The share of m that the images, positions and control points determine is the
+// eigenvalue mu of G v = mu G_a v: near 1 where the priors do not matter, 0 where nothing else is known. Two cases are
+// told apart:
 //
 //   * all positions on one straight line: the ground turns about it, and the frames with it;
 //   * a common rotation: satellites, or any small field of view from afar, where the frames turn in place and the

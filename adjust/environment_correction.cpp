@@ -45,6 +45,10 @@ std::vector<double> point_heights(const Level& level, const std::vector<Eigen::V
   return heights;
 }
 
+std::string key_of(const EnvironmentOptions& options) {
+  return std::string("environment.") + (options.refraction ? "refraction" : "earth_curvature");
+}
+
 }  // namespace
 
 void check_environment(const EnvironmentOptions& options, const Block& block) {
@@ -58,9 +62,18 @@ void check_environment(const EnvironmentOptions& options, const Block& block) {
                       std::any_of(block.control_points.begin(), block.control_points.end(),
                                   [](const ControlPoint& point) { return point.role == PointRole::kControl; });
   if (options.any() && !placed)
-    throw InputError(std::string("environment.") + (options.refraction ? "refraction" : "earth_curvature") +
+    throw InputError(key_of(options) +
                      ": the block has neither positions nor control points, so that its vertical and its heights are "
                      "not known; give positions or control points, or leave the option out");
+  if (options.any() && !block.lines.empty())
+    throw InputError(key_of(options) +
+                     ": measurements of lines of known direction are not corrected; leave out the lines or the option");
+}
+
+void refuse_environment(const EnvironmentOptions& options, const std::string& command) {
+  if (options.any())
+    throw InputError(key_of(options) + ": '" + command +
+                     "' takes measurements as they are; leave the option out of the project file for it");
 }
 
 void correct_measurements(const EnvironmentOptions& options, const GroundFrame& ground, const TileState& at,

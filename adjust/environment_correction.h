@@ -2,6 +2,8 @@
 // (geometry/environment.h): pixels become those of a perspective image of the ground frame.
 #pragma once
 
+#include <string>
+
 #include "adjust/tile_problem.h"
 
 namespace megablock {
@@ -17,8 +19,11 @@ struct EnvironmentOptions {
 
 // InputError when the curvature is asked for and the block is georeferenced, and when anything is asked for and the
 // block has neither positions (of frames, observed or approximate) nor control points: its vertical and heights are not
-// known.
+// known; or has lines of known direction, whose measurements are not corrected.
 void check_environment(const EnvironmentOptions& options, const Block& block);
+
+// InputError when anything is asked for: `command` takes measurements as they are.
+void refuse_environment(const EnvironmentOptions& options, const std::string& command);
 
 // Corrects every measurement of the problem, tie points' in units of 2^-10 px as they are stored. Where rays come from
 // is taken from `at`: poses, cameras, mounts and points, of which a few metres and degrees matter little; points that

@@ -2,9 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <limits>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "adjust/ground_alignment.h"
@@ -100,44 +102,91 @@ std::vector<OrientationPart> orientation_parts(const Block& block, const std::ve
 
 namespace {
 
+// What is kept of a part once it is oriented, in a frame of its own.
+struct OrientedPart {
+  OrientationPart part;
+  std::vector<std::optional<Pose>> poses;  // [part.frames]
+  IndexedVector<CameraIndex, Intrinsics> cameras;
+  std::vector<std::pair<FrameIndex, std::string>> failed;
+  GroundAngles known = GroundAngles::kNone;  // of its frame
+};
+
 class PartwiseOrientation {
  public:
   PartwiseOrientation(const Block& block, const BlockState& start, const std::vector<FrameIndex>& frames,
-                      const std::vector<VerifiedPair>& pairs, const OrientationOptions& options)
-      : block_(block), start_(start), frames_(frames), pairs_(pairs), options_(options) {
+                      const std::vector<VerifiedPair>& pairs, const TrackSet& tracks, const OrientationOptions& options)
+      : block_(block), start_(start), frames_(frames), pairs_(pairs), tracks_(tracks), options_(options) {
     options_.part_frames = 0;
   }
 
-  OrientationResult run(const TrackSet& tracks, int part_frames) {
-    orient_parts(tracks, part_frames);
+  OrientationResult run(int part_frames) {
+    orient_parts(orientation_parts(block_, frames_, pairs_, part_frames));
+    if (parts_.empty()) return whole();
     assemble();
-    return result();
+    OrientationResult in_parts = result();
+    // Parts that do not fit together, or fail, cost more frames than one orientation would.
+    if (10 * in_parts.failed.size() <= frames_.size()) return in_parts;
+    try {
+      OrientationResult at_once = whole();
+      return at_once.failed.size() < in_parts.failed.size() ? std::move(at_once) : std::move(in_parts);
+    } catch (const ComputeError&) {
+      return in_parts;
+    }
   }
 
  private:
-  void orient_parts(const TrackSet& tracks, int part_frames) {
-    for (OrientationPart& part : orientation_parts(block_, frames_, pairs_, part_frames)) {
-      const std::set<FrameIndex> inside(part.frames.begin(), part.frames.end());
-      std::vector<VerifiedPair> own;
-      for (const VerifiedPair& pair : pairs_)
-        if (inside.contains(block_.images[pair.a].frame) && inside.contains(block_.images[pair.b].frame))
-          own.push_back(pair);
-      try {
-        oriented_.push_back(orient_component(block_, start_, part.frames, own, tracks, options_));
-        parts_.push_back(std::move(part));
-      } catch (const ComputeError&) {  // too little holds it together; its frames may be in others
-      }
+  OrientationResult whole() const {
+    OrientationResult found = orient_component(block_, start_, frames_, pairs_, tracks_, options_);
+    found.summary += ", as a whole, as parts did not fit together";
+    return found;
+  }
+
+  void orient_parts(const std::vector<OrientationPart>& parts) {
+    const std::vector<std::vector<std::size_t>> rows = rows_of_parts(parts);
+    for (std::size_t p = 0; p < parts.size(); ++p) orient_part(parts[p], rows[p]);
+  }
+
+  void orient_part(const OrientationPart& part, const std::vector<std::size_t>& rows) {
+    std::vector<VerifiedPair> own;
+    own.reserve(rows.size());
+    for (const std::size_t r : rows) own.push_back(pairs_[r]);
+    try {
+      OrientationResult found = orient_component(block_, start_, part.frames, own, tracks_, options_);
+      OrientedPart oriented{part, {}, std::move(found.state.cameras), std::move(found.failed)};
+      for (const FrameIndex frame : part.frames)
+        oriented.poses.push_back(found.state.oriented[frame] ? std::optional(found.state.frames[frame]) : std::nullopt);
+      oriented.known = known_angles(make_orientation_graph(block_, start_, part.frames, own, TrackSet(), options_));
+      parts_.push_back(std::move(oriented));
+    } catch (const ComputeError&) {  // too little holds it together; its frames may be in others
     }
-    if (parts_.empty()) throw ComputeError("orientation: no part of the block could be oriented");
+  }
+
+  // Of the pairs, ascending, in one pass over them.
+  std::vector<std::vector<std::size_t>> rows_of_parts(const std::vector<OrientationPart>& parts) const {
+    std::map<FrameIndex, std::vector<std::size_t>> parts_of;  // ascending
+    for (std::size_t p = 0; p < parts.size(); ++p)
+      for (const FrameIndex frame : parts[p].frames) parts_of[frame].push_back(p);
+    std::vector<std::vector<std::size_t>> rows(parts.size());
+    std::vector<std::size_t> both;
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      const auto a = parts_of.find(block_.images[pairs_[r].a].frame),
+                 b = parts_of.find(block_.images[pairs_[r].b].frame);
+      if (a == parts_of.end() || b == parts_of.end()) continue;
+      both.clear();
+      std::set_intersection(a->second.begin(), a->second.end(), b->second.begin(), b->second.end(),
+                            std::back_inserter(both));
+      for (const std::size_t p : both) rows[p].push_back(r);
+    }
+    return rows;
   }
 
   void assemble() {
     std::vector<Model> models;
-    for (std::size_t p = 0; p < parts_.size(); ++p) {
-      Model model{static_cast<std::int64_t>(p), {}, {}};
-      for (const FrameIndex frame : parts_[p].frames)
-        if (oriented_[p].state.oriented[frame])
-          model.images.push_back({frame.value, oriented_[p].state.frames[frame], kCentreSigma, kRotationSigma});
+    for (const OrientedPart& oriented : parts_) {
+      Model model{static_cast<std::int64_t>(models.size()), {}, {}};
+      for (std::size_t i = 0; i < oriented.poses.size(); ++i)
+        if (oriented.poses[i])
+          model.images.push_back({oriented.part.frames[i].value, *oriented.poses[i], kCentreSigma, kRotationSigma});
       models.push_back(std::move(model));
     }
     AssemblyOptions options;
@@ -150,16 +199,18 @@ class PartwiseOrientation {
     for (const auto& [part, frames] : size)
       if (frames > largest) largest_ = part, largest = frames;
   }
+  bool joined(std::size_t p) const { return assembled_.part[p] == largest_; }
 
   // A frame's pose comes from the part in whose core it is, else from the first that has it.
   void collect(BlockState& state) const {
     for (const bool core : {true, false})
       for (std::size_t p = 0; p < parts_.size(); ++p) {
-        if (assembled_.part[p] != largest_) continue;
-        for (std::size_t i = core ? 0 : parts_[p].core; i < (core ? parts_[p].core : parts_[p].frames.size()); ++i) {
-          const FrameIndex frame = parts_[p].frames[i];
-          if (state.oriented[frame] || !oriented_[p].state.oriented[frame]) continue;
-          state.frames[frame] = assembled_.similarity[p](oriented_[p].state.frames[frame]);
+        if (!joined(p)) continue;
+        const OrientationPart& part = parts_[p].part;
+        for (std::size_t i = core ? 0 : part.core; i < (core ? part.core : part.frames.size()); ++i) {
+          const FrameIndex frame = part.frames[i];
+          if (state.oriented[frame] || !parts_[p].poses[i]) continue;
+          state.frames[frame] = assembled_.similarity[p](*parts_[p].poses[i]);
           state.oriented[frame] = 1;
         }
       }
@@ -171,18 +222,19 @@ class PartwiseOrientation {
       double weights = 0;
       std::vector<double> sums(static_cast<std::size_t>(state.cameras[c].size()), 0);
       for (std::size_t p = 0; p < parts_.size(); ++p) {
-        if (assembled_.part[p] != largest_ || !used_in(p, c)) continue;
-        const auto weight = static_cast<double>(parts_[p].core);
+        if (!joined(p) || !used_in(p, c)) continue;
+        const auto weight = static_cast<double>(parts_[p].part.core);
         weights += weight;
         for (int k = 0; k < state.cameras[c].size(); ++k)
-          sums[static_cast<std::size_t>(k)] += weight * oriented_[p].state.cameras[c][k];
+          sums[static_cast<std::size_t>(k)] += weight * parts_[p].cameras[c][k];
       }
       for (int k = 0; weights > 0 && k < state.cameras[c].size(); ++k)
         state.cameras[c][k] = sums[static_cast<std::size_t>(k)] / weights;
     }
   }
-  bool used_in(std::size_t part, CameraIndex camera) const {
-    return std::any_of(parts_[part].frames.begin(), parts_[part].frames.end(), [&](FrameIndex frame) {
+  bool used_in(std::size_t p, CameraIndex camera) const {
+    const std::vector<FrameIndex>& frames = parts_[p].part.frames;
+    return std::any_of(frames.begin(), frames.end(), [&](FrameIndex frame) {
       const Rig& rig = block_.rigs[block_.frames[frame].rig];
       return std::any_of(rig.mounts.begin(), rig.mounts.end(),
                          [&](const Mount& mount) { return mount.camera == camera; });
@@ -195,32 +247,68 @@ class PartwiseOrientation {
     collect(result.state);
     average_cameras(result.state);
     to_free_frame(result.state);
+    std::map<FrameIndex, std::string> reasons;
+    for (const OrientedPart& part : parts_)
+      for (const auto& [frame, reason] : part.failed) reasons[frame] = reason;
     std::size_t count = 0;
     for (const FrameIndex frame : frames_) {
       count += result.state.oriented[frame];
-      if (!result.state.oriented[frame])
-        result.failed.emplace_back(frame, "no part that is joined to the largest holds it");
+      if (result.state.oriented[frame]) continue;
+      const auto reason = reasons.find(frame);
+      result.failed.emplace_back(
+          frame, reason == reasons.end() ? "no part that is joined to the largest holds it" : reason->second);
     }
-    for (const OrientationResult& part : oriented_)
-      for (const auto& [frame, reason] : part.failed)
-        for (auto& [failed, why] : result.failed)
-          if (failed == frame) why = reason;
     std::sort(result.failed.begin(), result.failed.end());
     const auto kept =
         std::count_if(assembled_.links.begin(), assembled_.links.end(), [](const auto& l) { return l.kept; });
     result.summary = fmt::format("{} of {} frames oriented in {} parts, {} of {} links between them kept, free block",
                                  count, frames_.size(), parts_.size(), kept, assembled_.links.size());
+    if (!assembled_.lost.empty())
+      result.summary += fmt::format(", {} parts agree with no other", assembled_.lost.size());
+    if (!assembled_.converged)
+      result.summary += fmt::format(", joined in {} iterations without converging", assembled_.iterations);
     return result;
   }
 
+  // What all parts know of the ground, each as much as its frames: the assembled frame is that of the first alone.
+  struct Ground {
+    GroundAngles known = GroundAngles::kNone;
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  // to it
+  };
+  Ground ground() const {
+    Ground ground;
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+      if (joined(p)) ground.known = std::max(ground.known, parts_[p].known);
+    Eigen::Vector3d up = Eigen::Vector3d::Zero();
+    Eigen::Matrix4d squares = Eigen::Matrix4d::Zero();
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      if (!joined(p) || parts_[p].known != ground.known) continue;
+      const auto weight = static_cast<double>(parts_[p].part.core);
+      const Eigen::Quaterniond& rotation = assembled_.similarity[p].rotation;
+      up += weight * (rotation * Eigen::Vector3d::UnitZ());
+      squares += weight * rotation.coeffs() * rotation.coeffs().transpose();
+    }
+    if (ground.known == GroundAngles::kLevel)
+      ground.turn = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+    if (ground.known == GroundAngles::kAll) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(squares);
+      ground.turn.coeffs() = eigen.eigenvectors().col(3);
+      ground.turn = ground.turn.conjugate();
+    }
+    return ground;
+  }
+
   void to_free_frame(BlockState& state) const {
+    const Ground ground = this->ground();
     const OrientationGraph graph = make_orientation_graph(block_, start_, frames_, pairs_, TrackSet(), options_);
+    const Similarity level{1, ground.turn, Eigen::Vector3d::Zero()};
     OrientationValues values;
     bool metric = false;
     for (const auto& node : graph.frames)
-      values.frames.push_back(state.oriented[node.index] ? std::optional(state.frames[node.index]) : std::nullopt);
+      values.frames.push_back(state.oriented[node.index] ? std::optional(level(state.frames[node.index]))
+                                                         : std::nullopt);
     for (const auto& image : graph.images) metric |= image.mount.centre.norm() > 0;
-    const Similarity similarity = similarity_to_free_frame(graph, values, known_angles(graph), metric);
+    const Similarity similarity = similarity_to_free_frame(graph, values, ground.known, metric) * level;
     for (const FrameIndex frame : frames_)
       if (state.oriented[frame]) state.frames[frame] = similarity(state.frames[frame]);
   }
@@ -229,9 +317,9 @@ class PartwiseOrientation {
   const BlockState& start_;
   const std::vector<FrameIndex>& frames_;
   const std::vector<VerifiedPair>& pairs_;
-  OrientationOptions options_;  // of a part
-  std::vector<OrientationPart> parts_;
-  std::vector<OrientationResult> oriented_;  // [parts]
+  const TrackSet& tracks_;
+  OrientationOptions options_;       // of a part
+  std::vector<OrientedPart> parts_;  // what could be oriented
   AssembledModels assembled_;
   std::int64_t largest_ = 0;
 };
@@ -241,7 +329,7 @@ class PartwiseOrientation {
 OrientationResult orient_in_parts(const Block& block, const BlockState& start, const std::vector<FrameIndex>& frames,
                                   const std::vector<VerifiedPair>& pairs, const TrackSet& tracks,
                                   const OrientationOptions& options) {
-  return PartwiseOrientation(block, start, frames, pairs, options).run(tracks, options.part_frames);
+  return PartwiseOrientation(block, start, frames, pairs, tracks, options).run(options.part_frames);
 }
 
 }  // namespace megablock

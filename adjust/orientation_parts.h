@@ -4,7 +4,8 @@
 //
 // Cut: halves by the distance, in links, from a frame at the rim, until a part has no more than `part_frames`; then
 // every part takes in the frames linked to it. Everything goes by the frames' names, so that their order does not
-// matter.
+// matter. The level, or the attitude, is the mean of the parts that know it. Where more than a tenth of the frames
+// would be lost, because parts fail or do not fit together, the component is oriented as a whole.
 #pragma once
 
 #include "adjust/orientation.h"

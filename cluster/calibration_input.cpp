@@ -42,7 +42,9 @@ CalibrationInput of_project(const std::string& path) {
     throw InputError(path + ": the project has no 'tie_points'; run 'megablock run " + path +
                      " -j JOB' and give JOB instead");
   TrackSet tracks = read_given_tracks(project.tie_points, project.block);
-  CalibrationInput input{std::move(project.block), {}, std::move(tracks), read_options(project.settings).adjustment};
+  const JobOptions options = read_options(project.settings);
+  refuse_environment(options.environment, "calibrate");
+  CalibrationInput input{std::move(project.block), {}, std::move(tracks), options.adjustment};
   input.state = initial_state(input.block);
   return input;
 }

@@ -274,9 +274,21 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
 
 int run_job(const RunOptions& options, Communicator& ranks) { return with_job(options, ranks, run_stages); }
 
+namespace {
+
+void refuse_environment(const Job& job, const std::string& command) {
+  on_first_rank(job.ranks, [&] {
+    megablock::refuse_environment(job.settings.environment, command);
+    return std::string();
+  });
+}
+
+}  // namespace
+
 int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks) {
   settings.check();
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+    refuse_environment(job, "register");
     const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
     if (job.is_first_rank()) std::printf("%s", to_text(summary).c_str());
   });
@@ -285,6 +297,7 @@ int register_job(const RunOptions& options, const RegistrationSettings& settings
 int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks) {
   settings.rig.check();
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+    refuse_environment(job, "calibrate");
     CalibrationSettings own = settings;
     own.rig.adjustment = job.settings.adjustment;
     calibrate_rigs(job, tie_points, own);

@@ -26,15 +26,8 @@ struct TileStart {
   TileState state;
 };
 
-// The heights of the ground that the correction needs are those of the points as measured.
-void correct_environment(const Job& job, TileStart& start) {
-  TileProblem measured = start.problem;
-  TileState at = start.state;
-  triangulate_points(measured, at, job.settings.adjustment);
-  correct_measurements(job.settings.environment, job.block.ground, at, start.problem);
-}
-
-TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile, TrackSet tracks) {
+TileStart measured_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
+                         TrackSet tracks) {
   TileStart start;
   start.tracks = std::move(tracks);
   start.problem =
@@ -42,6 +35,20 @@ TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& ti
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   start.state =
       make_tile_state(start.problem, oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
+  return start;
+}
+
+// The heights of the ground that the correction needs are those of the points as measured.
+void correct_environment(const Job& job, TileStart& start) {
+  const std::vector<std::uint8_t> kept = start.problem.kept;
+  TileState at = start.state;
+  triangulate_points(start.problem, at, job.settings.adjustment);
+  start.problem.kept = kept;
+  correct_measurements(job.settings.environment, job.block.ground, at, start.problem);
+}
+
+TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile, TrackSet tracks) {
+  TileStart start = measured_start(job, oriented, tiles, tile, std::move(tracks));
   if (job.settings.environment.any()) correct_environment(job, start);
   return start;
 }
@@ -123,11 +130,12 @@ std::vector<TileMark> tile_marks(const Job& job, const BlockState& oriented, con
   std::string error;
   try {
     for (auto t = static_cast<std::size_t>(job.ranks.rank()); t < tracks.size(); t += ranks) {
-      const TileStart start = make_start(job, oriented, tiles, TileIndex(static_cast<std::int64_t>(t)),
-                                         read_tracks(job.store.verified_path(tracks[t])));
+      const TileStart start = measured_start(job, oriented, tiles, TileIndex(static_cast<std::int64_t>(t)),
+                                             read_tracks(job.store.verified_path(tracks[t])));
       Hasher hasher;
       hasher.add(algorithm::kAdjustment);
       add_to_hash(hasher, job.settings.adjustment);
+      if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
       add_to_hash(hasher, start.problem, start.state);
       writer.value(TileMark{hasher.value(), start.problem.observation_count()});
     }

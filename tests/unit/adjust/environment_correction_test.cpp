@@ -37,5 +37,26 @@ TEST(EnvironmentCorrection, NeedsPositionsOrControlPoints) {
   EXPECT_FALSE(refused({}, free));
 }
 
+TEST(EnvironmentCorrection, IsNotPassedOverWhereItIsNotApplied) {
+  Block block;
+  block.frames.push_back(Frame{});
+  block.frames[FrameIndex(0)].position_prior = PositionPrior{};
+  block.lines.resize(1);
+  const auto message = [](auto&& call) -> std::string {
+    try {
+      call();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message([&] { check_environment({.refraction = true}, block); }),
+              testing::HasSubstr("environment.refraction: measurements of lines"));
+  EXPECT_EQ(message([&] { check_environment({}, block); }), "");
+  EXPECT_THAT(message([&] { refuse_environment({.earth_curvature = true}, "register"); }),
+              testing::HasSubstr("environment.earth_curvature: 'register' takes measurements as they are"));
+  EXPECT_EQ(message([&] { refuse_environment({}, "register"); }), "");
+}
+
 }  // namespace
 }  // namespace megablock

@@ -184,4 +184,13 @@ inline Errors errors_of(const SimulatedBlock& scene, const OrientationResult& re
   return errors;
 }
 
+// Mean angle between where the images see down and where they should, degrees.
+inline double off_level_deg(const SimulatedBlock& scene, const OrientationResult& result) {
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  double sum = 0;
+  for (FrameIndex f(0); scene.block.frames.contains(f); ++f.value)
+    sum += (result.state.frames[f].rotation * down - scene.truth.frames[f].rotation * down).norm() / kDegree;
+  return sum / static_cast<double>(scene.block.frames.size());
+}
+
 }  // namespace megablock::orientation_scene

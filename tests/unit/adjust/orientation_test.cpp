@@ -256,15 +256,6 @@ TEST(Orientation, AttitudePriorsTurnAFreeBlock) {
   EXPECT_LT(largest, 2);
 }
 
-// Mean angle between where the images see down and where they should, degrees.
-double off_level_deg(const SimulatedBlock& scene, const OrientationResult& result) {
-  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
-  double sum = 0;
-  for (FrameIndex f(0); scene.block.frames.contains(f); ++f.value)
-    sum += (result.state.frames[f].rotation * down - scene.truth.frames[f].rotation * down).norm() / kDegree;
-  return sum / static_cast<double>(scene.block.frames.size());
-}
-
 // A free block is level, one in ten of its verticals anywhere; so is a street whose positions lie on a line.
 TEST(Orientation, VerticalsLevelABlock) {
   SceneOptions positions;
