@@ -1,8 +1,11 @@
 #include "merge/point_refinement.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "adjust/residual_squares.h"
@@ -14,58 +17,205 @@ namespace megablock {
 namespace {
 
 constexpr int kMaxSteps = 100;
-constexpr double kMaxDamping = 1e6;
+constexpr double kLeastDamping = 1e-4, kMostDamping = 1e6;
+constexpr std::size_t kAtOnce = 256;  // points: what is kept of them stays in the second cache
+
+// A point's cost at held poses, with its derivatives.
+struct PointCost {
+  double images = 0, prior = 0;                          // infinite where a camera cannot project the point
+  Eigen::Matrix3d reweighted = Eigen::Matrix3d::Zero();  // rho' alone
+  Eigen::Matrix3d curved = Eigen::Matrix3d::Zero();      // with the loss's curvature
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+
+  double whole() const { return images + prior; }
+  bool finite() const { return std::isfinite(whole()); }
+  double decrement_squared() const { return b.dot(reweighted.ldlt().solve(b)); }
+  Eigen::Vector3d step(double damping) const {
+    return (curved + damping * Eigen::Matrix3d(reweighted.diagonal().asDiagonal())).ldlt().solve(b);
+  }
+
+  void add(const RobustLoss& loss, const Eigen::Vector2d& residual, const Eigen::Matrix<double, 2, 3>& by_point) {
+    const double squares = residual.squaredNorm();
+    if (!std::isfinite(squares)) {
+      images = std::numeric_limits<double>::infinity();
+      return;
+    }
+    const auto rho = loss.evaluate(squares);
+    const Eigen::Vector3d along = by_point.transpose() * residual;
+    const Eigen::Matrix3d normal = rho[1] * (by_point.transpose() * by_point);
+    images += 0.5 * rho[0];
+    b -= rho[1] * along;
+    reweighted += normal;
+    curved += normal;
+    if (rho[2] < 0) curved += std::max(2 * rho[2], -rho[1] / squares) * (along * along.transpose());
+  }
+  void add_prior(const TileProblem::PointTerm& term, const Eigen::Vector3d& position) {
+    const Eigen::Vector3d weight = term.sigma.cwiseInverse(), r = point_prior_residual(position, term);
+    prior += 0.5 * r.squaredNorm();
+    b -= weight.cwiseProduct(r);
+    for (Eigen::Matrix3d* normal : {&reweighted, &curved}) normal->diagonal() += weight.cwiseAbs2();
+  }
+};
+
+struct Trial {
+  std::int64_t point = -1;
+  Eigen::Vector3d position;
+};
+
+// The costs of many points at once, their observations in lanes.
+class PointCosts {
+ public:
+  // `views`: of the images, as they stay (image_views).
+  PointCosts(const TileProblem& problem, const std::vector<ImageView>& views)
+      : problem_(problem), views_(views), lane_views_(lane_views(views)), prior_(prior_rows(problem)) {
+    lanes_.reserve(ObservationLanes::kUsual);
+  }
+
+  void evaluate(std::span<const Trial> trials, std::vector<PointCost>& costs) {
+    costs.assign(trials.size(), {});
+    for (std::size_t t = 0; t < trials.size(); ++t) {
+      const auto& [point, position] = trials[t];
+      for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
+        if (!problem_.kept[row]) continue;
+        sources_[static_cast<std::size_t>(lanes_.size())] = {t, row};
+        lanes_.add(lane_views_[problem_.image[row].value], position, problem_.x[row], problem_.y[row],
+                   problem_.inverse_sigma[row]);
+        if (lanes_.size() == ObservationLanes::kUsual) flush(trials, costs);
+      }
+      if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0)
+        costs[t].add_prior(problem_.point_priors[static_cast<std::size_t>(i)], position);
+    }
+    flush(trials, costs);
+  }
+
+ private:
+  struct Source {
+    std::size_t trial;
+    std::int64_t row;
+  };
+
+  void flush(std::span<const Trial> trials, std::vector<PointCost>& costs) {
+    lanes_.linearise();
+    for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) {
+      const auto [trial, row] = sources_[static_cast<std::size_t>(lane)];
+      PointCost& cost = costs[trial];
+      if (lane_views_[problem_.image[row].value].simple) {
+        cost.add(problem_.image_loss, lanes_.residual(lane), lanes_.by_point(lane));
+      } else {
+        add_other(trials[trial].position, row, cost);
+      }
+    }
+    lanes_.clear();
+  }
+  // Of a camera that the lanes do not know.
+  void add_other(const Eigen::Vector3d& position, std::int64_t row, PointCost& cost) const {
+    const ImageView& view = views_[problem_.image[row].value];
+    CameraResidual r;
+    if (linearise_in_camera(view, position, {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row], false,
+                            r)) {
+      cost.add(problem_.image_loss, r.residual, r.by_camera * view.rotation);
+    } else {
+      cost.images = std::numeric_limits<double>::infinity();
+    }
+  }
+
+  const TileProblem& problem_;
+  const std::vector<ImageView>& views_;
+  std::vector<LaneView> lane_views_;
+  std::vector<std::int64_t> prior_;
+  ObservationLanes lanes_;
+  std::array<Source, ObservationLanes::kUsual> sources_;
+};
 
 class PointRefiner {
  public:
   // `views`: of the state's images (image_views).
   PointRefiner(const TileProblem& problem, TileState& state, const std::vector<ImageView>& views, double settled)
-      : problem_(problem),
-        state_(state),
-        settled_squared_(settled * settled),
-        views_(views),
-        prior_(prior_rows(problem)) {}
+      : problem_(problem), state_(state), settled_squared_(settled * settled), views_(views), costs_(problem, views) {}
 
-  void refine(std::int64_t point) {
-    Eigen::Vector3d& position = state_.points[static_cast<std::size_t>(point)];
-    Equations now = equations(point, position);
-    if (!std::isfinite(now.cost)) {
-      const auto start = intersection(point);
-      if (!start) return;
-      now = equations(point, *start);
-      if (!std::isfinite(now.cost)) return;
-      position = *start;
+  // Brings points to their optimum; returns what their observations cost then.
+  double refine(std::span<const std::int64_t> points) {
+    start(points);
+    while (!trials_.empty()) {
+      costs_.evaluate(trials_, costs_of_trials_);
+      for (std::size_t t = 0; t < trials_.size(); ++t) judge(of_trial_[t], trials_[t].position, costs_of_trials_[t]);
+      take_steps();
     }
-    double damping = 1e-4;
-    bool raised = false;
-    for (int step = 0; step < kMaxSteps && now.decrement_squared() > settled_squared_; ++step) {
-      const Eigen::Vector3d trial = position + now.step(damping);
-      Equations next = equations(point, trial);
-      if (next.cost < now.cost) {
-        position = trial;
-        now = next;
-        if (!raised) damping /= 10;  // else it is just right
-        raised = false;
-      } else {
-        damping *= 10;
-        raised = true;
-        if (damping > kMaxDamping) return;
-      }
+    double images = 0;
+    for (const Work& work : works_) {
+      state_.points[static_cast<std::size_t>(work.point)] = work.position;
+      images += work.cost.images;
     }
+    return images;
   }
 
  private:
-  struct Equations {
-    double cost = 0;
-    Eigen::Matrix3d reweighted = Eigen::Matrix3d::Zero();  // rho' alone
-    Eigen::Matrix3d curved = Eigen::Matrix3d::Zero();      // with the loss's curvature
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-
-    double decrement_squared() const { return b.dot(reweighted.ldlt().solve(b)); }
-    Eigen::Vector3d step(double damping) const {
-      return (curved + damping * Eigen::Matrix3d(reweighted.diagonal().asDiagonal())).ldlt().solve(b);
-    }
+  struct Work {
+    std::int64_t point = -1;
+    Eigen::Vector3d position;
+    PointCost cost;
+    double damping = kLeastDamping;
+    bool raised = false;
+    int steps = 0;
+    bool done = false;
   };
+
+  void start(std::span<const std::int64_t> points) {
+    works_.clear();
+    trials_.clear();
+    for (const std::int64_t point : points) trials_.push_back({point, state_.points[static_cast<std::size_t>(point)]});
+    costs_.evaluate(trials_, costs_of_trials_);
+    for (std::size_t t = 0; t < trials_.size(); ++t)
+      works_.push_back({trials_[t].point, trials_[t].position, costs_of_trials_[t]});
+    trials_.clear();
+    of_trial_.clear();
+    for (std::size_t w = 0; w < works_.size(); ++w) {
+      works_[w].done = !works_[w].cost.finite();
+      if (!works_[w].done) continue;
+      if (const auto position = intersection(works_[w].point)) try_position(w, *position);
+    }
+    costs_.evaluate(trials_, costs_of_trials_);
+    for (std::size_t t = 0; t < trials_.size(); ++t) {
+      if (!costs_of_trials_[t].finite()) continue;
+      Work& work = works_[of_trial_[t]];
+      work.position = trials_[t].position;
+      work.cost = costs_of_trials_[t];
+      work.done = false;
+    }
+    take_steps();
+  }
+
+  void try_position(std::size_t work, const Eigen::Vector3d& position) {
+    trials_.push_back({works_[work].point, position});
+    of_trial_.push_back(work);
+  }
+
+  // The next trials.
+  void take_steps() {
+    trials_.clear();
+    of_trial_.clear();
+    for (std::size_t w = 0; w < works_.size(); ++w) {
+      Work& work = works_[w];
+      work.done |= work.steps == kMaxSteps || !(work.cost.decrement_squared() > settled_squared_);
+      if (work.done) continue;
+      ++work.steps;
+      try_position(w, work.position + work.cost.step(work.damping));
+    }
+  }
+
+  void judge(std::size_t index, const Eigen::Vector3d& position, const PointCost& cost) {
+    Work& work = works_[index];
+    if (cost.whole() < work.cost.whole()) {
+      work.position = position;
+      work.cost = cost;
+      if (!work.raised) work.damping /= 10;  // else it is just right
+      work.raised = false;
+    } else {
+      work.damping *= 10;
+      work.raised = true;
+      work.done = work.damping > kMostDamping;
+    }
+  }
 
   std::optional<Eigen::Vector3d> intersection(std::int64_t point) {
     rays_.clear();
@@ -80,46 +230,17 @@ class PointRefiner {
     return intersect_rays(rays_);
   }
 
-  Equations equations(std::int64_t point, const Eigen::Vector3d& position) const {
-    Equations e;
-    for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
-      if (!problem_.kept[row]) continue;
-      const ImageView& view = views_[problem_.image[row].value];
-      CameraResidual r;
-      if (!linearise_in_camera(view, position, {problem_.x[row], problem_.y[row]}, problem_.inverse_sigma[row], false,
-                               r)) {
-        e.cost = std::numeric_limits<double>::infinity();
-        return e;
-      }
-      const Eigen::Matrix<double, 2, 3> by_point = r.by_camera * view.rotation;
-      const double squares = r.residual.squaredNorm();
-      const auto rho = problem_.image_loss.evaluate(squares);
-      const Eigen::Vector3d along = by_point.transpose() * r.residual;
-      const Eigen::Matrix3d whole = rho[1] * (by_point.transpose() * by_point);
-      e.cost += 0.5 * rho[0];
-      e.b -= rho[1] * along;
-      e.reweighted += whole;
-      e.curved += whole;
-      if (rho[2] < 0) {
-        e.curved += std::max(2 * rho[2], -rho[1] / squares) * (along * along.transpose());
-      }
-    }
-    if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0) {
-      const auto& term = problem_.point_priors[static_cast<std::size_t>(i)];
-      const Eigen::Vector3d weight = term.sigma.cwiseInverse(), r = point_prior_residual(position, term);
-      e.cost += 0.5 * r.squaredNorm();
-      e.b -= weight.cwiseProduct(r);
-      for (Eigen::Matrix3d* normal : {&e.reweighted, &e.curved}) normal->diagonal() += weight.cwiseAbs2();
-    }
-    return e;
-  }
-
   const TileProblem& problem_;
   TileState& state_;
   const double settled_squared_;
   const std::vector<ImageView>& views_;
-  std::vector<std::int64_t> prior_;
-  std::vector<Ray> rays_;  // of the point at hand
+  PointCosts costs_;
+  // Of the points at hand.
+  std::vector<Work> works_;
+  std::vector<Trial> trials_;
+  std::vector<std::size_t> of_trial_;  // [trials_] in works_
+  std::vector<PointCost> costs_of_trials_;
+  std::vector<Ray> rays_;
 };
 
 // Observations of points one after the other: their loss, and whether one lies beyond the corner (Cauchy's loss has
@@ -163,16 +284,16 @@ double refine_points(const TileProblem& problem, const TilePlan& plan, TileState
   for (const auto& cell : plan.points)
     residuals.visit(cell, [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
   sums.finish();
+  double images = 0.5 * sums.settled();
   if (!sums.tail().empty()) {
     PointRefiner refiner(problem, state, residuals.views(), settled);
-    for (const std::int64_t point : sums.tail()) refiner.refine(point);
+    for (std::span<const std::int64_t> rest = sums.tail(); !rest.empty();) {
+      const auto some = rest.first(std::min(kAtOnce, rest.size()));
+      images += refiner.refine(some);
+      rest = rest.subspan(some.size());
+    }
   }
-  double images = sums.settled();
-  residuals.visit(sums.tail(), [&](std::int64_t, std::int64_t, double squares) {
-    images +=
-        std::isfinite(squares) ? problem.image_loss.evaluate(squares)[0] : std::numeric_limits<double>::infinity();
-  });
-  return 0.5 * images + other_cost(problem, state);
+  return images + other_cost(problem, state);
 }
 
 }  // namespace megablock
