@@ -1,5 +1,6 @@
 #include "merge/point_equations.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -52,10 +53,16 @@ const point_kernels::Kernels& point_kernels_of_processor() {
                                                : point_kernels::kPortable;
 }
 
+// The largest squared norm s with rho(s) = s; -1: none.
+double end_of_squares(const RobustLoss& loss) {
+  if (loss.kind == RobustLoss::Kind::kNone) return std::numeric_limits<double>::max();
+  return loss.kind == RobustLoss::Kind::kHuber ? loss.scale * loss.scale : -1;
+}
+
 }  // namespace
 
 using lane_kernels::kResidual;
-using point_kernels::kInverse;
+using point_kernels::kB;
 using point_kernels::kObservationValueCount;
 using point_kernels::kPointB;
 using point_kernels::kPointHeld;
@@ -64,18 +71,22 @@ using point_kernels::kPointOwnStep;
 using point_kernels::kPointV;
 using point_kernels::kPointValueCount;
 using point_kernels::kPointZ;
+using point_kernels::kRecordSize;
+using point_kernels::kV;
 using point_kernels::kYSize;
 
 PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)
     : problem_(problem),
       state_(state),
       kernels_(&point_kernels_of_processor()),
+      usual_squares_(end_of_squares(problem.image_loss)),
       views_(image_views(problem, state)),
       lane_views_(lane_views(views_)),
       unknowns_(image_unknowns(problem, plan, lane_views_)),
       prior_(prior_rows(problem)) {
   int widest = 0;
   for (const ImageUnknowns& u : unknowns_) widest = std::max(widest, u.shared_width);
+  all_plain_ = std::ranges::all_of(unknowns_, &ImageUnknowns::plain);
   std::int64_t room = ObservationLanes::kUsual;
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
     room = std::max(room, problem.begin[at(p + 1)] - problem.begin[at(p)]);
@@ -83,7 +94,8 @@ PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan,
   room = lanes_.capacity();
   rows_.resize(at(room));
   lane_unknowns_.resize(at(room));
-  point_of_lane_.resize(at(room));
+  begin_.resize(at(room + 1));
+  step_of_lane_.resize(at(room));
   shared_rows_.resize(at(room));
   frame_sums_.resize(at(room));
   motions_.resize(at(room));
@@ -91,12 +103,17 @@ PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan,
   point_values_.resize(room * kPointValueCount);
   y_.resize(room * kYSize);
   moved_.resize(room * 3);
+  for (AlignedValues* records : {&records_, &sums_, &steps_}) records->resize(room * kRecordSize);
   store_.resize(at(room * 11 * widest));  // J_s, W_sk, W_s and Y
 }
 
+constexpr std::size_t kAhead = 8;  // points
+
 std::size_t PointEquations::linearise(std::span<const std::int64_t> points, const Pass& pass) {
   clear();
-  for (const std::int64_t point : points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::int64_t point = points[i];
+    if (i + kAhead < points.size()) fetch_ahead(points[i + kAhead]);
     const std::int64_t more = problem_.begin[at(point + 1)] - problem_.begin[at(point)];
     const bool room = lanes_.size() + more <= ObservationLanes::kUsual && std::ssize(points_) < lanes_.capacity();
     if (!points_.empty() && !room) break;
@@ -104,13 +121,10 @@ std::size_t PointEquations::linearise(std::span<const std::int64_t> points, cons
   }
   lanes_.linearise();
   for (Point& point : points_) weigh(point, pass.curvature);
-  kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns());
-  for (std::size_t i = 0; i < points_.size(); ++i) sum_up(i);
-  for (std::size_t i = points_.size(); i < at(padded_points()); ++i)
-    for (int v = kPointV; v < kPointInverse; ++v) point_value(v, i) = 0;
-  kernels_->factorise(padded_points(), pass.lambda, kPivotTolerance * (1 + pass.lambda),
-                      {point_values_.data(), lanes_.capacity()});
-  spread();
+  kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(), records_.data());
+  sum_up();
+  kernels_->factorise(padded_points(), pass.lambda, kPivotTolerance * (1 + pass.lambda), sums_.data(),
+                      {point_values_.data(), lanes_.capacity()}, steps_.data());
   return points_.size();
 }
 
@@ -127,6 +141,18 @@ double* PointEquations::take(int count) {
   return first;
 }
 
+// Points of a cell lie apart from each other, where the processor does not look ahead by itself.
+void PointEquations::fetch_ahead(std::int64_t point) const {
+  const std::size_t row = at(problem_.begin[at(point)]);
+  if (row >= problem_.image.size()) return;
+  __builtin_prefetch(&problem_.image[row]);
+  __builtin_prefetch(&problem_.kept[row]);
+  __builtin_prefetch(&problem_.x[row]);
+  __builtin_prefetch(&problem_.y[row]);
+  __builtin_prefetch(&problem_.inverse_sigma[row]);
+  __builtin_prefetch(&state_.points[at(point)]);
+}
+
 void PointEquations::add_observations(std::int64_t point) {
   Point& added = points_.emplace_back();
   added.point = point;
@@ -137,7 +163,7 @@ void PointEquations::add_observations(std::int64_t point) {
     const std::int64_t image = problem_.image[at(row)].value;
     rows_[at(lanes_.size())] = row;
     lane_unknowns_[at(lanes_.size())] = &unknowns_[at(image)];
-    point_of_lane_[at(lanes_.size())] = std::ssize(points_) - 1;
+    step_of_lane_[at(lanes_.size())] = steps_.data() + (std::ssize(points_) - 1) * kRecordSize;
     lanes_.add(lane_views_[at(image)], position, problem_.x[at(row)], problem_.y[at(row)],
                problem_.inverse_sigma[at(row)]);
   }
@@ -147,24 +173,53 @@ void PointEquations::add_observations(std::int64_t point) {
 void PointEquations::weigh(Point& point, bool curvature) {
   point.residual_count = 2 * point.observation_count();
   point.shared_begin = std::ssize(shared_);
-  const double* residual = lanes_.values() + kResidual * lanes_.capacity();
-  for (std::int64_t lane = point.first; lane < point.last; ++lane) {
-    const ImageUnknowns& unknowns = unknowns_of(lane);
-    const double x = residual[lane], y = residual[lane + lanes_.capacity()];
-    const double squares = x * x + y * y;
-    // Nearly all: nothing is to be done but to count.
-    if (unknowns.plain && std::isfinite(squares) && problem_.image_loss.squares(squares)) {
-      point.rho += squares;
-      point.weighted_squares += squares;
-    } else {
-      weigh_lane(point, lane, curvature);
+  if (all_plain_) {
+    const double* residual = lanes_.values() + kResidual * lanes_.capacity();
+    double sum = 0;
+    bool usual = true;
+    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+      const double x = residual[lane], y = residual[lane + lanes_.capacity()], squares = x * x + y * y;
+      sum += squares;
+      usual &= squares <= usual_squares_;
+    }
+    if (usual) {  // most: nothing is to be done but to count
+      point.rho = point.weighted_squares = sum;
+      point.shared_end = point.shared_begin;
+      return;
     }
   }
+  weigh_each(point, curvature);
   point.shared_end = std::ssize(shared_);
 }
 
-// One whose loss, camera or shared unknowns ask for more.
+void PointEquations::weigh_each(Point& point, bool curvature) {
+  for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+    const ImageUnknowns& unknowns = unknowns_of(lane);
+    const double squares = lanes_.residual(lane).squaredNorm();
+    if (!unknowns.plain || !std::isfinite(squares)) {
+      linearise_lane(point, lane, curvature);
+    } else if (!problem_.image_loss.squares(squares)) {
+      weigh_lane(point, lane, curvature);
+    } else {
+      point.rho += squares;
+      point.weighted_squares += squares;
+    }
+  }
+}
+
+// One in the tail of the loss.
 void PointEquations::weigh_lane(Point& point, std::int64_t lane, bool curvature) {
+  const Eigen::Vector2d residual = lanes_.residual(lane);
+  const double squares = residual.squaredNorm();
+  const LossWeight weight(problem_.image_loss, squares, curvature);
+  point.rho += weight.rho;
+  point.weighted_squares += weight.first * squares;
+  lanes_.set(lane, weight.residual_scale * residual, lanes_.from_frame(lane),
+             weight.weighted(lanes_.by_point(lane), residual));
+}
+
+// One whose camera or shared unknowns ask for more.
+void PointEquations::linearise_lane(Point& point, std::int64_t lane, bool curvature) {
   const std::int64_t row = rows_[at(lane)], image = problem_.image[at(row)].value;
   const ImageView& view = views_[at(image)];
   const ImageUnknowns& unknowns = unknowns_of(lane);
@@ -222,14 +277,14 @@ void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const do
     for (int i = 0; i < dimension; ++i) sum[i + j * dimension] += w[i + j * rows];
 }
 
-void PointEquations::sum_up(std::size_t i) {
-  const Point& point = points_[i];
-  const std::int64_t stride = lanes_.capacity();
-  std::array<double, 9> sum{};  // V, then b, as of observations
-  for (std::int64_t lane = point.first; lane < point.last; ++lane)
-    for (int v = 0; v < 9; ++v) sum[at(v)] += values_.data()[v * stride + lane];
-  for (int v = 0; v < 9; ++v) point_value(kPointV + v, i) = sum[at(v)];
-  if (prior_[at(point.point)] >= 0) add_prior(i);
+// V and b.
+void PointEquations::sum_up() {
+  for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first;
+  begin_[points_.size()] = lanes_.size();
+  kernels_->sum(std::ssize(points_), begin_.data(), records_.data(), sums_.data());
+  std::fill(sums_.data() + std::ssize(points_) * kRecordSize, sums_.data() + padded_points() * kRecordSize, 0.0);
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (prior_[at(points_[i].point)] >= 0) add_prior(i);
 }
 
 void PointEquations::add_prior(std::size_t i) {
@@ -237,36 +292,25 @@ void PointEquations::add_prior(std::size_t i) {
   const auto& term = problem_.point_priors[at(prior_[at(point.point)])];
   const Eigen::Vector3d weight = term.sigma.cwiseInverse();  // 0 on a free axis
   const Eigen::Vector3d r = point_prior_residual(state_.points[at(point.point)], term);
-  constexpr int kOnDiagonal[3] = {kPointV, kPointV + 2, kPointV + 5};
+  double* sums = sums_.data() + static_cast<std::int64_t>(i) * kRecordSize;
+  constexpr int kOnDiagonal[3] = {kV, kV + 2, kV + 5};
   for (int k = 0; k < 3; ++k) {
-    point_value(kOnDiagonal[k], i) += weight[k] * weight[k];
-    point_value(kPointB + k, i) -= weight[k] * r[k];
+    sums[kOnDiagonal[k]] += weight[k] * weight[k];
+    sums[kB + k] -= weight[k] * r[k];
   }
   point.rho += r.squaredNorm();
   point.weighted_squares += r.squaredNorm();
   point.residual_count += (weight.array() > 0).count();
 }
 
-// What the observations need of their point.
-void PointEquations::spread() {
-  constexpr int kFrom[9] = {kPointInverse,     kPointInverse + 1, kPointInverse + 2,
-                            kPointInverse + 3, kPointInverse + 4, kPointInverse + 5,
-                            kPointOwnStep,     kPointOwnStep + 1, kPointOwnStep + 2};
-  for (int k = 0; k < 9; ++k) {
-    double* to = values_.data() + (kInverse + k) * lanes_.capacity();
-    const double* from = point_values_.data() + kFrom[k] * lanes_.capacity();
-    for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) to[lane] = from[point_of_lane_[at(lane)]];
-    std::fill(to + lanes_.size(), to + lanes_.padded_size(), 0.0);
-  }
-}
-
 void PointEquations::reduce(std::vector<FrameSum>& sums) {
   FrameSum unused;
+  std::fill(step_of_lane_.begin() + lanes_.size(), step_of_lane_.begin() + lanes_.padded_size(), steps_.data());
   for (std::int64_t lane = 0; lane < lanes_.padded_size(); ++lane)
     frame_sums_[at(lane)] =
         lane < lanes_.size() ? sums[at(unknowns_of(lane).frame)].values.data() : unused.values.data();
-  kernels_->reduce(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(), y_.data(),
-                   frame_sums_.data());
+  kernels_->reduce(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(),
+                   step_of_lane_.data(), y_.data(), frame_sums_.data());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& point = points_[i];
     for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k) {

@@ -126,16 +126,18 @@ class PointEquations {
   };
 
   void clear();
+  void fetch_ahead(std::int64_t point) const;
   double* take(int count);
   void add_observations(std::int64_t point);
   void weigh(Point& point, bool curvature);
+  void weigh_each(Point& point, bool curvature);
   void weigh_lane(Point& point, std::int64_t lane, bool curvature);
+  void linearise_lane(Point& point, std::int64_t lane, bool curvature);
   void add_shared(const ImageUnknowns& unknowns, const ImageView& view, const CameraResidual& r, std::int64_t lane,
                   Point& point);
   void add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows, Point& point);
-  void sum_up(std::size_t i);
+  void sum_up();
   void add_prior(std::size_t i);
-  void spread();
   std::int64_t padded_points() const { return lane_kernels::padded(std::ssize(points_)); }
   double& point_value(int v, std::size_t i) {
     return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];
@@ -148,6 +150,8 @@ class PointEquations {
   const TileProblem& problem_;
   const TileState& state_;
   const point_kernels::Kernels* kernels_;
+  double usual_squares_;  // squared residuals up to there cost what they are
+  bool all_plain_;        // all images
   std::vector<ImageView> views_;
   std::vector<LaneView> lane_views_;
   std::vector<ImageUnknowns> unknowns_;
@@ -156,10 +160,12 @@ class PointEquations {
   std::vector<Point> points_;
   ObservationLanes lanes_;
   std::vector<std::int64_t> rows_;                   // [lanes] of the problem
-  std::vector<std::int64_t> point_of_lane_;          // [lanes] in points_
   std::vector<const ImageUnknowns*> lane_unknowns_;  // [lanes]
   std::vector<SharedRows> shared_rows_;              // [lanes]
   AlignedValues values_, point_values_, y_, moved_;  // by ObservationValue, PointValue; [lanes x kYSize]; [3 x lanes]
+  AlignedValues records_, sums_, steps_;             // [lanes x kRecordSize]; [points x kRecordSize] each
+  std::vector<std::int64_t> begin_;                  // [points + 1] lanes
+  std::vector<const double*> step_of_lane_;          // [lanes] in steps_
   std::vector<double*> frame_sums_;                  // [lanes]
   std::vector<const double*> motions_;               // [lanes]
   std::vector<SharedPart> shared_;

@@ -12,8 +12,10 @@ struct Columns {
   std::int64_t stride;
 };
 
-// Of an observation, behind lane_kernels::Value: V_k = J_p'J_p and b_k = -J_p'r; C^-1 and V^-1 b of its point.
-enum ObservationValue : int { kV = 0, kB = 6, kInverse = 9, kPointStep = 15, kObservationValueCount = 18 };
+// Of an observation, behind lane_kernels::Value: V_k = J_p'J_p and b_k = -J_p'r.
+enum ObservationValue : int { kV = 0, kB = 6, kObservationValueCount = 9 };
+// The same values, or C^-1 (6) and V^-1 b (3) of a point, side by side; the rest is 0.
+constexpr int kRecordSize = 16;
 // Of a point.
 enum PointValue : int {
   kPointV = 0,  // with its prior
@@ -46,13 +48,18 @@ struct FrontStorage {
 };
 
 struct Kernels {
-  // From residuals and J_p (`linearised`: rows of lane_kernels::Value) to V_k and b_k.
-  void (*normal)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out);
-  // Of points: from V and b to the rest. A pivot of at most floor * V_kk is held.
-  void (*factorise)(std::int64_t count, double lambda, double floor, const Columns& points);
-  // Y of every observation [count x kYSize], and the sums of its frame.
+  // From residuals and J_p (`linearised`: rows of lane_kernels::Value) to V_k and b_k, as columns and as records.
+  void (*normal)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out,
+                 double* records);
+  // Sums over the observations begin[p] to begin[p + 1] of each point p, as records.
+  void (*sum)(std::int64_t points, const std::int64_t* begin, const double* records, double* sums);
+  // Of points: from the records of V and b to all values, and to the records of C^-1 and V^-1 b. A pivot of at most
+  // floor * V_kk is held.
+  void (*factorise)(std::int64_t count, double lambda, double floor, const double* sums, const Columns& points,
+                    double* steps);
+  // Y of every observation [count x kYSize], and the sums of its frame. steps: the record of each observation's point.
   void (*reduce)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
-                 double* y, double* const* frames);
+                 const double* const* steps, double* y, double* const* frames);
   // V_k (u x w + t) of the motion (w, t) of each observation's frame (8 values, two unused) to three rows.
   void (*move)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
                const double* const* motions, double* out, std::int64_t out_stride);

@@ -26,27 +26,65 @@ template <int kCount>
 // Lower triangle by rows.
 constexpr int lower(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : lower(j, i); }
 
-void normal(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out) {
+// Rows of one group of lanes to records side by side, kWidth lanes apart from each other.
+template <int kCount, typename Record, typename Write>
+[[gnu::always_inline]] inline void to_records(const Lanes (&values)[kCount], Record record, Write write) {
+  static_assert(kCount % kWidth == 0);
+#pragma GCC unroll 64
+  for (int block = 0; block < kCount; block += kWidth) {
+    Lanes rows[kWidth];
+#pragma GCC unroll 64
+    for (int k = 0; k < kWidth; ++k) rows[k] = values[block + k];
+    transpose(rows);
+#pragma GCC unroll 64
+    for (int lane = 0; lane < kWidth; ++lane) write(record(lane) + block, rows[lane]);
+  }
+}
+
+// Values of one group of lanes to records that follow each other.
+[[gnu::always_inline]] inline void write_records(const Lanes (&values)[kRecordSize], double* records) {
+  to_records(
+      values, [&](int lane) __attribute__((always_inline)) { return records + lane * kRecordSize; },
+      [](double* to, const Lanes& row) __attribute__((always_inline)) { store(to, row); });
+}
+
+void normal(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out,
+            double* records) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    Lanes r[2], j[6];
+    Lanes r[2], j[6], values[kRecordSize]{};
     read_rows(linearised + kResidual * linearised_stride + i, linearised_stride, r);
     read_rows(linearised + kByPoint * linearised_stride + i, linearised_stride, j);
 #pragma GCC unroll 64
     for (int a = 0; a < 3; ++a) {
 #pragma GCC unroll 64
-      for (int b = 0; b <= a; ++b)
-        store(out.values + (kV + lower(a, b)) * out.stride + i, j[a] * j[b] + j[3 + a] * j[3 + b]);
-      store(out.values + (kB + a) * out.stride + i, -(j[a] * r[0] + j[3 + a] * r[1]));
+      for (int b = 0; b <= a; ++b) values[kV + lower(a, b)] = j[a] * j[b] + j[3 + a] * j[3 + b];
+      values[kB + a] = -(j[a] * r[0] + j[3 + a] * r[1]);
     }
+#pragma GCC unroll 64
+    for (int v = 0; v < kObservationValueCount; ++v) store(out.values + v * out.stride + i, values[v]);
+    write_records(values, records + i * kRecordSize);
   }
 }
 
-void factorise(std::int64_t count, double lambda, double floor, const Columns& points) {
+void sum(std::int64_t points, const std::int64_t* begin, const double* records, double* sums) {
+  for (std::int64_t p = 0; p < points; ++p) {
+    Lanes sum[kRecordSize / kWidth]{};
+    for (std::int64_t i = begin[p]; i < begin[p + 1]; ++i)
+#pragma GCC unroll 64
+      for (int k = 0; k < kRecordSize / kWidth; ++k) sum[k] += load(records + i * kRecordSize + k * kWidth);
+#pragma GCC unroll 64
+    for (int k = 0; k < kRecordSize / kWidth; ++k) store(sums + p * kRecordSize + k * kWidth, sum[k]);
+  }
+}
+
+void factorise(std::int64_t count, double lambda, double floor, const double* sums, const Columns& points,
+               double* steps) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    Lanes v[6], b[3];
+    Lanes of_sums[kRecordSize];
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return sums + (i + lane) * kRecordSize; }, of_sums);
+    const Lanes *v = of_sums + kV, *b = of_sums + kB;
     double* at = points.values + i;
-    read_rows(at + kPointV * points.stride, points.stride, v);
-    read_rows(at + kPointB * points.stride, points.stride, b);
     const Lanes zero{};
     Lanes held = zero;
     const auto invert = [&](const Lanes& pivot, const Lanes& diagonal) __attribute__((always_inline)) {
@@ -63,25 +101,20 @@ void factorise(std::int64_t count, double lambda, double floor, const Columns& p
     const Lanes i21 = -i22 * (c21 * i11);
     const Lanes i20 = -i22 * (c20 * i00 + c21 * i10);
     const Lanes z0 = i00 * b[0], z1 = i10 * b[0] + i11 * b[1], z2 = i20 * b[0] + i21 * b[1] + i22 * b[2];
-    const Lanes out[] = {
-        i00, i10, i11, i20, i21, i22, z0, z1, z2, i00 * z0 + i10 * z1 + i20 * z2, i11 * z1 + i21 * z2, i22 * z2, held};
-    int row = kPointInverse;
-    for (const Lanes& value : out) store(at + row++ * points.stride, value);
-  }
-}
-
-// Rows of one group of lanes to records side by side, kWidth lanes apart from each other.
-template <int kCount, typename Record, typename Write>
-[[gnu::always_inline]] inline void to_records(const Lanes (&values)[kCount], Record record, Write write) {
-  static_assert(kCount % kWidth == 0);
+    const Lanes step[kRecordSize] = {
+        i00, i10, i11, i20, i21, i22, i00 * z0 + i10 * z1 + i20 * z2, i11 * z1 + i21 * z2, i22 * z2};
+    write_records(step, steps + i * kRecordSize);
+    const auto write = [&](int row, const Lanes* values, int number) __attribute__((always_inline)) {
 #pragma GCC unroll 64
-  for (int block = 0; block < kCount; block += kWidth) {
-    Lanes rows[kWidth];
-#pragma GCC unroll 64
-    for (int k = 0; k < kWidth; ++k) rows[k] = values[block + k];
-    transpose(rows);
-#pragma GCC unroll 64
-    for (int lane = 0; lane < kWidth; ++lane) write(record(lane) + block, rows[lane]);
+      for (int k = 0; k < number; ++k) store(at + (row + k) * points.stride, values[k]);
+    };
+    const Lanes z[] = {z0, z1, z2};
+    write(kPointV, v, 6);
+    write(kPointB, b, 3);
+    write(kPointInverse, step, 6);
+    write(kPointZ, z, 3);
+    write(kPointOwnStep, step + 6, 3);
+    write(kPointHeld, &held, 1);
   }
 }
 
@@ -94,14 +127,15 @@ template <int kCount, typename Record, typename Write>
 }
 
 void reduce(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
-            double* y, double* const* frames) {
+            const double* const* steps, double* y, double* const* frames) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    Lanes u[3], v[6], b[3], inverse[6], step[3];
+    Lanes u[3], v[6], b[3], of_point[kRecordSize];
     read_rows(linearised + kFromFrame * linearised_stride + i, linearised_stride, u);
     read_rows(values.values + kV * values.stride + i, values.stride, v);
     read_rows(values.values + kB * values.stride + i, values.stride, b);
-    read_rows(values.values + kInverse * values.stride + i, values.stride, inverse);
-    read_rows(values.values + kPointStep * values.stride + i, values.stride, step);
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return steps[i + lane]; }, of_point);
+    const Lanes *inverse = of_point, *step = of_point + 6;
     const Lanes zero{};
 
     Lanes t[3][3];  // T: row, column

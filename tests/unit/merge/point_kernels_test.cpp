@@ -27,6 +27,7 @@ struct Worked {
   std::vector<double> linearised = random(lane_kernels::kValueCount * kStride, 1);
   std::vector<double> values = std::vector<double>(kObservationValueCount * kStride, 0.0);
   std::vector<double> points = std::vector<double>(kPointValueCount * kStride, 0.0);
+  alignas(64) std::array<double, kCount * kRecordSize> records{}, point_sums{}, steps{};
   alignas(64) std::array<double, kCount * kYSize> y{};
   alignas(64) std::array<std::array<double, kFrameSize>, 2> frames{};  // of the even observations, of the odd ones
   alignas(64) std::array<std::array<double, 8>, 2> motions{};
@@ -46,21 +47,14 @@ struct Worked {
 
   explicit Worked(const Kernels& kernels) {
     const Columns columns{values.data(), kStride}, of_points{points.data(), kStride};
-    kernels.normal(linearised.data(), kStride, kCount, columns);
-    for (std::int64_t p = 0; p < kCount / 2; ++p)
-      for (int v = 0; v < 9; ++v)
-        points[static_cast<std::size_t>((kPointV + v) * kStride + p)] =
-            value(values, v, 2 * p) + value(values, v, 2 * p + 1);
-    for (int v = 0; v < 6; ++v)
-      points[static_cast<std::size_t>((kPointV + v) * kStride + 7)] = 0;  // nothing observes it
-    kernels.factorise(kCount / 2, kLambda, kFloor, of_points);
-    for (std::int64_t lane = 0; lane < kCount; ++lane) {
-      for (int k = 0; k < 6; ++k)
-        values[static_cast<std::size_t>((kInverse + k) * kStride + lane)] = value(points, kPointInverse + k, lane / 2);
-      for (int k = 0; k < 3; ++k)
-        values[static_cast<std::size_t>((kPointStep + k) * kStride + lane)] =
-            value(points, kPointOwnStep + k, lane / 2);
-    }
+    kernels.normal(linearised.data(), kStride, kCount, columns, records.data());
+    std::array<std::int64_t, kCount / 2 + 1> begin;
+    for (std::size_t p = 0; p < begin.size(); ++p) begin[p] = 2 * static_cast<std::int64_t>(p);
+    kernels.sum(kCount / 2, begin.data(), records.data(), point_sums.data());
+    for (std::size_t v = 0; v < 6; ++v) point_sums[7 * kRecordSize + v] = 0;  // nothing observes it
+    kernels.factorise(kCount / 2, kLambda, kFloor, point_sums.data(), of_points, steps.data());
+    std::array<const double*, kCount> step_of_lane;
+    for (std::size_t lane = 0; lane < kCount; ++lane) step_of_lane[lane] = steps.data() + lane / 2 * kRecordSize;
     std::array<double*, kCount> sums;
     std::array<const double*, kCount> of_lane;
     for (std::size_t m = 0; m < 2; ++m)
@@ -69,7 +63,7 @@ struct Worked {
       sums[lane] = frames[lane % 2].data();
       of_lane[lane] = motions[lane % 2].data();
     }
-    kernels.reduce(linearised.data(), kStride, kCount, columns, y.data(), sums.data());
+    kernels.reduce(linearised.data(), kStride, kCount, columns, step_of_lane.data(), y.data(), sums.data());
     kernels.move(linearised.data(), kStride, kCount, columns, of_lane.data(), moved.data(), kStride);
     // Four observations as if they were one point's, two of them in one frame; the first frame is eliminated.
     const std::array<std::int64_t, 4> rows{12, 0, 18, 12};
