@@ -38,14 +38,6 @@ SimulatedBlock seen_in_part(const KnownPositionsScene& scene, const std::vector<
   return block;
 }
 
-AdjustOptions tile_options(const KnownPositionsScene& scene) {
-  AdjustOptions options;
-  options.observations.image_sigma_px = scene.options.image_sigma_px;
-  options.estimate_image_sigma = false;
-  options.min_intersection_deg = 0.1;
-  return options;
-}
-
 void adjust_exactly(SerialRunner& runner) {
   GlobalOptions exact;
   exact.max_decrement = 1e-9;
@@ -67,7 +59,7 @@ TEST(KnownPositions, TKP16TilesGiveTheSameAsOneProblem) {
     const KnownPositionsScene scene(
         ten_cameras(drone ? KnownPositionsOptions::drone(300, 5) : KnownPositionsOptions::satellite(300, 0.1, 5)));
     SimulatedBlock block = seen_in_part(scene, {0, 2, 4});
-    SingleTile lone(block, tile_options(scene));
+    SingleTile lone(block, adjustment_of(scene));
     triangulate_points(lone.problem, lone.state, lone.options);
     block.truth = initial_state(block.block);  // where the tiles start
     block.points = lone.state.points;
@@ -108,7 +100,7 @@ TEST(KnownPositions, TKP14PointSubsetsAgreeAndSayWhatTheyShare) {
         drone ? KnownPositionsOptions::drone(1001, 14) : KnownPositionsOptions::satellite(1001, 0.1, 14);
     options.image_sigma_px = 0.1;
     const KnownPositionsScene scene(options);
-    SingleTile tile(scene.block(), tile_options(scene));
+    SingleTile tile(scene.block(), adjustment_of(scene));
     triangulate_points(tile.problem, tile.state, tile.options);
     ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
     const MotionReference reference = motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
@@ -152,7 +144,7 @@ TEST(KnownPositions, TKP15TilesAgreeAboutTheCamerasTheyShare) {
   std::array<TileState, 2> states;
   std::array<TileCovariance, 2> covariances;
   for (std::size_t t = 0; t < 2; ++t) {
-    SingleTile tile(two.block, tile_options(two.scene));
+    SingleTile tile(two.block, adjustment_of(two.scene));
     for (std::size_t p = 0; p < tile.problem.points.size(); ++p)
       if (p % 2 != t)
         std::fill(tile.problem.kept.begin() + tile.problem.begin[p],
@@ -180,7 +172,7 @@ TEST(KnownPositions, TKP15TilesAgreeAboutTheCamerasTheyShare) {
 
 TEST(KnownPositions, TKP15CorruptedTileIsNamed) {
   const TwoTiles two(16);
-  SingleTile lone(two.block, tile_options(two.scene));
+  SingleTile lone(two.block, adjustment_of(two.scene));
   TiledBlock tiled(two.block, 5, lone.options.observations, 0);
   ASSERT_GE(tiled.tiles.tile_count, 2);
   const auto checked = [&] {

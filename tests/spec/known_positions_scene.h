@@ -6,6 +6,7 @@
 
 #include <random>
 
+#include "adjust/tile_adjustment.h"
 #include "geometry/coplanarity.h"
 #include "io/held_priors.h"
 #include "io/simulate/simulate.h"
@@ -213,5 +214,14 @@ struct KnownPositionsScene {
   std::mt19937_64 random_;
   Eigen::Vector3d extent_;
 };
+
+// How a scene is adjusted: with the noise it has, and points that distant cameras see under small angles.
+inline AdjustOptions adjustment_of(const KnownPositionsScene& scene) {
+  AdjustOptions options;
+  options.observations.image_sigma_px = scene.options.image_sigma_px;
+  options.estimate_image_sigma = false;
+  options.min_intersection_deg = 0.1;
+  return options;
+}
 
 }  // namespace megablock

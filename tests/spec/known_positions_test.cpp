@@ -14,14 +14,6 @@
 namespace megablock {
 namespace {
 
-AdjustOptions adjustment_of(const KnownPositionsScene& scene) {
-  AdjustOptions options;
-  options.observations.image_sigma_px = scene.options.image_sigma_px;
-  options.estimate_image_sigma = false;
-  options.min_intersection_deg = 0.1;
-  return options;
-}
-
 std::vector<XyzAngles> angles_of(const TileState& state) {
   std::vector<XyzAngles> result;
   for (const Pose& pose : state.frames) result.push_back(xyz_angles(pose.rotation));
