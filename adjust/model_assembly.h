@@ -1,21 +1,8 @@
 // Block adjustment of independent models: pairs, sub-blocks or tiles, each in a frame of its own, joined by one
 // similarity each (M51, M52).
 //
-//  1. Links: a robust similarity between every two models that share points or images (model_link.h).
-//  2. Trust: agreeing points times the share of the link's triangles that close within their covariances; a spanning
-//     tree of the most trusted links gives the start. This is chaining, and its errors add up.
-//  3. All links together, in least squares with their covariances and with weights that forget what contradicts
-//     (Geman-McClure, its width following the median misfit); links that then contradict are removed.
-//  4. All shared points and images together. With S_m (model -> common frame), x_mi point i in model m, X_i its place
-//     and A_j, Q_mj attitudes of image j,
-//
-//         sum |S_m^-1 X_i - x_mi|^2 / sigma_mi^2  +  sum |Log(Q_mj' A_j R_m)|^2 / rho_mj^2
-//
-//     in units of each model, so that no scale shrinks. X and A are eliminated: with errors alike on all axes their
-//     normal matrices are multiples of the unit matrix, and X_i is the mean of S_m x_mi with weights 1/(s_m
-//     sigma_mi)^2. What is left, seven unknowns a model, is solved by sparse Cholesky factorisation. Points and images
-//     are tested in every round, both ways, and the worst of a place is left out first. What is then no longer held
-//     together is taken apart, and the rest goes on without it.
+// A start from the links between models: chained along the most trusted, then all together (linked_models.h). From it
+// all shared points and images together (place_adjustment.h).
 //
 // The frame is that of the model with the lowest number in each part that hangs together; its similarity is the
 // identity. Models, points and images are taken in the order of their numbers: the result has the same bits in whatever
@@ -28,7 +15,7 @@ namespace megablock {
 
 struct AssemblyOptions {
   LinkOptions links;
-  bool joint = true;        // false: only chained along the spanning tree (steps 1 and 2), for comparison
+  bool joint = true;        // false: only chained along the most trusted links, for comparison
   bool covariances = true;  // by the entries of the inverse that the factor has: about the time of two iterations
   int max_iterations = 30;  // of the joint adjustment
   void check() const;       // throws InputError
