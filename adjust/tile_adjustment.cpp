@@ -46,14 +46,20 @@ std::vector<double> residual_lengths(const TileProblem& problem, const TileState
 
 // Sigma of the kept image residuals from their median (1.1774 is the median of a Rayleigh distribution), in a-priori
 // sigmas: untouched by outliers.
-double robust_sigma(std::vector<double> lengths) {
-  if (lengths.empty()) throw ComputeError("the tile has no points that can be intersected");
+double robust_sigma(std::vector<double> lengths, const AdjustOptions& options) {
+  if (lengths.empty())
+    throw ComputeError(
+        fmt::format("the tile has no points that can be intersected: the rays of none meet in front of their images at "
+                    "adjustment.min_intersection_deg = {} or more; lower it where all rays are nearly parallel, as "
+                    "satellites' are, "
+                    "else check the start poses and cameras",
+                    options.min_intersection_deg));
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
   return *middle / 1.1774;
 }
-double robust_sigma(const TileProblem& problem, const TileState& state) {
-  return robust_sigma(residual_lengths(problem, state));
+double robust_sigma(const TileProblem& problem, const TileState& state, const AdjustOptions& options) {
+  return robust_sigma(residual_lengths(problem, state), options);
 }
 
 // Mean redundancy of an image residual: least squares shortens residuals by its root.
@@ -72,8 +78,8 @@ double redundancy(const TileProblem& problem) {
 double threshold_factor(const TileProblem& problem, double robust_sigma) {
   return std::max(1.0, robust_sigma / std::sqrt(redundancy(problem)));
 }
-double threshold_factor(const TileProblem& problem, const TileState& state) {
-  return threshold_factor(problem, robust_sigma(problem, state));
+double threshold_factor(const TileProblem& problem, const TileState& state, const AdjustOptions& options) {
+  return threshold_factor(problem, robust_sigma(problem, state, options));
 }
 
 class TileAdjuster {
@@ -123,12 +129,12 @@ class TileAdjuster {
     const std::int64_t settled = active_observations() / 500;
     bool falling = true;
     for (int round = 0; round < kMaxRounds; ++round) {
-      const double sigma = robust_sigma(problem_, state_);
+      const double sigma = robust_sigma(problem_, state_, options_);
       const double threshold = std::max(widest, kWide * sigma);
       const std::int64_t changed = screen_observations(problem_, state_, threshold, options_, chosen_);
       if (!falling && changed <= settled) break;
       solve_rough(Stage::kFocal, dense ? kFew : kMany);
-      const double next = robust_sigma(problem_, state_);
+      const double next = robust_sigma(problem_, state_, options_);
       falling = next >= 2 && next <= 0.7 * sigma;
       if (!dense && !falling) break;  // the later rounds take the same tracks
     }
@@ -168,7 +174,7 @@ class TileAdjuster {
   bool fits() const {
     constexpr double kHardlyAny = 0.01;
     const std::vector<double> lengths = residual_lengths(problem_, state_);
-    const double limit = options_.max_residual_sigmas * threshold_factor(problem_, robust_sigma(lengths));
+    const double limit = options_.max_residual_sigmas * threshold_factor(problem_, robust_sigma(lengths, options_));
     const auto beyond = std::count_if(lengths.begin(), lengths.end(), [&](double length) { return length > limit; });
     return static_cast<double>(beyond) <= kHardlyAny * static_cast<double>(lengths.size());
   }
@@ -225,7 +231,7 @@ class TileAdjuster {
   std::int64_t screen(double threshold) {
     const std::vector<std::uint8_t> before = problem_.kept;
     const std::int64_t changed =
-        screen_observations(problem_, state_, threshold * threshold_factor(problem_, state_), options_);
+        screen_observations(problem_, state_, threshold * threshold_factor(problem_, state_, options_), options_);
     for (std::size_t row = 0; row < before.size(); ++row) restored_ += !before[row] && problem_.kept[row];
     return changed;
   }
@@ -239,7 +245,7 @@ class TileAdjuster {
       if (!chosen_[p])
         std::fill(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0);
     const RobustLoss loss = problem_.image_loss;
-    problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_))};
+    problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_, options_))};
     const double near = 0.5 * kNear * kNear * frame_unknowns() / static_cast<double>(active_observations());
     solve({std::min(iterations, options_.max_iterations), std::max(kFlat, near), camera_free(stage)});
     problem_.image_loss = loss;
@@ -306,7 +312,7 @@ class TileAdjuster {
 }  // namespace
 
 double screening_threshold(const TileProblem& problem, const TileState& state, const AdjustOptions& options) {
-  return options.max_residual_sigmas * threshold_factor(problem, state);
+  return options.max_residual_sigmas * threshold_factor(problem, state, options);
 }
 
 AdjustSummary adjust_tile(TileProblem& problem, TileState& state, const AdjustOptions& options,

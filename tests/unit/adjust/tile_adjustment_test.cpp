@@ -392,5 +392,18 @@ TEST(Solve, RefusesWhatCannotBeAdjusted) {
   EXPECT_THROW(options.check(), InputError);
 }
 
+TEST(Solve, NamesTheAngleThatNoPointReaches) {
+  SingleTile tile(aerial(6, 17));
+  tile.options.min_intersection_deg = 89.5;
+  try {
+    adjust_tile(tile.problem, tile.state, tile.options);
+    ADD_FAILURE() << "nothing is said";
+  } catch (const ComputeError& error) {
+    EXPECT_NE(std::string(error.what()).find("adjustment.min_intersection_deg = 89.5 or more; lower it"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace megablock
