@@ -1,5 +1,7 @@
 #include "merge/cell_assembler.h"
 
+#include <algorithm>
+
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -26,10 +28,22 @@ void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen:
       place.values[below ? i + j * place.stride : j + i * place.stride] += block(i, j);
 }
 
-CellAssembler::CellAssembler(const TilePlan& plan, Front& front)
-    : plan_(plan), front_(front), frames_(plan.unknowns.size()) {
+CellAssembler::CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pair_blocks)
+    : plan_(plan),
+      front_(front),
+      frames_(plan.unknowns.size()),
+      numbers_(plan.unknowns.size(), -1),
+      pair_blocks_(pair_blocks) {
   rows_.reserve(plan.unknowns.size());
-  for (const Unknown& u : plan.unknowns) rows_.push_back(front.row_of(u.id));
+  for (const Unknown& u : plan.unknowns) {
+    rows_.push_back(front.row_of(u.id));
+    if (rows_.back() >= 0 && u.id.kind == UnknownKind::kFrame) frame_rows_.push_back(rows_.back());
+  }
+  std::ranges::sort(frame_rows_);
+  for (std::size_t u = 0; u < rows_.size(); ++u)
+    if (rows_[u] >= 0 && plan.unknowns[u].id.kind == UnknownKind::kFrame)
+      numbers_[u] = std::ranges::lower_bound(frame_rows_, rows_[u]) - frame_rows_.begin();
+  pair_blocks_.reserve(std::ssize(frame_rows_));
 }
 
 void CellAssembler::add_points(PointEquations& equations) {
@@ -39,12 +53,11 @@ void CellAssembler::add_points(PointEquations& equations) {
 
 void CellAssembler::add_point(const PointEquations& equations, std::size_t i) {
   const PointEquations::Point& point = equations.points()[i];
-  frame_rows_.clear();
+  point_frames_.clear();
   for (std::int64_t lane = point.first; lane < point.last; ++lane)
-    frame_rows_.push_back(rows_[at(equations.unknowns_of(lane).frame)]);
-  equations.kernels().subtract_pairs(
-      point.observation_count(), equations.y(point.first), frame_rows_.data(),
-      {front_.factor(), front_.update(), front_.dimension(), front_.eliminated_dimension()});
+    point_frames_.push_back(numbers_[at(equations.unknowns_of(lane).frame)]);
+  equations.kernels().subtract_pairs(point.observation_count(), equations.y(point.first), point_frames_.data(),
+                                     pair_blocks_.pairs());
   if (point.shared_end > point.shared_begin) add_shared(equations, i);
 
   SubtreeSums& sums = front_.sums();
@@ -123,7 +136,17 @@ void CellAssembler::add_normal(std::int64_t unknown, const Eigen::Ref<const Eige
   Eigen::Map<Eigen::VectorXd>(front_.diagonal() + row, normal.cols()) += normal.diagonal();
 }
 
+void CellAssembler::add_pairs() {
+  pair_blocks_.take(std::ssize(frame_rows_), [&](std::int64_t i, std::int64_t j, const double* block) {
+    const Front::Place place = front_.place(frame_rows_[at(i)], frame_rows_[at(j)]);
+    for (int column = 0; column < 6; ++column)
+      for (int row = 0; row < 6; ++row)
+        place.values[row + column * place.stride] += block[row + column * point_kernels::kPairStride];
+  });
+}
+
 void CellAssembler::finish(std::vector<double>& diagonal) {
+  add_pairs();
   for (std::size_t u = 0; u < frames_.size(); ++u) {
     if (rows_[u] < 0 || plan_.unknowns[u].id.kind != UnknownKind::kFrame) continue;
     const double* sum = frames_[u].values.data();

@@ -1,7 +1,9 @@
 // Fills the front of a cell with its points, which are eliminated on the way, and its other observations.
 //
-// Per point (point_equations.h) K_ij -= Y_i Y_j' goes to the front at once. What only concerns one frame or the shared
-// unknowns of one camera in one mount, J'J and -J'r, is summed apart and added to the front once per cell: of a frame
+// Per point (point_equations.h) K_ij -= Y_i Y_j' of shared unknowns goes to the front at once, that of two frames to a
+// block apart (pair_blocks.h). Added to the front once per
+// cell are these blocks and what only concerns one frame or the shared unknowns of one camera in one mount, J'J and
+// -J'r: of a frame
 // G'(V_k - T T')G and G'(b_k - T z) of its observations k, T = V_k C^-T. By its blocks, with R = V_k - T T', the first
 // is [u]x R [u]x', -[u]x R and R. Further the diagonal of J'J (point_kernels::FrameValue).
 #pragma once
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "merge/front.h"
+#include "merge/pair_blocks.h"
 #include "merge/point_equations.h"
 
 namespace megablock {
@@ -19,7 +22,8 @@ void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen:
 
 class CellAssembler {
  public:
-  CellAssembler(const TilePlan& plan, Front& front);
+  // `pair_blocks`: room for what points add between frames.
+  CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pair_blocks);
   void add_points(PointEquations& equations);  // after linearise()
   void add_term(const TermResidual& term);
   // Adds what was summed apart; the front is complete then. `diagonal`: of J'J over plan.unknowns, grows by the cell's.
@@ -41,6 +45,7 @@ class CellAssembler {
   };
   // A B' from the front
   void subtract_outer(const point_kernels::Kernels& kernels, const Factor& a, const Factor& b);
+  void add_pairs();
   // An unknown's own J'J (lower triangle), with its diagonal.
   void add_normal(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& normal);
 
@@ -50,7 +55,10 @@ class CellAssembler {
   std::vector<FrameSum> frames_;               // [plan.unknowns]
   std::vector<SharedSum> shared_;              // by ImageUnknowns::calibration
   std::vector<PointEquations::Block> blocks_;  // of the point at hand
-  std::vector<std::int64_t> frame_rows_;       // of its frames in the front
+  std::vector<std::int64_t> frame_rows_;       // of the cell's frames in the front, ascending
+  std::vector<std::int64_t> numbers_;          // [plan.unknowns] of frames among them
+  PairBlocks& pair_blocks_;                    // by these numbers
+  std::vector<std::int64_t> point_frames_;     // of the point at hand
 };
 
 }  // namespace megablock

@@ -13,8 +13,9 @@ namespace megablock {
 namespace {
 
 void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-               const PlanNode& node, PointEquations& equations, std::vector<double>& diagonal, Front& front) {
-  CellAssembler assembler(plan, front);
+               const PlanNode& node, PointEquations& equations, PairBlocks& pair_blocks, std::vector<double>& diagonal,
+               Front& front) {
+  CellAssembler assembler(plan, front, pair_blocks);
   for (std::span<const std::int64_t> rest = plan.points[at(node.leaf)]; !rest.empty();) {
     rest = rest.subspan(equations.linearise(rest, pass));
     assembler.add_points(equations);
@@ -76,13 +77,15 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
   PointEquations equations(problem, plan, state);
   std::vector<UpdateMatrix> updates(nodes.size());
   FrontMemory memory;
+  PairBlocks pair_blocks;
   TileCondensation result;
   result.factor.nodes.resize(nodes.size());
   result.factor.diagonal.assign(at(total_dimension(plan.unknowns)), 0);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const PlanNode& node = nodes[i];
     Front front(node.eliminated, node.passed, right_hand_sides, &memory);
-    if (node.leaf >= 0) fill_cell(problem, plan, state, pass, node, equations, result.factor.diagonal, front);
+    if (node.leaf >= 0)
+      fill_cell(problem, plan, state, pass, node, equations, pair_blocks, result.factor.diagonal, front);
     for (std::int64_t child : {node.left, node.right}) {
       if (child < 0) continue;
       front.add(updates[at(child)]);

@@ -41,10 +41,13 @@ enum FrameValue : int {
   kFrameSize = 32
 };
 
-// The part of a front that the frames of a point touch (Front::place).
-struct FrontStorage {
-  double *factor, *update;
-  std::int64_t dimension, eliminated;
+// What points add between frames (pair_blocks.h): the block of frames i >= j is number pair_number(i, j), [6 x 6]
+// column by column; each column is a cache line with two values unused. used: 1 where something was added.
+constexpr int kPairStride = 8, kPairSize = 6 * kPairStride;
+constexpr std::int64_t pair_number(std::int64_t i, std::int64_t j) { return i * (i + 1) / 2 + j; }
+struct Pairs {
+  double* blocks;
+  std::uint8_t* used;
 };
 
 struct Kernels {
@@ -68,8 +71,9 @@ struct Kernels {
   // C -= A B', three columns each, leading dimensions c_stride, a_stride, b_stride; A has `rows`, B `columns` rows.
   void (*subtract_product)(double* c, std::int64_t c_stride, const double* a, std::int64_t a_stride, std::int64_t rows,
                            const double* b, std::int64_t b_stride, std::int64_t columns);
-  // K_ij -= Y_i Y_j' for all pairs of observations of one point, i > j. rows: of their frames in the front [count].
-  void (*subtract_pairs)(std::int64_t count, const double* y, const std::int64_t* rows, const FrontStorage& front);
+  // K_ij -= Y_i Y_j' for all pairs of observations of one point, by the numbers of their frames [count]. On a diagonal
+  // block only the lower triangle counts.
+  void (*subtract_pairs)(std::int64_t count, const double* y, const std::int64_t* frames, const Pairs& pairs);
 };
 extern const Kernels kPortable, kAvx2, kAvx512;
 

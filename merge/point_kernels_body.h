@@ -328,18 +328,19 @@ void subtract_product(double* c, std::int64_t c_stride, const double* a, std::in
   }
 }
 
-void subtract_pairs(std::int64_t count, const double* y, const std::int64_t* rows, const FrontStorage& front) {
-  const std::int64_t e = front.eliminated, n = front.dimension, p = n - e;
+void subtract_pairs(std::int64_t count, const double* y, const std::int64_t* frames, const Pairs& pairs) {
+  constexpr int kRows = kWidth == kPairStride ? kPairStride : 6;  // the longest vectors take the unused rows along
   const auto subtract = [&](std::int64_t i, std::int64_t j) {
-    const std::int64_t row = rows[i], column = rows[j];
-    const bool first = column < e;
-    double* c = first ? front.factor + row + column * n : front.update + (row - e) + (column - e) * p;
-    subtract_block<6, 6>(c, first ? n : p, y + i * kYSize, kYStride, y + j * kYSize, kYStride);
+    const std::int64_t number = pair_number(frames[i], frames[j]);
+    pairs.used[number] = 1;
+    subtract_block<kRows, 6>(pairs.blocks + number * kPairSize, kPairStride, y + i * kYSize, kYStride, y + j * kYSize,
+                             kYStride);
   };
   for (std::int64_t i = 1; i < count; ++i) {
     for (std::int64_t j = 0; j < i; ++j) {
-      if (rows[i] >= rows[j]) subtract(i, j);
-      if (rows[i] <= rows[j]) subtract(j, i);  // both in a frame's own block, where the lower triangle counts
+      const bool below = frames[i] >= frames[j];
+      subtract(below ? i : j, below ? j : i);
+      if (frames[i] == frames[j]) subtract(j, i);
     }
   }
 }

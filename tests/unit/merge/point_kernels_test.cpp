@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <random>
 
 #include "adjust/observation_lanes.h"
@@ -16,6 +18,8 @@ using namespace point_kernels;
 
 constexpr std::int64_t kCount = 16, kStride = 24;
 constexpr double kLambda = 0.01, kFloor = 1e-12;
+// Of four observations as if they were one point's: two of them in one frame.
+constexpr std::array<std::int64_t, 4> kFrames{1, 0, 2, 1};
 
 const Kernels* kernels_of_width(int width) {
   if (lane_kernels_of_width(width) == nullptr) return nullptr;  // not on this processor
@@ -32,7 +36,8 @@ struct Worked {
   alignas(64) std::array<std::array<double, kFrameSize>, 2> frames{};  // of the even observations, of the odd ones
   alignas(64) std::array<std::array<double, 8>, 2> motions{};
   std::vector<double> moved = std::vector<double>(3 * kStride, 0.0);
-  std::vector<double> front = random(30 * 30, 3);
+  alignas(64) std::array<double, 6 * kPairSize> pairs = first_pairs();
+  std::array<std::uint8_t, 6> used{};
 
   static std::vector<double> random(std::int64_t count, unsigned seed) {
     std::mt19937_64 generator(seed);
@@ -40,6 +45,17 @@ struct Worked {
     std::vector<double> list(static_cast<std::size_t>(count));
     for (double& value : list) value = normal(generator);
     return list;
+  }
+  // Of three frames.
+  static std::array<double, 6 * kPairSize> first_pairs() {
+    std::array<double, 6 * kPairSize> pairs;
+    std::ranges::copy(random(std::ssize(pairs), 3), pairs.begin());
+    return pairs;
+  }
+  // Element (row, column) of the matrix of the three frames, lower triangle by blocks.
+  static double element(const std::array<double, 6 * kPairSize>& pairs, std::int64_t row, std::int64_t column) {
+    return pairs[static_cast<std::size_t>(pair_number(row / 6, column / 6) * kPairSize + column % 6 * kPairStride +
+                                          row % 6)];
   }
   double value(const std::vector<double>& from, int v, std::int64_t lane) const {
     return from[static_cast<std::size_t>(v * kStride + lane)];
@@ -65,9 +81,7 @@ struct Worked {
     }
     kernels.reduce(linearised.data(), kStride, kCount, columns, step_of_lane.data(), y.data(), sums.data());
     kernels.move(linearised.data(), kStride, kCount, columns, of_lane.data(), moved.data(), kStride);
-    // Four observations as if they were one point's, two of them in one frame; the first frame is eliminated.
-    const std::array<std::int64_t, 4> rows{12, 0, 18, 12};
-    kernels.subtract_pairs(4, y.data(), rows.data(), {front.data(), front.data() + 30 * 6, 30, 6});
+    kernels.subtract_pairs(4, y.data(), kFrames.data(), {pairs.data(), used.data()});
   }
 
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const {
@@ -160,18 +174,16 @@ TEST_P(PointKernels, EqualPlainMatrices) {
       EXPECT_NEAR(w.frames[f][static_cast<std::size_t>(kRightHandSide + k)], rhs[f][k], 1e-8);
     }
   }
-  // The lower triangle of the front: 6 columns of 30 rows, then 24 of 24.
-  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(30, 30);
-  const std::array<std::int64_t, 4> rows{12, 0, 18, 12};
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(18, 18);
   for (std::size_t a = 0; a < 4; ++a)
     for (std::size_t b = 0; b < 4; ++b)
-      if (a != b) expected.block<6, 6>(rows[a], rows[b]) -= factors[a] * factors[b].transpose();
-  const std::vector<double> before = Worked::random(30 * 30, 3);
-  for (std::int64_t column = 0; column < 30; ++column)
-    for (std::int64_t row = column; row < 30; ++row) {
-      const auto at = static_cast<std::size_t>(column < 6 ? row + 30 * column : 180 + (row - 6) + 24 * (column - 6));
-      EXPECT_NEAR(w.front[at] - before[at], expected(row, column), 1e-9) << row << " " << column;
-    }
+      if (a != b) expected.block<6, 6>(6 * kFrames[a], 6 * kFrames[b]) -= factors[a] * factors[b].transpose();
+  for (std::int64_t column = 0; column < 18; ++column)
+    for (std::int64_t row = column; row < 18; ++row)
+      EXPECT_NEAR(Worked::element(w.pairs, row, column) - Worked::element(Worked::first_pairs(), row, column),
+                  expected(row, column), 1e-9)
+          << row << " " << column;
+  EXPECT_EQ(w.used, (std::array<std::uint8_t, 6>{0, 1, 1, 1, 1, 0}));
 }
 
 TEST_P(PointKernels, HaveTheBitsOfThePortableOnes) {
@@ -181,7 +193,9 @@ TEST_P(PointKernels, HaveTheBitsOfThePortableOnes) {
   EXPECT_EQ(narrow.y, wide.y);
   EXPECT_EQ(narrow.frames, wide.frames);
   EXPECT_EQ(narrow.moved, wide.moved);
-  EXPECT_EQ(narrow.front, wide.front);
+  for (std::int64_t column = 0; column < 18; ++column)
+    for (std::int64_t row = column; row < 18; ++row)
+      EXPECT_EQ(Worked::element(narrow.pairs, row, column), Worked::element(wide.pairs, row, column));
 }
 
 TEST_P(PointKernels, SolveForThePoints) {
