@@ -3,9 +3,7 @@
 
 #include "cluster/job_options.h"
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-
+#include "cluster/job_json.h"
 #include "io/error.h"
 #include "io/settings_reader.h"
 
@@ -221,19 +219,7 @@ JobOptions read_options(const StageSettings& settings) {
   return options;
 }
 
-JobOptions options_of_job(const JobStore& store) {
-  std::ifstream in(store.path("job.json"));
-  if (!in)
-    throw InputError(store.directory() + ": is not a job directory (no job.json); name the folder given to 'run -j'");
-  StageSettings settings;
-  try {
-    const nlohmann::json json = nlohmann::json::parse(in);
-    for (const auto& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
-  } catch (const nlohmann::json::exception&) {
-    throw InputError(store.path("job.json") + ": is not readable; restore it or start a new job directory");
-  }
-  return read_options(settings);
-}
+JobOptions options_of_job(const JobStore& store) { return read_options(JobJson::of_job(store).settings()); }
 
 std::vector<OptionValue> option_values(const JobOptions& options) {
   std::vector<OptionValue> values;

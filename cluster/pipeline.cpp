@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "cluster/arithmetic.h"
 #include "cluster/collective.h"
 #include "cluster/exit_codes.h"
+#include "cluster/job_json.h"
 #include "cluster/process_memory.h"
 #include "cluster/stages/given_tracks.h"
 #include "cluster/stages/stages.h"
@@ -29,24 +29,9 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kJobVersion = 1;
-
-std::optional<Json> read_job_json(const JobStore& store) {
-  std::ifstream in(store.path("job.json"));
-  if (!in) return std::nullopt;
-  try {
-    return Json::parse(in);
-  } catch (const Json::exception&) {
-    throw InputError(store.path("job.json") + ": is not readable; restore it or start a new job directory");
-  }
-}
-
-void check_job_json(const JobStore& store, const Json& json) {
-  const int version = json.value("version", 0);
-  if (version != kJobVersion)
-    throw InputError(store.path("job.json") + ": job of version " + std::to_string(version) +
-                     ", this program writes version " + std::to_string(kJobVersion) + "; start a new job directory");
-  const std::string level = json.value("arithmetic", "");
+void check_job_json(const JobStore& store, const JobJson& job) {
+  job.check_version();
+  const std::string level = job.value<std::string>("arithmetic", "");
   if (level != arithmetic_level())
     throw InputError(store.path("job.json") + ": job of arithmetic level '" + level + "', this run computes '" +
                      arithmetic_level() + "'; give " + kArithmeticOption + " " + level +
@@ -54,16 +39,16 @@ void check_job_json(const JobStore& store, const Json& json) {
 }
 
 // The images of an earlier run keep their indices; new ones follow. Records when the block grew.
-std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<Json>& json, Block& block) {
+std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job, Block& block) {
   std::vector<std::int64_t> generations;
-  if (json && store.seal("block.h5")) {
+  if (job && store.seal("block.h5")) {
     const Block previous = read_block(store.verified_path("block.h5"));
     Block merged = append_to(previous, block);
     // Images taken away or changed start a new block; growing keeps what is there.
     const bool grown = merged.images.size() == block.images.size();
     if (grown) {
       block = std::move(merged);
-      json->at("generations").get_to(generations);
+      generations = job->at<std::vector<std::int64_t>>("generations");
     }
   }
   const auto images = static_cast<std::int64_t>(block.images.size());
@@ -94,7 +79,7 @@ void refuse_other_folders(const JobStore& store) {
 // Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
 std::string prepare(const RunOptions& options, const JobStore& store, Project project) {
   store.remove_temporaries();
-  const std::optional<Json> before = read_job_json(store);
+  const std::optional<JobJson> before = JobJson::read(store);
   if (before) check_job_json(store, *before);
   if (project.block.images.empty())
     throw InputError(options.project + ": no readable image in the block; check the images folder");
@@ -109,7 +94,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   Json effective = Json::object();
   for (const OptionValue& option : option_values(read_options(project.settings)))
     effective[option.section][option.key] = option.value;
-  Json job{{"version", kJobVersion},
+  Json job{{"version", JobJson::kVersion},
            {"program", kProgram},
            {"arithmetic", arithmetic_level()},
            {"project", project.file},
@@ -122,12 +107,6 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
   store.write_text("job.json", text);
   return text;
-}
-
-StageSettings settings_of(const Json& json) {
-  StageSettings settings;
-  for (const Json& e : json.at("settings")) settings.entries.push_back({e[0], e[1], e[2], e[3]});
-  return settings;
 }
 
 int default_threads(const Communicator& ranks) { return std::max(1, host_cores() / ranks.ranks_on_host()); }
@@ -249,23 +228,23 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
     lock.emplace(store);
     return prepare(run_options, store, std::move(project));
   });
-  const Json json = Json::parse(text);
+  const JobJson written(store.path("job.json"), text);
   Job job{.options = run_options,
           .ranks = ranks,
           .store = store,
-          .settings = read_options(settings_of(json)),
+          .settings = read_options(written.settings()),
           .events = EventLog(store, ranks.rank()),
           .block = read_block(store.verified_path("block.h5")),
-          .generations = json.at("generations"),
+          .generations = written.at<std::vector<std::int64_t>>("generations"),
           .records = {},
           .failures = {},
           .not_oriented = {},
-          .notes = json.at("warnings")};
+          .notes = written.at<std::vector<std::string>>("warnings")};
   if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
-  for (const auto& [file, reason] : json.at("unreadable").get<std::vector<std::pair<std::string, std::string>>>())
+  for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
     job.failures.push_back({"init", file, reason});
-  stages(job, json.at("tie_points"));
+  stages(job, written.at<std::string>("tie_points"));
   ranks.barrier();  // the lock is held until everybody is done
   return job.failures.empty() ? kExitDone : kExitFailedUnits;
 }

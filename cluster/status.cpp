@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "cluster/job_json.h"
 #include "cluster/progress.h"
 #include "cluster/stage_record.h"
 #include "io/error.h"
@@ -22,15 +22,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json job_json(const JobStore& store) {
-  std::ifstream in(store.path("job.json"));
-  if (!in)
-    throw InputError(store.directory() + ": is not a job directory (no job.json); name the folder given to 'run -j'");
-  return Json::parse(in, nullptr, false);
-}
-
-std::vector<StageStatus> stages_of(const JobStore& store, const Json& job) {
-  return stage_status(store, job.is_object() && !job.value("tie_points", std::string()).empty());
+std::vector<StageStatus> stages_of(const JobStore& store, const JobJson& job) {
+  return stage_status(store, !job.value<std::string>("tie_points", "").empty());
 }
 
 Json stages_json(const JobStore& store, const std::vector<StageStatus>& stages) {
@@ -49,7 +42,8 @@ Json stages_json(const JobStore& store, const std::vector<StageStatus>& stages) 
   return list;
 }
 
-Json failures_json(const Json& job, const std::vector<StageStatus>& stages, const std::optional<BlockResult>& result) {
+Json failures_json(const JobJson& job, const std::vector<StageStatus>& stages,
+                   const std::optional<BlockResult>& result) {
   Json list = Json::array();
   const auto add = [&](const std::string& stage, const std::string& unit, const std::string& reason) {
     list.push_back({{"stage", stage}, {"unit", unit}, {"reason", reason}});
@@ -121,7 +115,7 @@ void add_figures(Json& json, const BlockResult& result, const TrackBatches& trac
 
 // All keys from the start; null where nothing is known yet.
 Json status(const JobStore& store) {
-  const Json job = job_json(store);
+  const JobJson job = JobJson::of_job(store);
   const std::vector<StageStatus> stages = stages_of(store, job);
   std::optional<BlockResult> result;
   if (store.seal(kResult)) result = read_result_without_tracks(store.verified_path(kResult));
@@ -212,11 +206,13 @@ std::string status_text(const JobStore& store) {
   return text;
 }
 
-bool job_is_done(const JobStore& store) { return stages_of(store, job_json(store)).back().state == StageState::kDone; }
+bool job_is_done(const JobStore& store) {
+  return stages_of(store, JobJson::of_job(store)).back().state == StageState::kDone;
+}
 
 std::vector<std::string> unfinished_stages(const JobStore& store) {
   std::vector<std::string> lines;
-  for (const StageStatus& stage : stages_of(store, job_json(store))) {
+  for (const StageStatus& stage : stages_of(store, JobJson::of_job(store))) {
     const auto units = static_cast<std::int64_t>(stage.record.units.size());
     const auto failed = static_cast<std::int64_t>(stage.record.failures.size());
     const std::string name = "stage '" + stage.record.stage + "': ";
@@ -230,7 +226,7 @@ std::vector<std::string> unfinished_stages(const JobStore& store) {
 }
 
 std::string status_digest(const JobStore& store) {
-  job_json(store);
+  JobJson::of_job(store);
   if (!store.seal(kResult))
     throw InputError(store.directory() + ": the job has no result yet; run it to the end first");
   return read_result_without_tracks(store.verified_path(kResult)).digest;

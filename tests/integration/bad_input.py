@@ -296,6 +296,13 @@ class BadInput(unittest.TestCase):
         content["version"] = 999
         file.write_text(json.dumps(content))
         self.assertIn("version", one_line(self.run_job(BAD_INPUT)))
+        del content["version"]
+        file.write_text(json.dumps(content))
+        self.assertIn("job of version 0", one_line(self.run_job(BAD_INPUT)))
+        content.update(version=1, generations=12)
+        file.write_text(json.dumps(content))
+        self.assertIn(f"{file}: the key 'generations' has another form", one_line(self.run_job(BAD_INPUT)))
+        self.assertEqual(json.loads(file.read_text()), content)
         self.assertTrue((self.job / "result/block.h5").exists())
 
     def test_damaged_units_are_computed_again(self):
