@@ -262,10 +262,18 @@ void refuse_environment(const Job& job, const std::string& command) {
   });
 }
 
+// What all ranks were given alike is refused by all together.
+void check_once(Communicator& ranks, const auto& settings) {
+  on_first_rank(ranks, [&] {
+    settings.check();
+    return std::string();
+  });
+}
+
 }  // namespace
 
 int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks) {
-  settings.check();
+  check_once(ranks, settings);
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
     refuse_environment(job, "register");
     const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
@@ -274,7 +282,7 @@ int register_job(const RunOptions& options, const RegistrationSettings& settings
 }
 
 int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks) {
-  settings.rig.check();
+  check_once(ranks, settings.rig);
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
     refuse_environment(job, "calibrate");
     CalibrationSettings own = settings;
