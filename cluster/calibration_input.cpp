@@ -58,7 +58,9 @@ CalibrationInput of_finished_job(const JobStore& store) {
 }
 
 CalibrationInput of_matched_job(const JobStore& store) {
-  CalibrationInput input{read_block(store.verified_path(kBlock)), {}, {}, {}};
+  const JobOptions options = options_of_job(store);
+  refuse_environment(options.environment, "calibrate");
+  CalibrationInput input{read_block(store.verified_path(kBlock)), {}, {}, options.adjustment};
   input.state = initial_state(input.block);
   for (const std::string& unit : store.list(kTracks))
     if (unit.ends_with(".h5")) append_tracks(read_tracks(store.verified_path(unit)), {}, input.tracks);

@@ -81,6 +81,15 @@ class CompareModels(unittest.TestCase):
         self.assertIn("no job directory", refused(work, "--compare-models"))
         self.assertFalse((work / "bad").exists())
 
+    def test_measurements_of_a_job_are_not_taken_past_its_environment(self):
+        project = work / "street/refracted.yaml"
+        project.write_text(self.project.read_text() + "environment: {refraction: true}\n")
+        megablock("match", project, "-j", work / "refracted", "-q")
+        self.assertIn("environment.refraction: 'calibrate' takes measurements as they are",
+                      one_line(megablock("calibrate", work / "refracted", "--panoramic", "-o", work / "bad",
+                                         expect=BAD_INPUT)))
+        self.assertFalse((work / "bad").exists())
+
     def test_a_street_is_no_panorama(self):
         done = subprocess.run([MEGABLOCK, "calibrate", self.job, "--panoramic", "-o", work / "bad"],
                               capture_output=True, text=True)
