@@ -3,15 +3,42 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
 
+#include "cluster/block_checks.h"
 #include "cluster/diagnostics.h"
 #include "cluster/exit_codes.h"
 
 namespace megablock {
 
+namespace {
+
+std::vector<std::vector<std::string>> split(const std::vector<std::string>& lists) {
+  std::vector<std::vector<std::string>> names;
+  for (const std::string& list : lists) {
+    std::istringstream in(list);
+    names.emplace_back();
+    for (std::string name; std::getline(in, name, ',');) names.back().push_back(name);
+  }
+  return names;
+}
+
+// One object: the diagnostics and the key 'checks'.
+std::string with_checks(const std::string& diagnostics, const std::string& checks) {
+  auto json = nlohmann::ordered_json::parse(diagnostics);
+  json["checks"] = nlohmann::ordered_json::parse(checks);
+  return json.dump(1) + "\n";
+}
+
+}  // namespace
+
 void add_diagnose(CLI::App& app, std::function<int()>& action) {
   struct Options {
     std::string job;
+    std::vector<std::string> subsets;
     bool json = false;
   };
   auto options = std::make_shared<Options>();
@@ -19,16 +46,21 @@ void add_diagnose(CLI::App& app, std::function<int()>& action) {
       app.add_subcommand("diagnose", "Gaps, weak links, bases and missing views of a job, also before its adjustment");
   command->footer(
       "Example: megablock partition block.yaml -j job && megablock diagnose job\n"
-      "         megablock diagnose job --json > diagnostics.json");
+      "         megablock diagnose job --json > diagnostics.json\n"
+      "         megablock diagnose job --subset a.jpg,b.jpg,c.jpg --subset b.jpg,c.jpg,d.jpg");
   command->add_option("job", options->job, "Job directory")->required();
   command->add_flag("--json", options->json, "As JSON: all that is outside what is asked, with its places");
+  command->add_option("--subset", options->subsets,
+                      "Images, comma-separated: tie points that all of them share; given again, subsets are ranked");
   command->callback([=, &action] {
     action = [options] {
       const JobDiagnostics job = diagnose_job(JobStore(options->job));
+      const BlockChecks checks = check_job(JobStore(options->job), job.found.aerial, split(options->subsets));
       if (options->json)
-        std::printf("%s", to_json(job.found, job.block).c_str());
+        std::printf("%s", with_checks(to_json(job.found, job.block), to_json(checks, job.block)).c_str());
       else
-        std::printf("of %s:\n%s", job.source.c_str(), to_text(job.found, job.block).c_str());
+        std::printf("of %s:\n%s%s", job.source.c_str(), to_text(job.found, job.block).c_str(),
+                    to_text(checks, job.block).c_str());
       return kExitDone;
     };
   });

@@ -7,10 +7,9 @@
 #include <random>
 
 #include "adjust/ceres_problem.h"
-#include "adjust/image_sigma.h"
 #include "adjust/linearise.h"
-#include "adjust/sigma_scales.h"
 #include "cluster/job_options.h"
+#include "cluster/result_tile.h"
 #include "io/error.h"
 #include "io/result.h"
 #include "merge/monolithic.h"
@@ -22,40 +21,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct SingleTile {
-  TileProblem problem;
-  TileState state;
-};
-
-SingleTile single_tile(const BlockResult& result, const ObservationOptions& options) {
-  Tiles one = result.tiles;
-  one.tile_count = 1;
-  for (TileIndex& tile : one.tile_of_frame)
-    if (tile.valid()) tile = TileIndex(0);
-  SingleTile single;
-  single.problem = make_tile_problem(result.block, result.state, one, TileIndex(0), result.tracks, options);
-  TileProblem& problem = single.problem;
-  set_image_sigma(problem, result.image_sigma_px);
-  SigmaScales scales;
-  for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] = result.observation_table.kinds[k].scale;
-  scale_sigmas(problem, scales);
-  std::vector<Eigen::Vector3d> points = result.points;
-  for (std::size_t row = 0; row < result.kept.size(); ++row) problem.kept[row] &= result.kept[row];
-  for (std::size_t p = points.size(); p < problem.points.size(); ++p) {
-    constexpr double kMaxSigmas = 4;
-    const auto& control = result.control[static_cast<std::size_t>(problem.points[p].index)];
-    points.push_back(control.adjusted);
-    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
-      const double length = control.residual_px[static_cast<std::size_t>(row - problem.begin[p])].norm();
-      problem.kept[static_cast<std::size_t>(row)] &=
-          length * problem.inverse_sigma[static_cast<std::size_t>(row)] <= kMaxSigmas;
-    }
-  }
-  single.state = make_tile_state(problem, result.state, std::move(points));
-  return single;
-}
-
-double cost_after_ceres(const SingleTile& tile) {
+double cost_after_ceres(const ResultTile& tile) {
   CeresTile ceres_tile(tile.problem, tile.state);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -75,7 +41,7 @@ double sigma_of(const BlockResult& result, FrameIndex frame, int k) {
 }
 
 // Every component off by a normal deviate of a tenth of its sigma.
-TileState disturbed(const BlockResult& result, const SingleTile& tile) {
+TileState disturbed(const BlockResult& result, const ResultTile& tile) {
   constexpr double kShare = 0.1;
   std::mt19937_64 random(1);
   std::normal_distribution<double> gauss(0, kShare);
@@ -93,7 +59,7 @@ struct OwnRun {
   GlobalState end;
 };
 
-OwnRun adjust_single_tile(const BlockResult& result, const SingleTile& tile) {
+OwnRun adjust_single_tile(const BlockResult& result, const ResultTile& tile) {
   SerialRunner runner(single_tile(result.block).tree, {tile.problem}, {disturbed(result, tile)});
   GlobalOptions options;
   options.max_decrement = 1e-6;
@@ -118,7 +84,7 @@ ObservationOptions observation_options(const JobStore& store) { return options_o
 std::string compare_with_monolithic(const JobStore& store) {
   if (!store.seal(kResult)) throw InputError(store.path(kResult) + ": the job has no result yet; run it to the end");
   const BlockResult result = read_result(store.verified_path(kResult));
-  const SingleTile tile = single_tile(result, observation_options(store));
+  const ResultTile tile = tile_of_result(result, observation_options(store));
   SerialRunner runner(single_tile(result.block).tree, {tile.problem}, {tile.state});
   const SubtreeSums sums = runner.up(0).sums;
   Json json{{"images", tile.problem.images.size()},
