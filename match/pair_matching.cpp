@@ -12,6 +12,7 @@
 #include "match/match_filter.h"
 #include "match/nearest.h"
 #include "match/two_view.h"
+#include "match/upright_matching.h"
 
 namespace megablock {
 
@@ -83,6 +84,21 @@ std::int32_t first_at_place(const std::vector<Keypoint>& keypoints, std::int32_t
   return row;
 }
 
+Matches mutual_matches(const MutualNeighbours& nearest, double ratio) {
+  Matches matches;
+  for (std::size_t row = 0; row < nearest.of_a.row.size() / nearest.of_a.k; ++row) {
+    const std::size_t count = accepted(nearest.of_a, row, ratio);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int32_t other = nearest.of_a.row[row * nearest.of_a.k + i];
+      const auto this_row = static_cast<std::int32_t>(row);
+      if (accepts(nearest.of_b, static_cast<std::size_t>(other), this_row, ratio))
+        matches.emplace_back(this_row, other);
+    }
+  }
+  std::sort(matches.begin(), matches.end());
+  return matches;
+}
+
 std::uint64_t pair_seed(ImageIndex a, ImageIndex b) { return Hasher().add(a.value).add(b.value).value(); }
 
 }  // namespace
@@ -90,23 +106,35 @@ std::uint64_t pair_seed(ImageIndex a, ImageIndex b) { return Hasher().add(a.valu
 Matches match_descriptors(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
                           const MatchOptions& options) {
   options.check();
-  const MutualNeighbours nearest = nearest_neighbours(a, b, static_cast<std::size_t>(options.k_best) + 1);
-  Matches matches;
-  for (std::size_t row = 0; row < a.size(); ++row) {
-    const std::size_t count = accepted(nearest.of_a, row, options.ratio);
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::int32_t other = nearest.of_a.row[row * nearest.of_a.k + i];
-      const auto this_row = static_cast<std::int32_t>(row);
-      if (accepts(nearest.of_b, static_cast<std::size_t>(other), this_row, options.ratio)) {
-        matches.emplace_back(this_row, other);
-      }
-    }
-  }
-  std::sort(matches.begin(), matches.end());
-  return matches;
+  return mutual_matches(nearest_neighbours(a, b, static_cast<std::size_t>(options.k_best) + 1), options.ratio);
 }
 
 namespace {
+
+// Without what verticals that the coarsest features contradict have to say.
+PairKnowledge credible(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options,
+                       PairKnowledge known) {
+  static constexpr std::size_t kCoarsest = 1000;
+  if (!known.upright_a || !known.upright_b) return known;
+  const auto coarsest = [](const ImageFeatures& image) {
+    const auto first = image.descriptors.begin();
+    return std::vector<SiftDescriptor>(
+        first, first + static_cast<std::ptrdiff_t>(std::min(kCoarsest, image.descriptors.size())));
+  };
+  if (contradict_verticals(match_descriptors(coarsest(a), coarsest(b), options), *known.upright_a, *known.upright_b)) {
+    known.vertical_a = known.vertical_b = std::nullopt;
+    known.upright_a = known.upright_b = nullptr;
+  }
+  return known;
+}
+
+Matches match_features(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options,
+                       const PairKnowledge& known) {
+  if (!known.upright_a || !known.upright_b) return match_descriptors(a.descriptors, b.descriptors, options);
+  const auto k = static_cast<std::size_t>(options.k_best) + 1;
+  return mutual_matches(nearest_upright(a.descriptors, b.descriptors, *known.upright_a, *known.upright_b, k),
+                        options.ratio);
+}
 
 // Verification of matches by two-view geometry; `by_chance`: see TwoViewOptions.
 VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
@@ -182,9 +210,10 @@ VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Ca
     const double by_chance = std::min(1.0, options.max_residual_px / std::max(1.0, guided.half_width_px));
     pair = verify(a, b, camera_a, camera_b, options, guided.matches, known, by_chance);
   }
-  if (pair.model == PairModel::kNone)
-    pair =
-        verify(a, b, camera_a, camera_b, options, match_descriptors(a.descriptors, b.descriptors, options), known, 0);
+  if (pair.model == PairModel::kNone) {
+    const PairKnowledge believed = credible(a, b, options, known);
+    pair = verify(a, b, camera_a, camera_b, options, match_features(a, b, options, believed), believed, 0);
+  }
   if (known.orientation && known.filter && pair.model != PairModel::kNone)
     drop_wrong(a, b, camera_a, camera_b, options, *known.orientation, *known.filter, pair);
   return pair;

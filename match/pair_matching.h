@@ -42,6 +42,9 @@ struct PairKnowledge {
   const MatchFilter* filter = nullptr;  // none: nothing is filtered
   // The vertical in the axes of each camera, pointing down (TwoViewOptions).
   std::optional<AxisDirection> vertical_a = std::nullopt, vertical_b = std::nullopt;
+  // How their features stand to it (upright_sectors); where both are given, only features that stand alike are
+  // compared.
+  const std::vector<std::int8_t>*upright_a = nullptr, *upright_b = nullptr;
 };
 
 // Matches and verifies one pair; model kNone when it does not pass. Deterministic: seeded by the two image indices. A

@@ -29,6 +29,11 @@ constexpr double kSettled = 1e-7;
 // Of the best orientation's support, for a plane's other one to be its twin.
 constexpr double kTwinShare = 0.95;
 
+// Of the draws of five points that look for more than what verticals gave.
+constexpr double kSecondLook = 0.9;
+// Support of what they find, over that of what verticals gave, that leaves it the same.
+constexpr double kSameSupport = 1.05;
+
 RansacOptions sampling(const TwoViewOptions& options, int max_draws, double inlier_share = 0) {
   RansacOptions sampling;
   sampling.threshold = options.max_residual;
@@ -129,7 +134,9 @@ class PairEstimation {
     return found;
   }
 
-  // By five points, or by three where the verticals are known and agree with what they give.
+  // By five points. Where the verticals are known and agree with what three points give, these begin, and a few draws
+  // of five see whether there is more: errors of verticals lead into side minima, above all with cameras that are not
+  // calibrated.
   std::optional<RelativeOrientation> orientation() {
     std::vector<RelativeOrientation> starts;
     if (options_.vertical_a && options_.vertical_b) {
@@ -141,12 +148,17 @@ class PairEstimation {
         by_vertical_ = found->consensus.count >= needed_ &&
                        found->consensus.count >= kDoubtfulVertical * static_cast<double>(points_.size()) &&
                        agrees_with_verticals(starts.front(), found->consensus);
-        if (by_vertical_) return starts.front();
       }
     }
-    const auto found = ransac(five_points_, sampling(options_, 3000), std::span<const RelativeOrientation>(starts));
+    RansacOptions five = sampling(options_, 3000);
+    if (by_vertical_) five.confidence = kSecondLook;
+    const auto found = ransac(five_points_, five, std::span<const RelativeOrientation>(starts));
     if (!found) return std::nullopt;
     draws_ += found->draws;
+    if (by_vertical_) {
+      const Consensus start = consensus_of(five_points_, starts.front(), options_.max_residual);
+      by_vertical_ = found->consensus.score <= kSameSupport * start.score;
+    }
     return found->model;
   }
 

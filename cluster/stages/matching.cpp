@@ -9,6 +9,7 @@
 #include "io/verticals.h"
 #include "match/match_filter.h"
 #include "match/pair_matching.h"
+#include "match/upright_matching.h"
 
 namespace megablock {
 
@@ -48,7 +49,10 @@ struct Knowledge {
         filtered(job.settings.matching.filter),
         verticals(good_verticals(job.block)) {}
   PairKnowledge of(const ImagePair& pair) const {
-    return {trajectory.relate(pair.a, pair.b), filtered ? &filter : nullptr, vertical(pair.a), vertical(pair.b)};
+    return {.orientation = trajectory.relate(pair.a, pair.b),
+            .filter = filtered ? &filter : nullptr,
+            .vertical_a = vertical(pair.a),
+            .vertical_b = vertical(pair.b)};
   }
   std::optional<AxisDirection> vertical(ImageIndex image) const {
     const auto found = verticals.find(image);
@@ -59,6 +63,9 @@ struct Knowledge {
   bool filtered;
   std::map<ImageIndex, AxisDirection> verticals;
 };
+
+// Algorithm number of what verticals do in matching: pairs without them stay valid when it is raised.
+constexpr int kUprightMatching = 1;
 
 std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs,
                                const Knowledge& knowledge) {
@@ -77,6 +84,7 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
       hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
       add_camera(hasher, job.block.cameras[job.block.camera_of(image)]);
       if (const auto vertical = knowledge.vertical(image)) {
+        hasher.add(kUprightMatching);
         add_to_hash(hasher, vertical->direction);
         for (const double value : vertical->covariance.reshaped()) hasher.add(value);
       }
@@ -97,10 +105,22 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
   }
   std::vector<VerifiedPair> verified(pairs.size());
   const Block& block = job.block;
+  std::map<ImageIndex, std::vector<std::int8_t>> upright;
+  for (const ImageIndex image : images)
+    if (const auto vertical = knowledge.vertical(image); vertical && !upright.contains(image))
+      upright[image] =
+          upright_sectors(cache.features(image), block.cameras[block.camera_of(image)], vertical->direction);
+  const auto known = [&](const ImagePair& pair) {
+    PairKnowledge of_pair = knowledge.of(pair);
+    const auto of_a = upright.find(pair.a), of_b = upright.find(pair.b);
+    if (of_a != upright.end()) of_pair.upright_a = &of_a->second;
+    if (of_b != upright.end()) of_pair.upright_b = &of_b->second;
+    return of_pair;
+  };
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i)
     verified[i] = match_pair(*a[i], *b[i], block.cameras[block.camera_of(pairs[i].a)],
-                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching, knowledge.of(pairs[i]));
+                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching, known(pairs[i]));
   std::erase_if(verified, [](const VerifiedPair& pair) { return pair.model == PairModel::kNone; });
   return verified;
 }

@@ -1,0 +1,39 @@
+// Matching of two images that know where down is: what stands upright in one does so in the other.
+//
+// A feature's direction is counted from that of the vertical at its place, in sectors of 30 degrees, and features are
+// compared with those of the same sector and the two beside it: a quarter of all comparisons (gravity-aligned features:
+// D. Kurz and S. Benhimane, "Inertial sensor-aligned visual feature descriptors", CVPR 2011). Of verified matches in
+// streets 99 % differ by less than 20 degrees. The direction says nothing where one looks down on the ground, which
+// turns with the heading, nor next to the zenith: features seen more than 30 degrees below the horizon or 60 above it
+// are compared with all.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "io/block.h"
+#include "io/features.h"
+#include "match/nearest.h"
+
+namespace megablock {
+
+inline constexpr int kUprightSectors = 12;
+inline constexpr std::int8_t kAnySector = -1;
+
+// [features]: 0 to kUprightSectors - 1, or kAnySector. `down`: unit, camera axes.
+std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camera& camera, const Eigen::Vector3d& down);
+
+// As nearest_neighbours of all, those left out that differ by more than one sector.
+MutualNeighbours nearest_upright(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
+                                 std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
+                                 std::size_t k);
+
+// Whether matches, found regardless of sectors, agree in another turn than none: then a vertical is wrong. No more than
+// one in a thousand of pairs without any right match is taken for such.
+bool contradict_verticals(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
+                          std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b);
+
+}  // namespace megablock
