@@ -16,7 +16,7 @@ void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState
                const PlanNode& node, PointEquations& equations, PairBlocks& pair_blocks, std::vector<double>& diagonal,
                Front& front) {
   CellAssembler assembler(plan, front, pair_blocks);
-  for (std::span<const std::int64_t> rest = plan.points[at(node.leaf)]; !rest.empty();) {
+  for (std::span<const std::int32_t> rest = plan.points[at(node.leaf)]; !rest.empty();) {
     rest = rest.subspan(equations.linearise(rest, pass));
     assembler.add_points(equations);
   }
@@ -138,7 +138,7 @@ void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const T
   const UnknownMotions motions(plan, step.unknowns.values.data());
   PointEquations equations(problem, plan, state);
   for (const auto& cell : plan.points) {
-    for (std::span<const std::int64_t> rest = cell; !rest.empty();) {
+    for (std::span<const std::int32_t> rest = cell; !rest.empty();) {
       rest = rest.subspan(equations.linearise(rest, pass));
       equations.steps(motions, step.points);
       for (std::size_t i = 0; i < equations.points().size(); ++i)

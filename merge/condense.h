@@ -29,7 +29,7 @@ struct TilePlan {
   UnknownList boundary;                           // passed to the merge tree, ascending
   UnknownList owned;                              // no tile with a lower number touches them
   EliminationPlan cells;                          // leaves = cells
-  std::vector<std::vector<std::int64_t>> points;  // [cells] active points, ascending
+  std::vector<std::vector<std::int32_t>> points;  // [cells] active points (rows), ascending; all tiles' are kept
   // Rows of the problem's tables of observations without a point, [cells].
   std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, lines, verticals, intrinsic_priors,
       mount_priors;

@@ -109,7 +109,7 @@ PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan,
 
 constexpr std::size_t kAhead = 8;  // points
 
-std::size_t PointEquations::linearise(std::span<const std::int64_t> points, const Pass& pass) {
+std::size_t PointEquations::linearise(std::span<const std::int32_t> points, const Pass& pass) {
   clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::int64_t point = points[i];

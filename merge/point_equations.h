@@ -89,7 +89,7 @@ class PointEquations {
 
   // Linearises all kept observations of the first of the points, as many as there is room for, and factorises their own
   // blocks. Returns how many. Throws ComputeError behind a camera.
-  std::size_t linearise(std::span<const std::int64_t> points, const Pass& pass);
+  std::size_t linearise(std::span<const std::int32_t> points, const Pass& pass);
   const std::vector<Point>& points() const { return points_; }  // those
 
   // After linearise(): Y of all unknowns that see the points; the frames' sums grow by theirs. [plan.unknowns]

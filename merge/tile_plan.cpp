@@ -140,7 +140,8 @@ class CellPlanner {
   CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
               const std::vector<std::int32_t>& depth_of_frame, std::size_t cells)
       : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame), depth_of_frame_(depth_of_frame) {
-    for (auto* list : {&plan.points, &plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
+    plan.points.resize(cells);
+    for (auto* list : {&plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
                        &plan.intrinsic_priors, &plan.mount_priors})
       list->resize(cells);
     touched_.assign(cells, std::vector<std::uint8_t>(plan.unknowns.size(), 0));
@@ -179,7 +180,7 @@ class CellPlanner {
       if (!problem_.active(p)) continue;
       frames_of_point(problem_, p, frames);
       const std::size_t cell = owner_of(frames);
-      plan_.points[cell].push_back(p);
+      plan_.points[cell].push_back(static_cast<std::int32_t>(p));
       for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
         if (!problem_.kept[row]) continue;
         const TileImage& image = problem_.images[problem_.image[row].value];
@@ -188,6 +189,7 @@ class CellPlanner {
         touch(cell, plan_.unknown_of_mount[image.mount]);
       }
     }
+    for (auto& points : plan_.points) points.shrink_to_fit();
   }
 
   void share_terms() {

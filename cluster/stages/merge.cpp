@@ -233,6 +233,8 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
     write_final(job, inputs, fingerprint, adjusted, outcome, parts, event);
+    event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());  // what was written could not say it of itself
+    event.seconds = monotonic_seconds() - start;
     event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);
     job.events.append(event);
     checkpoint.clear();

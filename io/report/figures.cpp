@@ -13,7 +13,7 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::int64_t kSampleLimit = 500000;  // values a median is taken from
+constexpr std::int64_t kSampleLimit = 100000;  // points that medians are taken from
 constexpr std::int64_t kRayLimit = 24;         // rays of a track compared for its intersection angle
 
 // The columns of the tracks are there for all of them.

@@ -53,9 +53,10 @@ double seconds_since_1970() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-double peak_rss_mib(const BlockResult& result) {
+// Of all stages; the events know it of the writing of the result, too.
+double peak_rss_mib(const fs::path& job) {
   double peak = 0;
-  for (const StageStatistics& stage : result.stages) peak = std::max(peak, stage.peak_rss_mib);
+  for (const UnitEvent& event : read_events(JobStore(job.string()))) peak = std::max(peak, event.peak_rss_mib);
   return peak;
 }
 
@@ -113,7 +114,7 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
           {"seconds_per_iteration", per_iteration},
           {"global_iterations", result.global_iterations},
           {"chi2_per_dof", result.variance_factor},
-          {"peak_rss_mib_per_rank", peak_rss_mib(result)},
+          {"peak_rss_mib_per_rank", peak_rss_mib(job)},
           {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), std::uint8_t{1})},
           {"tiles", result.tiles.tile_count},
           {"points_across_tiles", points_across_tiles(result, tracks)},
