@@ -164,7 +164,7 @@ struct VerticalLine {
   TileProblem::LineTerm term;
   template <typename Scalar>
   bool operator()(const Scalar* frame, Scalar* result) const {
-    const Vector3<Scalar> up(Scalar(0), Scalar(0), Scalar(1));
+    const Vector3<Scalar> up = term.up.cast<Scalar>();
     const Vector3<Scalar> direction = rotation_of(frame) * up;
     result[0] = off_direction(term, direction);
     return true;
@@ -175,7 +175,7 @@ struct HorizontalLine {
   TileProblem::LineTerm term;
   template <typename Scalar>
   bool operator()(const Scalar* frame, const Scalar* other, Scalar* result) const {
-    const Vector3<Scalar> up(Scalar(0), Scalar(0), Scalar(1)), seen = term.other_normal.cast<Scalar>();
+    const Vector3<Scalar> up = term.up.cast<Scalar>(), seen = term.other_normal.cast<Scalar>();
     const Vector3<Scalar> normal = rotation_of(other).conjugate() * seen;
     const Vector3<Scalar> horizontal = normal.cross(up);
     const Scalar squares = horizontal.squaredNorm();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "adjust/vertical_terms.h"
 #include "geometry/rotation.h"
 
 namespace megablock {
@@ -62,6 +63,8 @@ OffDirection off_direction(const TileProblem::LineTerm& term, const Eigen::Vecto
 
 std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile) {
   std::vector<BlockLineTerm> terms;
+  if (block.lines.empty()) return terms;
+  const GroundVertical ground(block.ground);
   for (const KnownLine& line : block.lines) {
     const bool vertical = line.direction == KnownLine::Direction::kVertical;
     std::optional<Segment> before;
@@ -76,6 +79,7 @@ std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& stat
         BlockLineTerm& added = terms.emplace_back();
         added.frame = frame;
         added.term = term_of(*segment, measured.sigma_px);
+        added.term.up = -ground.down(state.frames[frame].centre);
         if (!vertical) {
           added.other = before_frame;
           added.term.other_normal = before->first.cross(before->second).normalized();
@@ -91,7 +95,7 @@ std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& stat
 // By R Exp(w): v = R d changes by -R [d]x w. By R_o Exp(w): N = R_o' n changes by [N]x w, u = N x z by -[z]x [N]x w,
 // and d = u / |u| by (I - d d') / |u| of that.
 LineResidual linearise_line(const Pose& frame, const Pose& other, const TileProblem::LineTerm& term) {
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d& up = term.up;
   const Eigen::Matrix3d rotation = frame.rotation.toRotationMatrix();
   LineResidual result;
   result.by_frame.setZero();

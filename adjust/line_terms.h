@@ -7,18 +7,21 @@
 //     r = w (a - b)'n / 2,   n = m x v / |m x v|,   equivalently   r = w v'c / |m x v|,   c = (a - b) x m / 2,
 //
 // w from radians to sigmas: the ends' distance from the image line through the middle and the vanishing point of v.
-//   vertical:    v = R z, z the ground's up axis;
+//   vertical:    v = R z, z up at the frame;
 //   horizontal:  v = R d with d the horizontal direction in the plane in which the other frame sees the line,
 //                d = N x z / |N x z|, N = R_o' n_o (ground); one observation for successive measurements of the line.
-// The rays are those of the given cameras and mounts (start values, where these are estimated): they turn a line by
-// less than its measurement can tell, as long as the focal length is good to some per cent.
+// "Up" is the ellipsoid's normal at the frame, where it stands when the terms are made, in a georeferenced block (10 km
+// from the origin that is 0.09 degrees off the ground's axis; a line 100 m from the frame is 0.001 degrees off it),
+// else the ground's axis. The rays are those of the given cameras and mounts (start values, where these are estimated):
+// they turn a line by less than its measurement can tell, as long as the focal length is good to some per cent.
 #pragma once
 
 #include "adjust/tile_problem.h"
 
 namespace megablock {
 
-// Terms of the lines whose frames have poses and that `tile` owns (owner_tile of their frames). Frames are global indices here.
+// Terms of the lines whose frames have poses and that `tile` owns (owner_tile of their frames). Frames are global
+// indices here.
 struct BlockLineTerm {
   FrameIndex frame, other;  // other: invalid for vertical lines
   TileProblem::LineTerm term;

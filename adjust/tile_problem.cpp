@@ -80,8 +80,12 @@ std::int32_t row_of(const std::vector<Value>& table, const Value& value) {
 class TileBuilder {
  public:
   TileBuilder(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile, const TrackSet& owned,
-              const ObservationOptions& options)
-      : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options) {}
+              const ObservationOptions& options, const std::vector<std::int32_t>& verticals)
+      : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options) {
+    for (const std::int32_t row : verticals)
+      if (const SeenVertical& vertical = block.verticals[static_cast<std::size_t>(row)]; oriented(vertical.image))
+        verticals_.push_back(&vertical);
+  }
 
   TileProblem build() {
     problem_.image_sigma_px = options_.image_sigma_px;
@@ -95,7 +99,6 @@ class TileBuilder {
     select_control_points();
     select_relative_poses();
     select_prior_owners();
-    select_verticals();
     make_tables();
     for (std::int64_t t = 0; t < owned_.track_count(); ++t) add_track(t);
     for (std::int64_t row : control_points_) add_control_point(row);
@@ -165,13 +168,6 @@ class TileBuilder {
     }
     make_distinct(prior_cameras_);
     make_distinct(prior_mounts_);
-  }
-
-  void select_verticals() {
-    for (const SeenVertical& vertical : block_.verticals) {
-      const FrameIndex frame = block_.images[vertical.image].frame;
-      if (oriented(frame) && tiles_.tile_of_frame[frame] == tile_) verticals_.push_back(&vertical);
-    }
   }
 
   void make_tables() {
@@ -290,6 +286,7 @@ class TileBuilder {
   }
 
   void add_verticals() {
+    if (verticals_.empty()) return;
     const GroundVertical ground(block_.ground);
     for (const SeenVertical* vertical : verticals_) {
       const Pose& frame = state_.frames[block_.images[vertical->image].frame];
@@ -335,6 +332,11 @@ class TileBuilder {
   std::vector<ImageIndex> image_table_;
 };
 
+void check_sizes(const Block& block, const BlockState& state, const Tiles& tiles) {
+  if (state.oriented.size() != block.frames.size() || tiles.tile_of_frame.size() != block.frames.size())
+    throw InputError("the block's state or tiles have another number of frames than the block");
+}
+
 }  // namespace
 
 Tiles single_tile(const Block& block) {
@@ -348,11 +350,27 @@ Tiles single_tile(const Block& block) {
 }
 
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
-                              const TrackSet& owned, const ObservationOptions& options) {
+                              const TrackSet& owned, const ObservationOptions& options,
+                              const VerticalsOfTiles& verticals) {
+  check_sizes(block, state, tiles);
   options.check();
-  if (state.oriented.size() != block.frames.size() || tiles.tile_of_frame.size() != block.frames.size())
-    throw InputError("the block's state or tiles have another number of frames than the block");
-  return TileBuilder(block, state, tiles, tile, owned, options).build();
+  return TileBuilder(block, state, tiles, tile, owned, options, verticals.at(static_cast<std::size_t>(tile.value)))
+      .build();
+}
+
+TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
+                              const TrackSet& owned, const ObservationOptions& options) {
+  check_sizes(block, state, tiles);
+  return make_tile_problem(block, state, tiles, tile, owned, options, verticals_of_tiles(block, tiles));
+}
+
+VerticalsOfTiles verticals_of_tiles(const Block& block, const Tiles& tiles) {
+  VerticalsOfTiles rows(static_cast<std::size_t>(tiles.tile_count));
+  for (std::size_t row = 0; row < block.verticals.size(); ++row) {
+    const TileIndex tile = tiles.tile_of_frame[block.images[block.verticals[row].image].frame];
+    if (tile.valid()) rows[static_cast<std::size_t>(tile.value)].push_back(static_cast<std::int32_t>(row));
+  }
+  return rows;
 }
 
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount) {

@@ -115,6 +115,7 @@ struct TileProblem {
     LocalFrame other;  // of a horizontal line; invalid: vertical
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(), across = Eigen::Vector3d::Zero();
     Eigen::Vector3d other_normal = Eigen::Vector3d::Zero();
+    Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // at the frame, ground axes
     double weight = 0;
     LocalFrame seen_by() const { return other.valid() ? other : frame; }
   };
@@ -186,6 +187,14 @@ Tiles single_tile(const Block& block);
 // so that rows stay aligned with the track file; then the control points' measurements follow.
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options);
+
+// Rows of Block::verticals in each tile, found in one pass over them for all tiles.
+using VerticalsOfTiles = std::vector<std::vector<std::int32_t>>;  // [tiles], ascending
+VerticalsOfTiles verticals_of_tiles(const Block& block, const Tiles& tiles);
+// The same problem; `verticals` of the same block and tiles.
+TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
+                              const TrackSet& owned, const ObservationOptions& options,
+                              const VerticalsOfTiles& verticals);
 
 // Whether a held mount and one of a lower row of its rig stand at different places: they give the scale of the ground.
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount);

@@ -19,6 +19,13 @@ namespace megablock {
 
 namespace {
 
+// What the tiles are made of.
+struct OrientedTiles {
+  const BlockState& oriented;
+  const Tiles& tiles;
+  const VerticalsOfTiles verticals;
+};
+
 // A tile before its adjustment.
 struct TileStart {
   TrackSet tracks;
@@ -26,15 +33,14 @@ struct TileStart {
   TileState state;
 };
 
-TileStart measured_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
-                         TrackSet tracks) {
+TileStart measured_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks) {
   TileStart start;
   start.tracks = std::move(tracks);
-  start.problem =
-      make_tile_problem(job.block, oriented, tiles, tile, start.tracks, job.settings.adjustment.observations);
+  start.problem = make_tile_problem(job.block, from.oriented, from.tiles, tile, start.tracks,
+                                    job.settings.adjustment.observations, from.verticals);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   start.state =
-      make_tile_state(start.problem, oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
+      make_tile_state(start.problem, from.oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
   return start;
 }
 
@@ -47,8 +53,8 @@ void correct_environment(const Job& job, TileStart& start) {
   correct_measurements(job.settings.environment, job.block.ground, at, start.problem);
 }
 
-TileStart make_start(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile, TrackSet tracks) {
-  TileStart start = measured_start(job, oriented, tiles, tile, std::move(tracks));
+TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks) {
+  TileStart start = measured_start(job, from, tile, std::move(tracks));
   if (job.settings.environment.any()) correct_environment(job, start);
   return start;
 }
@@ -74,11 +80,10 @@ TileStart with_parts(const TileStart& adjusted, const TrackParts& parts, TileSta
   return split;
 }
 
-TileAdjustment adjust_one(const Job& job, const BlockState& oriented, const Tiles& tiles, TileIndex tile,
-                          const std::string& tracks_unit) {
+TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex tile, const std::string& tracks_unit) {
   AdjustOptions options = job.settings.adjustment;
   options.only_start = true;
-  const auto start = [&](TrackSet tracks) { return make_start(job, oriented, tiles, tile, std::move(tracks)); };
+  const auto start = [&](TrackSet tracks) { return make_start(job, from, tile, std::move(tracks)); };
   TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)));
   const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
@@ -122,15 +127,14 @@ struct TileMark {
 };
 
 // Of all tiles: every rank reads its share of them. Collective.
-std::vector<TileMark> tile_marks(const Job& job, const BlockState& oriented, const Tiles& tiles,
-                                 const std::vector<std::string>& tracks) {
+std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, const std::vector<std::string>& tracks) {
   const auto ranks = static_cast<std::size_t>(job.ranks.size());
   ByteWriter writer;
   char kind = 'c';
   std::string error;
   try {
     for (auto t = static_cast<std::size_t>(job.ranks.rank()); t < tracks.size(); t += ranks) {
-      const TileStart start = measured_start(job, oriented, tiles, TileIndex(static_cast<std::int64_t>(t)),
+      const TileStart start = measured_start(job, from, TileIndex(static_cast<std::int64_t>(t)),
                                              read_tracks(job.store.verified_path(tracks[t])));
       Hasher hasher;
       hasher.add(algorithm::kAdjustment);
@@ -159,7 +163,8 @@ std::vector<TileMark> tile_marks(const Job& job, const BlockState& oriented, con
 
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
-  const std::vector<TileMark> marks = tile_marks(job, oriented, tiles, tracks);
+  const OrientedTiles from{oriented, tiles, verticals_of_tiles(job.block, tiles)};
+  const std::vector<TileMark> marks = tile_marks(job, from, tracks);
   std::vector<Unit> units;
   std::vector<std::string> names;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
@@ -168,8 +173,8 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
     unit.name = unit_name("adjust", tile.value);
     unit.fingerprint = marks[t].fingerprint;
     unit.cost = static_cast<double>(marks[t].observations);
-    unit.write = [&job, &oriented, &tiles, tile, track = tracks[t]](const std::string& path) {
-      write_adjustment(path, adjust_one(job, oriented, tiles, tile, track));
+    unit.write = [&job, &from, tile, track = tracks[t]](const std::string& path) {
+      write_adjustment(path, adjust_one(job, from, tile, track));
     };
     names.push_back(unit.name);
     units.push_back(std::move(unit));

@@ -201,7 +201,7 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   const double start = monotonic_seconds();
   return_freed_memory();
   reset_peak_rss();
-  const MergeInputs inputs{oriented, tiles, tracks, adjusted_units};
+  const MergeInputs inputs{oriented, tiles, tracks, adjusted_units, verticals_of_tiles(job.block, tiles)};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {

@@ -204,7 +204,7 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
 }
 
 MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& tiles, TileIndex tile,
-                          const std::string& tracks, const std::string& adjusted) {
+                          const VerticalsOfTiles& verticals, const std::string& tracks, const std::string& adjusted) {
   const BlockState& state = start.state;
   MergeTile merge;
   merge.tile = tile;
@@ -215,7 +215,7 @@ MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& 
     merge.tracks = split_tracks(merge.tracks, adjustment.parts);
   }
   const AdjustOptions& options = job.settings.adjustment;
-  merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations);
+  merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations, verticals);
   const std::size_t points = merge.problem.points.size();
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   merge.state = make_tile_state(merge.problem, state, std::vector<Eigen::Vector3d>(points, unknown));

@@ -40,6 +40,6 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
 // done so, or whose cameras are the mean of several tiles', are triangulated anew. Of a checkpoint, which has points of
 // its own, they are left as they were.
 MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& tiles, TileIndex tile,
-                          const std::string& tracks, const std::string& adjusted);
+                          const VerticalsOfTiles& verticals, const std::string& tracks, const std::string& adjusted);
 
 }  // namespace megablock

@@ -44,7 +44,7 @@ void add_other_terms(Hasher& hasher, const TileProblem& p) {
   hasher.add(p.lines.size());
   for (const auto& term : p.lines) {
     hasher.add(term.frame.value).add(term.other.value).add(term.weight);
-    for (const Eigen::Vector3d& v : {term.middle, term.across, term.other_normal}) add_to_hash(hasher, v);
+    for (const Eigen::Vector3d& v : {term.middle, term.across, term.other_normal, term.up}) add_to_hash(hasher, v);
   }
   hasher.add(p.verticals.size());
   for (const auto& term : p.verticals) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "adjust/vertical_terms.h"
 #include "io/simulate/simulate.h"
 
 namespace megablock {
@@ -12,13 +13,15 @@ namespace megablock {
 inline void add_known_lines(SimulatedBlock& simulated, std::int64_t stride, double noise_px) {
   const BlockState& truth = simulated.truth;
   const Block& block = simulated.block;
+  const GroundVertical ground(block.ground);
   std::mt19937_64 random(77);
   std::normal_distribution<double> gauss(0, 1);
   for (std::int64_t t = 0; t < simulated.tracks.track_count(); t += stride) {
     const bool vertical = (t / stride) % 2 == 0;
     const double azimuth = 0.7 * static_cast<double>(t);
-    const Eigen::Vector3d half =
-        1.5 * (vertical ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0));
+    const Eigen::Vector3d up = -ground.down(simulated.points[t]),
+                          level = up.cross(Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0)).normalized();
+    const Eigen::Vector3d half = 1.5 * (vertical ? up : level);
     KnownLine line{"line " + std::to_string(t),
                    vertical ? KnownLine::Direction::kVertical : KnownLine::Direction::kHorizontal,
                    {}};

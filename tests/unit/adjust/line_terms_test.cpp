@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/crs.h"
 #include "known_lines.h"
 #include "single_tile.h"
 
@@ -21,6 +22,7 @@ class Lines : public testing::TestWithParam<SimulationOptions::Scene> {};
 
 TEST_P(Lines, FitTheTruth) {
   SimulatedBlock simulated = simulate_block(scene(GetParam()));
+  simulated.block.ground.georeferenced = false;  // lines and frames have the same vertical
   add_known_lines(simulated, 10, 0);
   const SingleTile tile(std::move(simulated));
   const TileState truth = tile.truth();
@@ -34,6 +36,42 @@ TEST_P(Lines, FitTheTruth) {
     EXPECT_EQ(r.by_other.isZero(0), !term.other.valid());
   }
   EXPECT_GT(horizontal, 10);
+}
+
+// The block stands 10 km from the origin, level there: its lines are along its own vertical, 0.09 degrees from z.
+TEST_P(Lines, FollowThePlumbLineFarFromTheOrigin) {
+  SimulatedBlock simulated = simulate_block(scene(GetParam()));
+  GroundFrame& origin = simulated.block.ground;
+  origin.georeferenced = true;
+  const Georeference georeference(origin);
+  const Geodetic place = georeference.to_geodetic({8000, -6000, 0});
+  const Pose moved{georeference.own_from_block(place), georeference.to_local(place)};
+  for (Pose& frame : simulated.truth.frames) {
+    frame.centre = moved.rotation.conjugate() * frame.centre + moved.centre;
+    frame.rotation = frame.rotation * moved.rotation;
+  }
+  for (Eigen::Vector3d& point : simulated.points) point = moved.rotation.conjugate() * point + moved.centre;
+  add_known_lines(simulated, 10, 0);
+  const TileProblem problem = make_tile_problem(simulated.block, simulated.truth, single_tile(simulated.block),
+                                                TileIndex(0), simulated.tracks, {});
+  ASSERT_GT(problem.lines.size(), 50u);
+  double squares = 0, along_axis = 0;
+  for (TileProblem::LineTerm term : problem.lines) {
+    const auto residual = [&] {
+      return linearise_line(simulated.truth.frames[problem.frames[static_cast<std::size_t>(term.frame.value)]],
+                            simulated.truth.frames[problem.frames[static_cast<std::size_t>(term.seen_by().value)]],
+                            term)
+          .residual;
+    };
+    EXPECT_NEAR(term.up.dot(moved.rotation.conjugate() * Eigen::Vector3d::UnitZ()), 1, 1e-8);
+    squares += std::pow(residual(), 2);
+    term.up = Eigen::Vector3d::UnitZ();
+    along_axis += std::pow(residual(), 2);
+  }
+  std::printf("[ reached  ] rms residual %.2g sigma, by the ground's axis %.2g\n",
+              std::sqrt(squares / static_cast<double>(problem.lines.size())),
+              std::sqrt(along_axis / static_cast<double>(problem.lines.size())));
+  EXPECT_LT(squares, 0.03 * 0.03 * along_axis);
 }
 
 // Positions of metres leave a small block tilted; lines do not. Their residuals are those of their noise.

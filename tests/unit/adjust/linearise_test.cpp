@@ -138,6 +138,7 @@ TEST_P(Linearise, Line) {
   term.middle = (first + second).normalized();
   term.across = (first - second).cross(term.middle) / 2;
   term.other_normal = vector(1).normalized();
+  term.up = (Eigen::Vector3d::UnitZ() + vector(0.01)).normalized();
   term.weight = uniform(100, 4000);
   const LineResidual vertical = linearise_line(frame, frame, term);
   const Evaluated one = by_ceres<1, 7>(residual::VerticalLine{term}, {block(frame)});

@@ -233,7 +233,8 @@ TEST(TileProblem, TilesShareNoResidualAndMissNone) {
   options.relative_position_sigma_m = 0.05;
   options.control_points = 8;
   options.check_points = 4;
-  const SimulatedBlock simulated = simulate_block(options);
+  SimulatedBlock simulated = simulate_block(options);
+  for (std::int64_t i = 0; i < 40; i += 3) simulated.block.verticals.emplace_back().image = ImageIndex(i);
   const BlockState state = initial_state(simulated.block);
   const auto cost = [&](const Tiles& tiles, TileIndex tile) {
     TrackSet owned;
@@ -265,6 +266,9 @@ TEST(TileProblem, TilesShareNoResidualAndMissNone) {
   for (int t = 0; t < 3; ++t) sum += cost(three, TileIndex(t));
   EXPECT_TRUE(std::isfinite(whole));
   EXPECT_NEAR(sum, whole, 1e-9 * whole);
+  const VerticalsOfTiles dealt = verticals_of_tiles(simulated.block, three);
+  ASSERT_EQ(dealt.size(), 3u);
+  EXPECT_EQ(dealt[0].size() + dealt[1].size() + dealt[2].size(), 14u);
 }
 
 }  // namespace
