@@ -1,12 +1,11 @@
 #include "adjust/lost_frames.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
-#include <random>
 
-#include "geometry/p3p.h"
+#include "adjust/rig_sights.h"
+#include "geometry/ransac.h"
 
 namespace megablock {
 
@@ -47,25 +46,21 @@ class Resection {
       : problem_(problem), state_(state), point_of_row_(point_of_row), threshold_(threshold) {}
 
   std::optional<Pose> find(const std::vector<std::int64_t>& rows, std::uint64_t seed) const {
-    constexpr std::size_t kMaxScored = 300;
-    std::vector<std::int64_t> scored;
-    const std::size_t stride = 1 + (rows.size() - 1) / kMaxScored;
-    for (std::size_t i = 0; i < rows.size(); i += stride) scored.push_back(rows[i]);
-
-    std::mt19937_64 random(seed);
-    std::optional<Pose> best;
-    std::size_t most = 0;
-    constexpr int kSamples = 300;
-    for (int sample = 0; sample < kSamples; ++sample) {
-      for (const Pose& candidate : candidates(rows, random)) {
-        const std::size_t agree = agreeing(candidate, scored);
-        if (agree > most) most = agree, best = candidate;
-      }
-    }
-    if (!best) return std::nullopt;
-    const std::size_t agree = agreeing(*best, rows);
+    constexpr std::size_t kMaxSights = 300;
+    std::vector<RigSight> sights;
+    const std::size_t stride = 1 + (rows.size() - 1) / kMaxSights;
+    for (std::size_t i = 0; i < rows.size(); i += stride)
+      if (const auto sight = sight_of(rows[i])) sights.push_back(*sight);
+    RansacOptions sampling;
+    sampling.threshold = threshold_;
+    sampling.confidence = 0.999;
+    sampling.max_draws = 500;
+    sampling.seed = seed;
+    const auto found = ransac(RigSightEstimator(sights), sampling);
+    if (!found) return std::nullopt;
+    const std::size_t agree = agreeing(found->model, rows);
     const bool enough = agree >= kMinAgreeing && static_cast<double>(agree) >= kMinShare * std::ssize(rows);
-    return enough ? best : std::nullopt;
+    return enough ? std::optional(found->model) : std::nullopt;
   }
 
   std::size_t agreeing(const Pose& frame, const std::vector<std::int64_t>& rows) const {
@@ -84,30 +79,13 @@ class Resection {
            threshold_;
   }
 
-  // Poses of the frame from three observations of one of its images.
-  std::vector<Pose> candidates(const std::vector<std::int64_t>& rows, std::mt19937_64& random) const {
-    const LocalImage local = problem_.image[rows[random() % rows.size()]];
-    std::array<Eigen::Vector3d, 3> rays, points;
-    for (std::size_t k = 0; k < 3; ++k) {
-      constexpr int kTries = 50;
-      std::int64_t row = -1;
-      for (int attempt = 0; attempt < kTries && row < 0; ++attempt) {
-        const std::int64_t drawn = rows[random() % rows.size()];
-        if (problem_.image[drawn] == local) row = drawn;
-      }
-      if (row < 0) return {};
-      const auto ray = viewing_ray(state_.cameras[image_of(row).camera.value], {problem_.x[row], problem_.y[row]});
-      if (!ray) return {};
-      rays[k] = *ray;
-      points[k] = state_.points[point_of_row_[row]];
-    }
-    const Pose& mount = state_.mounts[problem_.images[local.value].mount];
-    std::vector<Pose> result;
-    for (const Pose& camera : solve_p3p(rays, points)) {
-      const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
-      result.push_back({rotation, camera.centre - rotation.conjugate() * mount.centre});
-    }
-    return result;
+  std::optional<RigSight> sight_of(std::int64_t row) const {
+    const TileImage& image = image_of(row);
+    const auto ray =
+        rig_ray(state_.mounts[image.mount], state_.cameras[image.camera.value], {problem_.x[row], problem_.y[row]});
+    if (!ray) return std::nullopt;
+    const std::int64_t point = point_of_row_[row];
+    return RigSight{*ray, state_.points[point], Eigen::Matrix3d::Zero(), 1 / problem_.inverse_sigma[row], point};
   }
 
   const TileProblem& problem_;

@@ -1,14 +1,15 @@
 #include "adjust/model_link.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <random>
 
 #include "geometry/chi_square.h"
 #include "geometry/median.h"
-#include "geometry/minimal_similarity.h"
+#include "geometry/ransac.h"
 #include "geometry/rotation.h"
+#include "geometry/similarity_estimator.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -43,176 +44,105 @@ Eigen::Matrix<double, 3, 7> by_model_step(const Eigen::Vector3d& z) {
 
 namespace {
 
-class LinkFit {
+constexpr double kSampleReach = 4;  // a sample's error grows away from its points
+
+// What two models share, for the engine: three places, or an image's attitude with the distance of two places. The
+// residual of an image is the larger of those of place and attitude.
+class LinkEstimator {
  public:
-  LinkFit(const Model& a, const Model& b, const SharedRows& shared, const LinkOptions& options)
-      : options_(options), limit_(chi_square_quantile(options.rejection_probability, 3)) {
-    for (const auto& [i, j] : shared.points) {
-      const ModelPoint &p = a.points[static_cast<std::size_t>(i)], &q = b.points[static_cast<std::size_t>(j)];
-      places_.push_back({p.position, q.position, p.sigma, q.sigma});
-    }
+  using Model = Similarity;
+  static constexpr std::size_t kSampleSize = 3;
+
+  LinkEstimator(const megablock::Model& a, const megablock::Model& b, const SharedRows& shared)
+      : places_(places_of(a, b, shared)), by_places_(places_), first_image_(shared.points.size()) {
     for (const auto& [i, j] : shared.images) {
       const ModelImage &p = a.images[static_cast<std::size_t>(i)], &q = b.images[static_cast<std::size_t>(j)];
-      places_.push_back({p.pose.centre, q.pose.centre, p.centre_sigma, q.centre_sigma});
       turns_.push_back({p.pose.rotation.conjugate() * q.pose.rotation, std::hypot(p.rotation_sigma, q.rotation_sigma)});
     }
-    first_image_ = shared.points.size();
-    std::seed_seq seed{static_cast<std::uint64_t>(a.number), static_cast<std::uint64_t>(b.number)};
-    random_.seed(seed);
   }
+  LinkEstimator(const LinkEstimator&) = delete;  // by_places_ looks at places_
+  LinkEstimator& operator=(const LinkEstimator&) = delete;
 
-  std::optional<ModelLink> run() {
-    if (equations(std::vector<std::uint8_t>(places_.size(), 1)) < 7 + options_.min_redundancy) return std::nullopt;
-    const auto start = best_sample();
-    if (!start) return std::nullopt;
-    Similarity s = *start;
-    take_factors(s, equations(std::vector<std::uint8_t>(places_.size(), 1)));
-    std::vector<std::uint8_t> agrees = agreeing(s, kWide * kWide * limit_);
-    ModelLink link;
-    for (int round = 0; round < kRounds; ++round) {
-      if (!solve(agrees, s, link.information)) return std::nullopt;
-      // A sample's misfits are larger than those of least squares.
-      if (round < kRounds / 2) take_factors(s, equations(agrees));
-      // Narrower with every round.
-      const double factor = std::max(1.0, kWide / std::pow(2, round));
-      const std::vector<std::uint8_t> next = agreeing(s, factor * factor * limit_);
-      if (factor == 1 && next == agrees) break;
-      agrees = next;
-    }
-    link.shared = static_cast<int>(places_.size());
-    link.agreeing = static_cast<int>(std::count(agrees.begin(), agrees.end(), 1));
-    if (equations(agrees) < 7 + options_.min_redundancy || link.agreeing < options_.min_share * link.shared)
-      return std::nullopt;
-    link.similarity = s;
-    return link;
-  }
-
- private:
-  struct Place {
-    Eigen::Vector3d a, b;
-    double sigma_a, sigma_b;
-  };
-  struct Turn {
-    Eigen::Quaterniond rotation;  // b -> a
-    double sigma;
-  };
-  static constexpr double kWide = 4;  // a sample's error grows away from its points
-  static constexpr int kRounds = 12;
-
+  std::size_t size() const { return places_.size(); }
+  int equations() const { return equations(std::vector<std::uint8_t>(size(), 1)); }
   int equations(const std::vector<std::uint8_t>& agrees) const {
     int count = 0;
     for (std::size_t i = 0; i < agrees.size(); ++i)
-      if (agrees[i]) count += i < first_image_ ? 3 : 6;
+      if (agrees[i]) count += turn(i) ? 6 : 3;
     return count;
   }
+  double chance(double sigmas) const { return by_places_.chance(sigmas); }
+  double extent() const { return by_places_.extent(); }
 
-  // By how much the variances of places and of attitudes are larger than their sigmas say, each by its own median. Of
-  // `used` equations seven go into the similarity.
-  void take_factors(const Similarity& s, int used) {
-    if (!options_.scale_sigmas) return;
-    std::vector<double> places, turns;
-    for (const Place& place : places_) places.push_back(place_factor_ * place_squares(s, place));
-    for (const Turn& turn : turns_) turns.push_back(turn_factor_ * turn_squares(s, turn));
-    const double typical = chi_square_quantile(0.5, 3) * (used - 7) / used;
-    place_factor_ = std::max(1.0, middle_of(places) / typical);
-    turn_factor_ = std::max(1.0, middle_of(turns) / typical);
+  Solutions<Similarity, 4> solve(const std::array<std::size_t, 3>& rows) const {
+    Solutions<Similarity, 4> found;
+    for (const Similarity& s : by_places_.solve(rows)) found.push_back(s);
+    for (std::size_t k = 0; k < 3; ++k)
+      if (const Turn* of_image = turn(rows[k])) {
+        const SimilarityPair &here = places_[rows[k]], &there = places_[rows[(k + 1) % 3]];
+        const double in_a = (there.to - here.to).norm(), in_b = (there.from - here.from).norm();
+        if (!(in_a > 0) || !(in_b > 0)) continue;
+        Similarity s{in_a / in_b, of_image->rotation, {}};
+        s.translation = here.to - s.scale * (s.rotation * here.from);
+        found.push_back(s);
+      }
+    return found;
   }
-  // Unlike median() the mean of both middle ones: few images are in both models.
-  static double middle_of(std::vector<double> values) {
-    const double upper = median(values);
-    for (double& value : values) value = -value;
-    return 0.5 * (upper - median(std::move(values)));
+  auto squared_residuals(const Similarity& s) const {
+    return [this, s, of_place = by_places_.squared_residuals(s)](std::size_t i) {
+      const double place = of_place(i) / place_factor_;
+      const Turn* of_image = turn(i);
+      return of_image ? std::max(place, turn_squares(s, *of_image) / turn_factor_) : place;
+    };
   }
-
-  double place_variance(const Similarity& s, const Place& place) const {
-    return place_factor_ * (place.sigma_b * place.sigma_b + place.sigma_a * place.sigma_a / (s.scale * s.scale));
-  }
-  double place_squares(const Similarity& s, const Place& place) const {
-    return (s.rotation.conjugate() * (place.a - s.translation) / s.scale - place.b).squaredNorm() /
-           place_variance(s, place);
-  }
-  double turn_variance(const Turn& turn) const { return turn_factor_ * turn.sigma * turn.sigma; }
-  double turn_squares(const Similarity& s, const Turn& turn) const {
-    return std::pow(rotation_angle(s.rotation, turn.rotation), 2) / turn_variance(turn);
-  }
-  // The larger of place and attitude of an image.
-  double squares(const Similarity& s, std::size_t i) const {
-    const double place = place_squares(s, places_[i]);
-    return i < first_image_ ? place : std::max(place, turn_squares(s, turns_[i - first_image_]));
-  }
-  std::vector<double> all_squares(const Similarity& s) const {
-    std::vector<double> result(places_.size());
-    for (std::size_t i = 0; i < result.size(); ++i) result[i] = squares(s, i);
-    return result;
+  std::optional<Similarity> refine(Similarity s, double threshold) const {
+    constexpr int kSteps = 2;
+    SimilarityCovariance information;
+    if (!adjust(agreeing(s, threshold * threshold), kSteps, s, information)) return std::nullopt;
+    return s;
   }
   std::vector<std::uint8_t> agreeing(const Similarity& s, double limit) const {
-    std::vector<std::uint8_t> result(places_.size());
-    for (std::size_t i = 0; i < result.size(); ++i) result[i] = squares(s, i) <= limit;
+    const auto squares = squared_residuals(s);
+    std::vector<std::uint8_t> result(size());
+    for (std::size_t i = 0; i < result.size(); ++i) result[i] = squares(i) <= limit;
     return result;
   }
 
-  std::optional<Similarity> sample() {
-    const std::size_t count = places_.size();
-    const auto draw = [&] { return random_() % count; };
-    if (!turns_.empty() && random_() % 2 == 0) {
-      const std::size_t t = random_() % turns_.size(), i = first_image_ + t, j = draw();
-      const Eigen::Vector3d in_a = places_[j].a - places_[i].a, in_b = places_[j].b - places_[i].b;
-      if (!(in_b.norm() > 0) || !(in_a.norm() > 0)) return std::nullopt;
-      Similarity s{in_a.norm() / in_b.norm(), turns_[t].rotation, {}};
-      s.translation = places_[i].a - s.scale * (s.rotation * places_[i].b);
-      return s;
+  // By how much the variances of places and of attitudes are larger than their sigmas say, each by its own median over
+  // what agrees. Of its equations seven go into the similarity.
+  void take_factors(const Similarity& s, const std::vector<std::uint8_t>& agrees) {
+    const auto of_place = by_places_.squared_residuals(s);
+    std::vector<double> places, turns;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (!agrees[i]) continue;
+      places.push_back(of_place(i));
+      if (const Turn* of_image = turn(i)) turns.push_back(turn_squares(s, *of_image));
     }
-    const std::size_t i = draw(), j = draw(), k = draw();
-    if (i == j || j == k || i == k) return std::nullopt;
-    return solve_similarity({places_[i].b, places_[j].b, places_[k].b}, {places_[i].a, places_[j].a, places_[k].a});
-  }
-
-  std::optional<Similarity> best_sample() {
-    constexpr double kMiss = 1e-6;  // probability that no sample is free of wrong points
-    const double limit = kWide * kWide * limit_;
-    std::optional<Similarity> best;
-    double least = std::numeric_limits<double>::infinity();
-    double wanted = options_.max_samples;
-    for (int draw = 0; draw < options_.max_samples && draw < wanted; ++draw) {
-      const auto candidate = sample();
-      if (!candidate || !candidate->translation.allFinite()) continue;
-      double value = 0;
-      int agree = 0;
-      if (options_.scale_sigmas) {
-        value = median(all_squares(*candidate));
-        agree = static_cast<int>(places_.size() / 2);
-      }
-      for (std::size_t i = 0; i < places_.size() && !options_.scale_sigmas && value < least; ++i) {
-        const double e = squares(*candidate, i);
-        value += std::min(e, limit);
-        agree += e < limit;
-      }
-      if (!(value < least)) continue;
-      best = candidate;
-      least = value;
-      const double good = std::pow(static_cast<double>(agree) / static_cast<double>(places_.size()), 3);
-      wanted = good < 1 ? std::max(20.0, std::log(kMiss) / std::log1p(-good)) : 20;
-    }
-    return best;
+    const double used = equations(agrees), typical = chi_square_quantile(0.5, 3) * (used - 7) / used;
+    place_factor_ = std::max(1.0, middle_of(std::move(places)) / typical);
+    turn_factor_ = std::max(1.0, middle_of(std::move(turns)) / typical);
   }
 
   // Least squares over what agrees.
-  bool solve(const std::vector<std::uint8_t>& agrees, Similarity& s, SimilarityCovariance& information) const {
-    for (int iteration = 0; iteration < 10; ++iteration) {
+  bool adjust(const std::vector<std::uint8_t>& agrees, int max_iterations, Similarity& s,
+              SimilarityCovariance& information) const {
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
       information.setZero();
       SimilarityStep right = SimilarityStep::Zero();
-      for (std::size_t i = 0; i < places_.size(); ++i) {
+      for (std::size_t i = 0; i < size(); ++i) {
         if (!agrees[i]) continue;
-        const Place& place = places_[i];
-        const Eigen::Vector3d z = s.rotation.conjugate() * (place.a - s.translation) / s.scale;
-        const double weight = 1 / place_variance(s, place);
+        const SimilarityPair& place = places_[i];
+        const Eigen::Vector3d z = s.rotation.conjugate() * (place.to - s.translation) / s.scale;
+        const double weight = 1 / (place_factor_ * (place.sigma_from * place.sigma_from +
+                                                    place.sigma_to * place.sigma_to / (s.scale * s.scale)));
         const Eigen::Matrix<double, 3, 7> by_step = by_model_step(z);
         information += weight * by_step.transpose() * by_step;
-        right -= weight * by_step.transpose() * (z - place.b);
-        if (i < first_image_) continue;
-        const Turn& turn = turns_[i - first_image_];
-        information.topLeftCorner<3, 3>().diagonal().array() += 1 / turn_variance(turn);
-        right.head<3>() += rotation_log<double>(s.rotation.conjugate() * turn.rotation) / turn_variance(turn);
+        right -= weight * by_step.transpose() * (z - place.from);
+        const Turn* of_image = turn(i);
+        if (!of_image) continue;
+        const double trust = 1 / (turn_factor_ * of_image->sigma * of_image->sigma);
+        information.topLeftCorner<3, 3>().diagonal().array() += trust;
+        right.head<3>() += trust * rotation_log<double>(s.rotation.conjugate() * of_image->rotation);
       }
       // Unit diagonal, so that what the points leave open shows.
       const SimilarityStep size = information.diagonal().cwiseSqrt();
@@ -231,20 +161,107 @@ class LinkFit {
     return s.translation.allFinite() && s.scale > 0;
   }
 
-  const LinkOptions& options_;
-  double limit_;                               // of the squares of three equations
+ private:
+  struct Turn {
+    Eigen::Quaterniond rotation;  // b -> a
+    double sigma;
+  };
+  // Points, then the centres of images; from b to a.
+  static std::vector<SimilarityPair> places_of(const megablock::Model& a, const megablock::Model& b,
+                                               const SharedRows& shared) {
+    std::vector<SimilarityPair> places;
+    for (const auto& [i, j] : shared.points) {
+      const ModelPoint &p = a.points[static_cast<std::size_t>(i)], &q = b.points[static_cast<std::size_t>(j)];
+      places.push_back({q.position, p.position, q.sigma, p.sigma});
+    }
+    for (const auto& [i, j] : shared.images) {
+      const ModelImage &p = a.images[static_cast<std::size_t>(i)], &q = b.images[static_cast<std::size_t>(j)];
+      places.push_back({q.pose.centre, p.pose.centre, q.centre_sigma, p.centre_sigma});
+    }
+    return places;
+  }
+  const Turn* turn(std::size_t i) const { return i < first_image_ ? nullptr : &turns_[i - first_image_]; }
+  static double turn_squares(const Similarity& s, const Turn& turn) {
+    return std::pow(rotation_angle(s.rotation, turn.rotation) / turn.sigma, 2);
+  }
+  // Unlike median() the mean of both middle ones: few images are in both models.
+  static double middle_of(std::vector<double> values) {
+    const double upper = median(values);
+    for (double& value : values) value = -value;
+    return 0.5 * (upper - median(std::move(values)));
+  }
+
+  std::vector<SimilarityPair> places_;
+  SimilarityEstimator by_places_;
+  std::size_t first_image_;
+  std::vector<Turn> turns_;                    // of the images
   double place_factor_ = 1, turn_factor_ = 1;  // of the variances
-  std::vector<Place> places_;                  // points, then the centres of images
-  std::vector<Turn> turns_;                    // of these
-  std::size_t first_image_ = 0;
-  std::mt19937_64 random_;
 };
+
+// The equations that a link needs.
+int fewest(const LinkOptions& options) { return 7 + options.min_redundancy; }
+
+std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimator, const LinkOptions& options,
+                                                    double limit, std::uint64_t seed) {
+  constexpr double kMiss = 1e-6;  // probability that no sample is free of wrong points
+  RansacOptions sampling;
+  sampling.max_draws = options.max_samples;
+  sampling.confidence = 1 - kMiss;
+  sampling.seed = seed;
+  if (!options.scale_sigmas) {
+    sampling.threshold = kSampleReach * std::sqrt(limit);
+    return ransac(estimator, sampling);
+  }
+  const double extent = estimator.extent();
+  if (!(extent > 0)) return std::nullopt;
+  sampling.max_threshold = 0.1 * extent;
+  const auto found = ransac(estimator, sampling);
+  if (found && estimator.equations(found->consensus.inlier) >= fewest(options)) return found;
+  // A few bad places agree no better than by accident; other links tell whether they are right.
+  sampling.threshold = extent;
+  return ransac(estimator, sampling);
+}
+
+std::optional<ModelLink> fit_link(LinkEstimator& estimator, const LinkOptions& options, std::uint64_t seed) {
+  constexpr int kRounds = 12;
+  if (estimator.equations() < fewest(options)) return std::nullopt;
+  const double limit = chi_square_quantile(options.rejection_probability, 3);  // of the squares of three equations
+  const auto start = best_sample(estimator, options, limit, seed);
+  if (!start) return std::nullopt;
+  Similarity s = start->model;
+  std::vector<std::uint8_t> agrees = start->consensus.inlier;
+  if (options.scale_sigmas) {
+    if (estimator.equations(agrees) < fewest(options)) return std::nullopt;
+    estimator.take_factors(s, agrees);
+    agrees = estimator.agreeing(s, kSampleReach * kSampleReach * limit);
+  }
+  ModelLink link;
+  for (int round = 0; round < kRounds; ++round) {
+    if (!estimator.adjust(agrees, 10, s, link.information)) return std::nullopt;
+    if (options.scale_sigmas && round < kRounds / 2) estimator.take_factors(s, agrees);
+    // Narrower with every round.
+    const double factor = std::max(1.0, kSampleReach / std::pow(2, round));
+    const std::vector<std::uint8_t> next = estimator.agreeing(s, factor * factor * limit);
+    if (estimator.equations(next) < fewest(options)) return std::nullopt;
+    if (factor == 1 && next == agrees) break;
+    agrees = next;
+  }
+  link.shared = static_cast<int>(estimator.size());
+  link.agreeing = static_cast<int>(std::count(agrees.begin(), agrees.end(), 1));
+  if (link.agreeing < options.min_share * link.shared) return std::nullopt;
+  link.similarity = s;
+  return link;
+}
 
 }  // namespace
 
 std::optional<ModelLink> fit_model_link(const std::vector<Model>& models, std::int32_t a, std::int32_t b,
                                         const SharedRows& shared, const LinkOptions& options) {
-  auto link = LinkFit(models[static_cast<std::size_t>(a)], models[static_cast<std::size_t>(b)], shared, options).run();
+  const Model &first = models[static_cast<std::size_t>(a)], &second = models[static_cast<std::size_t>(b)];
+  const std::uint64_t seed =
+      (static_cast<std::uint64_t>(first.number) << 32) ^ static_cast<std::uint64_t>(second.number);
+  LinkEstimator estimator(first, second, shared);
+  auto link = fit_link(estimator, options, seed);
   if (link) link->a = a, link->b = b;
   return link;
 }

@@ -58,9 +58,9 @@ struct LinkOptions {
   int min_redundancy = 8;               // equations that agree (3 a point, 6 an image) less 7
   double min_share = 0.25;              // agreeing of shared points and images
   int max_samples = 500;
-  // Sigmas of places and of attitudes are each known up to a factor, which each link takes from their median misfit
-  // (at least 1): for models of which only the order of their errors is known. More than half of what two models share
-  // must be right then.
+  // Sigmas of places and of attitudes are each known up to a factor, which each link takes from their median misfit over
+  // what agrees (at least 1): for models of which only the order of their errors is known. What agrees is then found a
+  // contrario (geometry/ransac.h).
   bool scale_sigmas = false;
   void check() const;  // throws InputError
 };

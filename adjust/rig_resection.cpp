@@ -5,46 +5,16 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <random>
 #include <set>
 
 #include "geometry/angles.h"
-#include "geometry/gp3p.h"
 #include "geometry/line_ratio.h"
+#include "geometry/ransac.h"
 #include "io/error.h"
 
 namespace megablock {
 
 namespace {
-
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-// Whitened residual and its derivative by the pose.
-struct Whitened {
-  Eigen::Vector2d residual;
-  Eigen::Matrix<double, 2, 6> by_pose;
-  double squared_px;
-};
-
-std::optional<Whitened> whitened(const RigSight& sight, const Pose& pose, bool with_jacobian) {
-  const auto r = ray_residual(sight.ray, to_inside(pose, sight.point));
-  if (!r) return std::nullopt;
-  const Eigen::Matrix<double, 2, 3> by_ground = r->by_point * pose.rotation.toRotationMatrix();
-  const Eigen::Matrix2d covariance = sight.sigma_px * sight.sigma_px * Eigen::Matrix2d::Identity() +
-                                     by_ground * sight.covariance * by_ground.transpose();
-  // Cholesky factor of a 2x2, by hand: this is the innermost loop.
-  const double a = std::sqrt(covariance(0, 0)), b = covariance(1, 0) / a,
-               c = std::sqrt(std::max(covariance(1, 1) - b * b, 1e-300));
-  const auto solve = [&](const auto& v) {
-    std::decay_t<decltype(v.eval())> x = v;
-    x.row(0) /= a;
-    x.row(1) = (x.row(1) - b * x.row(0)) / c;
-    return x;
-  };
-  Whitened w{solve(r->pixels), Eigen::Matrix<double, 2, 6>::Zero(), r->pixels.squaredNorm()};
-  if (with_jacobian) w.by_pose = solve((r->by_point * in_rig_by_pose(pose, sight.point)).eval());
-  return w;
-}
 
 using Approximate = std::optional<ApproximatePose>;
 
@@ -58,19 +28,16 @@ PoseIncrement departure(const Approximate& known, const Pose& pose) {
 }
 
 // Truncated sum of squares of the sights.
-double cost(std::span<const RigSight> sights, const Pose& pose, double limit_squared, double give_up) {
+double cost(std::span<const RigSight> sights, const Pose& pose, double limit_squared) {
+  const auto squares = RigSightEstimator(sights).squared_residuals(pose);
   double sum = 0;
-  for (const RigSight& sight : sights) {
-    const auto w = whitened(sight, pose, false);
-    sum += w ? std::min(limit_squared, w->residual.squaredNorm()) : limit_squared;
-    if (sum > give_up) break;
-  }
+  for (std::size_t i = 0; i < sights.size(); ++i) sum += std::min(limit_squared, squares(i));
   return sum;
 }
 
-Matrix6 normal_matrix(std::span<const RigSight> sights, const Approximate& known, const Pose& pose,
-                      double limit_squared, PoseIncrement& right) {
-  Matrix6 normal = Matrix6::Zero();
+PoseNormal normal_matrix(std::span<const RigSight> sights, const Approximate& known, const Pose& pose,
+                         double limit_squared, PoseIncrement& right) {
+  PoseNormal normal = PoseNormal::Zero();
   right.setZero();
   if (known) {  // the departure of the rotation is small: its derivative is the identity
     PoseIncrement inverse_sigma;
@@ -79,24 +46,19 @@ Matrix6 normal_matrix(std::span<const RigSight> sights, const Approximate& known
     normal = inverse_sigma.cwiseAbs2().asDiagonal();
     right = -inverse_sigma.cwiseProduct(departure(known, pose));
   }
-  for (const RigSight& sight : sights) {
-    const auto w = whitened(sight, pose, true);
-    if (!w || w->residual.squaredNorm() > limit_squared) continue;
-    normal += w->by_pose.transpose() * w->by_pose;
-    right -= w->by_pose.transpose() * w->residual;
-  }
+  add_normal_equations(sights, pose, limit_squared, normal, right);
   return normal;
 }
 
 // Levenberg-Marquardt on the truncated squares.
 Pose refine(std::span<const RigSight> sights, const Approximate& known, Pose pose, double limit_squared) {
   const auto value_at = [&](const Pose& p) {
-    return cost(sights, p, limit_squared, 1e300) + departure(known, p).squaredNorm();
+    return cost(sights, p, limit_squared) + departure(known, p).squaredNorm();
   };
   double damping = 1e-6, current = value_at(pose);
   for (int iteration = 0; iteration < 30 && damping < 1e6; ++iteration) {
     PoseIncrement right;
-    Matrix6 normal = normal_matrix(sights, known, pose, limit_squared, right);
+    PoseNormal normal = normal_matrix(sights, known, pose, limit_squared, right);
     normal.diagonal() *= 1 + damping;
     const PoseIncrement step = normal.ldlt().solve(right);
     if (!step.allFinite()) break;
@@ -118,58 +80,21 @@ struct Candidate {
   Pose pose;
 };
 
-// Solutions of one sample, kept when they are among the best.
-void try_sample(std::span<const RigSight> sights, const std::array<std::size_t, 3>& rows, double limit_squared,
-                std::vector<Candidate>& best) {
-  constexpr std::size_t kCandidates = 16;
-  std::array<Eigen::Vector3d, 3> origins, directions, points;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const RigSight& sight = sights[rows[k]];
-    origins[k] = sight.ray.origin, directions[k] = sight.ray.direction, points[k] = sight.point;
-  }
-  for (const Pose& pose : solve_gp3p(origins, directions, points)) {
-    const double give_up = best.size() < kCandidates ? 1e300 : best.back().cost;
-    const double value = cost(sights, pose, limit_squared, give_up);
-    if (best.size() == kCandidates && value >= best.back().cost) continue;
-    const auto place = std::upper_bound(best.begin(), best.end(), value,
-                                        [](double v, const Candidate& candidate) { return v < candidate.cost; });
-    best.insert(place, {value, pose});
-    if (best.size() > kCandidates) best.pop_back();
-  }
-}
-
-// Samples of three distinct points: all of them where they are few, else random ones until it is unlikely (1e-4) that
-// none of right sights alone was among them.
-std::vector<Candidate> sample(std::span<const RigSight> sights, const RigResectionOptions& options,
-                              double limit_squared, std::uint64_t seed) {
-  const std::size_t n = sights.size();
-  const auto distinct = [&](const std::array<std::size_t, 3>& r) {
-    return sights[r[0]].id != sights[r[1]].id && sights[r[0]].id != sights[r[2]].id &&
-           sights[r[1]].id != sights[r[2]].id;
-  };
-  std::vector<Candidate> best;
-  if (n * (n - 1) * (n - 2) / 6 <= static_cast<std::size_t>(options.samples)) {
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = i + 1; j < n; ++j)
-        for (std::size_t k = j + 1; k < n; ++k)
-          if (const std::array<std::size_t, 3> rows{i, j, k}; distinct(rows))
-            try_sample(sights, rows, limit_squared, best);
-    return best;
-  }
-  std::mt19937_64 random(seed);
-  double needed = options.samples;
-  for (int done = 0; done < options.samples && done < needed; ++done) {
-    const std::array<std::size_t, 3> rows{random() % n, random() % n, random() % n};
-    if (!distinct(rows)) continue;
-    try_sample(sights, rows, limit_squared, best);
-    if (best.empty()) continue;
-    // Share of right sights, at least: each wrong one costs the limit.
-    const double right = std::max(0.0, 1 - best.front().cost / (limit_squared * static_cast<double>(n)));
-    const double all_right = std::pow(right, 3);
-    // A sample of right sights is good for a start two times in three.
-    if (all_right > 0.02) needed = std::min(needed, 10 + std::log(1e-4) / std::log1p(-0.6 * all_right));
-  }
-  return best;
+// The poses of most support, best first: of all samples of three where these are few, else of random ones.
+std::vector<Pose> best_poses(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed) {
+  RansacOptions sampling;
+  sampling.threshold = options.max_error_sigmas;
+  sampling.confidence = 0.9999;
+  sampling.max_draws = options.samples;
+  sampling.min_draws = std::min(10, options.samples);
+  sampling.enumerate = options.samples;
+  sampling.keep = 16;
+  sampling.seed = seed;
+  auto found = ransac(RigSightEstimator(sights), sampling);
+  if (!found) return {};
+  std::vector<Pose> poses = std::move(found->others);
+  poses.insert(poses.begin(), found->model);
+  return poses;
 }
 
 std::size_t distinct_points(std::span<const RigSight> sights, const std::vector<std::uint8_t>* agrees = nullptr) {
@@ -199,12 +124,12 @@ double largest_angle_deg(std::span<const RigSight> sights, const std::vector<std
 
 // The candidates that the sights cannot tell from the best one, refined, each once.
 std::vector<Candidate> equally_good(std::span<const RigSight> sights, const Approximate& known,
-                                    const std::vector<Candidate>& found, double limit_squared) {
+                                    const std::vector<Pose>& found, double limit_squared) {
   constexpr double kClear = 9;  // a pose whose squares are this much larger is worse
   std::vector<Candidate> refined;
-  for (const Candidate& candidate : found) {
-    const Pose pose = refine(sights, known, candidate.pose, limit_squared);
-    refined.push_back({cost(sights, pose, limit_squared, 1e300) + departure(known, pose).squaredNorm(), pose});
+  for (const Pose& start : found) {
+    const Pose pose = refine(sights, known, start, limit_squared);
+    refined.push_back({cost(sights, pose, limit_squared) + departure(known, pose).squaredNorm(), pose});
   }
   std::stable_sort(refined.begin(), refined.end(),
                    [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
@@ -240,8 +165,8 @@ void assess(std::span<const RigSight> sights, const Approximate& known, const Ri
   if (line_ratio_of(sights, result.agrees) < options.min_line_ratio)
     throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
   PoseIncrement right;
-  const Matrix6 normal = normal_matrix(sights, known, result.pose, limit_squared, right);
-  result.covariance = normal.ldlt().solve(Matrix6::Identity());
+  const PoseNormal normal = normal_matrix(sights, known, result.pose, limit_squared, right);
+  result.covariance = normal.ldlt().solve(PoseNormal::Identity());
   const double sigma = std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace());
   if (!(sigma <= options.max_position_sigma_m) || !(result.covariance.diagonal().array() >= 0).all())
     throw ComputeError(
@@ -273,7 +198,7 @@ RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOpti
   if (line_ratio_of(sights, all) < options.min_line_ratio)
     throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
   const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
-  const std::vector<Candidate> found = sample(sights, options, limit_squared, seed);
+  const std::vector<Pose> found = best_poses(sights, options, seed);
   if (found.empty()) throw ComputeError("no pose agrees with three of the points");
   const std::vector<Candidate> candidates = equally_good(sights, known, found, limit_squared);
   RigResection result;

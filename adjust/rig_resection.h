@@ -1,11 +1,7 @@
 // Pose of a rig from known points seen by any of its cameras ("relevement", CN-21).
 //
-// Generalised P3P (geometry/gp3p.h) on samples of three points, each solution judged by all sights (truncated squares,
-// MSAC: Torr and Zisserman 2000), then Levenberg-Marquardt over the agreeing ones. Residuals are in pixels
-// (geometry/rig_ray.h), each whitened by
-//
-//     image_sigma^2 I + J R C_X R' J'        (C_X: covariance of the point, J R: derivative by the point)
-//
+// Generalised P3P (geometry/gp3p.h) on samples of three points, each solution judged by all sights (geometry/ransac.h),
+// then Levenberg-Marquardt over the agreeing ones, with residuals whitened by measurement and point (rig_sights.h),
 // so that sigmas of the points enter the choice, the weights and the covariance of the pose. A pose known beforehand
 // (the trajectory's: metres in position, hundredths of a degree in attitude) takes part as an observation with its
 // sigmas: it decides between the solutions of three points and steadies configurations near a critical surface.
@@ -17,17 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "geometry/rig_ray.h"
+#include "adjust/rig_sights.h"
 
 namespace megablock {
-
-struct RigSight {
-  RigRay ray;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();       // ground frame, metres
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the point, m^2
-  double sigma_px = 0.5;                                 // of the measurement, per axis
-  std::int64_t id = 0;                                   // of the point: sights of one point share it
-};
 
 struct RigResectionOptions {
   double max_error_sigmas = 4;        // length of the whitened residual of an agreeing sight

@@ -165,6 +165,42 @@ TEST(ModelAssembly, InformationOfLinksIsThatOfTheirErrors) {
   }
 }
 
+// Sigmas that are too small by ten, and more wrong points than right ones; then three images alone.
+TEST(ModelAssembly, LinksOfOpenSigmasFindWhatAgrees) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  const Similarity truth{2, rotation_exp<double>({0.3, -0.2, 1}), {10, 20, 30}};
+  std::vector<Model> models{{1, {}, {}}, {2, {}, {}}};
+  SharedRows shared;
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d x = 300 * vector();
+    models[1].points.push_back({i, x, 0.01});
+    models[0].points.push_back({i, truth(x) + (i % 5 < 3 ? 200 : 0.2) * vector(), 0.02});
+    shared.points.emplace_back(i, i);
+  }
+  LinkOptions options;
+  options.scale_sigmas = true;
+  const auto link = fit_model_link(models, 0, 1, shared, options);
+  ASSERT_TRUE(link);
+  EXPECT_NEAR(link->agreeing, 40, 1);
+  EXPECT_LT((link->similarity({0, 0, 0}) - truth({0, 0, 0})).norm(), 0.2);
+
+  models = {{1, {}, {}}, {2, {}, {}}};
+  shared = {};
+  for (int i = 0; i < 3; ++i) {
+    const Pose pose{rotation_exp<double>(vector()), {100.0 * i, 0, 0}};
+    Pose moved = truth(pose);
+    moved.rotation = rotation_update(moved.rotation, 1e-3 * vector());
+    models[1].images.push_back({i, pose, 0.01, 1e-4});
+    models[0].images.push_back({i, moved, 0.02, 1e-4});
+    shared.images.emplace_back(i, i);
+  }
+  const auto by_images = fit_model_link(models, 0, 1, shared, options);
+  ASSERT_TRUE(by_images);
+  EXPECT_LT(rotation_angle(by_images->similarity.rotation, truth.rotation), 3e-3);
+}
+
 TEST(ModelAssembly, CovariancesAreBlocksOfTheInverse) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
@@ -201,8 +237,8 @@ TEST(ModelAssembly, CovariancesAreBlocksOfTheInverse) {
   }
 }
 
-// One model is two hundred times worse than its sigmas say: its links, which find the size of their errors themselves, hold,
-// and not one of its places agrees with the others.
+// One model is two hundred times worse than its sigmas say: its links, which find the size of their errors themselves,
+// hold, and not one of its places agrees with the others.
 TEST(ModelAssembly, GoesOnWithoutAModelThatLosesItsPlaces) {
   model_grid::Options scene = small_grid();
   scene.images_per_side = 0;
