@@ -219,6 +219,7 @@ std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimat
   if (found && estimator.equations(found->consensus.inlier) >= fewest(options)) return found;
   // A few bad places agree no better than by accident; other links tell whether they are right.
   sampling.threshold = extent;
+  sampling.min_draws = std::min(20, options.max_samples);  // nearly all agree: one would be thought enough
   return ransac(estimator, sampling);
 }
 

@@ -55,12 +55,13 @@ struct ModelLink {
 
 struct LinkOptions {
   double rejection_probability = 1e-5;  // of a good point or image, by chance
-  int min_redundancy = 8;               // equations that agree (3 a point, 6 an image) less 7
+  int min_redundancy = 8;               // equations that agree (3 a point, 6 an image) less 7; of three places at least
   double min_share = 0.25;              // agreeing of shared points and images
   int max_samples = 500;
-  // Sigmas of places and of attitudes are each known up to a factor, which each link takes from their median misfit over
-  // what agrees (at least 1): for models of which only the order of their errors is known. What agrees is then found a
-  // contrario (geometry/ransac.h).
+  // Sigmas of places and of attitudes are each known up to a factor, which each link takes from their median misfit
+  // over what agrees (at least 1): for models of which only the order of their errors is known. What agrees is then
+  // found a contrario (geometry/ransac.h), or, where that is too few, as the better of samples of which most places
+  // agree.
   bool scale_sigmas = false;
   void check() const;  // throws InputError
 };

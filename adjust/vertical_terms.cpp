@@ -30,6 +30,17 @@ TileProblem::VerticalTerm vertical_term(const SeenVertical& seen, const GroundVe
   return term;
 }
 
+void take_plumb_lines(const Block& block, const BlockState& places, TileProblem& problem) {
+  if (problem.verticals.empty() && problem.lines.empty()) return;
+  const GroundVertical ground(block.ground);
+  const auto down = [&](LocalFrame frame) {
+    return ground.down(places.frames[problem.frames[static_cast<std::size_t>(frame.value)]].centre);
+  };
+  for (TileProblem::VerticalTerm& term : problem.verticals)
+    term.ground = down(problem.images[static_cast<std::size_t>(term.image.value)].frame);
+  for (TileProblem::LineTerm& term : problem.lines) term.up = -down(term.frame);
+}
+
 VerticalResidual linearise_vertical(const Pose& frame, const Pose& mount, const Intrinsics& camera,
                                     const TileProblem::VerticalTerm& term) {
   constexpr double kOpposite = 1e-9;

@@ -41,6 +41,10 @@ class GroundVertical {
 TileProblem::VerticalTerm vertical_term(const SeenVertical& seen, const GroundVertical& ground,
                                         const Eigen::Vector3d& centre);
 
+// Takes "down" of the problem's verticals and "up" of its lines from where their frames are in `places`. A merge moves
+// the frames; its problem, made anew when it is resumed, may not depend on how far they have come.
+void take_plumb_lines(const Block& block, const BlockState& places, TileProblem& problem);
+
 struct VerticalResidual {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6> by_frame, by_mount;  // zero by the centres; by parameters of the camera: -by_camera

@@ -36,9 +36,12 @@ std::vector<BlockChecks::Line> check_lines(const Block& block, const BlockState&
   return lines;
 }
 
-LevelCheck check_level(const TrackBatches& tracks) {
+std::optional<LevelCheck> check_level(const TrackBatches& tracks) {
   constexpr std::int64_t kEnough = 10'000;
-  return check_one_level(sample_of(tracks, kEnough).points);
+  constexpr std::size_t kFewest = 10;  // fewer say nothing
+  const auto sample = sample_of(tracks, kEnough);
+  if (sample.points.size() < kFewest) return std::nullopt;
+  return check_one_level(sample.points);
 }
 
 // The tie point that most images see.
@@ -74,9 +77,18 @@ void check_subsets(const BlockResult& figures, const std::string& path, const Ob
     return;
   }
   const ResultTile tile = tile_of_result(result, options);
+  const std::int64_t reference = reference_point(tile.problem);
+  if (reference < 0) {
+    checks.no_subsets = "no tie point takes part";
+    return;
+  }
   const std::vector<MotionReference> motion = motion_references(result.block, result.tiles);
+  if (motion.size() > 1) {  // what all attitudes have in common is one part's
+    checks.no_subsets = fmt::format("it has {} parts", motion.size());
+    return;
+  }
   try {
-    checks.subsets = check_point_subsets(tile.problem, tile.state, reference_point(tile.problem), kSubsets,
+    checks.subsets = check_point_subsets(tile.problem, tile.state, reference, kSubsets,
                                          motion.empty() ? MotionReference() : motion.front(), solve_by_condensation);
   } catch (const Error& error) {
     checks.no_subsets = error.what();

@@ -45,13 +45,15 @@ StageSettings JobJson::settings() const {
 }
 
 void JobJson::refuse(const std::string& key, const std::string& why) const {
-  const auto program = json_.find("program");
-  const bool said = program != json_.end() && program->is_string();
+  const auto said = json_.find("program");
+  const std::string program = said != json_.end() && said->is_string() ? said->get<std::string>() : "another version";
+  if (program == kProgram)
+    throw InputError(
+        fmt::format("{}: the key '{}' {}; restore the file, or start a new job directory", path_, key, why));
   throw InputError(
       fmt::format("{}: the key '{}' {}: {} wrote this job, this is {}; finish it with the program that began it, or "
-                  "start a new job "
-                  "directory",
-                  path_, key, why, said ? program->get<std::string>() : "another version", kProgram));
+                  "start a new job directory",
+                  path_, key, why, program, kProgram));
 }
 
 }  // namespace megablock

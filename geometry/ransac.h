@@ -250,6 +250,7 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
     for (int round = 0; round < kRounds && best.front().score.inliers > kSize; ++round) {
       const std::optional<Found> refined = estimator.refine(best.front().model, best.front().score.threshold);
       if (!refined || !consider(*refined)) break;
+      if (best.size() > 1) best.erase(best.begin() + 1);  // what it was refined from is no model of its own
     }
     draws_suffice(static_cast<double>(best.front().score.inliers) / static_cast<double>(size));
   };

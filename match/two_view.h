@@ -32,11 +32,11 @@ struct TwoView {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   // The other orientation that explains a plane nearly as well (95 % of the support); a third image decides.
   std::optional<RelativeOrientation> twin;
-  OrientationPrecision precision;    // of rotation and base; the base is open when rotation-only
-  bool ill_conditioned = false;      // the base's direction is worse than max_base_sigma_deg
-  bool by_vertical = false;          // found by three matches and the verticals
-  int draws = 0;                     // of all samples
-  double median_angle_deg = 0;       // of intersection of the inlier rays
+  OrientationPrecision precision;  // of rotation and base; the base is open when rotation-only
+  bool ill_conditioned = false;    // the base's direction is worse than max_base_sigma_deg
+  bool by_vertical = false;        // agrees with the verticals and has the support of what three matches and they gave
+  int draws = 0;                   // of all samples
+  double median_angle_deg = 0;     // of intersection of the inlier rays
   std::vector<std::uint8_t> inlier;  // [pairs]
   int inlier_count = 0;
 };

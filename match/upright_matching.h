@@ -32,7 +32,7 @@ MutualNeighbours nearest_upright(const std::vector<SiftDescriptor>& a, const std
                                  std::size_t k);
 
 // Whether matches, found regardless of sectors, agree in another turn than none: then a vertical is wrong. No more than
-// one in a thousand of pairs without any right match is taken for such.
+// one in a thousand of pairs without any right match, whose turns are evenly spread, is taken for such.
 bool contradict_verticals(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
                           std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b);
 

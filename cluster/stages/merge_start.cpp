@@ -7,6 +7,7 @@
 #include "adjust/tile_adjustment.h"
 #include "adjust/track_parts.h"
 #include "adjust/turned_stretches.h"
+#include "adjust/vertical_terms.h"
 #include "geometry/rotation.h"
 #include "geometry/similarity.h"
 #include "merge/tile_alignment.h"
@@ -203,8 +204,9 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
   return adjusted.empty() ? all : split_tracks(all, read_adjustment(job.store.verified_path(adjusted)).parts);
 }
 
-MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& tiles, TileIndex tile,
-                          const VerticalsOfTiles& verticals, const std::string& tracks, const std::string& adjusted) {
+MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const MergeStart& start, const Tiles& tiles,
+                          TileIndex tile, const VerticalsOfTiles& verticals, const std::string& tracks,
+                          const std::string& adjusted) {
   const BlockState& state = start.state;
   MergeTile merge;
   merge.tile = tile;
@@ -216,6 +218,7 @@ MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& 
   }
   const AdjustOptions& options = job.settings.adjustment;
   merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations, verticals);
+  take_plumb_lines(job.block, oriented, merge.problem);
   const std::size_t points = merge.problem.points.size();
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   merge.state = make_tile_state(merge.problem, state, std::vector<Eigen::Vector3d>(points, unknown));

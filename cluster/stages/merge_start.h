@@ -38,8 +38,9 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
 
 // A tile's problem with the kept flags of its adjustment. Its points go with the tile; those whose frames have not all
 // done so, or whose cameras are the mean of several tiles', are triangulated anew. Of a checkpoint, which has points of
-// its own, they are left as they were.
-MergeTile load_merge_tile(const Job& job, const MergeStart& start, const Tiles& tiles, TileIndex tile,
-                          const VerticalsOfTiles& verticals, const std::string& tracks, const std::string& adjusted);
+// its own, they are left as they were. `oriented`: what stays the same when the merge is resumed.
+MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const MergeStart& start, const Tiles& tiles,
+                          TileIndex tile, const VerticalsOfTiles& verticals, const std::string& tracks,
+                          const std::string& adjusted);
 
 }  // namespace megablock
