@@ -274,7 +274,7 @@ template <typename Values>
 void RankRunner::pass_down(std::int64_t n, const Values& front) {
   const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
   for (const std::int64_t child : {node.left, node.right}) {
-    Bytes bytes = front.restricted_to(plan_.nodes[static_cast<std::size_t>(child)].passed).to_bytes();
+    Bytes bytes = front.bytes_of(plan_.nodes[static_cast<std::size_t>(child)].passed);
     if (mine(child))
       downward_[child] = std::move(bytes);
     else

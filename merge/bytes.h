@@ -32,10 +32,14 @@ class ByteWriter {
     value<std::uint64_t>(v.size());
     append(v.data(), v.size() * sizeof(T));
   }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void elements(const T* first, std::size_t count) { append(first, count * sizeof(T)); }  // without their number
   void bytes(const Bytes& b) {
     value<std::uint64_t>(b.size());
     append(b.data(), b.size());
   }
+  void reserve(std::size_t size) { bytes_.reserve(size); }  // of what goes into memory
   Bytes take() { return std::move(bytes_); }  // what went into memory
 
  private:
@@ -67,6 +71,9 @@ class ByteReader {
     copy(v.data(), v.size() * sizeof(T));
     return v;
   }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void elements(T* first, std::size_t count) { copy(first, count * sizeof(T)); }  // as many as the caller knows of
   Bytes bytes() {
     Bytes b(count_of(1), '\0');
     copy(b.data(), b.size());

@@ -89,6 +89,7 @@ struct Step {
 
   const double* find(const UnknownId& id, std::int64_t column = 0) const;  // nullptr when absent
   Step restricted_to(const UnknownList& wanted) const;                     // throws ComputeError when one is missing
+  Bytes bytes_of(const UnknownList& wanted) const { return restricted_to(wanted).to_bytes(); }
   Bytes to_bytes() const;
   static Step from_bytes(const Bytes& bytes);
 };
@@ -176,6 +177,7 @@ struct FrontCovariance {
   std::vector<double> outer;       // C_PP [p x p]
 
   CovarianceMatrix restricted_to(const UnknownList& wanted) const;  // throws ComputeError when one is missing
+  Bytes bytes_of(const UnknownList& wanted) const;                  // of restricted_to(), which is not put together
   CovarianceMatrix whole() const;                                   // of E and P, ascending
 };
 

@@ -29,28 +29,46 @@ bool CovarianceMatrix::block(const UnknownId& row, const UnknownId& column, doub
   return true;
 }
 
-Bytes CovarianceMatrix::to_bytes() const {
+namespace {
+
+// Unknowns, then the lower triangle column by column, as it comes: `fill(j, out)` puts rows j to n of column j there.
+template <typename Fill>
+Bytes bytes_of_triangle(const UnknownList& unknowns, Fill&& fill) {
+  const std::int64_t n = total_dimension(unknowns);
   ByteWriter out;
+  out.reserve(2 * sizeof(std::uint64_t) + unknowns.size() * sizeof(Unknown) + at(n * (n + 1) / 2) * sizeof(double));
   out.values(unknowns);
-  std::vector<double> triangle;
-  pack(matrix, total_dimension(unknowns), triangle);
-  out.values(triangle);
+  out.value(static_cast<std::uint64_t>(n * (n + 1) / 2));
+  std::vector<double> column(at(n));
+  for (std::int64_t j = 0; j < n; ++j) {
+    fill(j, column.data());
+    out.elements(column.data(), at(n - j));
+  }
   return out.take();
+}
+
+}  // namespace
+
+Bytes CovarianceMatrix::to_bytes() const {
+  const std::int64_t n = total_dimension(unknowns);
+  return bytes_of_triangle(
+      unknowns, [&](std::int64_t j, double* out) { std::copy_n(matrix.begin() + j + j * n, n - j, out); });
 }
 
 CovarianceMatrix CovarianceMatrix::from_bytes(const Bytes& bytes) {
   ByteReader in(bytes);
   CovarianceMatrix covariance;
   covariance.unknowns = in.values<Unknown>();
-  const std::vector<double> triangle = in.values<double>();
   const std::int64_t n = total_dimension(covariance.unknowns);
-  if (!in.at_end() || static_cast<std::int64_t>(triangle.size()) != n * (n + 1) / 2)
+  if (in.value<std::uint64_t>() != static_cast<std::uint64_t>(n * (n + 1) / 2))
     throw StoreError("merge: a covariance matrix has the wrong size");
   covariance.matrix.resize(at(n * n));
-  auto value = triangle.begin();
-  for (std::int64_t j = 0; j < n; ++j)
-    for (std::int64_t i = j; i < n; ++i, ++value)
-      covariance.matrix[at(i + j * n)] = covariance.matrix[at(j + i * n)] = *value;
+  for (std::int64_t j = 0; j < n; ++j) {
+    double* const column = covariance.matrix.data() + j * n;
+    in.elements(column + j, at(n - j));
+    for (std::int64_t i = j + 1; i < n; ++i) covariance.matrix[at(j + i * n)] = column[i];
+  }
+  if (!in.at_end()) throw StoreError("merge: a covariance matrix has the wrong size");
   return covariance;
 }
 
@@ -84,30 +102,58 @@ FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix give
   return covariance;
 }
 
-CovarianceMatrix FrontCovariance::restricted_to(const UnknownList& wanted) const {
+namespace {
+
+// Elements of a front's covariance in the order of a list of its unknowns.
+class RestrictedCovariance {
+ public:
+  // Throws ComputeError when one is missing.
+  RestrictedCovariance(const FrontCovariance& front, const UnknownList& wanted)
+      : front_(front), e_(total_dimension(front.eliminated)), p_(total_dimension(front.passed)) {
+    const std::vector<std::int64_t> inner = row_offsets(front.eliminated), outer = row_offsets(front.passed);
+    for (const Unknown& u : wanted) {
+      const std::int64_t own = find_unknown(front.eliminated, u.id),
+                         other = own < 0 ? find_unknown(front.passed, u.id) : -1;
+      if (own < 0 && other < 0) throw ComputeError("covariance lacks " + describe(u.id));
+      const std::int64_t first = own >= 0 ? inner[at(own)] : outer[at(other)];
+      for (std::int64_t k = 0; k < u.dimension; ++k) rows_.push_back({own >= 0, first + k});
+    }
+  }
+
+  std::int64_t size() const { return static_cast<std::int64_t>(rows_.size()); }
+  double operator()(std::int64_t row, std::int64_t column) const {
+    const Row &a = rows_[at(row)], &b = rows_[at(column)];
+    if (a.inside && b.inside) return front_.inner[at(std::max(a.index, b.index) + std::min(a.index, b.index) * e_)];
+    if (a.inside) return front_.cross[at(b.index + a.index * p_)];
+    return b.inside ? front_.cross[at(a.index + b.index * p_)] : front_.outer[at(a.index + b.index * p_)];
+  }
+
+ private:
   struct Row {
     bool inside;         // of E
     std::int64_t index;  // in E or P
   };
-  const std::vector<std::int64_t> inner_rows = row_offsets(eliminated), outer_rows = row_offsets(passed);
-  std::vector<Row> rows;
-  for (const Unknown& u : wanted) {
-    const std::int64_t own = find_unknown(eliminated, u.id), other = own < 0 ? find_unknown(passed, u.id) : -1;
-    if (own < 0 && other < 0) throw ComputeError("covariance lacks " + describe(u.id));
-    const std::int64_t first = own >= 0 ? inner_rows[at(own)] : outer_rows[at(other)];
-    for (std::int64_t k = 0; k < u.dimension; ++k) rows.push_back({own >= 0, first + k});
-  }
-  const std::int64_t e = inner_rows.back(), p = outer_rows.back();
-  const auto element = [&](const Row& a, const Row& b) {
-    if (a.inside && b.inside) return inner[at(std::max(a.index, b.index) + std::min(a.index, b.index) * e)];
-    if (a.inside) return cross[at(b.index + a.index * p)];
-    return b.inside ? cross[at(a.index + b.index * p)] : outer[at(a.index + b.index * p)];
-  };
+  const FrontCovariance& front_;
+  const std::int64_t e_, p_;
+  std::vector<Row> rows_;
+};
+
+}  // namespace
+
+CovarianceMatrix FrontCovariance::restricted_to(const UnknownList& wanted) const {
+  const RestrictedCovariance element(*this, wanted);
   CovarianceMatrix part{wanted, {}};
-  part.matrix.reserve(rows.size() * rows.size());
-  for (const Row& column : rows)
-    for (const Row& row : rows) part.matrix.push_back(element(row, column));
+  part.matrix.reserve(at(element.size() * element.size()));
+  for (std::int64_t j = 0; j < element.size(); ++j)
+    for (std::int64_t i = 0; i < element.size(); ++i) part.matrix.push_back(element(i, j));
   return part;
+}
+
+Bytes FrontCovariance::bytes_of(const UnknownList& wanted) const {
+  const RestrictedCovariance element(*this, wanted);
+  return bytes_of_triangle(wanted, [&](std::int64_t j, double* out) {
+    for (std::int64_t i = j; i < element.size(); ++i) *out++ = element(i, j);
+  });
 }
 
 CovarianceMatrix FrontCovariance::whole() const { return restricted_to(unite({&eliminated, &passed})); }

@@ -49,7 +49,7 @@ class LineFinder {
 std::vector<std::vector<FrameIndex>> acquisition_order(const Block& block, const BlockState& state) {
   std::vector<std::vector<FrameIndex>> order;
   IndexedVector<FrameIndex, std::uint8_t> taken(block.frames.size(), 0);
-  for (const std::vector<ImageIndex>& pass : views_of(block).passes) {
+  for (const std::vector<ImageIndex>& pass : passes_of(block)) {
     std::vector<FrameIndex> frames;
     for (const ImageIndex image : pass) {
       const FrameIndex frame = block.images[image].frame;

@@ -1,12 +1,12 @@
 #include "partition/link_weights.h"
 
 #include <algorithm>
-#include <iterator>
+#include <utility>
 
 namespace megablock {
 
 void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
-  constexpr std::size_t kLeastWaiting = std::size_t{1} << 18;
+  constexpr std::size_t kLeastWaiting = std::size_t{1} << 16;
   if (a == b) return;
   edges_.push_back({std::min(a, b), std::max(a, b), tracks});
   if (edges_.size() - summed_ > std::max(kLeastWaiting, summed_ / 2)) sum_up();
@@ -26,12 +26,17 @@ void LinkWeights::sum_up() {
   edges_.resize(summed_);
 }
 
-FrameGraph LinkWeights::graph(std::int64_t frames) {
+FrameGraph LinkWeights::graph(std::int64_t frames) & {
+  LinkWeights copy = *this;
+  return std::move(copy).graph(frames);
+}
+
+FrameGraph LinkWeights::graph(std::int64_t frames) && {
   sum_up();
-  FrameGraph graph;
-  graph.frame_count = frames;
-  std::copy_if(edges_.begin(), edges_.end(), std::back_inserter(graph.edges),
-               [&](const FrameEdge& edge) { return edge.b.value < frames; });
+  std::erase_if(edges_, [&](const FrameEdge& edge) { return edge.b.value >= frames; });
+  FrameGraph graph{frames, std::exchange(edges_, {})};
+  graph.edges.shrink_to_fit();
+  summed_ = 0;
   return graph;
 }
 

@@ -14,7 +14,8 @@ class LinkWeights {
   // `tracks` more between two frames; nothing when they are the same.
   void add(FrameIndex a, FrameIndex b, std::int64_t tracks);
   // The links among the first `frames` frames. Does not depend on the order of add().
-  FrameGraph graph(std::int64_t frames);
+  FrameGraph graph(std::int64_t frames) &;
+  FrameGraph graph(std::int64_t frames) &&;  // in the memory of the sums
 
  private:
   void sum_up();

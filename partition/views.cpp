@@ -51,12 +51,16 @@ bool natural_less(std::string_view a, std::string_view b) {
   return a < b;
 }
 
-void rank_by_name(const Block& block, Views& views) {
+// Place of every image in the natural order of names.
+IndexedVector<ImageIndex, std::int64_t> name_ranks(const Block& block) {
   std::vector<ImageIndex> order;
+  order.reserve(block.images.size());
   for (std::size_t i = 0; i < block.images.size(); ++i) order.emplace_back(static_cast<std::int64_t>(i));
   std::sort(order.begin(), order.end(),
             [&](ImageIndex a, ImageIndex b) { return natural_less(block.images[a].name, block.images[b].name); });
-  for (std::size_t r = 0; r < order.size(); ++r) views.of_image[order[r]].rank = static_cast<std::int64_t>(r);
+  IndexedVector<ImageIndex, std::int64_t> ranks(block.images.size(), 0);
+  for (std::size_t r = 0; r < order.size(); ++r) ranks[order[r]] = static_cast<std::int64_t>(r);
+  return ranks;
 }
 
 // Median distance to the nearest other frame.
@@ -121,22 +125,25 @@ View view_of(const Block& block, ImageIndex image, double spacing, double ground
   return view;
 }
 
-void find_passes(const Block& block, Views& views) {
+std::vector<std::vector<ImageIndex>> passes_of(const Block& block,
+                                               const IndexedVector<ImageIndex, std::int64_t>& ranks) {
   std::map<std::tuple<std::int64_t, std::int64_t, int>, std::vector<ImageIndex>> groups;
   for (std::size_t i = 0; i < block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
     const Frame& frame = block.frames[block.images[image].frame];
     groups[{frame.pass, frame.rig.value, block.images[image].mount}].push_back(image);
   }
+  std::vector<std::vector<ImageIndex>> passes;
   for (auto& [key, images] : groups) {
     const auto time = [&](ImageIndex image) { return block.frames[block.images[image].frame].time_s; };
     const bool timed = std::all_of(images.begin(), images.end(), [&](ImageIndex i) { return std::isfinite(time(i)); });
     std::sort(images.begin(), images.end(), [&](ImageIndex a, ImageIndex b) {
       const double ta = timed ? time(a) : 0, tb = timed ? time(b) : 0;
-      return std::pair(ta, views.of_image[a].rank) < std::pair(tb, views.of_image[b].rank);
+      return std::pair(ta, ranks[a]) < std::pair(tb, ranks[b]);
     });
-    views.passes.push_back(std::move(images));
+    passes.push_back(std::move(images));
   }
+  return passes;
 }
 
 // A position is doubtful when none of its located acquisition neighbours is within ten usual steps.
@@ -193,13 +200,16 @@ double half_opening(const Camera& camera) {
   return std::atan(0.5 * std::max(camera.width, camera.height) / camera.intrinsics[kFocal]);
 }
 
+std::vector<std::vector<ImageIndex>> passes_of(const Block& block) { return passes_of(block, name_ranks(block)); }
+
 Views views_of(const Block& block) {
   Views views;
   const double spacing = frame_spacing(block), ground = ground_height(block);
   for (std::size_t i = 0; i < block.images.size(); ++i)
     views.of_image.push_back(view_of(block, ImageIndex(static_cast<std::int64_t>(i)), spacing, ground));
-  rank_by_name(block, views);
-  find_passes(block, views);
+  const IndexedVector<ImageIndex, std::int64_t> ranks = name_ranks(block);
+  for (ImageIndex i(0); ranks.contains(i); ++i.value) views.of_image[i].rank = ranks[i];
+  views.passes = passes_of(block, ranks);
   for (const std::vector<ImageIndex>& pass : views.passes) {
     find_doubtful(pass, views);
     place_between(pass, views);

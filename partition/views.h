@@ -25,8 +25,11 @@ struct View {
 
 struct Views {
   IndexedVector<ImageIndex, View> of_image;
-  std::vector<std::vector<ImageIndex>> passes;  // images of one pass, rig and mount in order of acquisition
+  std::vector<std::vector<ImageIndex>> passes;  // passes_of()
 };
+
+// Images of one pass, rig and mount, in order of acquisition: by time where all have one, else by name.
+std::vector<std::vector<ImageIndex>> passes_of(const Block& block);
 
 // Height above ground: from control points where there are some, else from the spacing of the frames, taking three
 // quarters of overlap. Views near the horizontal are given a depth of three spacings.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "cluster/stages/provenance.h"
 
@@ -42,17 +43,17 @@ void find_boundary(BlockResult& result, const std::vector<TilePart>& parts) {
 // Images without pose, each with its reason.
 void list_failures(const Job& job, BlockResult& result) {
   result.failures = job.failures;
-  for (std::size_t i = 0; i < job.block.images.size(); ++i) {
+  for (std::size_t i = 0; i < result.block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
-    const FrameIndex frame = job.block.images[image].frame;
+    const FrameIndex frame = result.block.images[image].frame;
     if (result.state.oriented[frame]) continue;
     const auto known = std::find_if(job.failures.begin(), job.failures.end(), [&](const FailedUnit& failure) {
-      return failure.unit == job.block.images[image].name;
+      return failure.unit == result.block.images[image].name;
     });
     if (known != job.failures.end()) continue;
     const auto reason = job.not_oriented.find(frame);
     const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
-    result.failures.push_back({linked ? "orientation" : "matching", job.block.images[image].name,
+    result.failures.push_back({linked ? "orientation" : "matching", result.block.images[image].name,
                                linked && reason != job.not_oriented.end() ? reason->second
                                : linked ? "oriented at first, but too few of its observations hold in the adjustment"
                                         : "no other image shares enough verified matches with it"});
@@ -68,14 +69,16 @@ void scale_covariances(BlockResult& result, double factor) {
 
 }  // namespace
 
-BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutcome& outcome,
+BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome,
                             const std::vector<TilePart>& parts) {
   BlockResult result;
-  result.block = job.block;
-  result.state = outcome.state;
+  result.image_records = image_records(job);
+  result.provenance = provenance_of(job);
+  result.block = std::exchange(job.block, {});
+  result.state = std::move(outcome.state);
   result.tiles = tiles;
-  result.frame_covariance = outcome.frame_covariance;
-  result.camera_covariance = outcome.camera_covariance;
+  result.frame_covariance = std::move(outcome.frame_covariance);
+  result.camera_covariance = std::move(outcome.camera_covariance);
   append_control(result, parts);
   find_boundary(result, parts);
   result.chi2 = outcome.chi2;
@@ -87,8 +90,6 @@ BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutco
   result.newton_decrement = outcome.newton_decrement;
   result.decrement_limit = job.settings.merge.decrement;
   result.free_parts = outcome.free_parts;
-  result.image_records = image_records(job);
-  result.provenance = provenance_of(job);
   result.gauge = outcome.gauge;
   result.seams = outcome.seams;
   result.observation_table = outcome.observations;

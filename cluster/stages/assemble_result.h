@@ -9,8 +9,9 @@
 
 namespace megablock {
 
-// Everything of the result but its tracks and digest. `parts`: of all tiles.
-BlockResult assemble_result(const Job& job, const Tiles& tiles, const MergeOutcome& outcome,
+// Everything of the result but its tracks and digest. `parts`: of all tiles. Takes over the job's block, which is empty
+// afterwards, and the outcome: of a million images there should not be two.
+BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome,
                             const std::vector<TilePart>& parts);
 
 }  // namespace megablock

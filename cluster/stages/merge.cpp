@@ -164,7 +164,7 @@ std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
 }
 
 void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
-                 const MergeOutcome& outcome, const std::vector<TilePart>& parts, const UnitEvent& event) {
+                 MergeOutcome outcome, const std::vector<TilePart>& parts, const UnitEvent& event) {
   if (!adjusted.converged)
     job.notes.push_back("the global adjustment did not converge: " + describe(adjusted.position.global));
   for (const SeamCheck& seam : outcome.seams)
@@ -176,7 +176,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
     if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());
   }
   return_freed_memory();  // fronts, tiles
-  BlockResult result = assemble_result(job, inputs.tiles, outcome, parts);
+  BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
   result.stages = statistics_of(job, event);
   std::filesystem::create_directories(job.store.path("result"));
   std::vector<PartTracks::File> files;
@@ -224,7 +224,7 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
   clear_scratch(job);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
   gather_covariances(job, adjusted);
-  const MergeOutcome outcome = make_outcome(adjusted, job.block);
+  MergeOutcome outcome = make_outcome(adjusted, job.block);
   UnitEvent event;
   event.stage = "merge";
   event.unit = kResult;
@@ -232,7 +232,7 @@ void run_merge(Job& job, const BlockState& oriented, const Tiles& tiles, const s
     event.peak_rss_mib = std::max(event.peak_rss_mib, std::stod(text));
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
-    write_final(job, inputs, fingerprint, adjusted, outcome, parts, event);
+    write_final(job, inputs, fingerprint, adjusted, std::move(outcome), parts, event);
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());  // what was written could not say it of itself
     event.seconds = monotonic_seconds() - start;
     event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);

@@ -104,11 +104,11 @@ std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, c
   return lines;
 }
 
-MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block) {
+MergeOutcome make_outcome(Adjusted& adjusted, const Block& block) {
   MergeOutcome outcome;
-  outcome.state = adjusted.state;
-  outcome.frame_covariance = adjusted.frame_covariance;
-  outcome.camera_covariance = adjusted.camera_covariance;
+  outcome.state = std::move(adjusted.state);
+  outcome.frame_covariance = std::move(adjusted.frame_covariance);
+  outcome.camera_covariance = std::move(adjusted.camera_covariance);
   const SubtreeSums& sums = adjusted.posterior.sums;
   outcome.chi2 = sums.weighted_squares;
   outcome.degrees_of_freedom =

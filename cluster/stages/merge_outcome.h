@@ -54,7 +54,7 @@ void gather_covariances(Job& job, Adjusted& adjusted);
 // What attitude priors alone tell of the orientation (common_motion.h), a line per case and part of the block.
 std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts);
 
-// After gather_covariances().
-MergeOutcome make_outcome(const Adjusted& adjusted, const Block& block);
+// After gather_covariances(); takes the state and the covariances over.
+MergeOutcome make_outcome(Adjusted& adjusted, const Block& block);
 
 }  // namespace megablock

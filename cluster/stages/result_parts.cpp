@@ -19,7 +19,7 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kPieceTracks = 512;      // read at a time of each tile
+constexpr std::int64_t kPieceTracks = 128;      // read at a time of each tile, of which there may be thousands
 constexpr std::int64_t kBatchTracks = 1 << 14;  // handed on at a time
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 

@@ -18,7 +18,9 @@ namespace {
 Tiles grow_tiles(const Job& job, LinkWeights links) {
   Tiles tiles;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
-    const FrameGraph graph = links.graph(frames_of_first_images(job.block, job.generations[g]));
+    const std::int64_t frames = frames_of_first_images(job.block, job.generations[g]);
+    const bool last = g + 1 == job.generations.size();
+    const FrameGraph graph = last ? std::move(links).graph(frames) : links.graph(frames);
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);
   }
   return tiles;

@@ -93,6 +93,10 @@ TEST(FrontTest, CovariancesByPartsAreThoseOfTheInverse) {
                 .maxCoeff(),
             1e-12);
   EXPECT_EQ(CovarianceMatrix::from_bytes(part.to_bytes()).matrix, part.matrix);
+  EXPECT_EQ(covariance.bytes_of(some), part.to_bytes());
+  EXPECT_THROW(covariance.bytes_of(frames(8, 9)), ComputeError);
+  EXPECT_THROW(CovarianceMatrix::from_bytes(part.to_bytes() + " "), StoreError);
+  EXPECT_THROW(CovarianceMatrix::from_bytes(part.to_bytes().substr(0, 100)), StoreError);
   EXPECT_THROW(covariance.restricted_to(frames(8, 9)), ComputeError);
   EXPECT_THROW(covariance_down(factor, {dense.eliminated, whole.matrix}), ComputeError);
 }

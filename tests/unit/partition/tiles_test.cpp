@@ -119,6 +119,7 @@ TEST(LinkWeights, AreTheSumsOfWhatWasAdded) {
     for (const auto& [pair, weight] : expected)
       if (pair.second < frames) edges.push_back({FrameIndex(pair.first), FrameIndex(pair.second), weight});
     EXPECT_EQ(graph.edges, edges);
+    EXPECT_EQ(LinkWeights(links).graph(frames).edges, edges);
   }
 }
 
