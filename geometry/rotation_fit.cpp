@@ -12,6 +12,7 @@ Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span
                                 std::span<const double> weights) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < from.size(); ++i) sum += (weights.empty() ? 1 : weights[i]) * to[i] * from[i].transpose();
+  if (!sum.allFinite()) return Eigen::Quaterniond(Eigen::Vector4d::Constant(std::nan("")));
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d middle = Eigen::Matrix3d::Identity();
   middle(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;

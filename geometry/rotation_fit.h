@@ -8,7 +8,7 @@
 namespace megablock {
 
 // Minimises sum w |y - R x|^2; weights empty = all one. Directions all on one line leave the rotation about it
-// arbitrary (but proper).
+// arbitrary (but proper). Not a number where some of them is not.
 Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                 std::span<const double> weights = {});
 

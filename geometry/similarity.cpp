@@ -4,11 +4,12 @@
 #include <Eigen/SVD>
 #include <array>
 #include <cmath>
-#include <random>
 #include <vector>
 
 #include "geometry/gauss_helmert.h"
+#include "geometry/ransac.h"
 #include "geometry/rotation.h"
+#include "geometry/similarity_estimator.h"
 
 namespace megablock {
 
@@ -45,6 +46,7 @@ std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, 
     spread += weight(i) * x.squaredNorm();
     covariance += weight(i) * y * x.transpose();
   }
+  if (!covariance.allFinite()) return std::nullopt;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   if (!(spread > 0) || !(svd.singularValues()(0) > 0)) return std::nullopt;
   Eigen::Vector3d sign(1, 1, 1);  // a reflection would fit better: give up the weakest axis
@@ -104,6 +106,22 @@ SimilarityCovariance covariance_about_origin(const Similarity& similarity, const
 
 namespace {
 
+// Also of points on one line, whose samples leave the rotation about it arbitrary.
+class PlacesEstimator : public SimilarityEstimator {
+ public:
+  explicit PlacesEstimator(std::span<const SimilarityPair> pairs) : SimilarityEstimator(pairs), pairs_(pairs) {}
+  Solutions<Similarity, 1> solve(const std::array<std::size_t, 3>& rows) const {
+    std::array<Eigen::Vector3d, 3> from, to;
+    for (std::size_t k = 0; k < 3; ++k) from[k] = pairs_[rows[k]].from, to[k] = pairs_[rows[k]].to;
+    Solutions<Similarity, 1> found;
+    if (const auto s = fit_similarity(from, to)) found.push_back(*s);
+    return found;
+  }
+
+ private:
+  std::span<const SimilarityPair> pairs_;
+};
+
 double cauchy_cost(const Similarity& s, std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                    std::span<const double> sigma) {
   double cost = 0;
@@ -116,7 +134,7 @@ double cauchy_cost(const Similarity& s, std::span<const Eigen::Vector3d> from, s
 
 std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d> from,
                                                 std::span<const Eigen::Vector3d> to, std::span<const double> sigma,
-                                                int samples, std::uint64_t seed) {
+                                                int max_draws, std::uint64_t seed) {
   const std::size_t count = from.size();
   std::vector<double> weights(count);
   for (std::size_t i = 0; i < count; ++i) weights[i] = 1 / (sigma[i] * sigma[i]);
@@ -132,15 +150,15 @@ std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d>
     return true;
   };
 
-  std::mt19937_64 random(seed);
-  for (int sample = 0; sample < samples && count > 3; ++sample) {
-    std::array<Eigen::Vector3d, 3> a, b;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::size_t i = random() % count;  // a point drawn twice only wastes the sample
-      a[k] = from[i];
-      b[k] = to[i];
-    }
-    consider(fit_similarity(a, b));
+  std::vector<SimilarityPair> pairs;
+  for (std::size_t i = 0; i < count; ++i) pairs.push_back({from[i], to[i], 0, sigma[i]});
+  // Where sigmas are too small few points agree with any sample, and the best few are as good as chance made them.
+  constexpr std::size_t kKeep = 10;
+  const RansacOptions options{
+      .threshold = threshold_of_sigma(1, 3), .max_draws = max_draws, .keep = kKeep, .seed = seed};
+  if (const auto found = ransac(PlacesEstimator(pairs), options); found && count > 3) {
+    consider(found->model);
+    for (const Similarity& other : found->others) consider(other);
   }
   constexpr int kIterations = 100;
   for (int iteration = 0; iteration < kIterations; ++iteration) {

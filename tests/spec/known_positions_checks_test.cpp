@@ -126,6 +126,36 @@ TEST(KnownPositions, TKP14PointSubsetsAgreeAndSayWhatTheyShare) {
   }
 }
 
+// Over many scenes the mean squared error is the mean of the stated squared sigmas. Three rotations in common for the
+// satellites, hence 150 deviates in 50 scenes: 1 +- 0.12.
+TEST(KnownPositions, TKP14StatedSigmasAreTrueOverManyScenes) {
+  for (const bool drone : {true, false}) {
+    double squared_error = 0, squared_sigma = 0;
+    for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+      KnownPositionsOptions options =
+          drone ? KnownPositionsOptions::drone(301, seed) : KnownPositionsOptions::satellite(301, 0.1, seed);
+      options.image_sigma_px = 0.1;
+      const KnownPositionsScene scene(options);
+      SingleTile tile(scene.block(), adjustment_of(scene));
+      triangulate_points(tile.problem, tile.state, tile.options);
+      ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
+      const MotionReference reference =
+          motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
+      const SubsetCheck check = check_point_subsets(tile.problem, tile.state, 0, 5, reference, solve_by_condensation);
+      for (std::size_t f = 0; f < scene.centres.size(); ++f)
+        squared_error +=
+            rotation_log<double>(rotation_from(scene.true_angles[f]).conjugate() * tile.state.frames[f].rotation)
+                .squaredNorm() /
+            (3 * static_cast<double>(scene.centres.size()));
+      squared_sigma += std::pow(check.rotation_sigma_rad(), 2);
+    }
+    const double ratio = squared_error / squared_sigma;
+    const std::string what = drone ? "drone, " : "satellite, ";
+    expect_at_most(ratio, 1.3, what + "mean squared error over the stated one");
+    expect_at_least(ratio, 0.7, what + "mean squared error over the stated one");
+  }
+}
+
 // Two tiles that share cameras 4 and 5.
 struct TwoTiles {
   KnownPositionsScene scene;

@@ -2,8 +2,6 @@
 // held positions, priors of the attitudes. Scenes and measures: known_positions_scene.h.
 #include <gtest/gtest.h>
 
-#include <numeric>
-
 #include "adjust/common_motion.h"
 #include "geometry/median.h"
 #include "known_positions_scene.h"
@@ -83,7 +81,7 @@ TEST(KnownPositions, TKP06bPriorsHelpAnglesAndImagesAtOnce) {
   expect_at_least(runs.angle_gain(), 2, "satellite, angle error divided by");
   const double expected = redundancy_ratio(6, 100);
   expect_at_least(runs.image_gain(), 0.95 * expected, "satellite, image error divided by");
-  expect_at_most(runs.image_gain(), 1.05 * 2, "satellite, image error divided by");
+  expect_at_most(runs.image_gain(), 1.05 * expected, "satellite, image error divided by");
   expect_at_most(std::abs(runs.mean(runs.chi2_per_freedom) - 1), 0.05, "satellite, chi2/dof off 1 by");
 }
 
@@ -113,46 +111,8 @@ TEST(KnownPositions, TKP16WholeTileAdjustmentFindsTheDrone) {
   expect_at_most(runs.worst_angles, 2e-6, "drone, worst angle error, rad");
 }
 
-// The verdict is of what the attitude priors alone tell: the rotation about the line, a common rotation.
-TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
-  struct Case {
-    bool drone, collinear;
-    int control;
-    double least_gain, largest_rms;
-    bool line_flagged, common_flagged;
-    int runs;
-  };
-  const Case cases[] = {{true, true, 0, 3, 1, true, false, 20},          {true, true, 1, 100, 0.015, false, false, 20},
-                        {true, true, 2, 100, 0.015, false, false, 20},   {true, true, 4, 200, 0.008, false, false, 20},
-                        {true, false, 0, 1000, 0.002, false, false, 20}, {false, false, 0, 2, 7, false, true, 200},
-                        {false, false, 1, 2.5, 2.5, false, true, 20},    {false, true, 0, 1.5, 1000, true, true, 20},
-                        {false, true, 1, 2.5, 4, false, true, 20}};
-  for (const Case& c : cases) {
-    const Runs runs = adjusted(c.runs, [&](std::uint64_t seed) {
-      KnownPositionsOptions options =
-          c.drone ? KnownPositionsOptions::drone(200, seed) : KnownPositionsOptions::satellite(200, 0.1, seed);
-      options.image_sigma_px = 0.1;
-      options.collinear = c.collinear;
-      options.control_points = c.control;
-      return options;
-    });
-    const std::string what = std::string(c.drone ? "drone" : "satellite") +
-                             (c.collinear ? ", collinear, " : ", spread, ") + std::to_string(c.control) +
-                             " control points: ";
-    expect_at_least(runs.angle_gain(), c.least_gain, what + "angle error divided by");
-    // The median: a few scenes with cameras nearly on a line lead the mean. The published 6.4 m is the mean of twenty.
-    expect_at_most(median(runs.point_rms_of_runs), c.largest_rms, what + "median rms of the points, m");
-    std::printf("[ reached  ] %smean rms %.4g m, of every twenty scenes", what.c_str(), runs.mean(runs.point_rms));
-    for (auto first = runs.point_rms_of_runs.begin(); first != runs.point_rms_of_runs.end(); first += 20)
-      std::printf(" %.4g", std::accumulate(first, first + 20, 0.0) / 20);
-    std::printf("\n");
-    EXPECT_EQ(runs.collinear, c.line_flagged ? c.runs : 0) << what;
-    EXPECT_EQ(runs.weak_common, c.common_flagged ? c.runs : 0) << what;
-  }
-}
-
 // Mean over the points of the expected squared error of their positions: the best that an unbiased estimate can do with
-// these images and attitudes, from the normal equations at the truth by central differences.
+// these images, attitudes and control points, from the normal equations at the truth by central differences.
 double expected_squared_error(const KnownPositionsScene& scene) {
   const auto cameras = static_cast<Eigen::Index>(scene.centres.size());
   const double image_weight = std::pow(scene.options.image_sigma_px, -2);
@@ -160,8 +120,8 @@ double expected_squared_error(const KnownPositionsScene& scene) {
       std::pow(scene.options.angle_sigma_rad, -2) * Eigen::MatrixXd::Identity(3 * cameras, 3 * cameras);
   std::vector<Eigen::Matrix3d> point_inverse;
   std::vector<Eigen::MatrixXd> coupling;  // (angles x point) times that
-  for (const Eigen::Vector3d& point : scene.points) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  const auto add = [&](const Eigen::Vector3d& point, double prior_weight) {
+    Eigen::Matrix3d normal = prior_weight * Eigen::Matrix3d::Identity();
     Eigen::MatrixXd both(3 * cameras, 3);
     for (Eigen::Index i = 0; i < cameras; ++i) {
       const auto camera = static_cast<std::size_t>(i);
@@ -184,26 +144,64 @@ double expected_squared_error(const KnownPositionsScene& scene) {
     point_inverse.push_back(normal.inverse());
     coupling.emplace_back(both * point_inverse.back());
     angles -= coupling.back() * both.transpose();
-  }
+  };
+  for (const Eigen::Vector3d& point : scene.points) add(point, 0);
+  for (const Eigen::Vector3d& point : scene.control_points) add(point, std::pow(scene.options.control_sigma_m, -2));
   const Eigen::MatrixXd covariance = angles.inverse();
   double sum = 0;
-  for (std::size_t j = 0; j < coupling.size(); ++j)
+  for (std::size_t j = 0; j < scene.points.size(); ++j)
     sum += point_inverse[j].trace() + (coupling[j].transpose() * covariance * coupling[j]).trace();
-  return sum / static_cast<double>(coupling.size());
+  return sum / static_cast<double>(scene.points.size());
 }
 
-// Whatever the mean of some scenes: over many, the points are as good as images and attitudes allow.
-TEST(KnownPositions, TKP20SatellitePointsAreAsGoodAsTheDataAllow) {
-  double reached = 0, expected = 0;
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
-    const KnownPositionsScene scene(KnownPositionsOptions::satellite(200, 0.1, seed));
-    SingleTile tile(scene.block(), adjustment_of(scene));
-    adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
-    reached += std::pow(scene.point_rms(tile.state.points), 2) / 200;
-    expected += expected_squared_error(scene) / 200;
+// Published: means of twenty scenes, which do not say how their cameras lie on a line. Satellite scenes of ours allow
+// no such mean in four cases, whatever the method: there the mean must be as good as the best one that they do allow.
+// The verdict is of what the attitude priors alone tell: the rotation about the line, a common rotation.
+TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
+  struct Case {
+    bool drone, collinear;
+    int control;
+    double least_gain, largest_rms;
+    bool line_flagged, common_flagged;
+    int runs;
+  };
+  const Case cases[] = {{true, true, 0, 3, 1, true, false, 20},          {true, true, 1, 100, 0.015, false, false, 20},
+                        {true, true, 2, 100, 0.015, false, false, 20},   {true, true, 4, 200, 0.008, false, false, 20},
+                        {true, false, 0, 1000, 0.002, false, false, 20}, {false, false, 0, 2, 7, false, true, 200},
+                        {false, false, 1, 2.5, 2.5, false, true, 200},   {false, true, 0, 1.5, 1000, true, true, 20},
+                        {false, true, 1, 2.5, 2.5, false, true, 200},    {false, true, 2, 2.5, 2, false, true, 200},
+                        {false, true, 4, 2.5, 1.9, false, true, 200}};
+  for (const Case& c : cases) {
+    const auto scene_of = [&](std::uint64_t seed) {
+      KnownPositionsOptions options =
+          c.drone ? KnownPositionsOptions::drone(200, seed) : KnownPositionsOptions::satellite(200, 0.1, seed);
+      options.image_sigma_px = 0.1;
+      options.collinear = c.collinear;
+      options.control_points = c.control;
+      return options;
+    };
+    const Runs runs = adjusted(c.runs, scene_of);
+    const std::string what = std::string(c.drone ? "drone" : "satellite") +
+                             (c.collinear ? ", collinear, " : ", spread, ") + std::to_string(c.control) +
+                             " control points: ";
+    const double mean = runs.mean(runs.point_rms), middle = median(runs.point_rms_of_runs);
+    expect_at_least(runs.angle_gain(), c.least_gain, what + "angle error divided by");
+    double reached = 0, expected = 0, best_mean = 0;
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(c.runs); ++seed) {
+      const double squared = expected_squared_error(KnownPositionsScene(scene_of(seed)));
+      reached += std::pow(runs.point_rms_of_runs[seed - 1], 2) / c.runs;
+      expected += squared / c.runs;
+      best_mean += std::sqrt(squared) / c.runs;
+    }
+    std::printf("[ reached  ] %smean %.4g m, median %.4g; rms of all %.4g, expected %.4g; mean of the expected %.4g\n",
+                what.c_str(), mean, middle, std::sqrt(reached), std::sqrt(expected), best_mean);
+    expect_at_most(mean, std::max(c.largest_rms, best_mean), what + "mean rms of the points, m");
+    if (!c.drone && !c.collinear) expect_at_most(middle, c.largest_rms, what + "median rms of the points, m");
+    if (c.runs >= 200)
+      expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, what + "off the expected rms by");
+    EXPECT_EQ(runs.collinear, c.line_flagged ? c.runs : 0) << what;
+    EXPECT_EQ(runs.weak_common, c.common_flagged ? c.runs : 0) << what;
   }
-  std::printf("[ reached  ] rms of 200 scenes %.4g m, expected %.4g m\n", std::sqrt(reached), std::sqrt(expected));
-  expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, "off the expected rms by");
 }
 
 }  // namespace

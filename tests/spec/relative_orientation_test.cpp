@@ -225,7 +225,9 @@ TEST(Spec, AT11VerticalPairIsBetterThanFivePoint) {
     const MeanErrors half = vertical(0.3 * axis, 0.5), one = vertical(0.3 * axis, 1);
     expect_at_most(half.base, 0.8, std::string(name) + ", base at 0.5 px");
     expect_at_most(one.base, 1.9, std::string(name) + ", base at 1 px");
-    expect_at_most(half.base, five(0.3 * axis, 0.5).base, std::string(name) + " against five points");
+    const double five_points = five(0.3 * axis, 0.5).base;
+    expect_at_most(half.base, five_points, std::string(name) + " against five points");
+    EXPECT_LT(half.base, five_points);
   }
 }
 

@@ -4,15 +4,22 @@
 
 #include <chrono>
 #include <limits>
+#include <random>
 #include <thread>
+#include <tuple>
 
 #include "geometry/homography.h"
 #include "geometry/pair_estimators.h"
 #include "geometry/ransac.h"
+#include "geometry/resection_estimators.h"
+#include "geometry/similarity_estimator.h"
+#include "geometry/vanishing_circles.h"
+#include "geometry/vanishing_points.h"
 #include "match/two_view.h"
 #include "reached.h"
 #include "tests/unit/geometry/linear_model.h"
 #include "tests/unit/geometry/scene_pairs.h"
+#include "tests/unit/geometry/segment_scenes.h"
 
 namespace megablock {
 namespace {
@@ -122,28 +129,94 @@ TEST(Spec, AT37ThreePointsAgainstFive) {
   expect_at_most(wrong, 4, "of 80 runs with p = 0.99, rotations off by more than half a degree");
 }
 
+// What `find` makes of the items 0, 1, ..., shared out to so many threads.
+template <typename Find>
+auto on_threads(std::size_t threads, std::size_t items, const Find& find) {
+  std::vector<decltype(find(std::size_t{}))> found(items);
+  std::vector<std::thread> workers;
+  for (std::size_t worker = 0; worker < threads; ++worker)
+    workers.emplace_back([&, worker] {
+      for (std::size_t i = worker; i < items; i += threads) found[i] = find(i);
+    });
+  for (std::thread& worker : workers) worker.join();
+  return found;
+}
+template <typename Find>
+void expect_same_on_any_threads(std::size_t items, const Find& find) {
+  const auto reference = on_threads(1, items, find);
+  for (const std::size_t threads : {8, 64}) EXPECT_TRUE(on_threads(threads, items, find) == reference) << threads;
+}
+
 TEST(Spec, AT35SameInliersForAnyNumberOfThreads) {
   constexpr std::size_t kPairs = 64;
   std::vector<TiltedPair> pairs;
   for (std::uint64_t seed = 0; seed < kPairs; ++seed) pairs.push_back(tilted_pair(half_wrong(), 150, seed));
-  std::vector<TwoView> reference;
-  for (const std::size_t threads : {1, 8, 64}) {
-    std::vector<TwoView> found(kPairs);
-    std::vector<std::thread> workers;
-    for (std::size_t worker = 0; worker < threads; ++worker)
-      workers.emplace_back([&, worker] {
-        for (std::size_t i = worker; i < kPairs; i += threads)
-          found[i] = estimate_two_view(pairs[i].points, {.max_residual = kThreshold, .seed = i});
-      });
-    for (std::thread& worker : workers) worker.join();
-    if (reference.empty()) reference = found;
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      EXPECT_EQ(found[i].inlier, reference[i].inlier);
-      EXPECT_EQ(found[i].rotation.coeffs(), reference[i].rotation.coeffs());
-      EXPECT_EQ(found[i].translation, reference[i].translation);
-      EXPECT_EQ(found[i].draws, reference[i].draws);
+  expect_same_on_any_threads(kPairs, [&](std::size_t i) {
+    const TwoView found = estimate_two_view(pairs[i].points, {.max_residual = kThreshold, .seed = i});
+    return std::tuple(found.inlier, Eigen::Vector4d(found.rotation.coeffs()), Eigen::Vector3d(found.translation),
+                      found.draws);
+  });
+}
+
+TEST(Spec, AT35SameSimilaritiesForAnyNumberOfThreads) {
+  constexpr std::size_t kSets = 64;
+  std::mt19937_64 random(35);
+  std::normal_distribution<double> normal(0, 1);
+  const auto place = [&](double sigma) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Eigen::Vector3d(sigma * Eigen::Vector3d(x, y, z));
+  };
+  std::vector<std::vector<SimilarityPair>> sets(kSets);
+  for (auto& pairs : sets)
+    for (int i = 0; i < 60; ++i) {
+      const Eigen::Vector3d from = place(100);
+      pairs.push_back({from, i % 2 == 0 ? place(100) : Eigen::Vector3d(2 * from + place(0.1)), 0, 0.1});
     }
-  }
+  expect_same_on_any_threads(kSets, [&](std::size_t i) {
+    const auto found = ransac(SimilarityEstimator(sets[i]), {.threshold = threshold_of_sigma(1, 3), .seed = i});
+    return found ? std::tuple(found->consensus.inlier, found->model.scale, found->draws)
+                 : std::tuple(std::vector<std::uint8_t>(), 0.0, 0);
+  });
+}
+
+TEST(Spec, AT35SameVanishingPointsForAnyNumberOfThreads) {
+  constexpr std::size_t kPictures = 16;
+  using fixture::SegmentScene;
+  const auto scene = [](std::size_t i) { return fixture::urban_scene(i + 35, {0.05, -0.1}, 3); };
+  expect_same_on_any_threads(kPictures, [&](std::size_t i) {
+    const VanishingPoints found = find_vanishing_points(scene(i).planes(), {.seed = i});
+    std::vector<Eigen::Vector3d> directions;
+    for (const VanishingPoint& point : found.points) directions.push_back(point.axis.direction);
+    return std::pair(found.point_of, directions);
+  });
+  expect_same_on_any_threads(kPictures, [&](std::size_t i) {
+    const SegmentScene image = scene(i);
+    std::vector<std::vector<int>> lines;
+    for (const CirclePoint& point : find_vanishing_points_by_circles(image.lines(), image.width, image.height))
+      lines.push_back(point.lines);
+    return lines;
+  });
+}
+
+// Sights of a camera, half of them wrong.
+TEST(Spec, AT35SameResectionsForAnyNumberOfThreads) {
+  constexpr std::size_t kPictures = 64;
+  std::mt19937_64 random(36);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<std::vector<RaySight>> images(kPictures);
+  for (auto& sights : images)
+    for (int i = 0; i < 80; ++i) {
+      const double x = uniform(random), y = uniform(random), depth = 4 + 2 * uniform(random);
+      const Eigen::Vector3d inside = depth * Eigen::Vector3d(x, y, 1);
+      const double u = uniform(random), v = uniform(random);
+      const Eigen::Vector3d seen = i % 2 == 0 ? Eigen::Vector3d(u, v, 1) : inside;
+      sights.push_back({Eigen::Vector3d::Zero(), seen.normalized(), inside + Eigen::Vector3d(10, 20, 30)});
+    }
+  expect_same_on_any_threads(kPictures, [&](std::size_t i) {
+    const auto found = ransac(ResectionEstimator(images[i]), {.threshold = 1e-3, .seed = i});
+    return found ? std::tuple(found->consensus.inlier, Eigen::Vector3d(found->model.centre), found->draws)
+                 : std::tuple(std::vector<std::uint8_t>(), Eigen::Vector3d(0, 0, 0), 0);
+  });
 }
 
 TwoView two_view(const PairSceneOptions& options, std::uint64_t seed, RelativeOrientation* truth = nullptr,

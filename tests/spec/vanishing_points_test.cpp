@@ -34,7 +34,10 @@ SegmentScene bundle(double y, double sigma_px, std::uint64_t seed) {
   return scene;
 }
 
-void record(const std::string& what, double value) { ::testing::Test::RecordProperty(what, std::to_string(value)); }
+void record(const std::string& what, double value) {
+  ::testing::Test::RecordProperty(what, std::to_string(value));
+  std::printf("[ reached  ] %s: %.4g\n", what.c_str(), value);
+}
 
 TEST(Spec, AT18LineCovariance) {
   constexpr int kTrials = 40000, kPoints = 40;

@@ -35,6 +35,13 @@ TEST(RotationFit, WeightsOfZeroLeavePairsOut) {
   EXPECT_LT(rotation_angle(fit_rotation(d.from, d.to, weight), d.rotation), 1e-12);
 }
 
+TEST(RotationFit, NotANumberGivesNotANumber) {
+  Directions d;
+  d.to[3].z() = std::nan("");
+  EXPECT_TRUE(fit_rotation(d.from, d.to).coeffs().hasNaN());
+  EXPECT_TRUE(fit_rotation_robust(d.from, d.to).coeffs().hasNaN());
+}
+
 TEST(RotationFit, RobustFitWithstandsAThirdOfWrongPairs) {
   Directions d;
   for (std::size_t i = 0; i < d.to.size(); ++i) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -98,6 +99,34 @@ TEST(Similarity, RobustFitIgnoresGrossErrors) {
   expect_same(*found, clouds.truth, 0.01, 0.5);
 }
 
+// Frames of a street: the rotation about it stays open, the places do not.
+TEST(Similarity, RobustFitOfPlacesOnALineIgnoresGrossErrors) {
+  const Similarity truth{1.5, rotation_exp<double>({0.3, -1, 2}), {100, -50, 20}};
+  std::vector<Eigen::Vector3d> from, to;
+  for (int i = 0; i < 40; ++i) {
+    from.emplace_back(2.0 * i, 0.5 * i, -0.1 * i);
+    to.push_back(truth(from.back()));
+    if (i % 3 == 0) to.back() += Eigen::Vector3d(300, 20 * (i % 7), -100);
+  }
+  const auto found = fit_similarity_robust(from, to, std::vector<double>(40, 0.1));
+  ASSERT_TRUE(found);
+  for (std::size_t i = 0; i < 40; ++i) {
+    if (i % 3 != 0) {
+      EXPECT_LT(((*found)(from[i]) - to[i]).norm(), 0.05) << i;
+    }
+  }
+  EXPECT_NEAR(found->scale, truth.scale, 1e-3);
+}
+
+// Sigmas a hundred times too small must not leave three points in the lead.
+TEST(Similarity, RobustFitStandsSigmasThatAreTooSmall) {
+  Clouds clouds(60, 0.5);
+  for (std::size_t i = 0; i < 60; i += 3) clouds.to[i] += Eigen::Vector3d(1e4, 2e3 * static_cast<double>(i % 7), -500);
+  const auto found = fit_similarity_robust(clouds.from, clouds.to, std::vector<double>(60, 0.005));
+  ASSERT_TRUE(found);
+  expect_same(*found, clouds.truth, 0.02, 1);
+}
+
 // Errors of many fits in the metric of the covariance: 7 on the average, and chi-square distributed where each is.
 TEST(Similarity, CovarianceIsThatOfRepeatedFits) {
   const Clouds clouds(15, 0, {100, 60, 5});
@@ -169,6 +198,13 @@ TEST(Similarity, RefusesPointsWithoutExtent) {
   const std::vector<Eigen::Vector3d> one(1, Eigen::Vector3d::Ones()), same(5, Eigen::Vector3d::Ones());
   EXPECT_FALSE(fit_similarity(one, one));
   EXPECT_FALSE(fit_similarity(same, same));
+}
+
+TEST(Similarity, RefusesWhatIsNotANumber) {
+  Clouds clouds(10);
+  clouds.to[4].y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(fit_similarity(clouds.from, clouds.to));
+  EXPECT_FALSE(fit_similarity_robust(clouds.from, clouds.to, std::vector<double>(10, 1.0)));
 }
 
 }  // namespace

@@ -102,6 +102,10 @@ TEST(Triangulation, RefusesWhatHasNoIntersection) {
   auto poses = ring(kFar, 2, 20);
   auto views = views_of(kFar, poses);
   EXPECT_FALSE(triangulate(std::vector<PointView>{views[0]}));
+  auto broken = views;
+  broken[1].pixel.x() = std::nan("");
+  EXPECT_FALSE(triangulate(broken)) << "not a number";
+  EXPECT_FALSE(intersect_rays(std::vector<Ray>{{Eigen::Vector3d::Zero(), x}, {z, std::nan("") * apart}}));
   EXPECT_FALSE(refine_point(poses[0].centre - 5 * (kFar - poses[0].centre), views)) << "start behind a camera";
 }
 
