@@ -103,6 +103,24 @@ GroundAngles known_angles(const OrientationGraph& graph) {
   return seen >= kVerticals ? GroundAngles::kLevel : GroundAngles::kNone;
 }
 
+std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, const OrientationValues& values,
+                                               const Eigen::Vector3d& down) {
+  const KnownPositions known = known_positions(graph, values);
+  const auto similarity = fit_similarity_robust(known.from, known.to, known.sigma);
+  if (!similarity) return std::nullopt;
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < known.to.size(); ++i) {
+    const double residual = ((*similarity)(known.from[i]) - known.to[i]).norm();
+    weights.push_back(1 /
+                      (static_cast<double>(known.to.size()) * (known.sigma[i] * known.sigma[i] + residual * residual)));
+  }
+  const auto covariance = similarity_covariance(*similarity, known.from, weights);
+  if (!covariance) return std::nullopt;
+  const Eigen::Vector3d here = similarity->rotation.conjugate() * down;
+  const Eigen::Matrix3d by_turn = skew(here);
+  return AxisDirection{here, by_turn * covariance->topLeftCorner<3, 3>() * by_turn.transpose()};
+}
+
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
                                                double median_distance, GroundAngles known_angles) {
   const KnownPositions known = known_positions(graph, values);

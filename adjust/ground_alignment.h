@@ -3,6 +3,7 @@
 #pragma once
 
 #include "adjust/track_intersection.h"
+#include "geometry/interpretation_plane.h"
 #include "geometry/similarity.h"
 
 namespace megablock {
@@ -11,6 +12,13 @@ namespace megablock {
 enum class GroundAngles { kNone, kLevel, kAll };
 // By attitude priors and given poses, or by the verticals of three images or more.
 GroundAngles known_angles(const OrientationGraph& graph);
+
+// Where the known positions say that `down` of the ground is, in the axes of `values`, of which only the frames'
+// centres count. First centres bend, and one bend moves many of them: the covariance is that of a single position for
+// each of the unknowns, with the residuals among its errors. Empty where they say nothing (on a line, fewer than
+// three).
+std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, const OrientationValues& values,
+                                               const Eigen::Vector3d& down);
 
 // Similarity that brings the oriented frames onto the known positions (priors and given poses), robustly; empty with
 // fewer than two of them. Positions on one line leave the rotation about the line open; it follows from

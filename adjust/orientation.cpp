@@ -12,6 +12,7 @@
 #include "adjust/orientation_parts.h"
 #include "adjust/resection.h"
 #include "adjust/rotation_averaging.h"
+#include "adjust/vertical_check.h"
 #include "adjust/vertical_terms.h"
 #include "geometry/angles.h"
 #include "io/error.h"
@@ -49,6 +50,11 @@ class Orientation {
     rays_ = viewing_rays(graph_, values_.cameras);
     average();
     first_centres();
+    if (check_verticals()) {
+      use_verticals_ = true;
+      average();
+      first_centres();
+    }
     to_ground();
     position();
     adjust();
@@ -71,6 +77,9 @@ class Orientation {
       }
     }
     std::sort(result.failed.begin(), result.failed.end());
+    result.verticals_aside = aside_;
+    std::sort(result.verticals_aside.begin(), result.verticals_aside.end(),
+              [](const SetAsideVertical& a, const SetAsideVertical& b) { return a.image < b.image; });
     for (std::size_t c = 0; c < graph_.cameras.size(); ++c)
       result.state.cameras[graph_.cameras[c]] = values_.cameras[c];
     for (const auto& point : values_.points) points += point.has_value();
@@ -83,13 +92,19 @@ class Orientation {
   }
 
  private:
-  void average() {
+  // Of frames.
+  std::vector<RelativeRotation> relative_rotations() const {
     std::vector<RelativeRotation> relative;
     for (const auto& edge : graph_.edges) {
       const auto &a = graph_.images[row(edge.a)], &b = graph_.images[row(edge.b)];
       relative.push_back(
           {a.frame, b.frame, b.mount.rotation.conjugate() * edge.rotation * a.mount.rotation, edge.inliers});
     }
+    return relative;
+  }
+
+  void average() {
+    const std::vector<RelativeRotation> relative = relative_rotations();
     std::vector<std::optional<RotationPrior>> priors(graph_.frames.size());
     for (std::size_t f = 0; f < priors.size(); ++f) {
       const auto& frame = graph_.frames[f];
@@ -98,8 +113,9 @@ class Orientation {
       else if (frame.attitude)
         priors[f] = {frame.attitude->rotation_cw, std::max(1e-4, frame.attitude->sigma_rad.norm())};
     }
-    const AveragedRotations averaged = average_rotations(graph_.frame_count(), relative, priors,
-                                                         options_.max_rotation_error_deg * kDegree, known_verticals());
+    const AveragedRotations averaged =
+        average_rotations(graph_.frame_count(), relative, priors, options_.max_rotation_error_deg * kDegree,
+                          use_verticals_ ? known_verticals() : std::vector<KnownVertical>());
     usable_ = averaged.kept;
     dropped_edges_ = std::count(usable_.begin(), usable_.end(), 0);
     rotations_ = averaged.rotation;
@@ -121,6 +137,50 @@ class Orientation {
                            std::max(1e-4, std::sqrt(down.covariance.trace() / 2))});
     }
     return verticals;
+  }
+
+  // Sets aside verticals that are wrong by what the rotations without them, the positions and the attitudes say;
+  // whether any are left.
+  bool check_verticals() {
+    std::vector<SeenDown> seen;
+    std::vector<std::size_t> images;
+    for (std::size_t i = 0; i < graph_.images.size(); ++i) {
+      const auto& image = graph_.images[i];
+      if (image.vertical == nullptr) continue;
+      const Camera& camera = block_.cameras[graph_.cameras[row(image.camera)]];
+      const Eigen::Matrix3d to_frame = image.mount.rotation.conjugate().toRotationMatrix();
+      seen.push_back({image.frame, image.camera,
+                      to_frame * whole_error(*image.vertical, camera, values_.cameras[row(image.camera)]).direction,
+                      to_frame * image.vertical->covariance * to_frame.transpose(),
+                      to_frame * camera_error(*image.vertical, camera)});
+      images.push_back(i);
+    }
+    if (seen.empty()) return false;
+    const std::vector<VerticalVerdict> verdicts =
+        judge_verticals(rotations_, relative_rotations(), usable_, seen, known_down());
+    for (std::size_t v = 0; v < verdicts.size(); ++v) {
+      if (verdicts[v] == VerticalVerdict::kBelieved) continue;
+      auto& image = graph_.images[images[v]];
+      aside_.push_back({image.index, verdicts[v]});
+      image.vertical = nullptr;
+    }
+    known_angles_ = known_angles(graph_);
+    return aside_.size() < seen.size();
+  }
+
+  // In the axes of the averaged rotations, as far as attitudes or positions tell.
+  std::optional<AxisDirection> known_down() const {
+    const GroundVertical ground(block_.ground);
+    const Eigen::Vector3d down = ground.down(Eigen::Vector3d::Zero());
+    if (known_angles_ != GroundAngles::kAll) return down_by_positions(graph_, values_, down);
+    constexpr double kMounting = 2 * kDegree;  // sensors against cameras
+    double variance = 0, count = 0;
+    for (const auto& frame : graph_.frames) {
+      if (!frame.given && !frame.attitude) continue;
+      if (!frame.given) variance += frame.attitude->sigma_rad.squaredNorm();
+      ++count;
+    }
+    return AxisDirection{down, (kMounting * kMounting + variance / count) * Eigen::Matrix3d::Identity()};
   }
 
   void first_centres() {
@@ -364,8 +424,9 @@ class Orientation {
   std::vector<std::uint8_t> usable_;                          // [edges]
   std::vector<Baseline> baselines_;
   std::vector<std::string> reasons_;  // [frames] why it has no pose
+  std::vector<SetAsideVertical> aside_;
   std::int64_t dropped_edges_ = 0;
-  bool any_position_ = false, any_given_ = false, in_ground_ = false;
+  bool any_position_ = false, any_given_ = false, in_ground_ = false, use_verticals_ = false;
   GroundAngles known_angles_ = GroundAngles::kNone;
 };
 

@@ -8,6 +8,7 @@
 
 #include "adjust/tile_problem.h"
 #include "io/features.h"
+#include "io/verticals.h"
 
 namespace megablock {
 
@@ -24,6 +25,7 @@ struct OrientationOptions {
 struct OrientationResult {
   BlockState state;                                        // `oriented` set for the frames that got a pose
   std::vector<std::pair<FrameIndex, std::string>> failed;  // frames without pose and why
+  std::vector<SetAsideVertical> verticals_aside;           // that are not believed (vertical_check.h), by image
   std::string summary;                                     // one line
 };
 

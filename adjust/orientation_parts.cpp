@@ -108,8 +108,16 @@ struct OrientedPart {
   std::vector<std::optional<Pose>> poses;  // [part.frames]
   IndexedVector<CameraIndex, Intrinsics> cameras;
   std::vector<std::pair<FrameIndex, std::string>> failed;
+  std::vector<SetAsideVertical> verticals_aside;
   GroundAngles known = GroundAngles::kNone;  // of its frame
 };
+
+void leave_out(const std::vector<SetAsideVertical>& aside, OrientationGraph& graph) {
+  std::set<ImageIndex> images;
+  for (const SetAsideVertical& vertical : aside) images.insert(vertical.image);
+  for (auto& image : graph.images)
+    if (images.contains(image.index)) image.vertical = nullptr;
+}
 
 class PartwiseOrientation {
  public:
@@ -152,10 +160,13 @@ class PartwiseOrientation {
     for (const std::size_t r : rows) own.push_back(pairs_[r]);
     try {
       OrientationResult found = orient_component(block_, start_, part.frames, own, tracks_, options_);
-      OrientedPart oriented{part, {}, std::move(found.state.cameras), std::move(found.failed)};
+      OrientedPart oriented{
+          part, {}, std::move(found.state.cameras), std::move(found.failed), std::move(found.verticals_aside)};
       for (const FrameIndex frame : part.frames)
         oriented.poses.push_back(found.state.oriented[frame] ? std::optional(found.state.frames[frame]) : std::nullopt);
-      oriented.known = known_angles(make_orientation_graph(block_, start_, part.frames, own, TrackSet(), options_));
+      OrientationGraph graph = make_orientation_graph(block_, start_, part.frames, own, TrackSet(), options_);
+      leave_out(oriented.verticals_aside, graph);
+      oriented.known = known_angles(graph);
       parts_.push_back(std::move(oriented));
     } catch (const ComputeError&) {  // too little holds it together; its frames may be in others
     }
@@ -259,6 +270,7 @@ class PartwiseOrientation {
           frame, reason == reasons.end() ? "no part that is joined to the largest holds it" : reason->second);
     }
     std::sort(result.failed.begin(), result.failed.end());
+    result.verticals_aside = verticals_aside();
     const auto kept =
         std::count_if(assembled_.links.begin(), assembled_.links.end(), [](const auto& l) { return l.kept; });
     result.summary = fmt::format("{} of {} frames oriented in {} parts, {} of {} links between them kept, free block",
@@ -267,6 +279,20 @@ class PartwiseOrientation {
       result.summary += fmt::format(", {} parts agree with no other", assembled_.lost.size());
     if (!assembled_.converged)
       result.summary += fmt::format(", joined in {} iterations without converging", assembled_.iterations);
+    return result;
+  }
+
+  // By the part in whose core the image's frame is.
+  std::vector<SetAsideVertical> verticals_aside() const {
+    std::map<ImageIndex, SetAsideVertical> aside;
+    for (const OrientedPart& part : parts_) {
+      const auto core = part.part.frames.begin();
+      const std::set<FrameIndex> own(core, core + static_cast<std::ptrdiff_t>(part.part.core));
+      for (const SetAsideVertical& vertical : part.verticals_aside)
+        if (own.contains(block_.images[vertical.image].frame)) aside.emplace(vertical.image, vertical);
+    }
+    std::vector<SetAsideVertical> result;
+    for (const auto& [image, vertical] : aside) result.push_back(vertical);
     return result;
   }
 

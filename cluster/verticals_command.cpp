@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 
 #include "cluster/exit_codes.h"
+#include "geometry/median.h"
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/image_header.h"
@@ -72,6 +73,18 @@ std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
                                                  std::sqrt(whole(1, 1)) * kDegreesPerRadian);
 }
 
+// Cameras are held within a sigma of the level two times out of three. What looks upright from above, rows of fields or
+// trees, lies anywhere.
+std::string remark_on(const std::vector<ImageVertical>& verticals) {
+  constexpr std::size_t kFewest = 5;
+  std::vector<double> rolls;
+  for (const ImageVertical& v : verticals)
+    if (v.found) rolls.push_back(std::abs(v.roll));
+  if (rolls.size() < kFewest || median(rolls) < 1) return "";
+  return "Most of them are turned farther than cameras are held: pictures from above show no vertical, but rows of "
+         "fields look as if. Look at some before you use them.\n";
+}
+
 int write_verticals(VerticalsOptions options) {
   options.segments.check();
   const Project project = read_project(options.project);
@@ -106,6 +119,7 @@ int write_verticals(VerticalsOptions options) {
   }
   JobStore(output.parent_path().string()).write_text(output.filename().string(), table);
   std::printf("%d of %zu images show the vertical: %s\n", found, verticals.size(), options.output.c_str());
+  std::printf("%s", remark_on(verticals).c_str());
   std::printf("To use them, give 'verticals: FILE' in the project file.\n");
   return failed > 0 ? kExitFailedUnits : kExitDone;
 }

@@ -95,7 +95,7 @@ std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, co
     }
     const double cost = roll * roll + pitch * pitch + not_orthogonal * oblique;
     if (!(cost <= kMostCost)) continue;
-    candidates.push_back({static_cast<int>(i), down});
+    candidates.push_back({static_cast<int>(i), down, roll});
     if (candidates.size() > 1 && cost >= least) continue;
     least = cost;
     best = candidates.back();

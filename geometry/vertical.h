@@ -36,6 +36,7 @@ Eigen::Vector3d down_of_exif_orientation(int code);
 struct Vertical {
   int point = -1;      // index of the vanishing point
   AxisDirection down;  // unit, signed
+  double roll = 0;     // from where it was expected, in sigmas of the prior
 };
 // Empty without a candidate.
 std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, const VerticalPrior& prior = {});

@@ -1,4 +1,5 @@
 // Current values of poses, intrinsics and mounts: docs/job-format.md, "State".
+#include "io/error.h"
 #include "io/hdf5_cameras.h"
 #include "io/hdf5_state.h"
 #include "io/unit_files.h"
@@ -57,15 +58,31 @@ void write_orientation(const std::string& path, const InitialOrientation& orient
               {"", "frames without a pose"});
   file.texts("failed/reason", column(orientation.failed, [](const auto& failed) { return failed.second; }),
              {"", "why"});
+  if (!orientation.verticals_aside.empty()) {
+    file.group("verticals_aside", "verticals that are not believed");
+    file.vector("verticals_aside/image",
+                column(orientation.verticals_aside, [](const SetAsideVertical& v) { return v.image.value; }), {"", ""});
+    file.vector("verticals_aside/verdict",
+                column(orientation.verticals_aside,
+                       [](const SetAsideVertical& v) { return static_cast<std::uint8_t>(v.verdict); }),
+                {"", "1 contradicted by most others, 2 without consensus, 3 against positions or attitudes"});
+  }
   file.close();
 }
 
 InitialOrientation read_orientation(const std::string& path) {
   const Hdf5Reader file(path, "orientation");
-  InitialOrientation orientation{get_state(file), {}};
+  InitialOrientation orientation{get_state(file), {}, {}};
   const auto frames = file.vector<std::int64_t>("failed/frame");
   const auto reasons = file.texts("failed/reason", static_cast<std::int64_t>(frames.size()));
   for (std::size_t f = 0; f < frames.size(); ++f) orientation.failed.emplace_back(FrameIndex(frames[f]), reasons[f]);
+  if (!file.has("verticals_aside")) return orientation;
+  const auto images = file.vector<std::int64_t>("verticals_aside/image");
+  const auto verdicts = file.vector<std::uint8_t>("verticals_aside/verdict", static_cast<std::int64_t>(images.size()));
+  for (std::size_t v = 0; v < images.size(); ++v) {
+    if (verdicts[v] < 1 || verdicts[v] > 3) throw StoreError(path + ": verticals_aside/verdict must be 1 to 3");
+    orientation.verticals_aside.push_back({ImageIndex(images[v]), static_cast<VerticalVerdict>(verdicts[v])});
+  }
   return orientation;
 }
 

@@ -9,6 +9,7 @@
 #include "io/features.h"
 #include "io/image_graph.h"
 #include "io/tracks.h"
+#include "io/verticals.h"
 
 namespace megablock {
 
@@ -36,10 +37,11 @@ TrackSet read_tracks(const std::string& path);
 void write_state(const std::string& path, const BlockState& state);
 BlockState read_state(const std::string& path);
 
-// The initial orientation: a state, and why frames got no pose.
+// The initial orientation: a state, why frames got no pose, and verticals that are not believed.
 struct InitialOrientation {
   BlockState state;
   std::vector<std::pair<FrameIndex, std::string>> failed;
+  std::vector<SetAsideVertical> verticals_aside;
 };
 void write_orientation(const std::string& path, const InitialOrientation& orientation);
 InitialOrientation read_orientation(const std::string& path);

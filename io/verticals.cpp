@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <utility>
 
 #include "geometry/angles.h"
 #include "geometry/vertical.h"
@@ -121,18 +122,47 @@ std::string verticals_row(const SeenVertical& vertical, const std::string& image
                      text_of(vertical.by_camera.reshaped()));
 }
 
-AxisDirection whole_error(const SeenVertical& vertical, const Camera& camera, const Intrinsics& values) {
-  AxisDirection down{vertical.down, vertical.covariance};
+Eigen::Matrix3Xd camera_error(const SeenVertical& vertical, const Camera& camera) {
   const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width);
+  Eigen::Matrix3Xd error = vertical.by_camera;
   for (Eigen::Index p = 0; p < vertical.camera.size(); ++p) {
     const auto at = static_cast<std::size_t>(p);
-    const double sigma = std::isfinite(camera.prior_sigma[at]) ? camera.prior_sigma[at] : weak[at];
-    const Eigen::Vector3d change = vertical.by_camera.col(p);
-    down.direction += (values[at] - vertical.camera[p]) * change;
-    down.covariance += sigma * sigma * change * change.transpose();
+    error.col(p) *= std::isfinite(camera.prior_sigma[at]) ? camera.prior_sigma[at] : weak[at];
   }
+  return error;
+}
+
+AxisDirection whole_error(const SeenVertical& vertical, const Camera& camera, const Intrinsics& values) {
+  AxisDirection down{vertical.down, vertical.covariance};
+  for (Eigen::Index p = 0; p < vertical.camera.size(); ++p)
+    down.direction += (values[static_cast<std::size_t>(p)] - vertical.camera[p]) * vertical.by_camera.col(p);
+  const Eigen::Matrix3Xd of_camera = camera_error(vertical, camera);
+  down.covariance += of_camera * of_camera.transpose();
   down.direction.normalize();
   return down;
+}
+
+std::string set_aside_text(const Block& block, std::span<const SetAsideVertical> aside, std::size_t all) {
+  constexpr std::size_t kNamed = 5;
+  if (aside.empty()) return "";
+  std::string reasons;
+  for (const auto& [verdict, reason] :
+       {std::pair(VerticalVerdict::kContradicted, "contradicted by most others"),
+        std::pair(VerticalVerdict::kNoConsensus, "that agree with too few others"),
+        std::pair(VerticalVerdict::kAgainstGround, "not down by the positions or attitudes")}) {
+    std::string names;
+    std::size_t count = 0;
+    for (const SetAsideVertical& vertical : aside) {
+      if (vertical.verdict != verdict || ++count > kNamed) continue;
+      names += (names.empty() ? "" : ", ") + block.images[vertical.image].name;
+    }
+    if (count > kNamed) names += fmt::format(" and {} more", count - kNamed);
+    if (count > 0) reasons += fmt::format("{}{} {} ({})", reasons.empty() ? "" : ", ", count, reason, names);
+  }
+  std::string text =
+      fmt::format("{} of {} verticals take{} no part: {}", aside.size(), all, aside.size() == 1 ? "s" : "", reasons);
+  if (2 * aside.size() > all) text += "; pictures from above show no vertical, leave out 'verticals' for them";
+  return text;
 }
 
 }  // namespace megablock

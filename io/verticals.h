@@ -8,6 +8,8 @@
 // Other columns are for the reader of the table.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,9 +26,28 @@ void read_verticals(const std::string& path, const std::vector<std::string>& lef
 std::string verticals_header();
 std::string verticals_row(const SeenVertical& vertical, const std::string& image);
 
-// Down as a camera with these values sees it, with all its errors: of measuring, and what the prior sigmas of the
-// camera's parameters add, the same for all its images (parameters without a prior: weak_sigmas). For those who do not
-// estimate the camera with it.
+// Of `down` by each of the camera's parameters, times its prior sigma (parameters without a prior: weak_sigmas).
+Eigen::Matrix3Xd camera_error(const SeenVertical& vertical, const Camera& camera);
+
+// Down as a camera with these values sees it, with all its errors: of measuring, and what camera_error adds, the
+// same for all its images. For those who do not estimate the camera with it.
 AxisDirection whole_error(const SeenVertical& vertical, const Camera& camera, const Intrinsics& values);
+
+// Whether a vertical is believed, and if not, why.
+enum class VerticalVerdict : std::uint8_t {
+  kBelieved,
+  kContradicted,   // most others contradict it
+  kNoConsensus,    // those it can be compared with agree on no direction
+  kAgainstGround,  // what it and others take for down is not, by the positions or attitudes
+};
+
+struct SetAsideVertical {
+  ImageIndex image;
+  VerticalVerdict verdict = VerticalVerdict::kContradicted;
+};
+
+// "3 of 40 verticals take no part: 3 contradicted by most others (a.jpg, b.jpg, c.jpg)"; empty for none. `all`: with
+// them.
+std::string set_aside_text(const Block& block, std::span<const SetAsideVertical> aside, std::size_t all);
 
 }  // namespace megablock

@@ -93,6 +93,7 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
   const VanishingPoint& point = found.points[static_cast<std::size_t>(vertical->point)];
   result.found = true;
   result.down = vertical->down;
+  result.roll = vertical->roll;
   result.lines = static_cast<int>(point.lines.size());
   result.variance_factor = point.weighted_squares / static_cast<double>(std::max<std::int64_t>(1, point.redundancy));
   result.down.covariance *= std::max(1.0, result.variance_factor);

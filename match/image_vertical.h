@@ -19,6 +19,7 @@ struct ImageVertical {
   // Camera axes, pointing down. Its covariance is that of the lines times their variance factor, where that is above
   // one.
   AxisDirection down;
+  double roll = 0;  // from where it was expected, in sigmas of the prior
   // Of `down` by each parameter of the camera: these turn and bend the lines of all its images together.
   Eigen::Matrix3Xd by_camera;
   int lines = 0;  // that show it

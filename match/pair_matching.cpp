@@ -1,9 +1,11 @@
 #include "match/pair_matching.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <tuple>
 
+#include "geometry/angles.h"
 #include "geometry/camera.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -12,7 +14,6 @@
 #include "match/match_filter.h"
 #include "match/nearest.h"
 #include "match/two_view.h"
-#include "match/upright_matching.h"
 
 namespace megablock {
 
@@ -109,24 +110,18 @@ Matches match_descriptors(const std::vector<SiftDescriptor>& a, const std::vecto
   return mutual_matches(nearest_neighbours(a, b, static_cast<std::size_t>(options.k_best) + 1), options.ratio);
 }
 
-namespace {
-
-// Without what verticals that the coarsest features contradict have to say.
-PairKnowledge credible(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options,
-                       PairKnowledge known) {
+Standing standing_of_coarsest(const ImageFeatures& a, const ImageFeatures& b, const std::vector<std::int8_t>& upright_a,
+                              const std::vector<std::int8_t>& upright_b, const MatchOptions& options) {
   static constexpr std::size_t kCoarsest = 1000;
-  if (!known.upright_a || !known.upright_b) return known;
   const auto coarsest = [](const ImageFeatures& image) {
     const auto first = image.descriptors.begin();
     return std::vector<SiftDescriptor>(
         first, first + static_cast<std::ptrdiff_t>(std::min(kCoarsest, image.descriptors.size())));
   };
-  if (contradict_verticals(match_descriptors(coarsest(a), coarsest(b), options), *known.upright_a, *known.upright_b)) {
-    known.vertical_a = known.vertical_b = std::nullopt;
-    known.upright_a = known.upright_b = nullptr;
-  }
-  return known;
+  return compare_standing(match_descriptors(coarsest(a), coarsest(b), options), upright_a, upright_b);
 }
+
+namespace {
 
 Matches match_features(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options,
                        const PairKnowledge& known) {
@@ -166,6 +161,16 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
     pair.feature_b.push_back(first_at_place(b.keypoints, positioned.matches[i].second));
   }
   return pair;
+}
+
+// Whether the rotation takes one vertical past the other by so much that matches may have been missed for it: of
+// features compared in sectors of 30 degrees, half a sector.
+bool contradicts_verticals(const VerifiedPair& pair, const PairKnowledge& known) {
+  constexpr double kFarthest = 15 * kDegree;
+  if (pair.model == PairModel::kNone || !known.vertical_a || !known.vertical_b) return false;
+  const auto& [w, x, y, z] = pair.rotation_wxyz;
+  const Eigen::Vector3d turned = Eigen::Quaterniond(w, x, y, z) * known.vertical_a->direction;
+  return turned.dot(known.vertical_b->direction) < std::cos(kFarthest);
 }
 
 Eigen::Vector2d pixel(const ImageFeatures& image, std::int32_t row) {
@@ -210,9 +215,13 @@ VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Ca
     const double by_chance = std::min(1.0, options.max_residual_px / std::max(1.0, guided.half_width_px));
     pair = verify(a, b, camera_a, camera_b, options, guided.matches, known, by_chance);
   }
+  const auto compare = [&](const PairKnowledge& knowing) {
+    return verify(a, b, camera_a, camera_b, options, match_features(a, b, options, knowing), knowing, 0);
+  };
   if (pair.model == PairModel::kNone) {
-    const PairKnowledge believed = credible(a, b, options, known);
-    pair = verify(a, b, camera_a, camera_b, options, match_features(a, b, options, believed), believed, 0);
+    pair = compare(known);
+    if (known.upright_a && known.upright_b && contradicts_verticals(pair, known))
+      pair = compare({.orientation = known.orientation, .filter = known.filter});
   }
   if (known.orientation && known.filter && pair.model != PairModel::kNone)
     drop_wrong(a, b, camera_a, camera_b, options, *known.orientation, *known.filter, pair);

@@ -11,6 +11,7 @@
 #include "io/block.h"
 #include "io/features.h"
 #include "match/trusted_pair.h"
+#include "match/upright_matching.h"
 
 namespace megablock {
 
@@ -43,9 +44,13 @@ struct PairKnowledge {
   // The vertical in the axes of each camera, pointing down (TwoViewOptions).
   std::optional<AxisDirection> vertical_a = std::nullopt, vertical_b = std::nullopt;
   // How their features stand to it (upright_sectors); where both are given, only features that stand alike are
-  // compared.
+  // compared. A pair that is verified so, and whose rotation then contradicts the verticals, is matched again without.
   const std::vector<std::int8_t>*upright_a = nullptr, *upright_b = nullptr;
 };
+
+// How the coarsest features of both images stand to each other, by their sectors (upright_sectors).
+Standing standing_of_coarsest(const ImageFeatures& a, const ImageFeatures& b, const std::vector<std::int8_t>& upright_a,
+                              const std::vector<std::int8_t>& upright_b, const MatchOptions& options);
 
 // Matches and verifies one pair; model kNone when it does not pass. Deterministic: seeded by the two image indices. A
 // pair that cannot be verified along its trusted epipolar lines is matched without them.

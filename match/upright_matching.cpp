@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "geometry/angles.h"
@@ -101,7 +102,7 @@ MutualNeighbours nearest_upright(const std::vector<SiftDescriptor>& a, const std
   return all;
 }
 
-bool contradict_verticals(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
+Standing compare_standing(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
                           std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b) {
   constexpr double kLog10Chance = -3;
   std::array<std::int64_t, kUprightSectors> turned{};
@@ -112,16 +113,37 @@ bool contradict_verticals(std::span<const std::pair<std::int32_t, std::int32_t>>
     ++turned[static_cast<std::size_t>(turn_between(of_a, of_b))];
     ++count;
   }
-  const auto around = [&](int turn) {  // within a sector
-    std::int64_t sum = 0;
-    for (int t = turn - 1; t <= turn + 1; ++t)
-      sum += turned[static_cast<std::size_t>((t + kUprightSectors) % kUprightSectors)];
-    return sum;
+  // What each of two turns explains, within a sector, and the other does not is as likely for either by chance.
+  const auto near = [](int turn, int other) {
+    const int apart = turn_between(static_cast<std::int8_t>(turn), static_cast<std::int8_t>(other));
+    return apart <= 1 || apart == kUprightSectors - 1;
   };
-  std::int64_t most = 0;
-  for (int turn = 3; turn <= kUprightSectors - 3; ++turn) most = std::max(most, around(turn));
-  return most > around(0) &&
-         std::log10(kUprightSectors - 5) + log10_binomial_tail(count, most, 3.0 / kUprightSectors) < kLog10Chance;
+  for (int turn = 1; turn < kUprightSectors; ++turn) {
+    std::int64_t here = 0, without_turn = 0;
+    for (int t = 0; t < kUprightSectors; ++t) {
+      if (near(turn, t) && !near(0, t)) here += turned[static_cast<std::size_t>(t)];
+      if (near(0, t) && !near(turn, t)) without_turn += turned[static_cast<std::size_t>(t)];
+    }
+    if (std::log10(kUprightSectors - 1) + log10_binomial_tail(here + without_turn, here, 0.5) < kLog10Chance)
+      return Standing::kTurned;
+  }
+  const std::int64_t alike = turned[0] + turned[1] + turned[kUprightSectors - 1];
+  return log10_binomial_tail(count, alike, 3.0 / kUprightSectors) < kLog10Chance ? Standing::kAlike
+                                                                                 : Standing::kUnknown;
+}
+
+std::vector<std::uint8_t> upright_pairs(std::span<const StandingPair> pairs) {
+  std::map<ImageIndex, int> belief;  // others alike, less others turned
+  for (const StandingPair& pair : pairs) {
+    const int said = pair.standing == Standing::kAlike ? 1 : pair.standing == Standing::kTurned ? -1 : 0;
+    belief[pair.a] += said;
+    belief[pair.b] += said;
+  }
+  std::vector<std::uint8_t> upright;
+  for (const StandingPair& pair : pairs)
+    upright.push_back(pair.standing == Standing::kAlike ||
+                      (pair.standing == Standing::kUnknown && belief[pair.a] > 0 && belief[pair.b] > 0));
+  return upright;
 }
 
 }  // namespace megablock

@@ -31,9 +31,24 @@ MutualNeighbours nearest_upright(const std::vector<SiftDescriptor>& a, const std
                                  std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
                                  std::size_t k);
 
-// Whether matches, found regardless of sectors, agree in another turn than none: then a vertical is wrong. No more than
-// one in a thousand of pairs without any right match, whose turns are evenly spread, is taken for such.
-bool contradict_verticals(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
+// How features that match, found regardless of sectors, stand in two images.
+enum class Standing : std::int8_t {
+  kUnknown,  // too few to tell
+  kAlike,
+  kTurned,  // most of them by another turn than none: a vertical is wrong
+};
+// Of pairs without any right match, whose turns are evenly spread, no more than one in a thousand is taken for alike,
+// and one for turned.
+Standing compare_standing(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
                           std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b);
+
+struct StandingPair {
+  ImageIndex a, b;
+  Standing standing = Standing::kUnknown;
+};
+// 1 for the pairs in which only features that stand alike need to be compared: where they are seen to stand so, and,
+// where nothing is seen, of images that stand alike with more others than they are turned against. A wrong vertical
+// costs a pair its matches, so that it takes evidence to believe one.
+std::vector<std::uint8_t> upright_pairs(std::span<const StandingPair> pairs);
 
 }  // namespace megablock

@@ -65,7 +65,7 @@ struct Knowledge {
 };
 
 // Algorithm number of what verticals do in matching: pairs without them stay valid when it is raised.
-constexpr int kUprightMatching = 1;
+constexpr int kUprightMatching = 2;
 
 std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs,
                                const Knowledge& knowledge) {
@@ -93,6 +93,22 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
   return hasher.value();
 }
 
+using UprightSectors = std::map<ImageIndex, std::vector<std::int8_t>>;  // of images with a vertical
+
+std::vector<StandingPair> standing_of(const Job& job, const std::vector<ImagePair>& pairs,
+                                      const std::vector<const ImageFeatures*>& a,
+                                      const std::vector<const ImageFeatures*>& b, const UprightSectors& upright) {
+  std::vector<StandingPair> standing(pairs.size());
+#pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    standing[i] = {pairs[i].a, pairs[i].b, Standing::kUnknown};
+    const auto of_a = upright.find(pairs[i].a), of_b = upright.find(pairs[i].b);
+    if (of_a != upright.end() && of_b != upright.end())
+      standing[i].standing = standing_of_coarsest(*a[i], *b[i], of_a->second, of_b->second, job.settings.matching);
+  }
+  return standing;
+}
+
 std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const Knowledge& knowledge,
                                      const std::vector<ImagePair>& pairs) {
   std::vector<ImageIndex> images;
@@ -105,22 +121,26 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
   }
   std::vector<VerifiedPair> verified(pairs.size());
   const Block& block = job.block;
-  std::map<ImageIndex, std::vector<std::int8_t>> upright;
+  UprightSectors upright;
   for (const ImageIndex image : images)
     if (const auto vertical = knowledge.vertical(image); vertical && !upright.contains(image))
       upright[image] =
           upright_sectors(cache.features(image), block.cameras[block.camera_of(image)], vertical->direction);
-  const auto known = [&](const ImagePair& pair) {
-    PairKnowledge of_pair = knowledge.of(pair);
-    const auto of_a = upright.find(pair.a), of_b = upright.find(pair.b);
-    if (of_a != upright.end()) of_pair.upright_a = &of_a->second;
-    if (of_b != upright.end()) of_pair.upright_b = &of_b->second;
+  const std::vector<StandingPair> standing = standing_of(job, pairs, a, b, upright);
+  const std::vector<std::uint8_t> stands_upright = upright_pairs(standing);
+  const auto known = [&](std::size_t i) {
+    PairKnowledge of_pair = knowledge.of(pairs[i]);
+    if (stands_upright[i]) {
+      of_pair.upright_a = &upright.at(pairs[i].a);
+      of_pair.upright_b = &upright.at(pairs[i].b);
+    }
+    if (standing[i].standing == Standing::kTurned) of_pair.vertical_a = of_pair.vertical_b = std::nullopt;
     return of_pair;
   };
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i)
     verified[i] = match_pair(*a[i], *b[i], block.cameras[block.camera_of(pairs[i].a)],
-                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching, known(pairs[i]));
+                             block.cameras[block.camera_of(pairs[i].b)], job.settings.matching, known(i));
   std::erase_if(verified, [](const VerifiedPair& pair) { return pair.model == PairModel::kNone; });
   return verified;
 }

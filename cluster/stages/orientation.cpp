@@ -4,6 +4,7 @@
 #include "adjust/orientation.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 #include <set>
 
@@ -24,7 +25,11 @@ namespace {
 using Frames = std::set<FrameIndex>;
 using Links = std::map<FrameIndex, Frames>;  // of frames with a verified pair
 
+// Algorithm number of what is believed of verticals: orientations without them stay valid when it is raised.
+constexpr int kVerticalCheck = 1;
+
 void add_vertical_values(Hasher& hasher, const Block& block) {
+  if (!block.verticals.empty()) hasher.add(kVerticalCheck);
   for (const SeenVertical& vertical : block.verticals) {
     add_to_hash(hasher.add(vertical.image.value), vertical.down);
     for (const double value : vertical.covariance.reshaped()) hasher.add(value);
@@ -113,6 +118,8 @@ void orient_set(const Job& job, const Block& block, const std::vector<VerifiedPa
   }
   for (const auto& failed : oriented.failed)
     if (set.contains(failed.first)) orientation.failed.push_back(failed);
+  for (const SetAsideVertical& vertical : oriented.verticals_aside)
+    if (set.contains(block.images[vertical.image].frame)) orientation.verticals_aside.push_back(vertical);
   if (frames.size() == set.size()) state.cameras = oriented.state.cameras;
 }
 
@@ -159,6 +166,21 @@ BlockState held_in_place(const Job& job, BlockState state) {
   return state;
 }
 
+// From here on the block does without them.
+void set_aside(Job& job, const std::vector<SetAsideVertical>& verticals, std::vector<SetAsideVertical>& all) {
+  std::set<ImageIndex> images;
+  for (const SetAsideVertical& vertical : verticals) images.insert(vertical.image);
+  std::erase_if(job.block.verticals, [&](const SeenVertical& vertical) { return images.contains(vertical.image); });
+  all.insert(all.end(), verticals.begin(), verticals.end());
+}
+
+void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std::size_t all) {
+  const std::string text = set_aside_text(job.block, aside, all);
+  if (text.empty()) return;
+  job.notes.push_back(text);
+  if (job.is_first_rank() && !job.options.quiet) std::fprintf(stderr, "orientation  %s\n", text.c_str());
+}
+
 }  // namespace
 
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
@@ -171,6 +193,8 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   BlockState state;
   std::uint64_t previous = 0;
   std::int64_t images_before = 0;
+  const std::size_t verticals = job.block.verticals.size();
+  std::vector<SetAsideVertical> aside;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const Block block = first_images(job.block, job.generations[g]);
     Hasher hasher;
@@ -182,7 +206,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
     unit.name = unit_name("orient", static_cast<std::int64_t>(g));
     unit.fingerprint = hasher.value();
     unit.write = [&](const std::string& path) {
-      InitialOrientation grown{grow(state, block), {}};
+      InitialOrientation grown{grow(state, block), {}, {}};
       const Links links = links_of(block, pairs);
       for (const Frames& set : sets_to_orient(grown.state, frames_from(block, images_before), links))
         orient_set(job, block, pairs, set, links, grown);
@@ -194,9 +218,11 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
     const InitialOrientation done = read_orientation(job.store.verified_path(unit.name));
     state = done.state;
     for (const auto& [frame, reason] : done.failed) job.not_oriented[frame] = reason;
+    set_aside(job, done.verticals_aside, aside);
     previous = job.store.seal(unit.name)->content_hash;
     images_before = job.generations[g];
   }
+  tell_of_verticals(job, aside, verticals);
   return held_in_place(job, grow(state, job.block));
 }
 

@@ -50,6 +50,18 @@ with tempfile.TemporaryDirectory() as folder:
     expect(brighton["mean_track_length"] >= 3.5, "brighton_beach: mean track 3.5")
     berlin = oriented(work, "berlin", "--control", str(data / "berlin" / "ground_control_points.json"))
     expect(berlin["oriented"] == 3, "berlin: all 3 images")
+    # Verticals that are wrong in every picture are said to be so, and do no harm.
+    project, names = work / "berlin.yaml", sorted(path.name for path in (data / "berlin").glob("*.jpg"))
+    rows = [f"{name},{down},0.1\n" for name, down in zip(names, ["1,0,0", "-1,0,0", "0,-0.6,0.8"])]
+    (work / "wrong.csv").write_text("image,down_x,down_y,down_z,sigma_deg\n" + "".join(rows))
+    project.write_text(project.read_text() + "verticals: wrong.csv\n")
+    said = subprocess.run([megablock, "run", str(project), "-j", str(work / "berlin")], check=True, text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT).stdout
+    wrong = json.loads(subprocess.check_output([megablock, "status", str(work / "berlin"), "--json"]))
+    expect("3 of 3 verticals take no part" in said, "berlin: wrong verticals are named")
+    for figure in "oriented", "points", "observations", "global_iterations":
+        expect(wrong[figure] == berlin[figure], f"berlin: as many {figure} with wrong verticals")
+    expect("vertical" not in wrong["observation_kinds"], "berlin: no vertical takes part")
     for name, figures in ("brighton_beach", brighton), ("berlin", berlin):
         expect(figures["newton_decrement"] <= 1e-2, f"{name}: converged to a decrement of 1e-2")
 sys.exit("not reached: " + "; ".join(failed) if failed else 0)

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 #include "io/error.h"
 #include "tests/unit/adjust/orientation_scene.h"
@@ -267,6 +268,63 @@ TEST(Orientation, VerticalsLevelABlock) {
     EXPECT_LT(errors_of(scene, result, true).position_m, 0.5);
     EXPECT_EQ(errors_of(scene, result, true).oriented, scene.block.frames.size());
     EXPECT_LT(off_level_deg(scene, result), 0.15) << "without: " << without;
+  }
+}
+
+// Half of the verticals anywhere: as level as with the other half alone.
+TEST(Orientation, WrongVerticalsAreSetAside) {
+  SceneOptions positions;
+  positions.gps_sigma_m = 3;
+  for (SimulatedBlock scene : {ring(20, {}), street(30, {}), street(30, positions), aerial(4, 7, positions)}) {
+    add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1});
+    std::set<ImageIndex> wrong;
+    std::mt19937_64 random(6);
+    for (std::size_t v = 0; v < scene.block.verticals.size(); v += 2) {
+      SeenVertical& vertical = scene.block.verticals[v];
+      do vertical.down = normal_vector(random).normalized();
+      while (vertical.down.dot(scene.truth.frames[scene.block.images[vertical.image].frame].rotation *
+                               -Eigen::Vector3d::UnitZ()) > 0.7);
+      wrong.insert(vertical.image);
+    }
+    const auto result = orient(scene, pairs_of(scene));
+    std::set<ImageIndex> aside;
+    for (const SetAsideVertical& vertical : result.verticals_aside) aside.insert(vertical.image);
+    EXPECT_EQ(aside, wrong);
+    EXPECT_LT(errors_of(scene, result, true).position_m, 0.5);
+    EXPECT_LT(off_level_deg(scene, result), 0.2);
+    std::erase_if(scene.block.verticals, [&](const SeenVertical& vertical) { return wrong.contains(vertical.image); });
+    EXPECT_EQ(orient(scene, pairs_of(scene)).state.frames[FrameIndex(0)].centre,
+              result.state.frames[FrameIndex(0)].centre);
+  }
+}
+
+// Verticals that are all wrong leave nothing behind: rows of fields from above, and any.
+TEST(Orientation, VerticalsOfFieldsLeaveNothingBehind) {
+  SceneOptions positions;
+  positions.gps_sigma_m = 3;
+  for (const bool rows : {true, false}) {
+    SimulatedBlock scene = aerial(4, 7, positions);
+    const auto without = orient(scene, pairs_of(scene));
+    EXPECT_TRUE(without.verticals_aside.empty());
+    add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1});
+    std::mt19937_64 random(6);
+    for (SeenVertical& vertical : scene.block.verticals) {
+      const Pose& frame = scene.truth.frames[scene.block.images[vertical.image].frame];
+      vertical.down =
+          rows ? Eigen::Vector3d(frame.rotation * Eigen::Vector3d::UnitX()) : normal_vector(random).normalized();
+      const Eigen::Matrix<double, 3, 2> across = tangent_plane(vertical.down);
+      vertical.covariance = std::pow(0.1 * kDegree, 2) * across * across.transpose();
+    }
+    const auto result = orient(scene, pairs_of(scene));
+    EXPECT_EQ(result.verticals_aside.size(), scene.block.verticals.size());
+    if (rows) {
+      for (const SetAsideVertical& vertical : result.verticals_aside)
+        EXPECT_EQ(vertical.verdict, VerticalVerdict::kAgainstGround);
+    }
+    for (const FrameIndex f : all_frames(scene.block)) {
+      EXPECT_EQ(result.state.frames[f].centre, without.state.frames[f].centre);
+      EXPECT_EQ(result.state.frames[f].rotation.coeffs(), without.state.frames[f].rotation.coeffs());
+    }
   }
 }
 

@@ -1,9 +1,9 @@
 // Round trips of features, candidates, matches, tiles and adjustments, full and empty.
-#include <filesystem>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "io/error.h"
 #include "io/hdf5_file.h"
@@ -230,10 +230,14 @@ TEST(OrientationFile, KeepsWhyFramesGotNoPose) {
   orientation.state.frames.resize(2);
   orientation.state.oriented.resize(2);
   orientation.failed = {{FrameIndex(1), "only 3 of its points could be intersected"}};
+  orientation.verticals_aside = {{ImageIndex(0), VerticalVerdict::kAgainstGround}};
   write_orientation(path, orientation);
   const InitialOrientation read = read_orientation(path);
   EXPECT_EQ(read.state.frames.size(), 2u);
   EXPECT_EQ(read.failed, orientation.failed);
+  ASSERT_EQ(read.verticals_aside.size(), 1u);
+  EXPECT_EQ(read.verticals_aside[0].image, ImageIndex(0));
+  EXPECT_EQ(read.verticals_aside[0].verdict, VerticalVerdict::kAgainstGround);
   std::filesystem::remove(path);
 }
 

@@ -114,5 +114,21 @@ TEST_F(VerticalsFile, WholeErrorHasTheCameras) {
   EXPECT_NEAR(whole_error(seen, camera, changed).direction.z(), 0.01, 1e-6);
 }
 
+TEST_F(VerticalsFile, WhatIsSetAsideIsSaidByReason) {
+  using enum VerticalVerdict;
+  EXPECT_EQ(set_aside_text(block_, {}, 3), "");
+  const std::string& first = block_.images[ImageIndex(0)].name;
+  const std::string& second = block_.images[ImageIndex(1)].name;
+  EXPECT_EQ(set_aside_text(block_, std::vector<SetAsideVertical>{{ImageIndex(1), kContradicted}}, 9),
+            "1 of 9 verticals takes no part: 1 contradicted by most others (" + second + ")");
+  const std::vector<SetAsideVertical> seven(7, {ImageIndex(0), kAgainstGround});
+  EXPECT_THAT(set_aside_text(block_, seven, 20), HasSubstr(first + ", " + first + " and 2 more)"));
+  const std::string all = set_aside_text(
+      block_, std::vector<SetAsideVertical>{{ImageIndex(0), kNoConsensus}, {ImageIndex(1), kAgainstGround}}, 2);
+  EXPECT_EQ(all, "2 of 2 verticals take no part: 1 that agree with too few others (" + first +
+                     "), 1 not down by the positions or attitudes (" + second +
+                     "); pictures from above show no vertical, leave out 'verticals' for them");
+}
+
 }  // namespace
 }  // namespace megablock

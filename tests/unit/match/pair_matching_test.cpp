@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
+#include "geometry/angles.h"
 #include "geometry/rotation.h"
 #include "io/error.h"
 #include "io/tracks.h"
@@ -113,6 +115,63 @@ TEST(MatchPair, NamesTheFirstOfTheRowsAtOnePlace) {
   ASSERT_GT(pair.feature_a.size(), 2u);
   EXPECT_EQ(std::pair(pair.feature_a[0], pair.feature_b[0]), std::pair(0, 0));
   EXPECT_EQ(std::pair(pair.feature_a[1], pair.feature_b[1]), std::pair(2, 2));
+}
+
+// The two pictures with marks that turn as they should, and their verticals, the second one off by so much in its
+// picture.
+struct UprightPictures {
+  TwoPictures scene = make_scene();
+  AxisDirection down_a, down_b;
+  std::vector<std::int8_t> sectors_a, sectors_b;
+
+  explicit UprightPictures(double off_deg) {
+    std::mt19937_64 generator(13);
+    const double turn_deg = 0.4 / kDegree;  // of the second picture
+    for (std::size_t i = 0; i < scene.a.keypoints.size(); ++i) {
+      scene.a.keypoints[i].angle_deg = static_cast<float>(generator() % 360);
+      const bool matched = i < kMatches + 100;
+      scene.b.keypoints[i].angle_deg = static_cast<float>(
+          std::fmod(matched ? scene.a.keypoints[i].angle_deg + turn_deg : static_cast<double>(generator() % 360), 360));
+    }
+    down_a.direction = Eigen::Vector3d::UnitY();
+    down_b.direction =
+        rotation_exp<double>(Eigen::Vector3d(0, 0, off_deg * kDegree)) * (scene.rotation * Eigen::Vector3d::UnitY());
+    down_a.covariance = down_b.covariance = std::pow(0.1 * kDegree, 2) * Eigen::Matrix3d::Identity();
+    sectors_a = upright_sectors(scene.a, make_camera(), down_a.direction);
+    sectors_b = upright_sectors(scene.b, make_camera(), down_b.direction);
+  }
+  PairKnowledge knowledge() const {
+    return {.orientation = std::nullopt,
+            .vertical_a = down_a,
+            .vertical_b = down_b,
+            .upright_a = &sectors_a,
+            .upright_b = &sectors_b};
+  }
+  Standing standing() const { return standing_of_coarsest(scene.a, scene.b, sectors_a, sectors_b, {}); }
+};
+
+TEST(MatchPair, TrueVerticalsCostNoMatches) {
+  const UprightPictures upright(0);
+  EXPECT_EQ(upright.standing(), Standing::kAlike);
+  const VerifiedPair pair =
+      match_pair(upright.scene.a, upright.scene.b, make_camera(), make_camera(), {}, upright.knowledge());
+  EXPECT_LT(pair.putative, kMatches + 180) << "some of the wrong ones stand otherwise";
+  EXPECT_GE(std::ssize(pair.feature_a), kMatches);
+}
+
+// Of features in sectors that are off by less than two some are compared all the same, and the rotation tells.
+TEST(MatchPair, WrongVerticalsCostNoMatches) {
+  const TwoPictures plain = make_scene();
+  const VerifiedPair without = match_pair(plain.a, plain.b, make_camera(), make_camera(), {});
+  for (const double off : {25., -40., 70., 180.}) {
+    const UprightPictures upright(off);
+    EXPECT_EQ(upright.standing(), std::abs(off) < 30 ? Standing::kAlike : Standing::kTurned) << off;
+    if (std::abs(off) > 45) continue;  // nothing right is compared
+    const VerifiedPair pair =
+        match_pair(upright.scene.a, upright.scene.b, make_camera(), make_camera(), {}, upright.knowledge());
+    EXPECT_EQ(pair.feature_a, without.feature_a) << off;
+    EXPECT_EQ(pair.feature_b, without.feature_b) << off;
+  }
 }
 
 TEST(MatchPair, IsRepeatable) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -124,30 +125,60 @@ TEST(UprightMatching, LookingDownNothingStands) {
     EXPECT_EQ(sector, kAnySector);
 }
 
-// Matches of which `right` have this turn and the others any.
-bool contradicts(int turn, int right, int wrong, std::uint64_t seed) {
+// Of matches of which `right` have this turn, in degrees and good to 8, and the others any.
+Standing standing(double turn_deg, int right, int wrong, std::uint64_t seed) {
   std::mt19937_64 generator(seed);
+  std::uniform_real_distribution<double> any(0, 360);
+  std::normal_distribution<double> error(0, 8);
+  const auto sector = [](double degrees) {
+    return static_cast<std::int8_t>(static_cast<int>(std::floor((degrees + 3600) / 30)) % kUprightSectors);
+  };
   std::vector<std::int8_t> a, b;
   std::vector<std::pair<std::int32_t, std::int32_t>> matches;
   for (int i = 0; i < right + wrong; ++i) {
-    a.push_back(static_cast<std::int8_t>(generator() % kUprightSectors));
-    const auto turned = i < right ? static_cast<std::uint64_t>(turn) : generator();
-    b.push_back(static_cast<std::int8_t>((static_cast<std::uint64_t>(a.back()) + turned) % kUprightSectors));
+    const double of_a = any(generator);
+    a.push_back(sector(of_a));
+    b.push_back(sector(i < right ? of_a + turn_deg + error(generator) : any(generator)));
     matches.emplace_back(i, i);
   }
-  return contradict_verticals(matches, a, b);
+  return compare_standing(matches, a, b);
 }
 
 TEST(UprightMatching, WrongVerticalsAreNoticed) {
-  int by_chance = 0;
+  int turned = 0, alike = 0, turned_by_chance = 0, missed = 0, not_noticed = 0;
   for (std::uint64_t seed = 1; seed <= 1000; ++seed) {
-    EXPECT_FALSE(contradicts(0, 20, 30, seed));
-    EXPECT_FALSE(contradicts(1, 20, 30, seed));
-    EXPECT_TRUE(contradicts(6, 30, 30, seed));
-    by_chance += contradicts(0, 0, 40, seed);
+    turned_by_chance += standing(0, 60, 60, seed) == Standing::kTurned;
+    missed += standing(0, 60, 60, seed) == Standing::kUnknown;
+    EXPECT_EQ(standing(180, 60, 30, seed), Standing::kTurned);
+    EXPECT_EQ(standing(-60, 60, 30, seed), Standing::kTurned);
+    not_noticed += standing(40, 120, 60, seed) != Standing::kTurned;
+    turned += standing(0, 0, 40, seed) == Standing::kTurned;
+    alike += standing(0, 0, 40, seed) == Standing::kAlike;
   }
-  EXPECT_LE(by_chance, 4);
-  EXPECT_FALSE(contradicts(0, 0, 0, 1));
+  EXPECT_LE(turned, 4);
+  EXPECT_LE(alike, 4);
+  EXPECT_LE(turned_by_chance, 1);
+  EXPECT_LE(missed, 1);
+  EXPECT_LE(not_noticed, 30) << "these are left to the rotation of the pair";
+  EXPECT_EQ(standing(0, 0, 0, 1), Standing::kUnknown);
+  EXPECT_EQ(standing(90, 5, 0, 1), Standing::kUnknown) << "too few to tell";
+}
+
+TEST(UprightMatching, ItTakesEvidenceToBelieveAVertical) {
+  const auto pair = [](int a, int b, Standing standing) {
+    return StandingPair{ImageIndex(a), ImageIndex(b), standing};
+  };
+  // 0 to 2 stand alike, 3 is turned against them, of 4 and 5 nothing is seen.
+  const std::vector<StandingPair> pairs{pair(0, 1, Standing::kAlike),   pair(0, 2, Standing::kUnknown),
+                                        pair(1, 2, Standing::kAlike),   pair(0, 3, Standing::kTurned),
+                                        pair(1, 3, Standing::kTurned),  pair(2, 3, Standing::kUnknown),
+                                        pair(0, 4, Standing::kUnknown), pair(4, 5, Standing::kUnknown)};
+  // 0 and 1 are turned against 3 as often as they stand alike with others.
+  EXPECT_EQ(upright_pairs(pairs), (std::vector<std::uint8_t>{1, 0, 1, 0, 0, 0, 0, 0}));
+  std::vector<StandingPair> more = pairs;
+  for (const int image : {0, 1, 2}) more.push_back(pair(image, 6, Standing::kAlike));
+  EXPECT_EQ(upright_pairs(more), (std::vector<std::uint8_t>{1, 1, 1, 0, 0, 0, 0, 0, 1, 1, 1}));
+  EXPECT_TRUE(upright_pairs({}).empty());
 }
 
 }  // namespace

@@ -1,0 +1,47 @@
+// Which verticals of a component are believed, before any of them is used.
+//
+// Right verticals show the same direction of the ground, wrong ones any: rows of a field, a slanting roof. Rotations
+// averaged without them carry the directions into common axes. These rotations drift, so a vertical is compared with
+// others near by in the graph, and a few farther ones: two of them agree when the rotation vector e from one to the
+// other passes
+//
+//     e' C^-1 e < chi^2(2, 0.999),   C = S_a + S_b + D D' + (v_ab + 1 deg^2) I
+//
+// with S the covariances of measuring, D what the parameters of the camera may be wrong by, which for images of one
+// camera is the difference of two like errors, v_ab the variance of the relative rotation, no more than that along the
+// best path of edges, and a degree for walls that lean. What agrees makes groups. Of all that was compared with one
+// another the largest group is believed when it has a third of all and four fifths of those who agree with anybody:
+// rows of a field agree with themselves, but in strips flown to and fro half of them the other way round. Last, what a
+// group takes for down must be down by the positions or attitudes, where these tell.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "adjust/rotation_averaging.h"
+#include "geometry/interpretation_plane.h"
+#include "io/verticals.h"
+
+namespace megablock {
+
+// What an image sees, in the axes of its node.
+struct SeenDown {
+  std::int32_t node = -1;
+  std::int32_t camera = -1;    // any number; the same: one camera
+  Eigen::Vector3d direction;   // unit
+  Eigen::Matrix3d covariance;  // of measuring alone, radians^2
+  Eigen::Matrix3Xd by_camera;  // of `direction` by each parameter of the camera, times its sigma
+};
+
+// A verdict for each of `seen`. `rotation` [nodes], world -> node, averaged without verticals, over the edges that
+// `kept` names; `down`: where down is known to be in their world. What cannot be compared with others is believed, but
+// where `down` contradicts it, or where nothing that can is believed.
+std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eigen::Quaterniond>>& rotation,
+                                             const std::vector<RelativeRotation>& edges,
+                                             const std::vector<std::uint8_t>& kept, const std::vector<SeenDown>& seen,
+                                             const std::optional<AxisDirection>& down);
+
+}  // namespace megablock
