@@ -113,6 +113,7 @@ struct Depth {
 struct MeasuredBaseline {
   std::int32_t a, b;
   Eigen::Vector3d direction;
+  double sigma;                         // of the direction, by the pair's matches
   std::vector<Depth> depth_a, depth_b;  // ascending by track
 };
 
@@ -245,7 +246,7 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
     if (common.size() < kFewestTracks) continue;
     const auto direction = baseline_direction(common, rotations[row(edge.a)]->conjugate() * edge.baseline);
     if (!direction) continue;
-    MeasuredBaseline baseline{edge.a, edge.b, *direction, {}, {}};
+    MeasuredBaseline baseline{edge.a, edge.b, *direction, edge.baseline_sigma, {}, {}};
     measure_depths(common, baseline);
     if (baseline.depth_a.size() >= kFewestTracks) baselines.push_back(std::move(baseline));
   }
@@ -256,7 +257,9 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
   if (baselines.empty()) return result;
   const auto lengths = solve_lengths(baselines.size(), length_ratios(graph.images.size(), baselines));
   for (std::size_t e = 0; e < baselines.size(); ++e)
-    if (lengths[e]) result.push_back({baselines[e].a, baselines[e].b, baselines[e].direction, std::exp(*lengths[e])});
+    if (lengths[e])
+      result.push_back(
+          {baselines[e].a, baselines[e].b, baselines[e].direction, std::exp(*lengths[e]), baselines[e].sigma});
   return result;
 }
 

@@ -21,6 +21,7 @@ struct Baseline {
   std::int32_t a = -1, b = -1;  // rows of graph.images
   Eigen::Vector3d direction;    // unit, from a to b, ground axes
   double length = 0;            // common scale of one connected part; 0: unknown
+  double sigma = 0;             // of the direction, rad, as the pair's own matches give it; 0: not known
 };
 
 // `rotations` [images], ground -> camera, empty where unknown; `usable` [edges]; rays [observations] in camera axes.

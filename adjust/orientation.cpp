@@ -97,8 +97,8 @@ class Orientation {
     std::vector<RelativeRotation> relative;
     for (const auto& edge : graph_.edges) {
       const auto &a = graph_.images[row(edge.a)], &b = graph_.images[row(edge.b)];
-      relative.push_back(
-          {a.frame, b.frame, b.mount.rotation.conjugate() * edge.rotation * a.mount.rotation, edge.inliers});
+      relative.push_back({a.frame, b.frame, b.mount.rotation.conjugate() * edge.rotation * a.mount.rotation,
+                          edge.inliers, edge.rotation_sigma});
     }
     return relative;
   }
@@ -196,7 +196,7 @@ class Orientation {
   // Frames' centres from the baselines times `scale`, with mounts where the scale is metric (`priors` given).
   void centres_from_baselines(double scale, const std::vector<std::optional<CentrePrior>>& known,
                               const std::vector<std::optional<Eigen::Vector3d>>& start) {
-    constexpr double kRelativeSigma = 0.1;
+    constexpr double kRelativeSigma = 0.1;  // of what the matches do not say
     std::vector<CentreDifference> differences;
     for (const Baseline& baseline : baselines_) {
       const auto &a = graph_.images[row(baseline.a)], &b = graph_.images[row(baseline.b)];
@@ -204,7 +204,8 @@ class Orientation {
       if (!known.empty())
         offset += rotations_[row(a.frame)]->conjugate() * a.mount.centre -
                   rotations_[row(b.frame)]->conjugate() * b.mount.centre;
-      differences.push_back({a.frame, b.frame, offset, kRelativeSigma * scale * baseline.length});
+      differences.push_back(
+          {a.frame, b.frame, offset, std::hypot(kRelativeSigma, baseline.sigma) * scale * baseline.length});
     }
     auto priors = known;
     priors.resize(graph_.frames.size());

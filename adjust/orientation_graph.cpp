@@ -1,11 +1,13 @@
 #include "adjust/orientation_graph.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <string>
 #include <tuple>
 #include <unordered_map>
 
+#include "adjust/plane_twins.h"
 #include "io/error.h"
 #include "io/held_priors.h"
 
@@ -72,6 +74,24 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
   return rows;
 }
 
+// Empty where it is not a rotation, or not a number. `turned`: of a with respect to b.
+std::optional<OrientationGraph::Relative> relative_of(const PairOrientation& stored, bool turned) {
+  const auto& wxyz = stored.rotation_wxyz;
+  const auto &of_rotation = stored.rotation_covariance, &of_base = stored.base_covariance;
+  Eigen::Quaterniond rotation(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  if (!(rotation.norm() > 0.5)) return std::nullopt;
+  rotation.normalize();
+  const Eigen::Vector3d translation(stored.translation[0], stored.translation[1], stored.translation[2]);
+  // X_b = R X_a + t: the centre of b in a is -R' t, that of a in b is t.
+  OrientationGraph::Relative relative;
+  relative.rotation = turned ? rotation.conjugate() : rotation;
+  relative.baseline = turned ? translation : Eigen::Vector3d(-(rotation.conjugate() * translation));
+  if (!(relative.baseline.norm() > 0.5)) relative.baseline.setZero();
+  relative.rotation_sigma = std::sqrt(std::max(0.0, (of_rotation[0] + of_rotation[3] + of_rotation[5]) / 3));
+  relative.baseline_sigma = std::sqrt(std::max(0.0, (of_base[0] + of_base[3] + of_base[5]) / 2));
+  return relative;
+}
+
 void add_edges(const std::vector<VerifiedPair>& pairs, const Rows& rows, OrientationGraph& graph) {
   for (const VerifiedPair& pair : pairs) {
     if (pair.model == PairModel::kNone) continue;
@@ -79,25 +99,18 @@ void add_edges(const std::vector<VerifiedPair>& pairs, const Rows& rows, Orienta
     if (a < 0 || b < 0 ||
         graph.images[static_cast<std::size_t>(a)].frame == graph.images[static_cast<std::size_t>(b)].frame)
       continue;
-    const auto& q = pair.rotation_wxyz;
+    const auto relative = relative_of(pair, b < a);
+    if (!relative) continue;
     OrientationGraph::PairEdge edge;
-    edge.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
-    if (!(edge.rotation.norm() > 0.5)) continue;  // not a rotation, or not a number
-    edge.rotation.normalize();
-    const Eigen::Vector3d translation(pair.translation[0], pair.translation[1], pair.translation[2]);
+    static_cast<OrientationGraph::Relative&>(edge) = *relative;
+    edge.a = std::min(a, b);
+    edge.b = std::max(a, b);
+    if (pair.model == PairModel::kRotationOnly) edge.baseline.setZero();
     edge.inliers = static_cast<double>(pair.feature_a.size());
-    // X_b = R X_a + t: centre of b in a is -R' t, of a in b it is t.
-    if (a < b) {
-      edge.a = a;
-      edge.b = b;
-      edge.baseline = -(edge.rotation.conjugate() * translation);
-    } else {
-      edge.a = b;
-      edge.b = a;
-      edge.rotation = edge.rotation.conjugate();
-      edge.baseline = translation;
+    if (const auto twin = pair.twin ? relative_of(*pair.twin, b < a) : std::nullopt) {
+      edge.has_twin = true;
+      edge.twin = *twin;
     }
-    if (pair.model == PairModel::kRotationOnly || !(edge.baseline.norm() > 0.5)) edge.baseline.setZero();
     graph.edges.push_back(edge);
   }
   std::sort(graph.edges.begin(), graph.edges.end(),
@@ -151,6 +164,7 @@ OrientationGraph make_orientation_graph(const Block& block, const BlockState& st
   OrientationGraph graph;
   const Rows rows = add_frames_and_images(block, start, frames, options, graph);
   add_edges(pairs, rows, graph);
+  choose_twins_by_planes(graph);
   add_tracks(tracks, rows, options.tracks_per_pair, graph);
   return graph;
 }

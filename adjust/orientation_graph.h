@@ -33,11 +33,17 @@ struct OrientationGraph {
     const SeenVertical* vertical = nullptr;  // of the block
   };
   // Relative orientation of camera b with respect to camera a.
-  struct PairEdge {
+  struct Relative {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // camera a -> camera b
+    // Unit direction from a to b in the axes of camera a; zero: rotation only.
+    Eigen::Vector3d baseline = Eigen::Vector3d::Zero();
+    double rotation_sigma = 0, baseline_sigma = 0;  // of the matches' errors, of each axis, rad; 0: not known
+  };
+  struct PairEdge : Relative {
     std::int32_t a = -1, b = -1;  // rows of `images`, a < b
-    Eigen::Quaterniond rotation;  // camera a -> camera b
-    Eigen::Vector3d baseline;     // unit direction from a to b in the axes of camera a; zero: rotation only
     double inliers = 0;
+    bool has_twin = false;
+    Relative twin;  // explains the matches of a plane nearly as well
   };
   // Observations of a track: rows [begin[t], begin[t + 1]); images ascending.
   struct Observation {

@@ -47,6 +47,15 @@ Eigen::Quaterniond along(const RelativeRotation& edge, std::int32_t from) {
   return edge.a == from ? edge.rotation : edge.rotation.conjugate();
 }
 
+constexpr double kVariance = 0.25 * kDegree * kDegree * 100;  // of a rotation from one inlier
+
+double variance_of(const RelativeRotation& edge) {
+  return kVariance / (1 + edge.inliers) + edge.sigma_rad * edge.sigma_rad;
+}
+
+// The number of inliers from which alone the rotation would be as good.
+double effective_inliers(const RelativeRotation& edge) { return std::max(0.0, kVariance / variance_of(edge) - 1); }
+
 // Edges and verticals, without those that the others make unlikely.
 struct Likely {
   Edges edges;
@@ -105,7 +114,7 @@ std::vector<double> trust(std::int32_t nodes, const Edges& edges) {
       if (rotation_angle(to_c, to_c_by_b) < kClosed) ++closed;
       ++i, ++j;
     }
-    result[e] = edge.inliers * (closed + 0.5) / (triangles + 1);
+    result[e] = effective_inliers(edge) * (closed + 0.5) / (triangles + 1);
   }
   return result;
 }
@@ -251,16 +260,20 @@ class Averager {
 
   void run() {
     if (level_.count == 0) return;
-    constexpr double kSmallest = 0.05 * kDegree;
+    static constexpr double kSmallest = 0.05 * kDegree;
     constexpr int kL1Iterations = 15, kIterations = 100;
+    const auto l1 = [](double e, double variance) { return std::sqrt(variance) / std::max(e, kSmallest); };
+    const auto geman_mcclure = [](double e, double variance) {
+      return std::pow(1 + e * e / (kScale * kScale + kSigmas * kSigmas * variance), -2);
+    };
     for (int i = 0; i < kL1Iterations; ++i)
-      if (iterate([&](double e) { return kScale / std::max(e, kSmallest); }, 1) < 1e-6) break;
+      if (iterate(l1, 1) < 1e-6) break;
     for (int i = 0; i < kIterations; ++i)
-      if (iterate([&](double e) { return std::pow(1 + e * e / (kScale * kScale), -2); }, 2) < 1e-12) break;
+      if (iterate(geman_mcclure, 2) < 1e-12) break;
   }
 
  private:
-  static constexpr double kScale = 2 * kDegree;
+  static constexpr double kScale = 2 * kDegree, kSigmas = 3;
   struct System {
     std::vector<std::int32_t> unknown;  // number of the node's unknown; -1: none
     std::int32_t count = 0;
@@ -293,8 +306,7 @@ class Averager {
       const RelativeRotation& edge = edges_[k];
       if (!kept_[k] || !active_[row(edge.a)]) continue;
       const Eigen::Vector3d e = error(edge);
-      constexpr double kVariance = 0.25 * kDegree * kDegree * 100;  // of a rotation from one inlier
-      equations.push_back({edge.a, edge.b, (1 + edge.inliers) / kVariance * robust(e.norm()), e});
+      equations.push_back({edge.a, edge.b, robust(e.norm(), variance_of(edge)) / variance_of(edge), e});
     }
     for (std::size_t i = 0; i < rotation_.size(); ++i)
       if (active_[i] && !held(priors_, i) && priors_[i]) {

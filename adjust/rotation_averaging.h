@@ -4,7 +4,9 @@
 // the world-axes residual e = Log(R_j' R_ij R_i), one iteration solves  w_j - w_i = e  in weighted least squares, a
 // graph Laplacian times the 3x3 identity, by sparse Cholesky factorisation. Start: the spanning tree of the most
 // trusted edges (inliers times the share of triangles that close). Weights: first 1/|e| (L1), then Geman-McClure, after
-// Chatterjee and Govindu, "Efficient and robust large-scale rotation averaging", ICCV 2013.
+// Chatterjee and Govindu, "Efficient and robust large-scale rotation averaging", ICCV 2013; over the variance of what
+// the matches say and of what they do not (calibration, wrong matches), which falls with their number. The loss turns
+// at 2 degrees and three sigmas of the edge, added in squares.
 //
 // The average is free by a rotation of the world, and its errors add up along chains. A node that sees the vertical
 // fixes two angles of three: with d where it sees down and g down in the world (the axis -z, to a degree) it measures
@@ -26,6 +28,7 @@ struct RelativeRotation {
   std::int32_t a = -1, b = -1;
   Eigen::Quaterniond rotation;  // R_b R_a'
   double inliers = 0;           // trust; a rotation from 100 inliers counts as 0.5 deg
+  double sigma_rad = 0;         // of its matches' errors, per angle: it counts by both; 0: not known
 };
 
 // What is known of a rotation from elsewhere.

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,21 +25,29 @@ struct ImageFeatures {
   std::vector<Keypoint> keypoints;     // sorted by decreasing scale, then x, then y
   std::vector<SiftDescriptor> descriptors;
   std::array<float, 128> global_descriptor{};  // unit norm; for candidate neighbours of images without position
-  std::string failure;                 // why the image has no features; empty when it has
+  std::string failure;                         // why the image has no features; empty when it has
 };
 
 // One matched pair of images; a.value < b.value always.
 enum class PairModel : std::uint8_t { kNone = 0, kEssential = 1, kHomography = 2, kRotationOnly = 3 };
 
-struct VerifiedPair {
-  ImageIndex a, b;
-  PairModel model = PairModel::kNone;
-  // Relative orientation of camera b with respect to camera a: X_b = R (X_a) + t, |t| = 1 (t = 0 when rotation-only).
+// Relative orientation of camera b with respect to camera a: X_b = R (X_a) + t, |t| = 1 (t = 0 when rotation-only).
+struct PairOrientation {
   std::array<double, 4> rotation_wxyz{1, 0, 0, 0};
   std::array<double, 3> translation{};
-  double median_angle_deg = 0;  // of intersection of the inlier rays
+  // Upper triangles by rows: of the increment w of R Exp(w), axes of a, rad^2, all zero where it is not known; of the
+  // translation, which keeps its length, axes of b. A base that is open has a sigma of pi.
+  std::array<double, 6> rotation_covariance{}, base_covariance{};
+};
+
+struct VerifiedPair : PairOrientation {
+  ImageIndex a, b;
+  PairModel model = PairModel::kNone;
+  double median_angle_deg = 0;                     // of intersection of the inlier rays
   std::vector<std::int32_t> feature_a, feature_b;  // inlier matches, rows in the features; ascending feature_a
-  std::int32_t putative = 0;    // matches before verification
+  std::int32_t putative = 0;                       // matches before verification
+  bool ill_conditioned = false;                    // the matches hardly determine the direction of the base
+  std::optional<PairOrientation> twin;             // explains the matches of a plane nearly as well; others decide
 };
 
 }  // namespace megablock

@@ -37,12 +37,74 @@ CandidateGraph read_candidates(const std::string& path) {
   return graph;
 }
 
+namespace {
+
+// The columns of relative orientations, in a group.
+void put_orientations(Hdf5Writer& file, const std::string& group, const std::vector<const PairOrientation*>& of) {
+  const auto column = [&](auto member) {
+    std::vector<double> values;
+    for (const PairOrientation* orientation : of) {
+      const auto& some = orientation->*member;
+      values.insert(values.end(), some.begin(), some.end());
+    }
+    return values;
+  };
+  file.matrix(group + "/rotation_wxyz", column(&PairOrientation::rotation_wxyz), 4,
+              {"", "unit quaternion, camera a -> camera b"});
+  file.matrix(group + "/translation", column(&PairOrientation::translation), 3,
+              {"", "X_b = R X_a + t; length 1, or 0 when rotation only"});
+  file.matrix(group + "/rotation_covariance", column(&PairOrientation::rotation_covariance), 6,
+              {"rad^2", "of w of R Exp(w), axes of a: xx, xy, xz, yy, yz, zz; all 0: not known"});
+  file.matrix(group + "/base_covariance", column(&PairOrientation::base_covariance), 6,
+              {"", "of the translation at length 1, axes of b: xx, xy, xz, yy, yz, zz"});
+}
+
+std::vector<PairOrientation> get_orientations(const Hdf5Reader& file, const std::string& group, std::int64_t count) {
+  std::vector<PairOrientation> result(static_cast<std::size_t>(count));
+  const auto column = [&](const char* name, auto member) {
+    const std::size_t columns = (PairOrientation{}.*member).size();
+    const auto values = file.matrix<double>(group + name, static_cast<std::int64_t>(columns), count);
+    for (std::size_t i = 0; i < result.size(); ++i)
+      std::copy_n(&values[columns * i], columns, (result[i].*member).begin());
+  };
+  if (count == 0) return result;
+  column("/rotation_wxyz", &PairOrientation::rotation_wxyz);
+  column("/translation", &PairOrientation::translation);
+  column("/rotation_covariance", &PairOrientation::rotation_covariance);
+  column("/base_covariance", &PairOrientation::base_covariance);
+  return result;
+}
+
+// Pairs over planes that have a second orientation.
+void put_twins(Hdf5Writer& file, const std::vector<VerifiedPair>& pairs) {
+  std::vector<std::int64_t> row;
+  std::vector<const PairOrientation*> twins;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!pairs[i].twin) continue;
+    row.push_back(static_cast<std::int64_t>(i));
+    twins.push_back(&*pairs[i].twin);
+  }
+  file.group("twins", "second orientations of pairs over a plane, which explain the matches nearly as well");
+  file.integers("twins/pair_difference", differences(row), {"", "row in pairs, minus that of the row before"});
+  put_orientations(file, "twins", twins);
+}
+
+void get_twins(const Hdf5Reader& file, std::vector<VerifiedPair>& pairs) {
+  const auto row = cumulate(file.vector<std::int64_t>("twins/pair_difference"));
+  const auto twins = get_orientations(file, "twins", std::ssize(row));
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    if (row[i] < 0 || row[i] >= std::ssize(pairs)) file.fail("twins/pair_difference", "names a pair that is not there");
+    pairs[static_cast<std::size_t>(row[i])].twin = twins[i];
+  }
+}
+
+}  // namespace
+
 void write_matches(const std::string& path, const std::vector<VerifiedPair>& pairs) {
-  std::vector<double> rotation, translation;
+  std::vector<const PairOrientation*> orientations;
   std::vector<std::int64_t> feature_a, feature_b;
   for (const VerifiedPair& pair : pairs) {
-    rotation.insert(rotation.end(), pair.rotation_wxyz.begin(), pair.rotation_wxyz.end());
-    translation.insert(translation.end(), pair.translation.begin(), pair.translation.end());
+    orientations.push_back(&pair);
     // Row differences restart in each pair.
     std::int64_t previous = 0;
     for (const std::int32_t row : pair.feature_a) {
@@ -58,8 +120,10 @@ void write_matches(const std::string& path, const std::vector<VerifiedPair>& pai
   file.vector("pairs/b", value([](const VerifiedPair& p) { return p.b.value; }), {"", "image index"});
   file.vector("pairs/model", value([](const VerifiedPair& p) { return static_cast<std::uint8_t>(p.model); }),
               {"", "0: not verified, 1: essential matrix, 2: homography, 3: rotation only"});
-  file.matrix("pairs/rotation_wxyz", rotation, 4, {"", "unit quaternion, camera a -> camera b"});
-  file.matrix("pairs/translation", translation, 3, {"", "X_b = R X_a + t; length 1, or 0 when rotation only"});
+  put_orientations(file, "pairs", orientations);
+  file.vector("pairs/ill_conditioned",
+              value([](const VerifiedPair& p) { return static_cast<std::uint8_t>(p.ill_conditioned); }),
+              {"", "1: the matches hardly determine the direction of the base"});
   file.vector("pairs/median_angle", value([](const VerifiedPair& p) { return p.median_angle_deg; }),
               {"deg", "median intersection angle of the inliers' rays"});
   file.vector("pairs/putative", value([](const VerifiedPair& p) { return p.putative; }),
@@ -67,6 +131,7 @@ void write_matches(const std::string& path, const std::vector<VerifiedPair>& pai
   file.integers("pairs/inliers",
                 value([](const VerifiedPair& p) { return static_cast<std::int64_t>(p.feature_a.size()); }),
                 {"", "number of rows of the group 'inliers', in the order of the pairs"});
+  put_twins(file, pairs);
   file.group("inliers", "matches that passed the verification");
   file.integers("inliers/feature_a_difference", feature_a,
                 {"", "row in the features of a, minus that of the inlier before in the pair"});
@@ -76,12 +141,14 @@ void write_matches(const std::string& path, const std::vector<VerifiedPair>& pai
 
 std::vector<VerifiedPair> read_matches(const std::string& path) {
   const Hdf5Reader file(path, "matches");
+  if (!file.has("pairs/rotation_covariance"))
+    file.fail("pairs/rotation_covariance", "is missing, as earlier versions of this program did not write it");
   const auto a = file.vector<std::int64_t>("pairs/a");
   const auto count = static_cast<std::int64_t>(a.size());
   const auto b = file.vector<std::int64_t>("pairs/b", count);
   const auto model = file.vector<std::uint8_t>("pairs/model", count);
-  const auto rotation = file.matrix<double>("pairs/rotation_wxyz", 4, count);
-  const auto translation = file.matrix<double>("pairs/translation", 3, count);
+  const auto orientations = get_orientations(file, "pairs", count);
+  const auto ill_conditioned = file.vector<std::uint8_t>("pairs/ill_conditioned", count);
   const auto angle = file.vector<double>("pairs/median_angle", count);
   const auto putative = file.vector<std::int32_t>("pairs/putative", count);
   const auto feature_a = file.vector<std::int64_t>("inliers/feature_a_difference");
@@ -95,8 +162,8 @@ std::vector<VerifiedPair> read_matches(const std::string& path) {
     pair.a = ImageIndex(a[i]);
     pair.b = ImageIndex(b[i]);
     pair.model = static_cast<PairModel>(model[i]);
-    std::copy_n(&rotation[4 * i], 4, pair.rotation_wxyz.begin());
-    std::copy_n(&translation[3 * i], 3, pair.translation.begin());
+    static_cast<PairOrientation&>(pair) = orientations[i];
+    pair.ill_conditioned = ill_conditioned[i] != 0;
     pair.median_angle_deg = angle[i];
     pair.putative = putative[i];
     std::int64_t row = 0;
@@ -106,6 +173,7 @@ std::vector<VerifiedPair> read_matches(const std::string& path) {
     }
     pair.feature_b.assign(feature_b.begin() + begin[i], feature_b.begin() + begin[i + 1]);
   }
+  get_twins(file, pairs);
   return pairs;
 }
 

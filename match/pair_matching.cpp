@@ -151,10 +151,7 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
   const TwoView found = estimate_two_view(positioned.points, two_view);
   if (found.model == PairModel::kNone) return pair;
 
-  pair.model = found.model;
-  pair.rotation_wxyz = {found.rotation.w(), found.rotation.x(), found.rotation.y(), found.rotation.z()};
-  pair.translation = {found.translation.x(), found.translation.y(), found.translation.z()};
-  pair.median_angle_deg = found.median_angle_deg;
+  set_orientation(pair, found);
   for (std::size_t i = 0; i < positioned.matches.size(); ++i) {
     if (!found.inlier[i]) continue;
     pair.feature_a.push_back(first_at_place(a.keypoints, positioned.matches[i].first));

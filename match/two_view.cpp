@@ -223,25 +223,31 @@ class PairEstimation {
     return result;
   }
 
-  void set_base(TwoView& result, const RelativeOrientation& o, double scale,
-                std::span<const double> weights = {}) const {
-    result.translation = o.base;
-    result.precision = precision_of(o, points_, result.inlier, scale, 1e-3 * options_.max_residual, weights);
+  void set_base(TwoView& result, const Hypothesis& of) const {
+    result.translation = of.orientation.base;
+    result.precision = precision_of_hypothesis(of, result.inlier);
     result.ill_conditioned = !(result.precision.base_sigma() <= options_.max_base_sigma_deg * kDegree);
+  }
+
+  OrientationPrecision precision_of_hypothesis(const Hypothesis& of, std::span<const std::uint8_t> inlier) const {
+    return precision_of(of.orientation, points_, inlier, of.scale, 1e-3 * options_.max_residual, of.weights);
   }
 
   TwoView oriented(bool planar) {
     const Hypothesis best = polished(hypotheses_.front());
     TwoView result =
         finish(planar ? PairModel::kHomography : PairModel::kEssential, best.orientation.rotation, best.support);
-    set_base(result, best.orientation, best.scale, best.weights);
+    set_base(result, best);
     result.by_vertical = by_vertical_;
     for (const Hypothesis& other : std::span(hypotheses_).subspan(1)) {
       if (!planar || other.support.score < kTwinShare * best.support.score) continue;
-      const double apart = std::max(rotation_angle(other.orientation.rotation, best.orientation.rotation),
-                                    (other.orientation.base - best.orientation.base).norm());
-      if (apart > 3 * kDegree) result.twin = other.orientation;
-      if (result.twin) break;
+      const Hypothesis twin = polished(other);
+      const double apart = std::max(rotation_angle(twin.orientation.rotation, best.orientation.rotation),
+                                    (twin.orientation.base - best.orientation.base).norm());
+      if (!(apart > 3 * kDegree)) continue;
+      result.twin = twin.orientation;
+      result.twin_precision = precision_of_hypothesis(twin, twin.support.inlier);
+      break;
     }
     return result;
   }
@@ -277,12 +283,12 @@ class PairEstimation {
       const RelativeOrientation refined = adjust_orientation(start, points_, adjustment(0.5 * limit));
       for (const RelativeOrientation& o : {start, refined}) {
         Consensus support = consensus_of(estimator, o, limit);
-        if (!best || support.score > best->support.score) best = {o, std::move(support)};
+        if (!best || support.score > best->support.score) best = {o, std::move(support), 0.5 * limit};
       }
     }
     if (!best || best->support.count < needed_ / 2) return std::nullopt;
     TwoView result = finish(PairModel::kEssential, best->orientation.rotation, found->consensus);
-    set_base(result, best->orientation, 0.5 * limit);
+    set_base(result, *best);
     return result;
   }
 
@@ -295,7 +301,33 @@ class PairEstimation {
   std::vector<Hypothesis> hypotheses_;
 };
 
+std::array<double, 4> stored(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+std::array<double, 3> stored(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+std::array<double, 6> upper_triangle(const Eigen::Matrix3d& c) {
+  return {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
+}
+
+void set_orientation(PairOrientation& pair, const Eigen::Quaterniond& rotation, const Eigen::Vector3d& base,
+                     const OrientationPrecision& precision) {
+  pair.rotation_wxyz = stored(rotation);
+  pair.translation = stored(base);
+  pair.rotation_covariance = upper_triangle(precision.covariance.topLeftCorner<3, 3>());
+  pair.base_covariance = {};
+  if (!(base.squaredNorm() > 0)) return;
+  const auto across = axes_across(base);
+  pair.base_covariance = upper_triangle(across * precision.covariance.bottomRightCorner<2, 2>() * across.transpose());
+}
+
 }  // namespace
+
+void set_orientation(VerifiedPair& pair, const TwoView& found) {
+  pair.model = found.model;
+  set_orientation(pair, found.rotation, found.translation, found.precision);
+  pair.median_angle_deg = found.median_angle_deg;
+  pair.ill_conditioned = found.ill_conditioned;
+  pair.twin.reset();
+  if (found.twin) set_orientation(pair.twin.emplace(), found.twin->rotation, found.twin->base, found.twin_precision);
+}
 
 TwoView estimate_two_view(const PointPairs& points, const TwoViewOptions& options) {
   if (points.size() < static_cast<std::size_t>(options.min_inliers)) {

@@ -32,11 +32,12 @@ struct TwoView {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   // The other orientation that explains a plane nearly as well (95 % of the support); a third image decides.
   std::optional<RelativeOrientation> twin;
-  OrientationPrecision precision;  // of rotation and base; the base is open when rotation-only
-  bool ill_conditioned = false;    // the base's direction is worse than max_base_sigma_deg
-  bool by_vertical = false;        // agrees with the verticals and has the support of what three matches and they gave
-  int draws = 0;                   // of all samples
-  double median_angle_deg = 0;     // of intersection of the inlier rays
+  // Of rotation and base; the base is open when rotation-only.
+  OrientationPrecision precision, twin_precision;
+  bool ill_conditioned = false;  // the base's direction is worse than max_base_sigma_deg
+  bool by_vertical = false;      // agrees with the verticals and has the support of what three matches and they gave
+  int draws = 0;                 // of all samples
+  double median_angle_deg = 0;   // of intersection of the inlier rays
   std::vector<std::uint8_t> inlier;  // [pairs]
   int inlier_count = 0;
 };
@@ -46,5 +47,8 @@ struct TwoView {
 // ten per cent: when no essential matrix holds, the inliers are those of the fundamental matrix and the orientation is
 // its nearest calibrated one.
 TwoView estimate_two_view(const PointPairs& points, const TwoViewOptions& options);
+
+// Model, orientation, its covariance and twin as the store keeps them; the matches are the caller's.
+void set_orientation(VerifiedPair& pair, const TwoView& found);
 
 }  // namespace megablock

@@ -19,6 +19,7 @@ namespace megablock::orientation_scene {
 struct SceneOptions {
   double noise_px = 0.5;
   double wrong_tracks = 0.1;    // share of tracks with one observation anywhere in the image
+  double focal_px = 1200;
   double focal_guess = 1;       // times the true focal length; unless 1 the block says that it is a guess
   double gps_sigma_m = 0;       // <= 0: none
   double max_distance_m = 1e9;  // points farther away are not seen
@@ -48,7 +49,7 @@ inline SimulatedBlock make_scene(const std::vector<Pose>& poses, const std::vect
   camera.name = "camera";
   camera.width = 1500;
   camera.height = 1000;
-  camera.intrinsics = {1200, 750, 500, 0, 0, 0, 0, 0};
+  camera.intrinsics = {options.focal_px, 750, 500, 0, 0, 0, 0, 0};
   const Intrinsics truth = camera.intrinsics;
   camera.intrinsics[kFocal] *= options.focal_guess;
   camera.focal_known = options.focal_guess == 1;

@@ -97,6 +97,58 @@ std::vector<KnownVertical> verticals_of(const Graph& graph, double noise_deg, do
   return verticals;
 }
 
+TEST(RotationAveraging, SigmasOfTheMatchesWeigh) {
+  // A third of the edges, with as many inliers as the others, is ten times as bad, and says so.
+  double with = 0, without = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Graph graph = chain(40, 4, 0.2, 0);
+    std::mt19937_64 random(seed);
+    for (std::size_t e = 0; e < graph.edges.size(); e += 3)
+      graph.edges[e].rotation = rotation_update(graph.edges[e].rotation, 2 * kDegree * normal_vector(random));
+    const auto error = [&] {
+      return largest_error_deg(graph, average_rotations(40, graph.edges, graph.priors, 20 * kDegree), false) / 20;
+    };
+    without += error();
+    for (std::size_t e = 0; e < graph.edges.size(); ++e) graph.edges[e].sigma_rad = (e % 3 == 0 ? 2 : 0.2) * kDegree;
+    with += error();
+  }
+  std::printf("mean of largest errors %.2f deg without the sigmas, %.2f with them\n", without, with);
+  EXPECT_LT(with, 0.8 * without);
+}
+
+// Mean square of what the average makes of the edges, less the truth, in sigmas of the edges: 1 for least squares with
+// the right weights, as the sum has 3 (nodes - 1) degrees of freedom.
+double normalised_error(const Graph& graph, const AveragedRotations& found) {
+  double sum = 0;
+  for (const RelativeRotation& edge : graph.edges) {
+    const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
+    const double error = rotation_angle(*found.rotation[b] * found.rotation[a]->conjugate(),
+                                        graph.truth[b] * graph.truth[a].conjugate());
+    sum += std::pow(error / edge.sigma_rad, 2);
+  }
+  return sum / (3 * static_cast<double>(graph.truth.size() - 1));
+}
+
+TEST(RotationAveraging, ErrorsAreThoseOfTheSigmas) {
+  for (const double wrong : {0.0, 0.1}) {
+    double mean = 0;
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int trial = 0; trial < 40; ++trial) {
+      Graph graph = chain(40, 6, 0, wrong);
+      for (RelativeRotation& edge : graph.edges) {
+        edge.inliers = 1e6;                                              // what the matches do not say is little
+        edge.sigma_rad = 0.2 * kDegree * std::pow(15, uniform(random));  // to 3 degrees
+        edge.rotation = rotation_update(edge.rotation, edge.sigma_rad * normal_vector(random));
+      }
+      mean += normalised_error(graph, average_rotations(40, graph.edges, graph.priors, 20 * kDegree)) / 40;
+    }
+    std::printf("%2.0f %% of the edges wrong: normalised error %.2f\n", 100 * wrong, mean);
+    EXPECT_GT(mean, 0.85);
+    EXPECT_LT(mean, 1.2);
+  }
+}
+
 // A chain wanders off, about the vertical only where the nodes see it; one tenth of them see it elsewhere.
 TEST(RotationAveraging, VerticalsLevelAChain) {
   const Graph graph = chain(200, 1, 0.5, 0);

@@ -110,13 +110,26 @@ TEST_F(GraphFiles, CellThatNamesNoPairIsRefused) {
 
 TEST_F(GraphFiles, MatchesComeBack) {
   std::vector<VerifiedPair> pairs(3);
-  pairs[0] = {ImageIndex(1),          ImageIndex(2), PairModel::kEssential,
-              {0.5, -0.5, 0.5, -0.5}, {0.6, 0, 0.8}, 12.5,
-              {0, 5, 7999},           {7, 3, 0},     400};
+  pairs[0] = {{{0.5, -0.5, 0.5, -0.5}, {0.6, 0, 0.8}, {6, 5, 4, 3, 2, 1}, {1, 2, 3, 4, 5, 6}},
+              ImageIndex(1),
+              ImageIndex(2),
+              PairModel::kEssential,
+              12.5,
+              {0, 5, 7999},
+              {7, 3, 0},
+              400,
+              true,
+              std::nullopt};
   pairs[1].a = ImageIndex(1);
   pairs[1].b = ImageIndex(3);
   pairs[1].putative = 3;
-  pairs[2] = {ImageIndex(2), ImageIndex(5000000000), PairModel::kRotationOnly, {1, 0, 0, 0}, {0, 0, 0}, 0, {2}, {9}, 1};
+  pairs[2].a = ImageIndex(2);
+  pairs[2].b = ImageIndex(5000000000);
+  pairs[2].model = PairModel::kHomography;
+  pairs[2].feature_a = {2};
+  pairs[2].feature_b = {9};
+  pairs[2].putative = 1;
+  pairs[2].twin = PairOrientation{{0, 1, 0, 0}, {0, 0, -1}, {1, 2, 3, 4, 5, 6}, {7, 8, 9, 8, 7, 6}};
   write_matches(path_, pairs);
   const std::vector<VerifiedPair> back = read_matches(path_);
   ASSERT_EQ(back.size(), pairs.size());
@@ -130,12 +143,36 @@ TEST_F(GraphFiles, MatchesComeBack) {
     EXPECT_EQ(back[i].feature_a, pairs[i].feature_a);
     EXPECT_EQ(back[i].feature_b, pairs[i].feature_b);
     EXPECT_EQ(back[i].putative, pairs[i].putative);
+    EXPECT_EQ(back[i].rotation_covariance, pairs[i].rotation_covariance);
+    EXPECT_EQ(back[i].base_covariance, pairs[i].base_covariance);
+    EXPECT_EQ(back[i].ill_conditioned, pairs[i].ill_conditioned);
+    ASSERT_EQ(back[i].twin.has_value(), pairs[i].twin.has_value());
+    if (!pairs[i].twin) continue;
+    EXPECT_EQ(back[i].twin->rotation_wxyz, pairs[i].twin->rotation_wxyz);
+    EXPECT_EQ(back[i].twin->translation, pairs[i].twin->translation);
+    EXPECT_EQ(back[i].twin->rotation_covariance, pairs[i].twin->rotation_covariance);
+    EXPECT_EQ(back[i].twin->base_covariance, pairs[i].twin->base_covariance);
   }
 }
 
 TEST_F(GraphFiles, EmptyMatchesComeBack) {
   write_matches(path_, {});
   EXPECT_TRUE(read_matches(path_).empty());
+}
+
+TEST_F(GraphFiles, MatchesOfEarlierVersionsAreRefused) {
+  Hdf5Writer file(path_, "matches");
+  file.group("pairs");
+  file.vector("pairs/a", std::vector<std::int64_t>{1});
+  file.close();
+  try {
+    read_matches(path_);
+    FAIL();
+  } catch (const StoreError& error) {
+    EXPECT_EQ(error.what(), path_ +
+                                ": pairs/rotation_covariance: is missing, as earlier versions of this program did "
+                                "not write it; delete the file and run again");
+  }
 }
 
 TEST_F(GraphFiles, TilesComeBack) {
