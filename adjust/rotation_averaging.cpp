@@ -49,9 +49,13 @@ Eigen::Quaterniond along(const RelativeRotation& edge, std::int32_t from) {
 
 constexpr double kVariance = 0.25 * kDegree * kDegree * 100;  // of a rotation from one inlier
 
+}  // namespace
+
 double variance_of(const RelativeRotation& edge) {
   return kVariance / (1 + edge.inliers) + edge.sigma_rad * edge.sigma_rad;
 }
+
+namespace {
 
 // The number of inliers from which alone the rotation would be as good.
 double effective_inliers(const RelativeRotation& edge) { return std::max(0.0, kVariance / variance_of(edge) - 1); }

@@ -30,6 +30,8 @@ struct RelativeRotation {
   double inliers = 0;           // trust; a rotation from 100 inliers counts as 0.5 deg
   double sigma_rad = 0;         // of its matches' errors, per angle: it counts by both; 0: not known
 };
+// Of such a rotation, per angle, radians^2.
+double variance_of(const RelativeRotation& edge);
 
 // What is known of a rotation from elsewhere.
 struct RotationPrior {

@@ -71,11 +71,9 @@ class Vicinity {
   Vicinity(std::size_t nodes, const std::vector<RelativeRotation>& edges, const std::vector<std::uint8_t>& kept,
            const std::vector<std::vector<std::size_t>>& shown_of)
       : shown_of_(shown_of), links_(nodes), best_(nodes), round_(nodes, -1) {
-    constexpr double kVariance =
-        0.25 * kDegree * kDegree * 100;  // of a rotation from one inlier (rotation_averaging.h)
     for (std::size_t e = 0; e < edges.size(); ++e) {
       if (!kept[e]) continue;
-      const double variance = kVariance / (1 + edges[e].inliers);
+      const double variance = variance_of(edges[e]);
       links_[row(edges[e].a)].push_back({edges[e].b, variance});
       links_[row(edges[e].b)].push_back({edges[e].a, variance});
     }

@@ -30,7 +30,8 @@ struct TwoView {
   PairModel model = PairModel::kNone;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  // The other orientation that explains a plane nearly as well (95 % of the support); a third image decides.
+  // The other orientation that explains a plane nearly as well (95 % of the support); the planes that other
+  // pairs of its images see decide.
   std::optional<RelativeOrientation> twin;
   // Of rotation and base; the base is open when rotation-only.
   OrientationPrecision precision, twin_precision;

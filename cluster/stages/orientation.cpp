@@ -26,7 +26,7 @@ using Frames = std::set<FrameIndex>;
 using Links = std::map<FrameIndex, Frames>;  // of frames with a verified pair
 
 // Algorithm number of what is believed of verticals: orientations without them stay valid when it is raised.
-constexpr int kVerticalCheck = 1;
+constexpr int kVerticalCheck = 2;
 
 void add_vertical_values(Hasher& hasher, const Block& block) {
   if (!block.verticals.empty()) hasher.add(kVerticalCheck);

@@ -1,6 +1,6 @@
 // One job on a simulated block of any size, from given tie points to the evaluated result:
 //
-//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 1024] [--folder F]
+//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 896] [--folder F]
 //                [--seed 1]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
