@@ -391,13 +391,14 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
     const RankTile& tile = tiles_.whole(row);
     const TilePlan& plan = tile_plans_[row];
     const Step& step = steps[row].unknowns;
+    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability());
     TileCovariance covariance =
-        covariance_tile(tile.problem, plan, tile.state, factors.tile, passed, datum_of(row), step);
+        covariance_tile(tile.problem, plan, tile.state, factors.tile, std::move(passed), datum_of(row), step);
+    factors_.discard(n);
+    covariance.boundary = {};
     if (with_columns_)
       to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);
-    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability());
     tables[row] = covariance.observations;
-    factors_.discard(n);
     if (visit) visit(tile, covariance);
   }
   ranks_.flush_sends();

@@ -9,6 +9,7 @@
 #include "io/report/html.h"
 #include "io/report/page.h"
 #include "io/report/sections.h"
+#include "io/track_rows.h"
 
 namespace megablock {
 
@@ -81,19 +82,37 @@ std::string report_html(const BlockResult& result, const ReportContext& context)
 
 struct Report::Gathered {
   report::Figures figures;
-  TrackResults sample;
+  TrackResults drawn;  // places of points, the images that see them and which of these take part; nothing else
 };
 
-Report::Report(const BlockResult& result, const TrackBatches& tracks) {
+namespace {
+
+TrackResults drawn_of(const TrackBatches& tracks) {
   constexpr std::int64_t kDrawn = 200000;  // tracks at most
-  gathered_.reset(new Gathered{report::figures_of(result, tracks), sample_of(tracks, kDrawn)});
+  TrackResults drawn;
+  drawn.tracks.begin.push_back(0);
+  visit_sample(tracks, kDrawn, [&](const TrackResults& batch, std::size_t row) {
+    drawn.points.push_back(batch.points[row]);
+    drawn.tracks.id.push_back(batch.tracks.id[row]);
+    const std::int64_t first = batch.tracks.begin[row], last = batch.tracks.begin[row + 1];
+    append_rows(batch.tracks.image, first, last, drawn.tracks.image);
+    append_rows(batch.kept, first, last, drawn.kept);
+    drawn.tracks.begin.push_back(static_cast<std::int64_t>(drawn.tracks.image.size()));
+  });
+  return drawn;
+}
+
+}  // namespace
+
+Report::Report(const BlockResult& result, const TrackBatches& tracks) {
+  gathered_.reset(new Gathered{report::figures_of(result, tracks), drawn_of(tracks)});
 }
 
 Report::~Report() = default;
 Report::Report(Report&&) noexcept = default;
 
 std::string Report::html(BlockResult result, const ReportContext& context) && {
-  static_cast<TrackResults&>(result) = std::move(gathered_->sample);
+  static_cast<TrackResults&>(result) = std::move(gathered_->drawn);
   return page_of(result, gathered_->figures, context);
 }
 

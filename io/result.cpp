@@ -71,15 +71,20 @@ void TrackResults::append(const TrackResults& from, std::size_t first, std::size
   copy(from.redundancy_y, row, behind, redundancy_y);
 }
 
-TrackResults sample_of(const TrackBatches& tracks, std::int64_t most) {
+void visit_sample(const TrackBatches& tracks, std::int64_t most,
+                  const std::function<void(const TrackResults& batch, std::size_t row)>& visit) {
   const std::int64_t step = 1 + (tracks.track_count() - 1) / most;
-  TrackResults sample;
   std::int64_t before = 0;  // tracks of the batches before
   tracks.visit([&](const TrackResults& batch) {
     for (std::int64_t row = (step - before % step) % step; row < batch.tracks.track_count(); row += step)
-      sample.append(batch, static_cast<std::size_t>(row), static_cast<std::size_t>(row) + 1);
+      visit(batch, static_cast<std::size_t>(row));
     before += batch.tracks.track_count();
   });
+}
+
+TrackResults sample_of(const TrackBatches& tracks, std::int64_t most) {
+  TrackResults sample;
+  visit_sample(tracks, most, [&](const TrackResults& batch, std::size_t row) { sample.append(batch, row, row + 1); });
   return sample;
 }
 

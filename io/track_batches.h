@@ -41,7 +41,9 @@ class StoredTracks final : public TrackBatches {
   std::int64_t count_ = 0;
 };
 
-// Every n-th track, n such that there are no more than `most`.
+// Every n-th track, n such that there are no more than `most`: the batch and the row in it.
+void visit_sample(const TrackBatches& tracks, std::int64_t most,
+                  const std::function<void(const TrackResults& batch, std::size_t row)>& visit);
 TrackResults sample_of(const TrackBatches& tracks, std::int64_t most);
 
 }  // namespace megablock

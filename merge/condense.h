@@ -116,7 +116,7 @@ struct TileCovariance {
 };
 // `columns`: of plan.unknowns, column 0 is not used; empty for blocks with a datum.
 TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const TileFactor& factor, const CovarianceMatrix& boundary, const TileDatum& datum = {},
+                               const TileFactor& factor, CovarianceMatrix boundary, const TileDatum& datum = {},
                                const Step& columns = {});
 
 }  // namespace megablock

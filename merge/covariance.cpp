@@ -43,10 +43,10 @@ class TileCovarianceBuilder {
     invert(plan.unknown_of_mount, mount_of_);
   }
 
-  TileCovariance build(const CovarianceMatrix& boundary) {
-    result_.boundary = boundary;
-    take(boundary, plan_.boundary);
-    descend(plan_.cells.root(), boundary);
+  TileCovariance build(CovarianceMatrix boundary) {
+    result_.boundary = std::move(boundary);
+    take(result_.boundary, plan_.boundary);
+    descend(plan_.cells.root(), result_.boundary);
     return std::move(result_);
   }
 
@@ -239,12 +239,12 @@ class TileCovarianceBuilder {
 }  // namespace
 
 TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const TileFactor& factor, const CovarianceMatrix& boundary, const TileDatum& datum,
+                               const TileFactor& factor, CovarianceMatrix boundary, const TileDatum& datum,
                                const Step& columns) {
   if (factor.empty())
-    return covariance_tile(problem, plan, state, condense_tile(problem, plan, state, 0, datum).factor, boundary, datum,
-                           columns);
-  return TileCovarianceBuilder(problem, plan, state, factor, columns).build(boundary);
+    return covariance_tile(problem, plan, state, condense_tile(problem, plan, state, 0, datum).factor,
+                           std::move(boundary), datum, columns);
+  return TileCovarianceBuilder(problem, plan, state, factor, columns).build(std::move(boundary));
 }
 
 }  // namespace megablock

@@ -59,16 +59,26 @@ struct SemidefiniteFactor {
   std::vector<int> pivots;  // row i of P'A is row pivots[i] - 1 of A; empty: P = I
   int rank = 0;
 
-  Eigen::MatrixXd permuted(const Eigen::MatrixXd& m) const {  // P'm
-    Eigen::MatrixXd result = m;
-    for (std::size_t i = 0; i < pivots.size(); ++i) result.row(static_cast<Eigen::Index>(i)) = m.row(pivots[i] - 1);
-    return result;
+  Eigen::MatrixXd rows_permuted(Eigen::MatrixXd m) const {  // P'm
+    if (!pivots.empty()) m = Eigen::MatrixXd(m(order(), Eigen::all));
+    return m;
+  }
+  Eigen::MatrixXd columns_permuted(Eigen::MatrixXd m) const {  // mP
+    if (!pivots.empty()) m = Eigen::MatrixXd(m(Eigen::all, order()));
+    return m;
   }
   // b'A^+ b of a b in the range, so that the leading rows alone give it: |L_11^-1 b_1|^2.
   double least_squares(const Eigen::VectorXd& b) const {
-    Eigen::VectorXd leading = permuted(b).topRows(rank);
+    Eigen::VectorXd leading = rows_permuted(b).topRows(rank);
     lower.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
     return leading.squaredNorm();
+  }
+
+ private:
+  std::vector<int> order() const {
+    std::vector<int> rows = pivots;
+    for (int& row : rows) --row;
+    return rows;
   }
 };
 
@@ -109,15 +119,17 @@ class CovarianceRoot {
         semidefinite_factor([&]() -> Eigen::MatrixXd { return inverse.asDiagonal() * matrix * inverse.asDiagonal(); });
     factor_.lower.rightCols(n - factor_.rank).setZero();
   }
-  Eigen::MatrixXd transposed_times(const Eigen::MatrixXd& m) const {  // F'm
-    Eigen::MatrixXd result = factor_.permuted(scale_.asDiagonal() * m);
-    multiply(CblasLeft, CblasTrans, result);
-    return result;
+  Eigen::MatrixXd transposed_times(Eigen::MatrixXd m) const {  // F'm, in the memory of m
+    m.array().colwise() *= scale_.array();
+    m = factor_.rows_permuted(std::move(m));
+    multiply(CblasLeft, CblasTrans, m);
+    return m;
   }
-  Eigen::MatrixXd times(const Eigen::MatrixXd& m) const {  // mF
-    Eigen::MatrixXd result = factor_.permuted(scale_.asDiagonal() * m.transpose()).transpose();
-    multiply(CblasRight, CblasNoTrans, result);
-    return result;
+  Eigen::MatrixXd times(Eigen::MatrixXd m) const {  // mF
+    m.array().rowwise() *= scale_.transpose().array();
+    m = factor_.columns_permuted(std::move(m));
+    multiply(CblasRight, CblasNoTrans, m);
+    return m;
   }
 
  private:
@@ -287,15 +299,23 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
 
   const Eigen::Index n = own.b.size();
   if (n == 0) return check;
-  const CovarianceRoot root(boundary.restricted_to(condensed.unknowns));
-  const Eigen::MatrixXd seen = root.transposed_times(own.s);
-  // The rest's normal equations on the boundary are C^-1 - S. With C = FF' and W = I - F'SF, which has their nullity,
-  // s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
-  Eigen::MatrixXd w = Eigen::MatrixXd::Identity(n, n) - root.times(seen);
-  const SemidefiniteFactor rest = semidefinite_factor([&] { return w; }, kShared);
-  check.degrees = alone.rank - (n - rest.rank);
-  check.statistic = std::max(0.0, alone.value + rest.least_squares(root.transposed_times(own.b))) / variance_factor;
-  if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+  Eigen::MatrixXd seen;
+  {
+    const CovarianceRoot root(boundary.restricted_to(condensed.unknowns));
+    seen = root.transposed_times(own.s);
+    // The rest's normal equations on the boundary are C^-1 - S. With C = FF' and W = I - F'SF, which has their nullity,
+    // s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
+    const auto w = [&] {
+      Eigen::MatrixXd matrix = root.times(seen);
+      matrix = -matrix;
+      matrix.diagonal().array() += 1;
+      return matrix;
+    };
+    const SemidefiniteFactor rest = semidefinite_factor(w, kShared);
+    check.degrees = alone.rank - (n - rest.rank);
+    check.statistic = std::max(0.0, alone.value + rest.least_squares(root.transposed_times(own.b))) / variance_factor;
+    if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+  }
 
   check.worst = worst_of(check_unknowns(own, seen, condensed.unknowns, probability, variance_factor));
   return check;

@@ -128,7 +128,7 @@ void SerialRunner::covariances_from(std::int64_t number, CovarianceMatrix passed
   if (node.leaf >= 0) {
     const std::size_t t = at(node.leaf);
     const TileFactor& factor = inner_factor(number, 0).tile;
-    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], factor, passed, datum_of(t),
+    result[t] = covariance_tile(problems_[t], tile_plans_[t], states_[t], factor, std::move(passed), datum_of(t),
                                 with_columns_ ? steps_[t].unknowns : Step{});
     return;
   }

@@ -14,6 +14,7 @@
 #include "geometry/pose.h"
 #include "io/error.h"
 #include "io/file_error.h"
+#include "io/track_rows.h"
 
 namespace megablock {
 
@@ -47,46 +48,33 @@ std::vector<std::uint8_t> verdicts(const TileProblem& problem) {
 }
 
 // In 1 / 255 (TrackResults); what takes no part is NaN.
-std::vector<std::uint8_t> redundancy_column(const std::vector<float>& values, std::int64_t rows) {
-  std::vector<std::uint8_t> column;
-  column.reserve(static_cast<std::size_t>(rows));
-  for (std::int64_t o = 0; o < rows; ++o) {
-    const float value = values[static_cast<std::size_t>(o)];
-    column.push_back(value > 0 ? static_cast<std::uint8_t>(std::lround(255 * std::min(value, 1.f))) : 0);
-  }
-  return column;
+std::uint8_t stored_redundancy(float value) {
+  return value > 0 ? static_cast<std::uint8_t>(std::lround(255 * std::min(value, 1.f))) : 0;
 }
 
-// The tile's tracks; ids are their keys.
-TrackResults track_results(const RankTile& tile, const TrackSet& tracks, const std::vector<std::uint8_t>& kept,
-                           const TileCovariance& covariance) {
-  TrackResults result;
-  result.tracks = tracks;
-  const std::int64_t count = tracks.track_count(), rows = tracks.observation_count();
-  for (std::size_t o = 0; o < tracks.image.size(); ++o) {
-    result.tracks.x[o] = to_fixed_pixel(tile.problem.x[o]);
-    result.tracks.y[o] = to_fixed_pixel(tile.problem.y[o]);
-  }
-  result.file_tracks = tracks.id;
-  result.file_tiles.assign(static_cast<std::size_t>(count), TileIndex(tile.tile));
-  result.points.assign(tile.state.points.begin(), tile.state.points.begin() + count);
-  result.kept.assign(kept.begin(), kept.begin() + rows);
-  if (!covariance.points.empty())
-    result.point_covariance.assign(covariance.points.begin(), covariance.points.begin() + count);
-  if (!covariance.redundancy_x.empty()) {
-    result.redundancy_x = redundancy_column(covariance.redundancy_x, rows);
-    result.redundancy_y = redundancy_column(covariance.redundancy_y, rows);
-  }
-  result.residual_x.reserve(static_cast<std::size_t>(rows));
-  result.residual_y.reserve(static_cast<std::size_t>(rows));
-  for (std::int64_t p = 0; p < count; ++p)
-    for (std::int64_t o = tile.problem.begin[static_cast<std::size_t>(p)];
-         o < tile.problem.begin[static_cast<std::size_t>(p) + 1]; ++o) {
-      const Eigen::Vector2d r = residual(tile, p, o);
-      result.residual_x.push_back(static_cast<float>(r.x()));
-      result.residual_y.push_back(static_cast<float>(r.y()));
+// One of the tile's tracks, behind those of `to`; its id is its key.
+void append_track(const RankTile& tile, const TrackSet& tracks, const std::vector<std::uint8_t>& kept,
+                  const TileCovariance& covariance, std::int64_t track, TrackResults& to) {
+  const auto t = static_cast<std::size_t>(track);
+  append_tracks(tracks, track, track + 1, to.tracks);
+  to.file_tracks.push_back(tracks.id[t]);
+  to.file_tiles.push_back(TileIndex(tile.tile));
+  to.points.push_back(tile.state.points[t]);
+  if (!covariance.points.empty()) to.point_covariance.push_back(covariance.points[t]);
+  std::size_t row = to.kept.size();  // of the observation in `to`
+  for (std::int64_t observation = tracks.begin[t]; observation < tracks.begin[t + 1]; ++observation, ++row) {
+    const auto o = static_cast<std::size_t>(observation);
+    to.tracks.x[row] = to_fixed_pixel(tile.problem.x[o]);
+    to.tracks.y[row] = to_fixed_pixel(tile.problem.y[o]);
+    to.kept.push_back(kept[o]);
+    if (!covariance.redundancy_x.empty()) {
+      to.redundancy_x.push_back(stored_redundancy(covariance.redundancy_x[o]));
+      to.redundancy_y.push_back(stored_redundancy(covariance.redundancy_y[o]));
     }
-  return result;
+    const Eigen::Vector2d r = residual(tile, track, observation);
+    to.residual_x.push_back(static_cast<float>(r.x()));
+    to.residual_y.push_back(static_cast<float>(r.y()));
+  }
 }
 
 void add_control(const RankTile& tile, const std::vector<std::uint8_t>& kept,
@@ -156,16 +144,14 @@ TrackResults tracks_of(const Bytes& bytes) {
   return tracks;
 }
 
-// Ascending by key; parts of one track, which have one key, stay in their order.
-TrackResults in_key_order(TrackResults tracks) {
-  const std::vector<TrackIndex>& id = tracks.tracks.id;
-  if (std::is_sorted(id.begin(), id.end())) return tracks;
-  std::vector<std::size_t> order(id.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return id[a] < id[b]; });
-  TrackResults sorted;
-  for (const std::size_t row : order) sorted.append(tracks, row, row + 1);
-  return sorted;
+// Tracks ascending by key; parts of one track, which have one key, stay in their order.
+std::vector<std::int64_t> key_order(const TrackSet& tracks) {
+  std::vector<std::int64_t> order(tracks.id.size());
+  std::iota(order.begin(), order.end(), std::int64_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
+    return tracks.id[static_cast<std::size_t>(a)] < tracks.id[static_cast<std::size_t>(b)];
+  });
+  return order;
 }
 
 // Reads a part piece by piece; the file is open only while a piece is read, as there may be thousands of parts.
@@ -260,13 +246,13 @@ TilePart write_part(const std::string& path, const RankTile& tile, const TrackSe
   part.frames = touched_frames(tile.problem, kept);
   add_control(tile, kept, covariance.points, part);
 
-  const TrackResults ordered = in_key_order(track_results(tile, tracks, kept, covariance));
+  const std::vector<std::int64_t> order = key_order(tracks);
   errno = 0;
   std::ofstream file(path, std::ios::binary);
   for (std::int64_t first = 0; first < part.track_count; first += kPieceTracks) {
     TrackResults piece;
-    piece.append(ordered, static_cast<std::size_t>(first),
-                 static_cast<std::size_t>(std::min(first + kPieceTracks, part.track_count)));
+    for (std::int64_t i = first; i < std::min(first + kPieceTracks, part.track_count); ++i)
+      append_track(tile, tracks, kept, covariance, order[static_cast<std::size_t>(i)], piece);
     const Bytes bytes = bytes_of(piece);
     const auto length = static_cast<std::uint64_t>(bytes.size());
     file.write(reinterpret_cast<const char*>(&length), sizeof length);
