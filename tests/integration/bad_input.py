@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What bad input gets: one clear line, nothing lost, the documented exit code.
 
-usage: bad_input.py MEGABLOCK [unittest arguments]
+usage: bad_input.py MEGABLOCK [BadInput | Signals] [unittest arguments]
 Works on a small rendered block; needs nothing but the program and the standard library. Cases that need a file system
 of their own (full disk, read-only job) mount a tmpfs and are skipped, saying so, where that is not allowed.
 """
@@ -39,7 +39,7 @@ def tearDownModule():
     shutil.rmtree(work)
 
 
-class BadInput(unittest.TestCase):
+class CopyOfTheBlock(unittest.TestCase):
     def setUp(self):
         self.folder = work / self.id().split(".")[-1]
         shutil.copytree(work / "clean", self.folder)
@@ -50,6 +50,8 @@ class BadInput(unittest.TestCase):
     def run_job(self, expect=DONE):
         return megablock("run", self.project, "-j", self.job, "-q", expect=expect)
 
+
+class BadInput(CopyOfTheBlock):
     def pictures(self):
         return sorted(self.images.glob("*.jpg"))
 
@@ -426,7 +428,10 @@ class BadInput(unittest.TestCase):
         subprocess.check_call(["mount", "-o", "remount,ro", str(self.job)])
         self.assertRegex(one_line(self.run_job(BAD_INPUT)), "(?i)read-only")
 
-    # --- signals -----------------------------------------------------------------------------------------------------
+
+class Signals(CopyOfTheBlock):
+    """How soon a run ends is timed: they want the computer for themselves."""
+
     def test_sigterm_in_every_stage(self):
         reference = status(work / "clean_job")["digest"]
         begun = {"features": "job.json", "candidates": "features/000000.h5", "matching": "graph.h5",

@@ -52,8 +52,8 @@ def main():
         # Cameras and mounts known, then a lens whose distortion is not.
         for calibrated in (False, True):
             folder = pathlib.Path(scratch) / str(calibrated)
-            megablock("simulate", "--scene", "street", "--rendered", "--frames", 2, *["--no-calibration"] * calibrated,
-                      "-o", folder)
+            megablock("simulate", "--scene", "street", "--rendered", "--frames", 2, "--width", 1440,
+                      "--image-height", 960, "--focal", 1050, *["--no-calibration"] * calibrated, "-o", folder)
             table = folder / "verticals.csv"
             said = megablock("verticals", folder / "block.yaml", "-o", table)
             assert "8 of 8 images show the vertical" in said, said

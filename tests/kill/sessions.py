@@ -35,8 +35,11 @@ def kill_all(session):
 
 
 def kill_after(command, ranks, log, moment_s):
+    """Whether it still ran then."""
     process = start(command, ranks, log)
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(timeout=moment_s)
+    running = process.poll() is None
     kill_all(process.pid)
     process.wait()
+    return running

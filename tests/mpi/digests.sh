@@ -10,7 +10,8 @@ work=$(mktemp -d); trap 'rm -rf "$work"' EXIT
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 if [ "$scene" = rendered ]; then
   "$megablock" simulate --rendered --frames "$frames" --width 400 --image-height 320 --focal 320 -o "$work/block" >/dev/null
-  printf 'tiles:\n  tile_max_frames: %d\ncandidates:\n  cell_pairs: 10\n' $((frames / 4)) >> "$work/block/block.yaml"
+  printf 'tiles:\n  tile_max_frames: %d\ncandidates:\n  cell_pairs: 10\nfeatures:\n  max_features: 1500\n' \
+    $((frames / 4)) >> "$work/block/block.yaml"
 elif [ "$scene" = registration ]; then
   "$megablock" simulate --scene stereopolis --frames "$frames" --street-spacing 60 --points-per-frame 150 \
     --drift-per-frame 0.05 --control-zones 2 -o "$work/block" >/dev/null
