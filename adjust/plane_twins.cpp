@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -42,8 +44,8 @@ double agreement(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 }  // namespace
 
-void choose_twins_by_planes(OrientationGraph& graph) {
-  std::vector<std::vector<SeenNormals>> seen(graph.images.size());
+void choose_twins_by_planes(OrientationGraph& graph, std::size_t witnesses) {
+  std::vector<std::vector<SeenNormals>> seen(graph.images.size());  // the strongest pairs of each image first
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const OrientationGraph::PairEdge& edge = graph.edges[e];
     if (!edge.has_twin) continue;
@@ -52,13 +54,18 @@ void choose_twins_by_planes(OrientationGraph& graph) {
     seen[row(edge.a)].push_back({e, *normals});
     seen[row(edge.b)].push_back({e, {edge.rotation * (*normals)[0], edge.twin.rotation * (*normals)[1]}});
   }
+  const auto stronger = [&](const SeenNormals& one, const SeenNormals& other) {
+    const OrientationGraph::PairEdge &p = graph.edges[one.edge], &q = graph.edges[other.edge];
+    return std::tuple(-p.inliers, p.a, p.b) < std::tuple(-q.inliers, q.a, q.b);
+  };
+  for (std::vector<SeenNormals>& of_image : seen) std::sort(of_image.begin(), of_image.end(), stronger);
   // First each pair is held against whichever normals of the others fit, then against those chosen.
   std::vector<std::uint8_t> by_twin(graph.edges.size(), 0);
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::array<double, 2>> votes(graph.edges.size(), {0, 0});
     for (const std::vector<SeenNormals>& of_image : seen)
       for (const SeenNormals& one : of_image)
-        for (const SeenNormals& other : of_image) {
+        for (const SeenNormals& other : std::span(of_image).first(std::min(witnesses, of_image.size()))) {
           if (one.edge == other.edge) continue;
           const Eigen::Vector3d &chosen = other.normal[by_twin[other.edge]], &left = other.normal[!by_twin[other.edge]];
           for (std::size_t t = 0; t < 2; ++t) {

@@ -16,8 +16,12 @@
 
 namespace megablock {
 
+// Pairs of an image that the others of this image are held against: those of the most inliers. More of them say the
+// same again, and each with all others would be quadratic in the pairs of an image.
+inline constexpr std::size_t kTwinWitnesses = 64;
+
 // Puts the orientation whose normals agree with those of other pairs first, where it clearly does so better than its
 // twin; the other becomes its twin. Deterministic, whatever the order of the pairs.
-void choose_twins_by_planes(OrientationGraph& graph);
+void choose_twins_by_planes(OrientationGraph& graph, std::size_t witnesses = kTwinWitnesses);
 
 }  // namespace megablock
