@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "adjust/orientation_graph.h"
+#include "adjust/vertical_terms.h"
 #include "geometry/angles.h"
 #include "geometry/chi_square.h"
 #include "geometry/rotation.h"
@@ -235,6 +236,26 @@ std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eig
   std::vector<VerticalVerdict> verdicts(seen.size(), none ? VerticalVerdict::kNoConsensus : VerticalVerdict::kBelieved);
   for (std::size_t i = 0; i < found.size(); ++i) verdicts[index[i]] = found[i];
   return verdicts;
+}
+
+std::vector<SetAsideVertical> against_given_poses(const Block& block) {
+  constexpr double kApproximate = 5 * kDegree;
+  const GroundVertical ground(block.ground);
+  std::vector<SetAsideVertical> aside;
+  for (const SeenVertical& vertical : block.verticals) {
+    const std::optional<Pose>& given = block.frames[block.images[vertical.image].frame].given_pose;
+    if (!given) continue;
+    const Camera& camera = block.cameras[block.camera_of(vertical.image)];
+    const AxisDirection seen = whole_error(vertical, camera, camera.intrinsics);
+    const Eigen::Vector3d down =
+        block.mount_of(vertical.image).pose.rotation * (given->rotation * ground.down(given->centre));
+    const double variance = kApproximate * kApproximate + kLeaning * kLeaning;
+    if (!same_direction(down, seen.direction, seen.covariance + variance * Eigen::Matrix3d::Identity()))
+      aside.push_back({vertical.image, VerticalVerdict::kAgainstGround});
+  }
+  std::sort(aside.begin(), aside.end(),
+            [](const SetAsideVertical& a, const SetAsideVertical& b) { return a.image < b.image; });
+  return aside;
 }
 
 }  // namespace megablock

@@ -12,7 +12,8 @@
 // best path of edges, and a degree for walls that lean. What agrees makes groups. Of all that was compared with one
 // another the largest group is believed when it has a third of all and four fifths of those who agree with anybody:
 // rows of a field agree with themselves, but in strips flown to and fro half of them the other way round. Last, what a
-// group takes for down must be down by the positions or attitudes, where these tell.
+// group takes for down must be down by the positions or attitudes, where these tell. Frames with a given pose are not
+// oriented, so theirs are held against the pose alone, one by one.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -43,5 +44,9 @@ std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eig
                                              const std::vector<RelativeRotation>& edges,
                                              const std::vector<std::uint8_t>& kept, const std::vector<SeenDown>& seen,
                                              const std::optional<AxisDirection>& down);
+
+// Verticals of frames with a given pose that are wrong by it: farther off than an approximate pose can be, which is
+// taken to have a sigma of five degrees. By image.
+std::vector<SetAsideVertical> against_given_poses(const Block& block);
 
 }  // namespace megablock

@@ -32,7 +32,16 @@ struct VerticalsOptions {
 // Attitudes of sensors are those of the sensor: mountings, and edges of buildings, are off by this much.
 constexpr double kLeastSensorSigma = 2 * kDegree;
 
-// Where down should be: by the attitude of the frame, else by how the camera was held (EXIF).
+constexpr double kGivenPoseSigma = 5 * kDegree;  // approximate poses
+
+std::uint64_t seed_of(const Image& image) {
+  Hasher hasher;
+  hasher.add(std::string_view(image.name));
+  return hasher.value();
+}
+
+}  // namespace
+
 VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
   VerticalPrior prior;
   const Image& image = block.images[i];
@@ -42,6 +51,11 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
     prior.roll_sigma = prior.pitch_sigma = std::max(kLeastSensorSigma, frame.attitude_prior->sigma_rad.maxCoeff());
     return prior;
   }
+  if (frame.given_pose) {
+    prior.down = block.mount_of(i).pose.rotation * (frame.given_pose->rotation * -Eigen::Vector3d::UnitZ());
+    prior.roll_sigma = prior.pitch_sigma = kGivenPoseSigma;
+    return prior;
+  }
   try {
     prior.down = down_of_exif_orientation(read_image_header(image.path).orientation);
   } catch (const InputError&) {
@@ -49,11 +63,19 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
   return prior;
 }
 
-std::uint64_t seed_of(const Image& image) {
-  Hasher hasher;
-  hasher.add(std::string_view(image.name));
-  return hasher.value();
+// Cameras are held within a sigma of the level two times out of three. What looks upright from above, rows of fields or
+// trees, lies anywhere.
+std::string remark_on(const std::vector<ImageVertical>& verticals) {
+  constexpr std::size_t kFewest = 5;
+  std::vector<double> rolls;
+  for (const ImageVertical& v : verticals)
+    if (v.found) rolls.push_back(std::abs(v.roll));
+  if (rolls.size() < kFewest || median(rolls) < 1) return "";
+  return "Most of them are turned farther than cameras are held: pictures from above show no vertical, but rows of "
+         "fields look as if. Look at some before you use them.\n";
 }
+
+namespace {
 
 SeenVertical seen_vertical(ImageIndex image, const ImageVertical& found, const Intrinsics& camera) {
   return {image, found.down.direction, found.down.covariance,
@@ -71,18 +93,6 @@ std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
   return verticals_row(seen, name) + fmt::format(",{},{:.3f},{:.3g},{:.3g}\n", found_in, v.variance_factor,
                                                  std::sqrt(whole(0, 0)) * kDegreesPerRadian,
                                                  std::sqrt(whole(1, 1)) * kDegreesPerRadian);
-}
-
-// Cameras are held within a sigma of the level two times out of three. What looks upright from above, rows of fields or
-// trees, lies anywhere.
-std::string remark_on(const std::vector<ImageVertical>& verticals) {
-  constexpr std::size_t kFewest = 5;
-  std::vector<double> rolls;
-  for (const ImageVertical& v : verticals)
-    if (v.found) rolls.push_back(std::abs(v.roll));
-  if (rolls.size() < kFewest || median(rolls) < 1) return "";
-  return "Most of them are turned farther than cameras are held: pictures from above show no vertical, but rows of "
-         "fields look as if. Look at some before you use them.\n";
 }
 
 int write_verticals(VerticalsOptions options) {

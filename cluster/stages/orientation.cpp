@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "adjust/vertical_check.h"
 #include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/growth.h"
@@ -185,16 +186,19 @@ void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std
 
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   BlockState start = initial_state(job.block);
-  if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; }))
+  const std::size_t verticals = job.block.verticals.size();
+  std::vector<SetAsideVertical> aside;
+  set_aside(job, against_given_poses(job.block), aside);
+  if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
+    tell_of_verticals(job, aside, verticals);
     return held_in_place(job, std::move(start));
+  }
   if (matches.empty())
     throw AgreedError<InputError>(
         "images without pose cannot be oriented from given tie points alone; give poses in the project file");
   BlockState state;
   std::uint64_t previous = 0;
   std::int64_t images_before = 0;
-  const std::size_t verticals = job.block.verticals.size();
-  std::vector<SetAsideVertical> aside;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const Block block = first_images(job.block, job.generations[g]);
     Hasher hasher;

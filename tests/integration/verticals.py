@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Verticals of rendered street pictures against the true poses, their sigmas, and bad pictures. usage: verticals.py MEGABLOCK"""
+"""Verticals of rendered street pictures against the true poses, their sigmas, and bad pictures; verticals against given
+poses. usage: verticals.py MEGABLOCK"""
 import csv
 import json
 import math
@@ -47,6 +48,24 @@ def errors(folder, table):
     return math.sqrt(squares), normalised
 
 
+def against_given_poses(folder):
+    """A block of given poses, which is not oriented: verticals that contradict them are named and take no part."""
+    megablock("simulate", "--frames", 12, "--no-calibration", "-o", folder)
+    project, wrong = folder / "block.yaml", ("f000003.jpg", "f000007.jpg")
+    with project.open("a") as file:
+        file.write("verticals: verticals.csv\n")
+    table = ["image,down_x,down_y,down_z,sigma_deg"]
+    for row in rows(folder / "truth.csv"):
+        down = by_quaternion([float(row[k]) for k in ("qw", "qx", "qy", "qz")], [0, 0, -1])
+        if row["name"] in wrong:
+            down = down[1:] + down[:1]  # rows of a field
+        table.append(",".join([row["name"], *map(str, down), "0.1"]))
+    (folder / "verticals.csv").write_text("\n".join(table) + "\n")
+    said = megablock("run", project, "-j", folder / "job")
+    assert "2 of 12 verticals take no part: 2" in said and all(name in said for name in wrong), said
+    assert all(name in (folder / "job/result/report.html").read_text() for name in wrong)
+
+
 def main():
     with tempfile.TemporaryDirectory() as scratch:
         # Cameras and mounts known, then a lens whose distortion is not.
@@ -72,6 +91,7 @@ def main():
         lines = first.decode().splitlines()
         again = table.read_text().splitlines()
         assert [a for a, b in zip(again, lines) if a != b] == ["f000001_c2.jpg,,,,,,,,,,,0,0,0,,,"], again
+        against_given_poses(pathlib.Path(scratch) / "given")
 
 
 main()

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <random>
+#include <set>
 
 #include "geometry/angles.h"
 #include "tests/unit/adjust/orientation_scene.h"
+#include "tests/unit/adjust/seen_verticals.h"
 
 namespace megablock {
 namespace {
@@ -221,6 +223,44 @@ TEST(VerticalCheck, IsRepeatable) {
   const Averaged block = chain(200, 7);
   const Sights sights = sights_of(block, 0.1, 0.5, 8);
   EXPECT_EQ(block.judge(sights.seen), block.judge(sights.seen));
+}
+
+// One by one: a pose says of its own frame alone. What is off by as much as an approximate pose may be stays.
+TEST(VerticalCheck, AgainstGivenPoses) {
+  SimulationOptions options;
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 20;
+  options.rig_cameras = 2;
+  SimulatedBlock scene = simulate_block(options);
+  Block& block = scene.block;
+  add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1});
+  EXPECT_TRUE(against_given_poses(block).empty());
+
+  std::set<ImageIndex> wrong;
+  std::mt19937_64 random(6);
+  for (std::size_t v = 0; v < block.verticals.size(); ++v) {
+    SeenVertical& vertical = block.verticals[v];
+    const Eigen::Vector3d axis = tangent_plane(vertical.down).col(v % 2);
+    const double off_deg = v % 3 == 0 ? 30 + 5 * static_cast<double>(v % 20) : v % 3 == 1 ? 10 : 0;
+    vertical.down = rotation_exp<double>(off_deg * kDegree * axis) * vertical.down;
+    const Eigen::Matrix<double, 3, 2> across = tangent_plane(vertical.down);
+    vertical.covariance = std::pow(0.1 * kDegree, 2) * across * across.transpose();
+    if (v % 3 == 0) wrong.insert(vertical.image);
+  }
+  std::shuffle(block.verticals.begin(), block.verticals.end(), random);
+  std::set<ImageIndex> aside;
+  const std::vector<SetAsideVertical> found = against_given_poses(block);
+  for (const SetAsideVertical& vertical : found) {
+    EXPECT_EQ(vertical.verdict, VerticalVerdict::kAgainstGround);
+    aside.insert(vertical.image);
+  }
+  EXPECT_EQ(aside, wrong);
+  EXPECT_TRUE(
+      std::is_sorted(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.image < b.image; }));
+
+  // Frames without a given pose are not judged here.
+  for (FrameIndex f(0); block.frames.contains(f); ++f.value) block.frames[f].given_pose.reset();
+  EXPECT_TRUE(against_given_poses(block).empty());
 }
 
 }  // namespace
