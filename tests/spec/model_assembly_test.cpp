@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 
 #include "reached.h"
 #include "tests/unit/adjust/model_grid.h"
@@ -20,6 +21,7 @@ bool same_bits(const Similarity& a, const Similarity& b) {
 TEST(Spec, AT33SubBlocksAssembled) {
   model_grid::Options scene;
   scene.rows = scene.columns = 20;
+  scene.images_per_side = std::sqrt(250.0);
   scene.wrong_points = scene.wrong_links = 0.05;
   const ModelGrid grid(scene);
   std::printf("[ scene    ] %zu models, %.0f images and %.0f points each, %zu links, %zu wrong\n", grid.models.size(),
@@ -46,11 +48,15 @@ TEST(Spec, AT33SubBlocksAssembled) {
               joint.corner_rms, joint.corner, chained.corner_rms, chained.corner, chained.scale);
   EXPECT_GT(chained.corner_rms, 2 * joint.corner_rms);
 
-  AssemblyOptions places_only;
-  places_only.covariances = false;
-  const AssembledModels again = assemble_models(grid.shuffled(1), places_only);
-  for (std::size_t m = 0; m < grid.models.size(); ++m)
-    ASSERT_TRUE(same_bits(assembled.similarity[m], again.similarity[grid.place_when_shuffled(1)[m]])) << m;
+  for (const unsigned shuffle : {1u, 2u}) {
+    const AssembledModels again = assemble_models(grid.shuffled(shuffle));
+    const std::vector<std::size_t> place = grid.place_when_shuffled(shuffle);
+    ASSERT_EQ(again.covariance.size(), grid.models.size());
+    for (std::size_t m = 0; m < grid.models.size(); ++m) {
+      ASSERT_TRUE(same_bits(assembled.similarity[m], again.similarity[place[m]])) << shuffle << ' ' << m;
+      ASSERT_EQ(assembled.covariance[m], again.covariance[place[m]]) << shuffle << ' ' << m;
+    }
+  }
 }
 
 }  // namespace

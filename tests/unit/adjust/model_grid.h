@@ -17,7 +17,7 @@ namespace megablock::model_grid {
 struct Options {
   int rows = 4, columns = 4;
   double side = 2000, overlap = 0.2;
-  int images_per_side = 16;  // of a sub-block; 0: none
+  double images_per_side = 16;  // of a sub-block; 0: none
   double points_per_side = 20;
   double relief = 100;
   double sigma = 0.1, rotation_sigma = 1e-4;  // units, rad
