@@ -71,6 +71,7 @@ class LinkEstimator {
       if (agrees[i]) count += turn(i) ? 6 : 3;
     return count;
   }
+  // Of the places alone, which is careful: an image whose attitude must agree too does so by accident less often.
   double chance(double sigmas) const { return by_places_.chance(sigmas); }
   double extent() const { return by_places_.extent(); }
 

@@ -201,6 +201,41 @@ TEST(ModelAssembly, LinksOfOpenSigmasFindWhatAgrees) {
   EXPECT_LT(rotation_angle(by_images->similarity.rotation, truth.rotation), 3e-3);
 }
 
+// How meaningful it is that images agree is told by their places alone, which is careful: of few images as many have to
+// agree as of points. It costs nothing, as those few are found among samples of which most places agree, where points
+// of the same places are not: attitudes make hypotheses, and take away what does not fit.
+TEST(ModelAssembly, FewImagesAreFoundWhoseChanceIsThatOfPlaces) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal;
+  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  const Similarity truth{2, rotation_exp<double>({0.3, -0.2, 1}), {10, 20, 30}};
+  LinkOptions options;
+  options.scale_sigmas = true;
+  for (const auto& [right, all] :
+       {std::pair(3, 4), std::pair(3, 5), std::pair(4, 6), std::pair(5, 8), std::pair(5, 15)}) {
+    std::vector<Model> images{{1, {}, {}}, {2, {}, {}}}, points = images;
+    SharedRows of_images, of_points;
+    for (int i = 0; i < all; ++i) {
+      const Pose pose{rotation_exp<double>(vector()), 300 * vector()};
+      Pose moved = truth(pose);
+      moved.centre += (i < right ? 0.02 : 200) * vector();
+      moved.rotation = rotation_update(moved.rotation, (i < right ? 1e-4 : 1) * vector());
+      images[1].images.push_back({i, pose, 0.01, 1e-4});
+      images[0].images.push_back({i, moved, 0.02, 1e-4});
+      points[1].points.push_back({i, pose.centre, 0.01});
+      points[0].points.push_back({i, moved.centre, 0.02});
+      of_images.images.emplace_back(i, i);
+      of_points.points.emplace_back(i, i);
+    }
+    const auto by_images = fit_model_link(images, 0, 1, of_images, options);
+    ASSERT_TRUE(by_images) << right << " of " << all;
+    EXPECT_EQ(by_images->agreeing, right) << right << " of " << all;
+    EXPECT_LT(rotation_angle(by_images->similarity.rotation, truth.rotation), 2e-4) << right << " of " << all;
+    const auto by_points = fit_model_link(points, 0, 1, of_points, options);
+    EXPECT_EQ(by_points && by_points->agreeing == right, right > 4) << right << " of " << all;
+  }
+}
+
 TEST(ModelAssembly, CovariancesAreBlocksOfTheInverse) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
