@@ -9,6 +9,8 @@ target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})
 target_link_libraries(megablock_options INTERFACE OpenMP::OpenMP_CXX)  # everywhere: precompiled headers are shared
 # Contraction off: a*b+c gives the same bits wherever the compiler could have fused it or not.
 target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow -ffp-contract=off)
+# Programs start with the libraries they use: each test is a process.
+target_link_options(megablock_options INTERFACE LINKER:--as-needed)
 # GCC 12's false alarms on inlined copies of std::string and std::vector.
 target_compile_options(megablock_options INTERFACE -Wno-restrict -Wno-stringop-overflow -Wno-array-bounds
                                                    -Wno-stringop-overread)
