@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <complex>
+#include <limits>
 
 #include "geometry/polynomial.h"
 
@@ -132,7 +133,8 @@ LinearInXy equation_from(const Eigen::Matrix<double, 1, 10>& upper, const Eigen:
 constexpr double kSolved = 1e-10;  // of the sines of the angles between rays and epipolar planes
 
 // Newton on b' [t]x R a = 0, five equations in rotation and base. False where it does not end at a solution. One step
-// does for simple roots; towards multiple ones (a plane seen along its normal) each only halves the distance.
+// does for simple roots. Towards double ones (a plane seen along its normal) each only halves the distance and leaves a
+// quarter of the residuals: where the last one did, the next is twice as long, which restores quadratic convergence.
 bool polish_orientation(const FiveRays& a, const FiveRays& b, RelativeOrientation& o) {
   const auto residuals = [&](const RelativeOrientation& at) {
     const Eigen::Matrix3d essential = essential_from(at);
@@ -141,8 +143,9 @@ bool polish_orientation(const FiveRays& a, const FiveRays& b, RelativeOrientatio
     return r;
   };
   Eigen::Matrix<double, 5, 1> r = residuals(o);
+  double before = std::numeric_limits<double>::infinity();  // sum of squares
   for (int iteration = 0; iteration < 25; ++iteration) {
-    if (r.squaredNorm() < 1e-31) return true;
+    if (r.squaredNorm() < 1e-30) return true;
     const Eigen::Matrix3d rotation = o.rotation.toRotationMatrix();
     const Eigen::Vector3d first = o.base.unitOrthogonal(), second = o.base.cross(first);
     Eigen::Matrix<double, 5, 5> jacobian;
@@ -155,6 +158,9 @@ bool polish_orientation(const FiveRays& a, const FiveRays& b, RelativeOrientatio
       jacobian(i, 4) = normal.dot(second);
     }
     Eigen::Matrix<double, 5, 1> step = jacobian.partialPivLu().solve(r);
+    const double share = r.squaredNorm() / before;
+    if (share > 1.0 / 32 && share < 1.0 / 8) step *= 2;
+    before = r.squaredNorm();
     const double length = step.norm();
     if (!std::isfinite(length)) break;
     if (length > 0.1) step *= 0.1 / length;

@@ -25,7 +25,7 @@ bool polish(const Eigen::Vector3d& cosine, const Eigen::Vector3d& side_squared, 
       jacobian(k, j) = 2 * (s[j] - s[i] * cosine[k]);
     }
     error = f.norm();
-    if (error < 1e-14 * side_squared.norm()) break;
+    if (error < 1e-15 * s.squaredNorm()) break;  // what rounding leaves
     const Eigen::Vector3d step = jacobian.partialPivLu().solve(f);
     if (!step.allFinite() || step.norm() > s.norm()) break;
     s -= step;

@@ -16,7 +16,7 @@ namespace megablock {
 
 // Algorithm number of each stage: part of its fingerprints, raised when its results change.
 namespace algorithm {
-inline constexpr int kFeatures = 1, kCandidates = 1, kMatching = 4, kTiles = 3, kTracks = 3, kOrientation = 5,
+inline constexpr int kFeatures = 1, kCandidates = 1, kMatching = 5, kTiles = 3, kTracks = 3, kOrientation = 6,
                      kAdjustment = 10, kMerge = 11, kResult = 1;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/median.h"
 #include "pair_scene.h"
 
 namespace megablock {
@@ -53,6 +54,21 @@ TEST(FivePoint, StructuredScenesAreNoSpecialCase) {
       }
     }
   }
+}
+
+// Newton steps as long as those for simple roots end at some 1e-5 degrees.
+TEST(FivePoint, DoubleRootsAreReached) {
+  std::mt19937_64 random(14);
+  PairSceneOptions options;
+  options.base = {0, 0, 0.3};
+  options.plane = true;
+  std::vector<double> errors;
+  for (int trial = 0; trial < 200; ++trial) {
+    const PairScene scene = five_of(options, random);
+    errors.push_back(
+        nearest_error_deg(solve_five_point(scene.first<5>(scene.a), scene.first<5>(scene.b)), scene.truth));
+  }
+  EXPECT_LT(median(std::move(errors)), 1e-7);
 }
 
 TEST(FivePoint, NothingForBadPoints) {
