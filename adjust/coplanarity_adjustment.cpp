@@ -379,6 +379,35 @@ CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   return result;
 }
 
+CoplanaritySpectrum spectrum(const CoplanarityNetwork& network) {
+  const CoplanarityDiagnosis diagnosis = diagnose(network);
+  std::vector<std::uint8_t> met;
+  const CoplanarityNetwork exact = brought_together(network, met);
+  const FreeColumns free(network);
+  Eigen::MatrixXd both = Eigen::MatrixXd::Zero(diagnosis.rows, free.count);
+  Eigen::Index row = 0;
+  for (std::int64_t j = 0; j < network.point_count(); ++j) {
+    if (!met[static_cast<std::size_t>(j)]) continue;
+    visit_pairs(network, j, [&](std::size_t a, std::size_t b) {
+      visit_derivatives(exact, free, a, b, determinant(exact, a, b),
+                        [&](std::int64_t column, double value) { both(row, column) = value; });
+      ++row;
+    });
+  }
+  // Eigenvalues of (0 C; C' 0), half of them negative: without squares, which would lose the small ones. Zeros are told
+  // by the rank that scaled rows have.
+  const auto above_zero = [](const Eigen::MatrixXd& c, std::int64_t rank) -> std::vector<double> {
+    Eigen::MatrixXd symmetric = Eigen::MatrixXd::Zero(c.rows() + c.cols(), c.rows() + c.cols());
+    symmetric.bottomLeftCorner(c.cols(), c.rows()) = c.transpose();
+    const Eigen::VectorXd values = symmetric_eigen(symmetric).values.reverse().head(rank);
+    return {values.begin(), values.end()};
+  };
+  const auto& angles = diagnosis.angle_values;
+  return {
+      above_zero(both.leftCols(free.angles), rank_of(Eigen::VectorXd::Map(angles.data(), std::ssize(angles)), kAngles)),
+      above_zero(both.rightCols(free.count - free.angles), diagnosis.image_rank), above_zero(both, diagnosis.rank)};
+}
+
 CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, const CoplanarityOptions& options) {
   options.check();
   CoplanaritySolution solution;

@@ -67,6 +67,14 @@ struct CoplanarityDiagnosis {
 };
 CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network);
 
+// Singular values above zero of A, B and (A B), m px^2 per radian and per pixel, descending: at the rays that meet,
+// of the free parameters. Their numbers are the ranks; their squares are what the report plots of A'A, B'B and M'M.
+// Dense, for the scenes of the report: seconds at 1 000 parameters, the third power of their number.
+struct CoplanaritySpectrum {
+  std::vector<double> angles, images, both;
+};
+CoplanaritySpectrum spectrum(const CoplanarityNetwork& network);
+
 struct CoplanaritySolution {
   CoplanarityNetwork network;              // with corrected angles and image coordinates; held ones have the same bits
   double mean_before = 0, mean_after = 0;  // of |F|

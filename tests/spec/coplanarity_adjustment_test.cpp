@@ -343,6 +343,43 @@ TEST(CoplanarityAdjustment, TKP10ConditionOfTheAngles) {
   expect_at_most(drone_most, 100, "drone, condition of A");
 }
 
+// A, B and M = (A B) of 16 points. B and M are never of full rank: their condition is that of what they determine.
+TEST(CoplanarityAdjustment, TKP10SingularValuesOfAnglesImagesAndBoth) {
+  for (const bool drone : {false, true}) {
+    const KnownPositionsOptions options =
+        drone ? KnownPositionsOptions::drone(16, 1) : KnownPositionsOptions::satellite(16, 0.1, 1);
+    const CoplanarityNetwork network = network_of(KnownPositionsScene(options));
+    const CoplanaritySpectrum values = spectrum(network);
+    ASSERT_EQ(values.angles.size(), 18u);
+    ASSERT_EQ(values.images.size(), 16u * 9);
+    ASSERT_EQ(values.both.size(), 16u * 9);
+    const CoplanarityDiagnosis diagnosis = diagnose(network);
+    for (std::size_t i = 0; i < 18; ++i)
+      EXPECT_NEAR(values.angles[i], diagnosis.angle_values[i], 1e-7 * diagnosis.angle_values.front());
+
+    // B is one block per point.
+    CoplanarityNetwork one = network;
+    hold_angles(one);
+    one.begin.resize(2);
+    one.camera.resize(6);
+    one.image.resize(6);
+    for (const double value : spectrum(one).images)
+      EXPECT_THAT(values.images, testing::Contains(testing::DoubleNear(value, 1e-9 * value)));
+    // Columns more make no singular value smaller, and the squares add up.
+    double squares = 0, sum = 0;
+    for (std::size_t i = 0; i < values.both.size(); ++i) {
+      EXPECT_GE(values.both[i], values.images[i] * (1 - 1e-9));
+      squares += values.both[i] * values.both[i];
+      sum += values.images[i] * values.images[i];
+    }
+    for (const double value : values.angles) sum += value * value;
+    EXPECT_NEAR(squares, sum, 1e-9 * sum);
+    std::printf("[ reached  ] %s: A %.3g to %.3g, B %.3g to %.3g, M %.3g to %.3g\n", drone ? "drone" : "satellite",
+                values.angles.front(), values.angles.back(), values.images.front(), values.images.back(),
+                values.both.front(), values.both.back());
+  }
+}
+
 TEST(CoplanarityAdjustment, RefusesBadNetworks) {
   const CoplanarityNetwork good = network_of(KnownPositionsScene(KnownPositionsOptions::drone(8, 1)));
   const auto refused = [](CoplanarityNetwork network, const std::string& why) {
