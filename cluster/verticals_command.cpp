@@ -57,7 +57,7 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
     return prior;
   }
   try {
-    prior.down = down_of_exif_orientation(read_image_header(image.path).orientation);
+    prior.down = down_of_exif_orientation(read_image_header(block.path_of(image)).orientation);
   } catch (const InputError&) {
   }  // reading the picture says what is wrong with it
   return prior;
@@ -100,7 +100,8 @@ int write_verticals(VerticalsOptions options) {
   const Project project = read_project(options.project);
   const Block& block = project.block;
   namespace fs = std::filesystem;
-  if (std::none_of(block.images.begin(), block.images.end(), [](const Image& i) { return fs::exists(i.path); }))
+  if (std::none_of(block.images.begin(), block.images.end(),
+                   [&](const Image& i) { return fs::exists(block.path_of(i)); }))
     throw InputError(options.project + ": the project has no pictures; verticals are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "verticals.csv").string();
   const fs::path output = fs::absolute(options.output);
@@ -112,8 +113,8 @@ int write_verticals(VerticalsOptions options) {
   for (std::int64_t k = 0; k < count; ++k) {
     const ImageIndex i(k);
     verticals[static_cast<std::size_t>(k)] =
-        find_image_vertical(block.images[i].path, block.cameras[block.camera_of(i)], expected_vertical(block, i),
-                            seed_of(block.images[i]), options.segments);
+        find_image_vertical(block.path_of(block.images[i]), block.cameras[block.camera_of(i)],
+                            expected_vertical(block, i), seed_of(block.images[i]), options.segments);
   }
 
   std::string table = verticals_header() +

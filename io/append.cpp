@@ -79,6 +79,7 @@ Block append_to(const Block& previous, const Block& now) {
   }
   Block merged;
   merged.ground = previous.ground.georeferenced ? previous.ground : now.ground;
+  merged.image_folder = now.image_folder;  // the job's may have been moved
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
   const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
   const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);

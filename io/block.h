@@ -76,7 +76,6 @@ struct Frame {
 
 struct Image {
   std::string name;  // unique; relative path in the image folder
-  std::string path;  // file, absolute; empty for simulated tie points
   FrameIndex frame;
   int mount = 0;                // in the frame's rig
   std::uint64_t file_hash = 0;  // XXH3 of the file (0: none)
@@ -131,6 +130,7 @@ struct SeenVertical {
 
 struct Block {
   GroundFrame ground;
+  std::string image_folder;  // absolute, ends with '/'; empty for simulated tie points
   IndexedVector<CameraIndex, Camera> cameras;
   IndexedVector<RigIndex, Rig> rigs;
   IndexedVector<FrameIndex, Frame> frames;
@@ -145,6 +145,7 @@ struct Block {
     return rig_of(images[image].frame).mounts[static_cast<std::size_t>(images[image].mount)];
   }
   CameraIndex camera_of(ImageIndex image) const { return mount_of(image).camera; }
+  std::string path_of(const Image& image) const { return image_folder.empty() ? "" : image_folder + image.name; }
 };
 
 // Current values of everything but points. Mounts are indexed [rig][mount].

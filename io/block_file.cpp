@@ -202,7 +202,7 @@ IndexedVector<FrameIndex, Frame> get_frames(const Hdf5Reader& file) {
 void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images, const Block& block) {
   file.group("images", "one row per exposure");
   file.texts("images/name", column(images, [](const Image& i) { return i.name; }));
-  file.texts("images/path", column(images, [](const Image& i) { return i.path; }),
+  file.texts("images/path", column(images, [&](const Image& i) { return block.path_of(i); }),
              {"", "image file; empty for simulated tie points"});
   file.vector("images/frame", column(images, [](const Image& i) { return i.frame.value; }), {"", "row in frames"});
   file.vector("images/mount", column(images, [](const Image& i) { return static_cast<std::int32_t>(i.mount); }),
@@ -221,17 +221,25 @@ void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images
               {"", "XXH3 of the image file, 0: none"});
 }
 
+// What stands before the images' names in their paths, of which all but one would only be repeated.
+std::string get_image_folder(const Hdf5Reader& file) {
+  if (file.shape("images/path") != file.shape("images/name")) file.fail("images/path", "has not a row per image");
+  if (file.shape("images/name") == std::vector<std::int64_t>{0}) return "";
+  const std::string path = file.text_rows("images/path", {{0, 1}}).front();
+  const std::string name = file.text_rows("images/name", {{0, 1}}).front();
+  return path.ends_with(name) ? path.substr(0, path.size() - name.size()) : "";
+}
+
 IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
-  const std::vector<std::string> names = file.texts("images/name");
+  std::vector<std::string> names = file.texts("images/name");
   const auto count = static_cast<std::int64_t>(names.size());
-  const std::vector<std::string> paths = file.texts("images/path", count);
   const auto frames = file.vector<std::int64_t>("images/frame", count);
   const auto mounts = file.vector<std::int32_t>("images/mount", count);
   const auto hashes = file.vector<std::uint64_t>("images/file_hash", count);
   IndexedVector<ImageIndex, Image> images;
   images.reserve(names.size());
   for (std::size_t i = 0; i < names.size(); ++i)
-    images.push_back({names[i], paths[i], FrameIndex(frames[i]), mounts[i], hashes[i]});
+    images.push_back({std::move(names[i]), FrameIndex(frames[i]), mounts[i], hashes[i]});
   return images;
 }
 
@@ -432,6 +440,7 @@ Block get_block(const Hdf5Reader& file) {
   block.cameras = get_cameras(file);
   block.rigs = get_rigs(file);
   block.frames = get_frames(file);
+  block.image_folder = get_image_folder(file);
   block.images = get_images(file);
   block.relative_poses = get_relative_poses(file);
   block.control_points = get_control(file);

@@ -133,7 +133,7 @@ void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping groupin
       block.cameras.push_back(make_camera(name, image.header));
       block.rigs.push_back(std::move(rig));
     }
-    Image entry{image.name, image.path, block.frames.next_index(), 0, image.hash};
+    Image entry{image.name, block.frames.next_index(), 0, image.hash};
     Frame frame;
     frame.name = image.name;
     frame.rig = found->second;

@@ -99,7 +99,10 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
 
   auto cameras = top.mapping("cameras");
   const CameraGrouping grouping = cameras ? read_camera_grouping(*cameras) : CameraGrouping::kExif;
-  if (images) add_images(scanned, grouping, project.block);
+  if (images) {
+    project.block.image_folder = (fs::path(*images) / "").string();
+    add_images(scanned, grouping, project.block);
+  }
   if (cameras) read_cameras(*cameras, project.block);
   if (const auto masks = top.existing_folder("masks")) read_masks(*masks, project);
   read_rigs(top, project);

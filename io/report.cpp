@@ -39,12 +39,7 @@ std::string name_of(const std::string& job);
 std::string title_of(const BlockResult& result, const std::string& job) {
   const std::string project = std::filesystem::path(result.provenance.project).stem().string();
   if (!project.empty() && project != "block") return project;
-  if (result.block.images.contains(ImageIndex(0))) {
-    const Image& first = result.block.images[ImageIndex(0)];
-    const std::size_t folder = first.path.size() - std::min(first.path.size(), first.name.size() + 1);
-    if (folder > 0 && first.path.ends_with("/" + first.name))
-      if (std::string name = name_of(first.path.substr(0, folder)); !name.empty()) return name;
-  }
+  if (std::string name = name_of(result.block.image_folder); !name.empty()) return name;
   return name_of(job);
 }
 

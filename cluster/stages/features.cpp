@@ -74,7 +74,7 @@ void write_shard(const Job& job, const Shard& shard, const std::string& path) {
     const ImageIndex image(shard.first + i);
     const std::string& mask = job.block.cameras[job.block.camera_of(image)].mask_path;
     images[static_cast<std::size_t>(i)] =
-        detect_features(job.block.images[image].path, mask, image, job.settings.features);
+        detect_features(job.block.path_of(job.block.images[image]), mask, image, job.settings.features);
   }
   write_features(path, images);
 }

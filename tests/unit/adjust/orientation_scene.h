@@ -18,7 +18,7 @@ namespace megablock::orientation_scene {
 
 struct SceneOptions {
   double noise_px = 0.5;
-  double wrong_tracks = 0.1;    // share of tracks with one observation anywhere in the image
+  double wrong_tracks = 0.1;  // share of tracks with one observation anywhere in the image
   double focal_px = 1200;
   double focal_guess = 1;       // times the true focal length; unless 1 the block says that it is a guess
   double gps_sigma_m = 0;       // <= 0: none
@@ -66,8 +66,7 @@ inline SimulatedBlock make_scene(const std::vector<Pose>& poses, const std::vect
       frame.position_prior->position = poses[i].centre + options.gps_sigma_m * normal_vector(random);
     }
     scene.block.frames.push_back(frame);
-    scene.block.images.push_back(
-        {"image" + std::to_string(1000 + i), "", FrameIndex(static_cast<std::int64_t>(i)), 0, 0});
+    scene.block.images.push_back({"image" + std::to_string(1000 + i), FrameIndex(static_cast<std::int64_t>(i)), 0, 0});
   }
   scene.truth = initial_state(scene.block);
   scene.truth.frames = IndexedVector<FrameIndex, Pose>(poses);

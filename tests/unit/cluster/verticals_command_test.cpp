@@ -54,7 +54,7 @@ TEST(VerticalsCommand, ExpectsDownWhereTheFrameSaysItIs) {
 
   frame.attitude_prior.reset();
   frame.given_pose.reset();
-  block.images[image].path = "nowhere.jpg";
+  block.image_folder = "/nowhere/";
   const VerticalPrior by_camera = expected_vertical(block, image);
   EXPECT_EQ(by_camera.down, Eigen::Vector3d::UnitY());
   EXPECT_EQ(by_camera.roll_sigma, VerticalPrior().roll_sigma);

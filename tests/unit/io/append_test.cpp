@@ -30,7 +30,7 @@ Block block_of(const std::vector<std::string>& names, const GroundFrame& ground)
     frame.position_prior = PositionPrior{{static_cast<double>(name.back()), 2, 3}};
     frame.attitude_prior = AttitudePrior{};
     frame.given_pose = Pose{Eigen::Quaterniond::Identity(), {1, 2, static_cast<double>(name.back())}};
-    block.images.push_back({name, "", block.frames.next_index(), 0, 0});
+    block.images.push_back({name, block.frames.next_index(), 0, 0});
     block.frames.push_back(frame);
   }
   ControlPoint point;
@@ -84,7 +84,9 @@ TEST(AppendTo, ContentsAreTheNewOnes) {
   Block now = block_of({"b1", "b2"}, kHere);
   now.cameras[CameraIndex(0)].intrinsics[kFocal] = 123;
   now.frames[FrameIndex(1)].position_prior.reset();
+  now.image_folder = "/moved/";
   const Block merged = append_to(block_of({"b1", "b2"}, kHere), now);
+  EXPECT_EQ(merged.image_folder, "/moved/");
   EXPECT_EQ(merged.cameras[CameraIndex(0)].intrinsics[kFocal], 123);
   EXPECT_FALSE(merged.frames[FrameIndex(1)].position_prior);
 }

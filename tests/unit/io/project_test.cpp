@@ -61,7 +61,7 @@ TEST(Project, ScansImagesInByteOrderAndGroupsThem) {
   std::vector<std::string> names;
   for (const Image& image : project.block.images) names.push_back(image.name);
   EXPECT_THAT(names, ElementsAre("B.jpeg", "a.png", "b/10.jpg", "b/2.JPG"));
-  EXPECT_EQ(project.block.images[ImageIndex(3)].path, folder / "images/b/2.JPG");
+  EXPECT_EQ(project.block.path_of(project.block.images[ImageIndex(3)]), folder / "images/b/2.JPG");
   EXPECT_EQ(project.block.images[ImageIndex(3)].file_hash, hash_file(folder / "images/b/2.JPG"));
   ASSERT_THAT(project.block.cameras, SizeIs(3));
   const Camera& dji = project.block.cameras[CameraIndex(0)];

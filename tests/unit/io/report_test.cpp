@@ -126,8 +126,7 @@ TEST(Report, SaysWhatTheResultComesFrom) {
 
 TEST(Report, IsCalledByTheProjectOrTheImageFolder) {
   BlockResult result = made_up_result(small_block());
-  Image& first = result.block.images[ImageIndex(0)];
-  first.path = "/data/photos/" + first.name;
+  result.block.image_folder = "/data/photos/";
   EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: photos</h1>"));
   result.provenance.project = "harbour-2024.yaml";
   EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: harbour-2024</h1>"));
@@ -332,7 +331,7 @@ TEST(ReportFigures, IntersectionAnglesAndTrackLengths) {
   for (int i = 0; i < 2; ++i) {
     result.block.frames.push_back({});
     result.block.frames.back().rig = RigIndex(0);
-    result.block.images.push_back({std::to_string(i), "", FrameIndex(i), 0, 0});
+    result.block.images.push_back({std::to_string(i), FrameIndex(i), 0, 0});
     result.state.frames.push_back({Eigen::Quaterniond::Identity(), Eigen::Vector3d(2.0 * i, 0, 0)});
     result.state.oriented.push_back(1);
   }

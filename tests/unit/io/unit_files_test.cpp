@@ -84,10 +84,10 @@ void expect_equal(const Block& a, const Block& b) {
   }
   ASSERT_EQ(a.frames.size(), b.frames.size());
   for (FrameIndex f(0); a.frames.contains(f); ++f.value) expect_equal(a.frames[f], b.frames[f]);
+  EXPECT_EQ(a.image_folder, b.image_folder);
   ASSERT_EQ(a.images.size(), b.images.size());
   for (ImageIndex i(0); a.images.contains(i); ++i.value) {
     EXPECT_EQ(a.images[i].name, b.images[i].name);
-    EXPECT_EQ(a.images[i].path, b.images[i].path);
     EXPECT_EQ(a.images[i].frame, b.images[i].frame);
     EXPECT_EQ(a.images[i].mount, b.images[i].mount);
     EXPECT_EQ(a.images[i].file_hash, b.images[i].file_hash);

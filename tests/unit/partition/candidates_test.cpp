@@ -41,7 +41,7 @@ ImageIndex add_photo(Block& block, const std::string& name, std::optional<Eigen:
   if (position) frame.position_prior = PositionPrior{*position, Eigen::Vector3d(3, 3, 6), Eigen::Vector3d::Zero()};
   const FrameIndex index = block.frames.next_index();
   block.frames.push_back(frame);
-  block.images.push_back(Image{name, "", index, 0, 0});
+  block.images.push_back(Image{name, index, 0, 0});
   return ImageIndex(block.images.next_index().value - 1);
 }
 
@@ -325,7 +325,7 @@ TEST(Candidates, RigImagesByConesAndViewingDirections) {
     frame.given_pose = Pose{looking(0, 0), Eigen::Vector3d(0, 4.0 * f, 2)};
     block.frames.push_back(frame);
     for (int m = 0; m < 5; ++m)
-      block.images.push_back(Image{frame.name + "/" + std::to_string(m), "", FrameIndex(f), m, 0});
+      block.images.push_back(Image{frame.name + "/" + std::to_string(m), FrameIndex(f), m, 0});
   }
   const CandidateOptions options;
   const CandidateGraph graph = candidate_pairs(block, {}, options);
