@@ -86,8 +86,8 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
 }
 
 RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
-                       const MemoryOptions& memory)
-    : ranks_(ranks), tiles_(tiles), factors_(memory) {
+                       const MemoryOptions& memory, const NodeSolver& solver)
+    : ranks_(ranks), tiles_(tiles), solver_(solver), factors_(memory) {
   rank_of_node_.assign(tree.nodes.size(), 0);
   own_tile_of_node_.assign(tree.nodes.size(), -1);
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
@@ -193,7 +193,7 @@ UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, U
   const auto n = static_cast<std::size_t>(node);
   const Stopwatch watch(seconds_.fronts);
   const LeastSquares left_alone = left.alone, right_alone = right.alone;
-  Front::Result result = eliminate_node(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
+  Front::Result result = solver_.eliminate(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
   if (check_seam_here) {
     result.update.alone = least_squares(result.update);
     seams_.push_back(check_seam(node, left_alone, right_alone, result, seam_probability()));
@@ -301,7 +301,7 @@ std::vector<TileStep> RankRunner::steps_down(const Pass& pass) {
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     const Stopwatch watch(node.leaf < 0 ? seconds_.fronts : seconds_.tiles);
     if (node.leaf < 0) {
-      pass_down(n, back_substitute_node(factors_of(n, pass).front, passed));
+      pass_down(n, solver_.back_substitute(factors_of(n, pass).front, passed));
       continue;
     }
     const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
@@ -382,7 +382,7 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
     factors_.leave_room(waiting_bytes() + front_bytes(n));
     const NodeFactors& factors = factors_of(n, 0);
     if (node.leaf < 0) {
-      const FrontCovariance covariance = covariance_node(factors.front, std::move(passed));
+      const FrontCovariance covariance = solver_.covariance(factors.front, std::move(passed));
       factors_.discard(n);
       pass_down(n, covariance);
       continue;

@@ -37,9 +37,10 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
 
 class RankRunner : public TreeRunner {
  public:
-  // `tiles`: this rank's, ascending, longer-lived than the runner; rank_of_tile: of all tiles. Collective.
+  // `tiles`: this rank's, ascending, longer-lived than the runner, as is `solver`; rank_of_tile: of all tiles.
+  // Collective.
   RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
-             const MemoryOptions& memory);
+             const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
   ~RankRunner() override;
 
   UpReport up(const Pass& pass) override;
@@ -100,6 +101,7 @@ class RankRunner : public TreeRunner {
 
   Communicator& ranks_;
   TileStore& tiles_;
+  const NodeSolver& solver_;
   std::vector<TilePlan> tile_plans_;              // of tiles_
   std::vector<TileGauge> gauges_, trial_gauges_;  // of tiles_, at their states and after a step
   std::vector<int> rank_of_node_;

@@ -1,20 +1,35 @@
 #include "merge/node.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace megablock {
 
-Front::Result eliminate_node(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) {
-  Front front(node.eliminated, node.passed, std::max(left.right_hand_sides, right.right_hand_sides));
-  for (UpdateMatrix* child : {&left, &right}) {
-    front.add(*child);
-    *child = UpdateMatrix();  // its memory is wanted
+namespace {
+
+class DenseNodeSolver final : public NodeSolver {
+ public:
+  Front::Result eliminate(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) const override {
+    Front front(node.eliminated, node.passed, std::max(left.right_hand_sides, right.right_hand_sides));
+    for (UpdateMatrix* child : {&left, &right}) {
+      front.add(*child);
+      *child = UpdateMatrix();  // its memory is wanted
+    }
+    return std::move(front).eliminate(lambda);
   }
-  return std::move(front).eliminate(lambda);
-}
+  Step back_substitute(const FrontFactor& factor, const Step& parent) const override {
+    return megablock::back_substitute(factor, parent);
+  }
+  FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix passed) const override {
+    return covariance_down(factor, std::move(passed));
+  }
+};
 
-Step back_substitute_node(const FrontFactor& factor, const Step& parent) { return back_substitute(factor, parent); }
+}  // namespace
 
-FrontCovariance covariance_node(const FrontFactor& factor, CovarianceMatrix passed) {
-  return covariance_down(factor, std::move(passed));
+const NodeSolver& dense_node_solver() {
+  static const DenseNodeSolver solver;
+  return solver;
 }
 
 }  // namespace megablock

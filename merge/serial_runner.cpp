@@ -7,8 +7,8 @@
 namespace megablock {
 
 SerialRunner::SerialRunner(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
-                           MemoryOptions memory)
-    : problems_(std::move(problems)), states_(std::move(states)), factors_(std::move(memory)) {
+                           MemoryOptions memory, const NodeSolver& solver)
+    : problems_(std::move(problems)), states_(std::move(states)), factors_(std::move(memory)), solver_(solver) {
   std::vector<UnknownList> lists;
   for (const TileProblem& problem : problems_) lists.push_back(tile_unknowns(problem));
   plan_ = make_plan(tree, lists);
@@ -39,7 +39,7 @@ UpdateMatrix SerialRunner::condense_subtree(std::int64_t number, const Pass& pas
     UpdateMatrix left = condense_subtree(node.left, pass, check_seams);
     UpdateMatrix right = condense_subtree(node.right, pass, check_seams);
     const LeastSquares left_alone = left.alone, right_alone = right.alone;
-    Front::Result result = eliminate_node(node, std::move(left), std::move(right), pass.lambda);
+    Front::Result result = solver_.eliminate(node, std::move(left), std::move(right), pass.lambda);
     if (check_seams) {
       result.update.alone = least_squares(result.update);
       seams_.push_back(check_seam(number, left_alone, right_alone, result,
@@ -96,7 +96,7 @@ void SerialRunner::down_from(std::int64_t number, const Pass& pass, const Step& 
         solve_tile_down(problems_[t], tile_plans_[t], states_[t], pass, inner_factor(number, pass).tile, parent);
     return;
   }
-  const Step step = back_substitute_node(inner_factor(number, pass).front, parent);
+  const Step step = solver_.back_substitute(inner_factor(number, pass).front, parent);
   down_from(node.right, pass, step);
   down_from(node.left, pass, step);
 }
@@ -132,7 +132,7 @@ void SerialRunner::covariances_from(std::int64_t number, CovarianceMatrix passed
                                 with_columns_ ? steps_[t].unknowns : Step{});
     return;
   }
-  const FrontCovariance covariance = covariance_node(inner_factor(number, 0).front, std::move(passed));
+  const FrontCovariance covariance = solver_.covariance(inner_factor(number, 0).front, std::move(passed));
   for (const std::int64_t child : {node.right, node.left})
     covariances_from(child, covariance.restricted_to(plan_.nodes[at(child)].passed), result);
 }

@@ -16,9 +16,9 @@ namespace megablock {
 
 class SerialRunner : public TreeRunner {
  public:
-  // problems[t] and states[t] of tile t; the states' common unknowns must agree.
+  // problems[t] and states[t] of tile t; the states' common unknowns must agree. `solver` outlives the runner.
   SerialRunner(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
-               MemoryOptions memory = {});
+               MemoryOptions memory = {}, const NodeSolver& solver = dense_node_solver());
   ~SerialRunner() override;
 
   UpReport up(const Pass& pass) override;
@@ -64,6 +64,7 @@ class SerialRunner : public TreeRunner {
   std::vector<TileStep> steps_;
   EliminationPlan plan_;
   FactorStore factors_;
+  const NodeSolver& solver_;
   BlockGauge block_gauge_;
   bool with_columns_ = false;  // the last pass carries the further right-hand sides of a free datum
   GaugeReport gauge_;
