@@ -69,6 +69,66 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SameOptimum,
                            return p.param == SimulationOptions::Scene::kAerial ? "Aerial" : "Street";
                          });
 
+// Every loss, with and without shared calibration, with priors and free.
+struct OptimumCase {
+  SimulationOptions::Scene scene;
+  RobustLoss::Kind loss;
+  bool shared, free;
+};
+
+class EveryOptimum : public testing::TestWithParam<OptimumCase> {};
+
+SimulatedBlock block_of(const OptimumCase& c) {
+  SimulationOptions options = scene(c.scene, 70);
+  options.calibrate = c.shared;
+  if (c.free) options.gps_sigma_m = 0;
+  SimulatedBlock block = simulate_block(options);
+  if (!c.shared) return block;
+  for (Rig& rig : block.block.rigs)
+    for (std::size_t m = 1; m < rig.mounts.size(); ++m) {
+      rig.mounts[m].rotation_sigma_rad = 0.01;
+      rig.mounts[m].position_sigma_m = 0.05;
+    }
+  return block;
+}
+
+TEST_P(EveryOptimum, AsOneCeresProblem) {
+  ObservationOptions observations;
+  observations.image_loss = {GetParam().loss, 3};
+  observations.position_loss = {GetParam().loss, 3};
+  const TiledBlock block(block_of(GetParam()), 14, observations, 0.02);
+  ASSERT_GE(block.tiles.tile_count, 5);
+  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  GlobalState state = start_global(exact());
+  adjust_globally(runner, exact(), state);
+  EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
+  EXPECT_EQ(runner.block_gauge().free(), GetParam().free);
+
+  const TileState solution = block.gathered(runner.problems(), runner.states());
+  MergeTree alone;
+  alone.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
+  SerialRunner whole(alone, {block.whole}, {solution});
+  whole.up(0);
+  EXPECT_LE(max_pose_difference_sigmas(block.whole, solution, whole.block_gauge(), whole.tile_plans().front()), 1e-6);
+  const double cost = evaluate_cost(block.whole, solution);
+  EXPECT_NEAR(cost_after_ceres(block.whole, solution, 30), cost, 1e-9 * cost);
+}
+
+std::vector<OptimumCase> every_case() {
+  std::vector<OptimumCase> cases;
+  for (const auto scene : {SimulationOptions::Scene::kAerial, SimulationOptions::Scene::kStreet})
+    for (const auto loss : {RobustLoss::Kind::kHuber, RobustLoss::Kind::kCauchy})
+      for (const bool shared : {false, true})
+        for (const bool free : {false, true}) cases.push_back({scene, loss, shared, free});
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, EveryOptimum, testing::ValuesIn(every_case()), [](const auto& p) {
+  return std::string(p.param.scene == SimulationOptions::Scene::kAerial ? "Aerial" : "Street") +
+         (p.param.loss == RobustLoss::Kind::kHuber ? "Huber" : "Cauchy") + (p.param.shared ? "Shared" : "Held") +
+         (p.param.free ? "Free" : "Priors");
+});
+
 bool same_bits(const TileState& a, const TileState& b) {
   const auto same_pose = [](const Pose& x, const Pose& y) {
     return x.rotation.coeffs() == y.rotation.coeffs() && x.centre == y.centre;
