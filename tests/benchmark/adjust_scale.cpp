@@ -1,7 +1,7 @@
 // One job on a simulated block of any size, from given tie points to the evaluated result:
 //
-//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 896] [--folder F]
-//                [--seed 1]
+//   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 16] [--folder F]
+//                [--seed 1] [--calibration held|shared]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
 // its last line; seconds are those of the run on the wall clock. What --folder holds is not simulated again.
@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 struct ScaleOptions {
   SceneOptions scene;
   int ranks = 1, threads = 1;
-  double memory_mib = 896;  // per rank, for tiles, fronts and factors of the merge
+  double memory_mib = 16;  // per rank, for tiles, fronts and factors of the merge
   std::string arithmetic = "avx2";
 };
 
@@ -130,6 +130,8 @@ int main(int argc, char** argv) {
   ScaleOptions options;
   CLI::App app("One job on a simulated block of any size; prints one JSON object");
   add_scene_options(app, options.scene);
+  app.add_option("--calibration", options.scene.calibration, "By default a street's is held, an aerial block's shared")
+      ->check(CLI::IsMember({"held", "shared"}));
   app.add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 1024));
   app.add_option("--threads", options.threads, "Threads per rank")->check(CLI::Range(1, 1024));
   app.add_option("--memory", options.memory_mib, "Memory per rank for tiles, fronts and factors, MiB")
