@@ -227,8 +227,11 @@ std::optional<Eigen::Vector3d> restitute(std::span<const ElevenParameters> image
     if (!triangle.allFinite() || !(svd.singularValues()[2] > 1e-7 * svd.singularValues()[0])) return std::nullopt;
     point = svd.solve(equations.factor().topRightCorner<3, 1>());
   }
+  point += reference;
   if (!point.allFinite()) return std::nullopt;
-  return reference + point;
+  for (const ElevenParameters& image : images)
+    if (!in_front(image, point)) return std::nullopt;
+  return point;
 }
 
 }  // namespace megablock

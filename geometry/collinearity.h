@@ -54,6 +54,12 @@ inline bool in_front(const NineParameters& image, const Eigen::Vector3d& point) 
   return image.rotation.row(2).dot(point - image.centre) < 0;
 }
 
+// The sign of C.M + 1 is that of g in front of the image, and g > 0 where det [A; B; C] = -p^2 / g^3 < 0.
+inline bool in_front(const ElevenParameters& image, const Eigen::Vector3d& point) {
+  const double denominator = image.c.dot(point - image.origin) + 1;
+  return image.a.cross(image.b).dot(image.c) < 0 ? denominator > 0 : denominator < 0;
+}
+
 // Our camera (pose.h: y down, looking along +z) is turned half around x:  R_cw = diag(1, -1, -1) R, and the image's y
 // is reversed: x_p and p are those of pixels, y = -(row - y_p of the pixels).
 Pose pose_from(const NineParameters& image);
@@ -91,8 +97,8 @@ std::optional<FittedNine> fit_nine(const NineParameters& start, std::span<const 
                                    std::span<const Eigen::Vector2d> image);
 
 // The point seen in two and more images (restitution): (2) times its denominator, linear; repeated with the
-// denominators as weights, so that its residuals are those of the image coordinates. Empty for fewer than two images or
-// rays parallel within about 1e-7, and where something is not a number.
+// denominators as weights, so that its residuals are those of the image coordinates. Empty for fewer than two images,
+// rays parallel within about 1e-7, a point that comes to lie behind an image, and where something is not a number.
 std::optional<Eigen::Vector3d> restitute(std::span<const ElevenParameters> images,
                                          std::span<const Eigen::Vector2d> coordinates);
 

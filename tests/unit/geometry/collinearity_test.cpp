@@ -116,5 +116,25 @@ TEST(Collinearity, RestitutionOfBadInput) {
   EXPECT_FALSE(restitute(same, std::vector<Eigen::Vector2d>{{1, 2}, {std::nan(""), 2}}));
 }
 
+// Whatever the side of the image that the origin lies on.
+TEST(Collinearity, RestitutionRefusesPointsBehindTheImages) {
+  const NineParameters first = tilted_image();
+  NineParameters second = first;
+  second.centre += 20 * first.rotation.row(0).transpose();
+  const Eigen::Vector3d ahead = -first.rotation.row(2).transpose();
+  for (const double origin_at : {150.0, -150.0})
+    for (const double point_at : {100.0, -100.0}) {
+      const Eigen::Vector3d origin = first.centre + origin_at * ahead, point = first.centre + point_at * ahead;
+      const std::vector<ElevenParameters> images = {eleven_from(first, origin).value(),
+                                                    eleven_from(second, origin).value()};
+      EXPECT_EQ(in_front(images[0], point), in_front(first, point));
+      const auto found = restitute(images, std::vector<Eigen::Vector2d>{project(first, point), project(second, point)});
+      ASSERT_EQ(found.has_value(), point_at > 0) << origin_at;
+      if (found.has_value()) {
+        EXPECT_LT((*found - point).norm(), 1e-6);
+      }
+    }
+}
+
 }  // namespace
 }  // namespace megablock
