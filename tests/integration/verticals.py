@@ -48,6 +48,22 @@ def errors(folder, table):
     return math.sqrt(squares), normalised
 
 
+def held_upside_down(folder, table):
+    """A picture whose EXIF orientation says that the camera was held upside down: down is where up was."""
+    picture = folder / "images" / "f000000_c1.jpg"
+    upright = picture.read_bytes()
+    entry = bytes.fromhex("12010300010000000100")  # orientation, one short: 1
+    assert upright.count(entry) == 1
+    before = {row["image"]: row for row in rows(table)}[picture.name]
+    picture.write_bytes(upright.replace(entry, bytes.fromhex("12010300010000000300")))
+    turned = table.with_name("turned.csv")
+    megablock("verticals", folder / "block.yaml", "-o", turned)
+    after = {row["image"]: row for row in rows(turned)}[picture.name]
+    for axis in "xyz":
+        assert abs(float(before[f"down_{axis}"]) + float(after[f"down_{axis}"])) < 1e-6, (before, after)
+    picture.write_bytes(upright)
+
+
 def against_given_poses(folder):
     """A block of given poses, which is not oriented: verticals that contradict them are named and take no part."""
     megablock("simulate", "--frames", 12, "--no-calibration", "-o", folder)
@@ -84,6 +100,7 @@ def main():
         first = table.read_bytes()
         megablock("verticals", folder / "block.yaml", "-o", table)
         assert table.read_bytes() == first
+        held_upside_down(folder, table)
         picture = folder / "images" / "f000001_c2.jpg"
         picture.write_bytes(picture.read_bytes()[:20000])
         said = megablock("verticals", folder / "block.yaml", "-o", table, expect=FAILED_UNITS)
