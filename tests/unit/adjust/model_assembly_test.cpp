@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "adjust/similarity_equations.h"
 #include "io/error.h"
 #include "tests/unit/adjust/model_grid.h"
@@ -112,6 +114,60 @@ TEST(ModelAssembly, WrongPointsAndLinksAreLeftOut) {
   EXPECT_EQ(grid.right_links_removed(found), 0);
   EXPECT_LT(grid.errors(found).normalised, 5);
   EXPECT_NEAR(found.sigma0, 1, 0.05);
+}
+
+// The smallest models: pairs of images, each as long as its own base, joined by the image and the points that
+// successive ones share.
+TEST(ModelAssembly, PairsOfImagesJoinIntoAStrip) {
+  constexpr int kImages = 10;
+  constexpr double kSigma = 1e-3;  // of points and centres, bases
+  std::mt19937_64 random(71);
+  std::normal_distribution<double> gauss;
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto noise = [&](double sigma) {
+    return Eigen::Vector3d(sigma * gauss(random), sigma * gauss(random), sigma * gauss(random));
+  };
+  std::vector<Pose> images;
+  for (int i = 0; i < kImages; ++i)
+    images.push_back({rotation_exp<double>(noise(0.2)), Eigen::Vector3d(i, 0, 0) + noise(0.2)});
+  std::vector<Eigen::Vector3d> points;
+  for (int p = 0; p < 300; ++p)
+    points.emplace_back(0.5 * (kImages - 1) * (1 + 1.2 * uniform(random)), 2 * uniform(random), 5 + uniform(random));
+
+  std::vector<Model> models;
+  std::vector<double> bases;
+  for (int k = 0; k + 1 < kImages; ++k) {
+    const Pose &first = images[static_cast<std::size_t>(k)], &second = images[static_cast<std::size_t>(k) + 1];
+    bases.push_back((second.centre - first.centre).norm());
+    const auto in_model = [&](const Eigen::Vector3d& x) {
+      return Eigen::Vector3d(first.rotation * (x - first.centre) / bases.back());
+    };
+    Model model;
+    model.number = k;
+    for (std::size_t p = 0; p < points.size(); ++p)
+      if (std::abs(points[p].x() - k - 0.5) < 1.5)
+        model.points.push_back({static_cast<std::int64_t>(p), in_model(points[p]) + noise(kSigma), kSigma});
+    for (const int i : {k, k + 1}) {
+      const Pose& image = images[static_cast<std::size_t>(i)];
+      const Pose seen{rotation_exp<double>(noise(kSigma)) * image.rotation * first.rotation.conjugate(),
+                      in_model(image.centre) + noise(kSigma)};
+      model.images.push_back({i, seen, kSigma, kSigma});
+    }
+    models.push_back(model);
+  }
+
+  const AssembledModels found = assemble_models(models);
+  for (std::size_t k = 0; k < models.size(); ++k) {
+    ASSERT_EQ(found.part[k], 0);
+    EXPECT_NEAR(found.similarity[k].scale, bases[k] / bases[0], 0.01);
+    for (const ModelImage& image : models[k].images) {
+      const Pose& truth = images[static_cast<std::size_t>(image.number)];
+      const Eigen::Vector3d expected = images[0].rotation * (truth.centre - images[0].centre) / bases[0];
+      EXPECT_LT((found.similarity[k](image.pose.centre) - expected).norm(), 0.03) << k << ' ' << image.number;
+    }
+  }
+  EXPECT_EQ(found.rejected, 0);
+  EXPECT_NEAR(found.sigma0, 1, 0.1);
 }
 
 TEST(ModelAssembly, OrderOfModelsAndPointsDoesNotMatter) {
