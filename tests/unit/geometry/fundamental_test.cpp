@@ -105,6 +105,29 @@ TEST(Fundamental, NothingForBadPoints) {
   centre.base.setZero();
   const PairScene still(centre, 20, random);
   EXPECT_FALSE(fit_essential(still.a, still.b)) << "no base";
+  std::vector<Eigen::Vector3d> unknown = rays.a;
+  unknown[2].x() = std::nan("");
+  EXPECT_FALSE(fit_essential(unknown, rays.b));
+  EXPECT_FALSE(fit_essential(std::span(rays.a).first(7), std::span(rays.b).first(7)));
+}
+
+TEST(Fundamental, NothingForSevenBadPoints) {
+  std::mt19937_64 random(34);
+  const auto seven = [](const std::vector<Eigen::Vector2d>& points) {
+    std::array<Eigen::Vector2d, 7> first;
+    std::copy_n(points.begin(), 7, first.begin());
+    return first;
+  };
+  const PixelScene scene(PairScene(turned(), 7, random));
+  auto a = seven(scene.a), b = seven(scene.b);
+  EXPECT_FALSE(solve_seven_point(a, b).empty());
+  a[4] = a[5];
+  b[4] = b[5];
+  EXPECT_TRUE(solve_seven_point(a, b).empty()) << "two points are one";
+  PairSceneOptions centre = turned();
+  centre.base.setZero();
+  const PixelScene still(PairScene(centre, 7, random));
+  EXPECT_TRUE(solve_seven_point(seven(still.a), seven(still.b)).empty()) << "no base";
   std::array<Eigen::Vector2d, 7> line;
   for (std::size_t i = 0; i < 7; ++i) line[i] = static_cast<double>(i) * Eigen::Vector2d(3, 2);
   EXPECT_TRUE(solve_seven_point(line, line).empty()) << "all on one line";

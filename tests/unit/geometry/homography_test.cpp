@@ -124,6 +124,21 @@ TEST(Homography, NothingForBadPoints) {
   EXPECT_TRUE(orientations_of_homography(Eigen::Matrix3d::Constant(std::nan(""))).empty());
 }
 
+TEST(Homography, NothingForBadPixels) {
+  const std::vector<Eigen::Vector2d> square = {{0, 0}, {100, 0}, {100, 80}, {0, 80}};
+  ASSERT_TRUE(fit_pixel_homography(square, square));
+  EXPECT_FALSE(fit_pixel_homography(std::span(square).first(3), std::span(square).first(3)));
+  auto bad = square;
+  bad[2].y() = std::nan("");
+  EXPECT_FALSE(fit_pixel_homography(bad, square));
+  bad = square;
+  bad[0] = bad[1];
+  EXPECT_FALSE(fit_pixel_homography(bad, bad)) << "two points are one";
+  for (std::size_t i = 0; i < 4; ++i) bad[i] = static_cast<double>(i) * Eigen::Vector2d(3, 2);
+  EXPECT_FALSE(fit_pixel_homography(bad, bad)) << "all on one line";
+  EXPECT_FALSE(fit_pixel_homography(std::vector<Eigen::Vector2d>(4, {5, 5}), square)) << "all in one place";
+}
+
 TEST(RotationPair, TwoRaysGiveTheRotationOfOneCentre) {
   std::mt19937_64 random(25);
   for (int trial = 0; trial < 200; ++trial) {
