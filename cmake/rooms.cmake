@@ -21,7 +21,9 @@ if(MEGABLOCK_SANITIZE)
   # Without the checks of pointers that the address sanitizer makes anyway: in Eigen they triple the build's time.
   target_compile_options(megablock_options INTERFACE -fsanitize=address,undefined
                          -fno-sanitize=null,object-size,alignment,vptr
-                         -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+                         -fno-omit-frame-pointer -fno-sanitize-recover=undefined
+                         # GCC's manual: with sanitizers this warning errs, here on Eigen's temporaries.
+                         -Wno-maybe-uninitialized)
   # Debian's static libceres holds Eigen code compiled without sanitizers, which takes memory from malloc as it is.
   target_compile_definitions(megablock_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
   target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)

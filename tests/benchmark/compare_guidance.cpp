@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/simulate/render.h"
@@ -18,6 +17,7 @@
 #include "match/match_filter.h"
 #include "match/pair_matching.h"
 #include "partition/candidates.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace {
 
@@ -62,7 +62,8 @@ Town make_town(std::int64_t frames, double repeated, std::uint64_t seed) {
   town.block = simulated.block;
   town.block.relative_poses.clear();  // pictures come with poses alone
   const auto& city = dynamic_cast<const City&>(*town.layout.scene);
-  const std::string file = (std::filesystem::temp_directory_path() / "compare_guidance.jpg").string();
+  const ScratchDirectory scratch;
+  const std::string file = scratch.path("image.jpg");
   town.features.resize(town.block.images.size());
   for (CameraIndex camera(0); town.block.cameras.contains(camera); ++camera.value) {
     const RayTable rays(town.block.cameras[camera], town.layout.truth.cameras[camera]);
@@ -72,7 +73,6 @@ Town make_town(std::int64_t frames, double repeated, std::uint64_t seed) {
       town.features[static_cast<std::size_t>(i.value)] = detect_features(file, "", i, {});
     }
   }
-  std::filesystem::remove(file);
   return town;
 }
 

@@ -9,6 +9,7 @@
 
 #include "io/crs.h"
 #include "real_data.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -19,16 +20,11 @@ namespace fs = std::filesystem;
 // A project file in a folder of its own.
 class ProjectFile {
  public:
-  explicit ProjectFile(const std::string& text)
-      : folder_(fs::temp_directory_path() / ("megablock_real_" + std::to_string(::getpid()))) {
-    fs::create_directories(folder_);
-    std::ofstream(folder_ / "block.yaml") << text;
-  }
-  ~ProjectFile() { fs::remove_all(folder_); }
-  std::string path() const { return (folder_ / "block.yaml").string(); }
+  explicit ProjectFile(const std::string& text) { std::ofstream(path()) << text; }
+  std::string path() const { return scratch_.path("block.yaml"); }
 
  private:
-  fs::path folder_;
+  ScratchDirectory scratch_;
 };
 
 Project read_set(const std::string& set, const std::string& more = "") {

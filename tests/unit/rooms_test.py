@@ -33,5 +33,10 @@ for room, allowed in MAY_INCLUDE.items():
                 problems.append(f"{path}:{number}: only cluster includes MPI")
             if name.lower().startswith(("hdf5", "h5")) and room != "io":
                 problems.append(f"{path}:{number}: only io includes HDF5")
+# Tests run side by side: none may name a place in the temporary folder, each gets one of its own.
+names_a_place = re.compile(r"TempDir\(|temp_directory_path\(")
+for path in sorted((source / "tests").rglob("*")):
+    if path.suffix in (".h", ".cpp") and path.name != "scratch_directory.h" and names_a_place.search(path.read_text()):
+        problems.append(f"{path}: tests get their folders from ScratchDirectory")
 print("\n".join(problems) or f"{files} files keep to the arrows")
 sys.exit(1 if problems or files < 50 else 0)

@@ -8,6 +8,7 @@
 #include "cluster/job_options.h"
 #include "cluster/status.h"
 #include "io/error.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -19,11 +20,7 @@ using testing::StartsWith;
 
 class JobJsonTest : public testing::Test {
  protected:
-  JobJsonTest() : store_(testing::TempDir() + "job_json") {
-    std::filesystem::remove_all(store_.directory());
-    store_.create();
-  }
-  ~JobJsonTest() override { std::filesystem::remove_all(store_.directory()); }
+  JobJsonTest() : store_(scratch_.path("job")) { store_.create(); }
 
   void write(const std::string& text) { std::ofstream(store_.path("job.json")) << text; }
 
@@ -36,6 +33,7 @@ class JobJsonTest : public testing::Test {
     return "";
   }
 
+  ScratchDirectory scratch_;
   JobStore store_;
 };
 

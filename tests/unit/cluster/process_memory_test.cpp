@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/unit/io/scratch_directory.h"
+
 namespace megablock {
 namespace {
 
@@ -14,18 +16,13 @@ namespace fs = std::filesystem;
 
 class ControlGroup : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("megablock-control-group-" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   void write(const std::string& name, const std::string& text) {
-    fs::create_directories((folder_ / name).parent_path());
-    std::ofstream(folder_ / name) << text << "\n";
+    fs::create_directories(fs::path(scratch_.path(name)).parent_path());
+    std::ofstream(scratch_.path(name)) << text << "\n";
   }
-  double limit() const { return control_group_memory_mib((folder_ / "list").string(), (folder_ / "root").string()); }
+  double limit() const { return control_group_memory_mib(scratch_.path("list"), scratch_.path("root")); }
 
-  fs::path folder_;
+  ScratchDirectory scratch_;
 };
 
 TEST_F(ControlGroup, LeastOfTheGroupAndThoseAboveIt) {
@@ -46,7 +43,7 @@ TEST_F(ControlGroup, VersionOneHasAFolderOfItsOwn) {
 TEST_F(ControlGroup, NoLimit) {
   write("list", "0::/");
   EXPECT_TRUE(std::isinf(limit()));
-  EXPECT_TRUE(std::isinf(control_group_memory_mib((folder_ / "absent").string(), (folder_ / "root").string())));
+  EXPECT_TRUE(std::isinf(control_group_memory_mib(scratch_.path("absent"), scratch_.path("root"))));
 }
 
 TEST(HostMemory, IsFiniteAndPositive) {

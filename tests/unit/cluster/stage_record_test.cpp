@@ -7,19 +7,14 @@
 #include <fstream>
 
 #include "io/error.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
 
 class StageRecordTest : public testing::Test {
  protected:
-  StageRecordTest() : store_(testing::TempDir() + "stage_record_" + unit_test_name()) {
-    std::filesystem::remove_all(store_.directory());
-    store_.create();
-  }
-  ~StageRecordTest() override { std::filesystem::remove_all(store_.directory()); }
-
-  static std::string unit_test_name() { return testing::UnitTest::GetInstance()->current_test_info()->name(); }
+  StageRecordTest() : store_(scratch_.path("job")) { store_.create(); }
 
   // The record of a stage after the one before, with one unit; `make`: the unit's file too.
   StageRecord add(const std::string& stage, const StageRecord* before, std::uint64_t fingerprint, bool make) {
@@ -36,6 +31,7 @@ class StageRecordTest : public testing::Test {
     return names;
   }
 
+  ScratchDirectory scratch_;
   JobStore store_;
 };
 

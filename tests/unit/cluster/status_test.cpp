@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/unit/io/made_up_result.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -16,9 +17,7 @@ using testing::Not;
 
 class StatusTest : public testing::Test {
  protected:
-  StatusTest()
-      : store_(testing::TempDir() + "status_" + testing::UnitTest::GetInstance()->current_test_info()->name()) {
-    std::filesystem::remove_all(store_.directory());
+  StatusTest() : store_(scratch_.path("job")) {
     store_.create();
     std::ofstream(store_.path("job.json")) << "{}";
     SimulationOptions options;
@@ -27,13 +26,13 @@ class StatusTest : public testing::Test {
     options.check_points = 2;
     result_ = made_up_result(options, 2);
   }
-  ~StatusTest() override { std::filesystem::remove_all(store_.directory()); }
 
   void write() {
     store_.write("result/block.h5", 1, [&](const std::string& path) { write_result(path, result_); });
   }
   nlohmann::json json() const { return nlohmann::json::parse(status_json(store_)); }
 
+  ScratchDirectory scratch_;
   JobStore store_;
   BlockResult result_;
 };

@@ -9,6 +9,7 @@
 #include "io/pose_csv.h"
 #include "io/project.h"
 #include "small_result.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -16,7 +17,6 @@ namespace {
 using fixture::gps_tags;
 using fixture::message_of;
 using fixture::small_result;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using fixture::write_picture;
 using ::testing::ElementsAre;
@@ -24,13 +24,13 @@ using ::testing::HasSubstr;
 
 // What the export wrote comes back as given poses of the frames, rigs included.
 TEST(ApproximatePoses, ReadWhatTheExportWrites) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  export_result(result, "csv", folder / "out");
+  export_result(result, "csv", folder.path("out"));
   for (const std::string name : {"frames.csv", "images_local.csv", "images_wgs84.csv"}) {
     Block block = result.block;
     std::vector<std::string> warnings;
-    set_given_poses(read_approximate_poses(folder / ("out/" + name)), {}, block, warnings);
+    set_given_poses(read_approximate_poses(folder.path("out/" + name)), {}, block, warnings);
     for (const FrameIndex f : {FrameIndex(0), FrameIndex(1), FrameIndex(3)}) {
       ASSERT_TRUE(block.frames[f].given_pose) << name;
       EXPECT_LT((block.frames[f].given_pose->centre - result.state.frames[f].centre).norm(), 2e-5) << name;
@@ -42,31 +42,31 @@ TEST(ApproximatePoses, ReadWhatTheExportWrites) {
 
 // A pose by the name of the second camera of a rig gives the frame's.
 TEST(ApproximatePoses, OfAnyImageOfARig) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  export_result(result, "csv", folder / "out");
-  std::istringstream lines(fixture::read_file(folder / "out/images_local.csv"));
+  export_result(result, "csv", folder.path("out"));
+  std::istringstream lines(fixture::read_file(folder.path("out/images_local.csv")));
   std::string header, first, second;
   std::getline(lines, header);
   std::getline(lines, first);
   std::getline(lines, second);
-  write_file(folder / "p.csv", header + "\n" + second + "\n");
+  write_file(folder.path("p.csv"), header + "\n" + second + "\n");
   Block block = result.block;
   std::vector<std::string> warnings;
-  set_given_poses(read_approximate_poses(folder / "p.csv"), {}, block, warnings);
+  set_given_poses(read_approximate_poses(folder.path("p.csv")), {}, block, warnings);
   const Pose& pose = *block.frames[FrameIndex(0)].given_pose;
   EXPECT_LT((pose.centre - result.state.frames[FrameIndex(0)].centre).norm(), 1e-9);
   EXPECT_LT(rotation_angle(pose.rotation, result.state.frames[FrameIndex(0)].rotation), 1e-9);
 }
 
 TEST(ApproximatePoses, FramesOfAnotherOriginAreTurned) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  write_pose_csv(folder / "p.csv", pose_table(result.block, result.state));
+  write_pose_csv(folder.path("p.csv"), pose_table(result.block, result.state));
   Block block = result.block;
   block.ground = {true, 46.9, -92.1, 150, "EPSG:4979"};
   std::vector<std::string> warnings;
-  set_given_poses(read_approximate_poses(folder / "p.csv"), {}, block, warnings);
+  set_given_poses(read_approximate_poses(folder.path("p.csv")), {}, block, warnings);
   const Georeference before(result.block.ground), after(block.ground);
   const Pose &pose = *block.frames[FrameIndex(0)].given_pose, &given = result.state.frames[FrameIndex(0)];
   for (const Eigen::Vector3d& point : {Eigen::Vector3d(0, 0, 0), {30, -20, 5}}) {
@@ -76,15 +76,15 @@ TEST(ApproximatePoses, FramesOfAnotherOriginAreTurned) {
 }
 
 TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
-  TemporaryFolder folder;
-  write_picture(folder / "images/a.jpg", 64, 48, 1);
-  write_picture(folder / "images/b.jpg", 64, 48, 2);
-  write_file(folder / "images/broken.jpg", "");
-  write_file(folder / "poses.csv",
+  ScratchDirectory folder;
+  write_picture(folder.path("images/a.jpg"), 64, 48, 1);
+  write_picture(folder.path("images/b.jpg"), 64, 48, 2);
+  write_file(folder.path("images/broken.jpg"), "");
+  write_file(folder.path("poses.csv"),
              "image,latitude_deg,longitude_deg,height_m,gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg,note\n"
              "a.jpg,52.5201,13.4002,140,90,-90,0,first\nbroken.jpg,52.52,13.4,140,0,0,0,\n");
-  write_file(folder / "block.yaml", "images: images\nposes: poses.csv\n");
-  const Project project = read_project(folder / "block.yaml");
+  write_file(folder.path("block.yaml"), "images: images\nposes: poses.csv\n");
+  const Project project = read_project(folder.path("block.yaml"));
   EXPECT_DOUBLE_EQ(project.block.ground.latitude_deg, 52.52);
   ASSERT_TRUE(project.block.frames[FrameIndex(0)].given_pose);
   EXPECT_FALSE(project.block.frames[FrameIndex(1)].given_pose);
@@ -98,16 +98,16 @@ TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
 
 // The same nadir photo, its top to the east, in the three kinds of angles.
 TEST(ApproximatePoses, AnglesOfBodyGimbalAndPhotoAgree) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const std::vector<std::string> tables = {
       "yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,90,0,0\n",
       "gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg\nframe0/0.jpg,1,2,3,90,-90,0\n",
       "omega_deg,phi_deg,kappa_deg\nframe0/0.jpg,1,2,3,0,0,-90\n"};
   for (const std::string& table : tables) {
-    write_file(folder / "p.csv", "image,x_m,y_m,z_m," + table);
+    write_file(folder.path("p.csv"), "image,x_m,y_m,z_m," + table);
     Block block = small_result().block;
     std::vector<std::string> warnings;
-    set_given_poses(read_approximate_poses(folder / "p.csv"), {}, block, warnings);
+    set_given_poses(read_approximate_poses(folder.path("p.csv")), {}, block, warnings);
     const Eigen::Quaterniond& rotation = block.frames[FrameIndex(0)].given_pose->rotation;
     EXPECT_LT((rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, -1, 0)).norm(), 1e-12) << table;
     EXPECT_LT((rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d(0, 0, -1)).norm(), 1e-12) << table;
@@ -115,13 +115,13 @@ TEST(ApproximatePoses, AnglesOfBodyGimbalAndPhotoAgree) {
 }
 
 TEST(ApproximatePoses, Refusals) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   Block block = small_result().block;
   const auto refusal = [&](const std::string& text) {
-    write_file(folder / "p.csv", text);
+    write_file(folder.path("p.csv"), text);
     std::vector<std::string> warnings;
     return message_of<InputError>([&] {
-      const ApproximatePoses poses = read_approximate_poses(folder / "p.csv");
+      const ApproximatePoses poses = read_approximate_poses(folder.path("p.csv"));
       set_given_poses(poses, {}, block, warnings);
     });
   };

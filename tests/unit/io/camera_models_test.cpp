@@ -11,6 +11,7 @@
 #include "io/unit_files.h"
 #include "small_result.h"
 #include "tests/unit/geometry/camera_samples.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -18,7 +19,6 @@ namespace {
 using fixture::message_of;
 using fixture::read_file;
 using fixture::small_result;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using fixture::write_picture;
 using ::testing::HasSubstr;
@@ -38,15 +38,15 @@ Block every_camera() {
 }
 
 TEST(CameraModelFiles, KeepEveryModel) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const Block block = every_camera();
   EXPECT_NO_THROW(check(block));
-  write_block(folder / "block.h5", block);
-  const Block back = read_block(folder / "block.h5");
+  write_block(folder.path("block.h5"), block);
+  const Block back = read_block(folder.path("block.h5"));
   ASSERT_EQ(back.cameras.size(), block.cameras.size());
   const BlockState state = initial_state(block);
-  write_state(folder / "state.h5", state);
-  EXPECT_EQ(read_state(folder / "state.h5").cameras, state.cameras);
+  write_state(folder.path("state.h5"), state);
+  EXPECT_EQ(read_state(folder.path("state.h5")).cameras, state.cameras);
   TileAdjustment adjustment;
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
     const CameraIndex index(static_cast<std::int64_t>(c));
@@ -56,24 +56,24 @@ TEST(CameraModelFiles, KeepEveryModel) {
     adjustment.intrinsics.push_back(block.cameras[index].intrinsics);
     adjustment.camera_observations.push_back(1);
   }
-  write_adjustment(folder / "adjustment.h5", adjustment);
-  EXPECT_EQ(read_adjustment(folder / "adjustment.h5").intrinsics, adjustment.intrinsics);
+  write_adjustment(folder.path("adjustment.h5"), adjustment);
+  EXPECT_EQ(read_adjustment(folder.path("adjustment.h5")).intrinsics, adjustment.intrinsics);
 }
 
 class CameraModelProject : public ::testing::Test {
  protected:
   void SetUp() override {
-    write_picture(folder_ / "images/a.jpg", 1920, 1080, 50);
-    write_picture(folder_ / "images/b.jpg", 1920, 1080, 60);
+    write_picture(folder_.path("images/a.jpg"), 1920, 1080, 50);
+    write_picture(folder_.path("images/b.jpg"), 1920, 1080, 60);
   }
   Camera read(const std::string& camera) {
-    write_file(folder_ / "block.yaml", "images: images\ncameras:\n  default:\n" + camera);
-    return read_project(folder_ / "block.yaml").block.cameras[CameraIndex(0)];
+    write_file(folder_.path("block.yaml"), "images: images\ncameras:\n  default:\n" + camera);
+    return read_project(folder_.path("block.yaml")).block.cameras[CameraIndex(0)];
   }
   std::string refusal(const std::string& camera) {
     return message_of<InputError>([&] { read(camera); });
   }
-  TemporaryFolder folder_;
+  ScratchDirectory folder_;
 };
 
 TEST_F(CameraModelProject, TakesModelAndParameters) {
@@ -127,27 +127,27 @@ BlockResult result_with(const std::string& name) {
 TEST(CameraModelExchange, ColmapKeepsPinholeAndFisheye) {
   for (const char* model : {"pinhole", "opencv-fisheye", "brown"})
     for (const char* format : {"colmap-text", "colmap-bin"}) {
-      TemporaryFolder folder;
+      ScratchDirectory folder;
       const BlockResult result = result_with(model);
-      export_result(result, format, folder / "model");
-      const ImportedBlock imported = import_block(format, folder / "model");
+      export_result(result, format, folder.path("model"));
+      const ImportedBlock imported = import_block(format, folder.path("model"));
       EXPECT_EQ(imported.state.cameras, result.state.cameras) << model << " " << format;
     }
-  TemporaryFolder folder;
-  export_result(result_with("opencv-fisheye"), "colmap-text", folder / "model");
-  EXPECT_THAT(read_file(folder / "model/cameras.txt"), HasSubstr(" OPENCV_FISHEYE "));
+  ScratchDirectory folder;
+  export_result(result_with("opencv-fisheye"), "colmap-text", folder.path("model"));
+  EXPECT_THAT(read_file(folder.path("model/cameras.txt")), HasSubstr(" OPENCV_FISHEYE "));
 }
 
 TEST(CameraModelExchange, RefusesByCamera) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult panorama = result_with("equirectangular");
   const std::string camera =
       "camera '" + panorama.block.cameras[CameraIndex(0)].name + "' has the model equirectangular, ";
   for (const char* format : {"colmap-text", "colmap-bin"})
-    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder / "model"); }),
+    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder.path("model")); }),
                 HasSubstr(camera + "which COLMAP does not have"));
   for (const char* format : {"bal", "bundler"})
-    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder / "file"); }),
+    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder.path("file")); }),
                 HasSubstr("has the model equirectangular, whose images BAL"));
 }
 
@@ -162,12 +162,12 @@ TEST(CameraModelExchange, BalTakesCorrectedPixels) {
 }
 
 TEST(CameraModelExchange, CsvLeavesCellsOfOtherModelsEmpty) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   BlockResult result = result_with("pinhole");
   Intrinsics& brown = result.state.cameras[CameraIndex(1)];
   brown = result.block.cameras[CameraIndex(1)].intrinsics = {1000, 500, 400, -0.1, 0, 0, 0, 0};
-  export_result(result, "csv", folder / "tables");
-  const std::string text = read_file(folder / "tables/cameras.csv");
+  export_result(result, "csv", folder.path("tables"));
+  const std::string text = read_file(folder.path("tables/cameras.csv"));
   EXPECT_THAT(text, HasSubstr("name,width,height,model,f,cx,cy,k1,k2,k3,p1,p2\n"));
   EXPECT_THAT(text, HasSubstr(",,,,,\n"));
   EXPECT_THAT(text, HasSubstr(",brown,1000,500,400,-0.1,0,0,0,0\n"));

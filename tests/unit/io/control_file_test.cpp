@@ -5,13 +5,13 @@
 #include "image_files.h"
 #include "io/error.h"
 #include "io/project.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
 
 using fixture::gps_tags;
 using fixture::message_of;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using fixture::write_picture;
 using ::testing::ElementsAre;
@@ -23,14 +23,15 @@ class ControlFile : public ::testing::Test {
  protected:
   ControlFile() {
     for (int i = 0; i < 3; ++i)
-      write_picture(folder_ / ("images/sub/" + std::to_string(i) + ".jpg"), 200, 100, i,
+      write_picture(folder_.path("images/sub/" + std::to_string(i) + ".jpg"), 200, 100, i,
                     gps_tags(52.52, 13.40 + 0.0002 * i, 40));
   }
 
   Project read(const std::string& control_name, const std::string& control) {
-    write_file(folder_ / control_name, control);
-    write_file(folder_ / "block.yaml", "images: images\norigin: [52.52, 13.4, 40]\ncontrol: " + control_name + "\n");
-    return read_project(folder_ / "block.yaml");
+    write_file(folder_.path(control_name), control);
+    write_file(folder_.path("block.yaml"),
+               "images: images\norigin: [52.52, 13.4, 40]\ncontrol: " + control_name + "\n");
+    return read_project(folder_.path("block.yaml"));
   }
 
   std::string refusal(const std::string& name, const std::string& control) {
@@ -40,7 +41,7 @@ class ControlFile : public ::testing::Test {
     return message;
   }
 
-  TemporaryFolder folder_;
+  ScratchDirectory folder_;
   const Georeference reference_{GroundFrame{true, 52.52, 13.4, 40, ""}};
 };
 
@@ -93,7 +94,8 @@ TEST_F(ControlFile, GcpListRefusals) {
   EXPECT_THAT(refusal("gcp_list.txt", "EPSG:123456\n" + good), HasSubstr("not known to PROJ"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n52.52 113.4 40 5 6 sub/0.jpg a\n"), HasSubstr("gcp_list.txt:2"));
   EXPECT_THAT(refusal("gcp_list.txt", ""), HasSubstr("gcp_list.txt: is empty"));
-  EXPECT_THAT(message_of<InputError>([&] { read_control_table(folder_ / "none.txt"); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(message_of<InputError>([&] { read_control_table(folder_.path("none.txt")); }),
+              HasSubstr("cannot be read"));
 }
 
 TEST_F(ControlFile, OpenSfmJson) {
@@ -148,8 +150,8 @@ TEST_F(ControlFile, CsvInTheBlocksFrameAndItsWriterReturn) {
     EXPECT_THAT(b.control_points[2].measurements, SizeIs(0));
   };
   expect_right(block);
-  write_control_csv(folder_ / "written.csv", block);
-  expect_right(read("again.csv", fixture::read_file(folder_ / "written.csv")).block);
+  write_control_csv(folder_.path("written.csv"), block);
+  expect_right(read("again.csv", fixture::read_file(folder_.path("written.csv"))).block);
 }
 
 TEST_F(ControlFile, CsvRefusals) {
@@ -167,7 +169,7 @@ TEST_F(ControlFile, CsvRefusals) {
 }
 
 TEST_F(ControlFile, MeasurementsInImagesLeftOutAreWarnings) {
-  write_file(folder_ / "images/broken.jpg", "");
+  write_file(folder_.path("images/broken.jpg"), "");
   const Project project =
       read("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 broken.jpg a\n13.4 52.52 40 5 6 sub/0.jpg a\n");
   EXPECT_THAT(project.block.control_points[0].measurements, SizeIs(1));
@@ -177,8 +179,8 @@ TEST_F(ControlFile, MeasurementsInImagesLeftOutAreWarnings) {
 TEST_F(ControlFile, SettingsOfTheProjectOverrideTheFile) {
   read("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 sub/0.jpg a\n13.4001 52.52 NaN 5 6 sub/0.jpg b\n");
   const auto with = [&](const std::string& control) {
-    write_file(folder_ / "block.yaml", "images: images\ncontrol:\n" + control);
-    return read_project(folder_ / "block.yaml").block.control_points;
+    write_file(folder_.path("block.yaml"), "images: images\ncontrol:\n" + control);
+    return read_project(folder_.path("block.yaml")).block.control_points;
   };
   const auto points =
       with("  file: gcp_list.txt\n  sigma_horizontal_m: 0.1\n  sigma_vertical_m: 0.2\n  sigma_px: 2\n  check: [b]\n");
@@ -196,11 +198,11 @@ TEST_F(ControlFile, SettingsOfTheProjectOverrideTheFile) {
 }
 
 TEST(ControlWithoutGps, GivesTheOrigin) {
-  TemporaryFolder folder;
-  write_picture(folder / "images/0.jpg", 200, 100, 0);
-  write_file(folder / "gcp_list.txt", "EPSG:32633\n391000 5820000 44 5 6 0.jpg\n391100 5820000 44 8 9 0.jpg\n");
-  write_file(folder / "block.yaml", "images: images\ncontrol: gcp_list.txt\n");
-  const Block block = read_project(folder / "block.yaml").block;
+  ScratchDirectory folder;
+  write_picture(folder.path("images/0.jpg"), 200, 100, 0);
+  write_file(folder.path("gcp_list.txt"), "EPSG:32633\n391000 5820000 44 5 6 0.jpg\n391100 5820000 44 8 9 0.jpg\n");
+  write_file(folder.path("block.yaml"), "images: images\ncontrol: gcp_list.txt\n");
+  const Block block = read_project(folder.path("block.yaml")).block;
   EXPECT_TRUE(block.ground.georeferenced);
   const Eigen::Vector3d difference = block.control_points[1].position - block.control_points[0].position;
   EXPECT_NEAR(difference.norm(), 100 / 0.99975, 0.02) << "the grid's scale 1.6 degrees from the central meridian";

@@ -12,6 +12,7 @@
 #include "io/simulate/random.h"
 #include "io/simulate/simulate.h"
 #include "io/unit_files.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -240,16 +241,14 @@ TEST_F(EvaluateTest, JsonHasNullForWhatDoesNotExist) {
 }
 
 TEST_F(EvaluateTest, TruthIsReadFromFiles) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "evaluate_test";
-  std::filesystem::remove_all(folder);
-  write_simulated_block(options(), folder.string());
+  const ScratchDirectory folder;
+  write_simulated_block(options(), folder.path());
   const Evaluation direct = evaluate(result_, simulated_.truth);
   for (const std::string name : {"", "truth.csv", "truth.h5"}) {
-    const Evaluation e = evaluate(result_, (folder / name).string());
+    const Evaluation e = evaluate(result_, folder.path(name));
     EXPECT_NEAR(e.position_rms_m, direct.position_rms_m, 1e-12) << name;
     EXPECT_NEAR(e.rotation_rms_deg, direct.rotation_rms_deg, 1e-9) << name;
   }
-  std::filesystem::remove_all(folder);
 }
 
 TEST_F(EvaluateTest, TooFewFramesToAlign) {

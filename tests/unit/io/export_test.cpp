@@ -17,6 +17,7 @@
 #include "io/export_view.h"
 #include "io/pose_csv.h"
 #include "small_result.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -24,7 +25,6 @@ namespace {
 using fixture::message_of;
 using fixture::read_file;
 using fixture::small_result;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using ::testing::HasSubstr;
 
@@ -70,13 +70,13 @@ struct WrittenModel {
   std::map<std::int64_t, Point> points;
 };
 
-WrittenModel read_colmap_text(const TemporaryFolder& folder) {
+WrittenModel read_colmap_text(const ScratchDirectory& folder) {
   WrittenModel model;
-  for (const auto& w : words_of(folder / "model/cameras.txt")) {
+  for (const auto& w : words_of(folder.path("model/cameras.txt"))) {
     for (std::size_t i = 4; i < w.size(); ++i) model.cameras[std::stoll(w[0])].push_back(std::stod(w[i]));
     model.camera_models[std::stoll(w[0])] = w[1] + " " + w[2] + " " + w[3];
   }
-  const auto lines = words_of(folder / "model/images.txt");
+  const auto lines = words_of(folder.path("model/images.txt"));
   for (std::size_t i = 0; i + 1 < lines.size(); i += 2) {
     const auto& w = lines[i];
     std::vector<double> v;
@@ -87,7 +87,7 @@ WrittenModel read_colmap_text(const TemporaryFolder& folder) {
           {{std::stod(lines[i + 1][k]), std::stod(lines[i + 1][k + 1])}, std::stoll(lines[i + 1][k + 2])});
     model.images[std::stoll(w[0])] = image;
   }
-  for (const auto& w : words_of(folder / "model/points3D.txt")) {
+  for (const auto& w : words_of(folder.path("model/points3D.txt"))) {
     WrittenModel::Point point{{std::stod(w[1]), std::stod(w[2]), std::stod(w[3])}, std::stod(w[7]), {}};
     for (std::size_t k = 8; k + 1 < w.size(); k += 2) point.track.push_back({std::stoll(w[k]), std::stoll(w[k + 1])});
     model.points[std::stoll(w[0])] = point;
@@ -119,9 +119,9 @@ class Bytes {
   std::size_t at_ = 0;
 };
 
-WrittenModel read_colmap_binary(const TemporaryFolder& folder) {
+WrittenModel read_colmap_binary(const ScratchDirectory& folder) {
   WrittenModel model;
-  Bytes cameras(read_file(folder / "model/cameras.bin"));
+  Bytes cameras(read_file(folder.path("model/cameras.bin")));
   for (auto n = cameras.next<std::uint64_t>(); n > 0; --n) {
     const auto id = cameras.next<std::uint32_t>();
     const auto kind = cameras.next<std::int32_t>();
@@ -133,7 +133,7 @@ WrittenModel read_colmap_binary(const TemporaryFolder& folder) {
     for (int i = 0; i < (kind == 4 ? 8 : 12); ++i) model.cameras[id].push_back(cameras.next<double>());
   }
   EXPECT_TRUE(cameras.done());
-  Bytes images(read_file(folder / "model/images.bin"));
+  Bytes images(read_file(folder.path("model/images.bin")));
   for (auto n = images.next<std::uint64_t>(); n > 0; --n) {
     const auto id = images.next<std::uint32_t>();
     double v[7];
@@ -147,7 +147,7 @@ WrittenModel read_colmap_binary(const TemporaryFolder& folder) {
     model.images[id] = image;
   }
   EXPECT_TRUE(images.done());
-  Bytes points(read_file(folder / "model/points3D.bin"));
+  Bytes points(read_file(folder.path("model/points3D.bin")));
   for (auto n = points.next<std::uint64_t>(); n > 0; --n) {
     const auto id = static_cast<std::int64_t>(points.next<std::uint64_t>());
     const double x = points.next<double>(), y = points.next<double>(), z = points.next<double>();
@@ -210,9 +210,9 @@ void expect_equals(const WrittenModel& model, const BlockResult& result) {
 }
 
 TEST(Export, ColmapTextProjectsAsWeDo) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  export_result(result, "colmap-text", folder / "model");
+  export_result(result, "colmap-text", folder.path("model"));
   const WrittenModel model = read_colmap_text(folder);
   expect_equals(model, result);
   EXPECT_EQ(model.camera_models.at(1), "OPENCV 2000 1500");
@@ -220,9 +220,9 @@ TEST(Export, ColmapTextProjectsAsWeDo) {
 }
 
 TEST(Export, ColmapBinaryHoldsTheSameBits) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  export_result(result, "colmap-bin", folder / "model");
+  export_result(result, "colmap-bin", folder.path("model"));
   expect_equals(read_colmap_binary(folder), result);
 }
 
@@ -237,10 +237,10 @@ Eigen::Vector2d bal_project(const double* c, const Eigen::Vector3d& X) {
 }
 
 TEST(Export, BalProjectsAsWeDo) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result(false);
-  export_result(result, "bal", folder / "sub/problem.txt");
-  std::istringstream stream(read_file(folder / "sub/problem.txt"));
+  export_result(result, "bal", folder.path("sub/problem.txt"));
+  std::istringstream stream(read_file(folder.path("sub/problem.txt")));
   std::size_t cameras, points, observations;
   stream >> cameras >> points >> observations;
   const ExportView view = make_export_view(result);
@@ -273,7 +273,7 @@ TEST(Export, BalProjectsAsWeDo) {
 
 // Parameters that BAL does not have are taken out of the observations: residuals stay what they were, to first order.
 TEST(Export, BalKeepsTheRaysOfCamerasItCannotDescribe) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   BlockResult result = small_result(true);
   for (std::size_t o = 0; o < result.kept.size(); ++o) {  // exact observations
     const Mount& mount = result.block.mount_of(result.tracks.image[o]);
@@ -286,8 +286,8 @@ TEST(Export, BalKeepsTheRaysOfCamerasItCannotDescribe) {
     result.tracks.x[o] = to_fixed_pixel(pixel.x());
     result.tracks.y[o] = to_fixed_pixel(pixel.y());
   }
-  export_result(result, "bal", folder / "problem.txt");
-  std::istringstream stream(read_file(folder / "problem.txt"));
+  export_result(result, "bal", folder.path("problem.txt"));
+  std::istringstream stream(read_file(folder.path("problem.txt")));
   std::size_t cameras, points, observations;
   stream >> cameras >> points >> observations;
   std::vector<std::array<double, 4>> rows(observations);
@@ -309,7 +309,7 @@ TEST(Export, BalKeepsTheRaysOfCamerasItCannotDescribe) {
 
 // The sigmas of a camera off the frame's centre against many drawn poses of the frame.
 TEST(Export, CsvSigmasAreThoseOfTheProjectionCentre) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   BlockResult result = small_result();
   result.block.rigs[RigIndex(0)].mounts[1].pose.centre = {3, -1, 2};
   result.state.mounts[RigIndex(0)][1].centre = {3, -1, 2};
@@ -322,7 +322,7 @@ TEST(Export, CsvSigmasAreThoseOfTheProjectionCentre) {
   c(2, 3) = c(3, 2) = -0.008;
   c *= 1e-4;
   result.frame_covariance.assign(result.block.frames.size(), c);
-  export_result(result, "csv", folder / "tables");
+  export_result(result, "csv", folder.path("tables"));
   const Eigen::LLT<BlockResult::Matrix6> factor(c);
   std::mt19937_64 engine(8);
   std::normal_distribution<double> normal;
@@ -340,8 +340,8 @@ TEST(Export, CsvSigmasAreThoseOfTheProjectionCentre) {
     local += error.cwiseAbs2() / draws;
     world += (own * error).cwiseAbs2() / draws;
   }
-  const auto local_row = words_of(folder / "tables/images_local.csv", ',')[2];
-  const auto world_row = words_of(folder / "tables/images_wgs84.csv", ',')[2];
+  const auto local_row = words_of(folder.path("tables/images_local.csv"), ',')[2];
+  const auto world_row = words_of(folder.path("tables/images_wgs84.csv"), ',')[2];
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
     EXPECT_NEAR(std::stod(local_row[12 + k]), std::sqrt(local[axis]), 0.02 * std::sqrt(local[axis]));
@@ -351,7 +351,7 @@ TEST(Export, CsvSigmasAreThoseOfTheProjectionCentre) {
 }
 
 TEST(Export, CsvGivesPosesInBothFrames) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   BlockResult result = small_result();
   // An image 10 km north, near nadir in its own vertical, its top 30 degrees east of north.
   const Georeference reference(result.block.ground);
@@ -359,8 +359,8 @@ TEST(Export, CsvGivesPosesInBothFrames) {
   const double degree = std::numbers::pi / 180;
   const Eigen::Quaterniond own = rotation_from(BodyAttitude{30 * degree, 5 * degree, 2 * degree});
   result.state.frames[FrameIndex(0)] = {own * reference.own_from_block(far), reference.to_local(far)};
-  export_result(result, "csv", folder / "tables");
-  const auto world = words_of(folder / "tables/images_wgs84.csv", ',');
+  export_result(result, "csv", folder.path("tables"));
+  const auto world = words_of(folder.path("tables/images_wgs84.csv"), ',');
   ASSERT_EQ(world.size(), 7u);
   EXPECT_EQ(world[1][0], "frame0/0.jpg");
   EXPECT_NEAR(std::stod(world[1][1]), 46.93, 1e-10);
@@ -369,7 +369,7 @@ TEST(Export, CsvGivesPosesInBothFrames) {
   EXPECT_NEAR(std::stod(world[1][7]), 30, 1e-8);
   EXPECT_NEAR(std::stod(world[1][8]), 5, 1e-8);
   EXPECT_NEAR(std::stod(world[1][9]), 2, 1e-8);
-  const auto local = words_of(folder / "tables/images_local.csv", ',');
+  const auto local = words_of(folder.path("tables/images_local.csv"), ',');
   ASSERT_EQ(local.size(), 7u);
   for (std::size_t row = 1; row < local.size(); ++row) {
     std::vector<double> v;
@@ -382,29 +382,29 @@ TEST(Export, CsvGivesPosesInBothFrames) {
     EXPECT_LT(rotation_angle(rotation_from(BodyAttitude{v[6] * degree, v[7] * degree, v[8] * degree}), pose.rotation),
               1e-9);
   }
-  const PoseTable frames = read_pose_csv(folder / "tables/frames.csv");
+  const PoseTable frames = read_pose_csv(folder.path("tables/frames.csv"));
   ASSERT_EQ(frames.names.size(), 3u);
   EXPECT_EQ(frames.poses[2].centre, result.state.frames[FrameIndex(3)].centre);
-  const auto cameras = words_of(folder / "tables/cameras.csv", ',');
+  const auto cameras = words_of(folder.path("tables/cameras.csv"), ',');
   ASSERT_EQ(cameras.size(), 3u);
   EXPECT_EQ(cameras[2][3], "brown");
   EXPECT_EQ(std::stod(cameras[2][9]), 0.013);
 }
 
 TEST(Export, CsvOfALocalBlockHasNoGeodeticTable) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   BlockResult result = small_result();
   result.block.ground = GroundFrame{};
-  export_result(result, "csv", folder / "tables");
-  EXPECT_TRUE(std::filesystem::exists(folder / "tables/images_local.csv"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "tables/images_wgs84.csv"));
+  export_result(result, "csv", folder.path("tables"));
+  EXPECT_TRUE(std::filesystem::exists(folder.path("tables/images_local.csv")));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("tables/images_wgs84.csv")));
 }
 
 TEST(Export, PlyHoldsDoublesAndTheOrigin) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  export_result(result, "ply", folder / "points.ply");
-  const std::string text = read_file(folder / "points.ply");
+  export_result(result, "ply", folder.path("points.ply"));
+  const std::string text = read_file(folder.path("points.ply"));
   const std::size_t body = text.find("end_header\n") + 11;
   const ExportView view = make_export_view(result);
   const std::size_t vertices = view.tracks.size() + view.images.size();
@@ -421,11 +421,11 @@ TEST(Export, PlyHoldsDoublesAndTheOrigin) {
 }
 
 TEST(Export, GeoJsonFootprintsLieUnderTheCamera) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   BlockResult result = small_result();
   result.state.frames[FrameIndex(1)].rotation = rotation_from(YawPitchRoll{0, 0, 0});  // looks at the horizon
-  export_result(result, "geojson", folder / "f.geojson");
-  const auto json = nlohmann::json::parse(read_file(folder / "f.geojson"));
+  export_result(result, "geojson", folder.path("f.geojson"));
+  const auto json = nlohmann::json::parse(read_file(folder.path("f.geojson")));
   ASSERT_EQ(json["features"].size(), 6u);
   const auto& nadir = json["features"][0];
   EXPECT_EQ(nadir["properties"]["image"], "frame0/0.jpg");
@@ -443,18 +443,18 @@ TEST(Export, GeoJsonFootprintsLieUnderTheCamera) {
   EXPECT_NEAR(area, 133 * 100, 2500);
   EXPECT_EQ(json["features"][2]["geometry"]["type"], "Point");
   result.block.ground = GroundFrame{};
-  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "geojson", folder / "f.geojson"); }),
+  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "geojson", folder.path("f.geojson")); }),
               HasSubstr("not georeferenced"));
 }
 
 TEST(Export, RefusesUnknownFormatsAndPlacesItCannotWrite) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "kml", folder / "x"); }),
+  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "kml", folder.path("x")); }),
               HasSubstr("'kml' is no export format; they are colmap-text, "));
-  write_file(folder / "file", "in the way");
+  write_file(folder.path("file"), "in the way");
   for (const std::string& format : export_formats())
-    EXPECT_NE(message_of<Error>([&] { export_result(result, format, folder / "file/out"); }), "") << format;
+    EXPECT_NE(message_of<Error>([&] { export_result(result, format, folder.path("file/out")); }), "") << format;
   EXPECT_NE(message_of<InputError>([&] { export_result(result, "bal", "/dev/full"); }), "");
 }
 

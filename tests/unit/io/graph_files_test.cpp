@@ -262,7 +262,8 @@ TEST_F(GraphFiles, EmptyAdjustmentComesBack) {
 }
 
 TEST(OrientationFile, KeepsWhyFramesGotNoPose) {
-  const std::string path = testing::TempDir() + "orientation_with_reasons.h5";
+  const ScratchDirectory scratch;
+  const std::string path = scratch.path("orientation.h5");
   InitialOrientation orientation;
   orientation.state.frames.resize(2);
   orientation.state.oriented.resize(2);
@@ -275,7 +276,6 @@ TEST(OrientationFile, KeepsWhyFramesGotNoPose) {
   ASSERT_EQ(read.verticals_aside.size(), 1u);
   EXPECT_EQ(read.verticals_aside[0].image, ImageIndex(0));
   EXPECT_EQ(read.verticals_aside[0].verdict, VerticalVerdict::kAgainstGround);
-  std::filesystem::remove(path);
 }
 
 }  // namespace

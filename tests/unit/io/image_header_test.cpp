@@ -4,6 +4,7 @@
 
 #include "image_files.h"
 #include "io/error.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -13,13 +14,12 @@ using fixture::gps_tags;
 using fixture::joined;
 using fixture::message_of;
 using fixture::Tags;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using fixture::write_picture;
 using ::testing::HasSubstr;
 
 TEST(ImageHeader, ReadsCameraTimeAndPosition) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   Tags tags = gps_tags(-33.8567844, -151.2152967, -12.5);
   tags = joined(tags, {{"Exif.Image.Make", "DJI"},
                        {"Exif.Image.Model", "FC300S"},
@@ -35,8 +35,8 @@ TEST(ImageHeader, ReadsCameraTimeAndPosition) {
                        {"Xmp.drone-dji.RtkStdLon", "0.012"},
                        {"Xmp.drone-dji.RtkStdLat", "0.014"},
                        {"Xmp.drone-dji.RtkStdHgt", "0.031"}});
-  write_picture(folder / "a.jpg", 64, 48, 1, tags);
-  const ImageHeader header = read_image_header(folder / "a.jpg");
+  write_picture(folder.path("a.jpg"), 64, 48, 1, tags);
+  const ImageHeader header = read_image_header(folder.path("a.jpg"));
   EXPECT_EQ(header.width, 64);
   EXPECT_EQ(header.height, 48);
   EXPECT_EQ(header.model, "FC300S");
@@ -75,23 +75,23 @@ TEST(ImageHeader, FocalLengthByEachWay) {
 }
 
 TEST(ImageHeader, FocalPlaneResolutionRefersToTheImageAsTaken) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const Tags tags = {{"Exif.Photo.FocalLength", "43/10"},
                      {"Exif.Photo.FocalPlaneXResolution", "4000000/244"},
                      {"Exif.Photo.FocalPlaneResolutionUnit", "2"},
                      {"Exif.Photo.PixelXDimension", "4000"},
                      {"Exif.Photo.PixelYDimension", "3000"}};
-  write_picture(folder / "reduced.jpg", 180, 135, 1, tags);
-  const ImageHeader header = read_image_header(folder / "reduced.jpg");
+  write_picture(folder.path("reduced.jpg"), 180, 135, 1, tags);
+  const ImageHeader header = read_image_header(folder.path("reduced.jpg"));
   EXPECT_NEAR(header.sensor_width_mm, 0.244 * 25.4, 1e-9);
   EXPECT_NEAR(*focal_px(header), 4.3 / (0.244 * 25.4) * 180, 1e-9);
 }
 
 TEST(ImageHeader, AnImageWithoutTagsHasOnlyItsSize) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   for (const char* name : {"a.jpg", "a.png", "a.tif"}) {
-    write_picture(folder / name, 40, 30, 7);
-    const ImageHeader header = read_image_header(folder / name);
+    write_picture(folder.path(name), 40, 30, 7);
+    const ImageHeader header = read_image_header(folder.path(name));
     EXPECT_EQ(header.width, 40) << name;
     EXPECT_EQ(header.height, 30) << name;
     EXPECT_FALSE(header.position);
@@ -102,14 +102,14 @@ TEST(ImageHeader, AnImageWithoutTagsHasOnlyItsSize) {
 }
 
 TEST(ImageHeader, NonsenseInTagsIsAbsence) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   Tags tags = gps_tags(10, 20, 30);
   tags["Exif.GPSInfo.GPSLatitude"] = "1/0 0/0 0/0";
   tags["Exif.Photo.DateTimeOriginal"] = "0000:00:00 00:00:00";
   tags["Exif.Photo.FocalLength"] = "0/0";
   tags["Xmp.drone-dji.GimbalYawDegree"] = "unknown";
-  write_picture(folder / "a.jpg", 40, 30, 7, tags);
-  const ImageHeader header = read_image_header(folder / "a.jpg");
+  write_picture(folder.path("a.jpg"), 40, 30, 7, tags);
+  const ImageHeader header = read_image_header(folder.path("a.jpg"));
   EXPECT_FALSE(header.position);
   EXPECT_TRUE(std::isnan(header.time_s));
   EXPECT_FALSE(focal_px(header));
@@ -117,13 +117,13 @@ TEST(ImageHeader, NonsenseInTagsIsAbsence) {
 }
 
 TEST(ImageHeader, BadFilesGiveAReason) {
-  TemporaryFolder folder;
-  write_file(folder / "empty.jpg", "");
-  write_file(folder / "text.jpg", "this is no image, only words that go on for a while");
-  write_picture(folder / "good.jpg", 400, 300, 7, gps_tags(1, 2, 3));
-  write_file(folder / "cut.jpg", fixture::read_file(folder / "good.jpg").substr(0, 90));
+  ScratchDirectory folder;
+  write_file(folder.path("empty.jpg"), "");
+  write_file(folder.path("text.jpg"), "this is no image, only words that go on for a while");
+  write_picture(folder.path("good.jpg"), 400, 300, 7, gps_tags(1, 2, 3));
+  write_file(folder.path("cut.jpg"), fixture::read_file(folder.path("good.jpg")).substr(0, 90));
   const auto reason = [&](const std::string& name) {
-    return message_of<InputError>([&] { read_image_header(folder / name); });
+    return message_of<InputError>([&] { read_image_header(folder.path(name)); });
   };
   EXPECT_THAT(reason("empty.jpg"), HasSubstr("empty"));
   EXPECT_NE(reason("text.jpg"), "");

@@ -9,6 +9,7 @@
 #include "io/project.h"
 #include "io/unit_files.h"
 #include "small_result.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -16,7 +17,6 @@ namespace {
 using fixture::message_of;
 using fixture::read_file;
 using fixture::small_result;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using ::testing::HasSubstr;
 
@@ -45,10 +45,10 @@ void expect_same_residuals(const ImportedBlock& imported, const BlockResult& res
 }
 
 TEST(Import, ColmapTextReturnsTheModel) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result();
-  export_result(result, "colmap-text", folder / "model");
-  const ImportedBlock imported = import_block("colmap-text", folder / "model");
+  export_result(result, "colmap-text", folder.path("model"));
+  const ImportedBlock imported = import_block("colmap-text", folder.path("model"));
   expect_same_residuals(imported, result, 1e-9);
   EXPECT_EQ(imported.block.images[ImageIndex(1)].name, "frame0/1.jpg");
   EXPECT_EQ(imported.block.cameras.size(), 2u);
@@ -56,22 +56,22 @@ TEST(Import, ColmapTextReturnsTheModel) {
 }
 
 TEST(Import, BalAndBundlerReturnTheResiduals) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const BlockResult result = small_result(false);
   for (const std::string format : {"bal", "bundler"}) {
-    export_result(result, format, folder / format);
-    const ImportedBlock imported = import_block(format, folder / format);
+    export_result(result, format, folder.path(format));
+    const ImportedBlock imported = import_block(format, folder.path(format));
     expect_same_residuals(imported, result, 1.5e-3);  // observations are rounded to 2^-10 px again
     EXPECT_EQ(imported.block.images[ImageIndex(1)].name, format == "bal" ? "image000001" : "frame0/1.jpg");
   }
 }
 
 TEST(Import, WritesAProjectThatReads) {
-  TemporaryFolder folder;
-  export_result(small_result(false), "bal", folder / "problem.txt");
-  const ImportedBlock imported = import_block("bal", folder / "problem.txt");
-  write_imported(imported, folder / "project");
-  const Project project = read_project(folder / "project/block.yaml");
+  ScratchDirectory folder;
+  export_result(small_result(false), "bal", folder.path("problem.txt"));
+  const ImportedBlock imported = import_block("bal", folder.path("problem.txt"));
+  write_imported(imported, folder.path("project"));
+  const Project project = read_project(folder.path("project/block.yaml"));
   EXPECT_EQ(project.block.images.size(), 6u);
   EXPECT_TRUE(project.block.frames[FrameIndex(5)].given_pose);
   EXPECT_EQ(read_tracks(project.tie_points).x, imported.tracks.x);
@@ -110,38 +110,39 @@ void expect_same_model(const ImportedBlock& a, const ImportedBlock& b) {
 }
 
 TEST(Import, WhatWasImportedIsExportedAgainAlike) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   for (const std::string& format : import_formats()) {
     SCOPED_TRACE(format);
     // The first import rounds observations about the principal point (BAL, Bundler) and forgets rigs and residuals.
-    export_result(small_result(format.starts_with("colmap")), format, folder / (format + "0"));
-    const ImportedBlock first = import_block(format, folder / (format + "0"));
-    export_result(as_result(first), format, folder / (format + "1"));
-    expect_same_model(import_block(format, folder / (format + "1")), first);
+    export_result(small_result(format.starts_with("colmap")), format, folder.path(format + "0"));
+    const ImportedBlock first = import_block(format, folder.path(format + "0"));
+    export_result(as_result(first), format, folder.path(format + "1"));
+    expect_same_model(import_block(format, folder.path(format + "1")), first);
   }
 }
 
 TEST(Import, ColmapBinaryIsColmapText) {
-  TemporaryFolder folder;
-  for (const std::string format : {"colmap-text", "colmap-bin"}) export_result(small_result(), format, folder / format);
-  const ImportedBlock text = import_block("colmap-text", folder / "colmap-text");
-  const ImportedBlock binary = import_block("colmap-bin", folder / "colmap-bin");
-  write_imported(text, folder / "a");
-  write_imported(binary, folder / "b");
+  ScratchDirectory folder;
+  for (const std::string format : {"colmap-text", "colmap-bin"})
+    export_result(small_result(), format, folder.path(format));
+  const ImportedBlock text = import_block("colmap-text", folder.path("colmap-text"));
+  const ImportedBlock binary = import_block("colmap-bin", folder.path("colmap-bin"));
+  write_imported(text, folder.path("a"));
+  write_imported(binary, folder.path("b"));
   for (const std::string name : {"given.h5", "tie_points.h5"})
-    EXPECT_EQ(read_file(folder / ("a/" + name)), read_file(folder / ("b/" + name))) << name;
+    EXPECT_EQ(read_file(folder.path("a/" + name)), read_file(folder.path("b/" + name))) << name;
   EXPECT_EQ(text.points, binary.points);
 }
 
 TEST(Import, BadBinaryModelsAreRefusedByByte) {
-  TemporaryFolder folder;
-  export_result(small_result(), "colmap-bin", folder / "model");
+  ScratchDirectory folder;
+  export_result(small_result(), "colmap-bin", folder.path("model"));
   const auto refusal = [&](const std::string& name, auto change) {
-    const std::string file = folder / ("model/" + name), before = read_file(file);
+    const std::string file = folder.path("model/" + name), before = read_file(file);
     std::string content = before;
     change(content);
     write_file(file, content);
-    const std::string message = message_of<InputError>([&] { import_block("colmap-bin", folder / "model"); });
+    const std::string message = message_of<InputError>([&] { import_block("colmap-bin", folder.path("model")); });
     write_file(file, before);
     return message;
   };
@@ -155,17 +156,17 @@ TEST(Import, BadBinaryModelsAreRefusedByByte) {
   }
   EXPECT_THAT(refusal("cameras.bin", [](std::string& content) { content[12] = 10; }),
               HasSubstr("camera model 'number 10' is not supported"));
-  EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-bin", folder / "none"); }),
+  EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-bin", folder.path("none")); }),
               HasSubstr("cannot be read"));
 }
 
 TEST(Import, ASmallBundlerFileByHand) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   // A camera at (0, 0, 10) that looks down -z, another not oriented; the point at (1, 2, 0) is seen at f / 10 * (1, 2).
-  write_file(folder / "b.out",
+  write_file(folder.path("b.out"),
              "# Bundle file v0.3\n2 1\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
              "1000 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -10\n1 2 0\n9 9 9\n2 1 7 100 200 0 3 5 5\n");
-  const ImportedBlock imported = import_block("bundler", folder / "b.out");
+  const ImportedBlock imported = import_block("bundler", folder.path("b.out"));
   ASSERT_EQ(imported.block.images.size(), 1u);
   EXPECT_EQ(imported.block.images[ImageIndex(0)].name, "image000001");
   const Camera& camera = imported.block.cameras[CameraIndex(0)];
@@ -180,10 +181,10 @@ TEST(Import, ASmallBundlerFileByHand) {
 }
 
 TEST(Import, BadFilesAreRefusedByLine) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const auto refusal = [&](const std::string& format, const std::string& text) {
-    write_file(folder / "f", text);
-    return message_of<InputError>([&] { import_block(format, folder / "f"); });
+    write_file(folder.path("f"), text);
+    return message_of<InputError>([&] { import_block(format, folder.path("f")); });
   };
   EXPECT_THAT(refusal("bal", "1 1 1\n0 0 1 x\n"), HasSubstr("f:2: y of an observation: 'x' is not a number"));
   EXPECT_THAT(refusal("bal", "1 1 1\n1 0 1 1\n"), HasSubstr("f:2: camera of an observation: 1 is outside 0..0"));
@@ -195,16 +196,16 @@ TEST(Import, BadFilesAreRefusedByLine) {
   EXPECT_THAT(refusal("bundler", "# Bundle file v0.3\n1 0\n5 0 0 2 0 0 0 1 0 0 0 1 0 0 0\n"),
               HasSubstr("no rotation matrix"));
   EXPECT_THAT(refusal("nvm", ""), HasSubstr("'nvm' is no import format"));
-  EXPECT_THAT(message_of<InputError>([&] { import_block("bal", folder / "none"); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(message_of<InputError>([&] { import_block("bal", folder.path("none")); }), HasSubstr("cannot be read"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-text", folder.path()); }), HasSubstr("cannot be read"));
 }
 
 TEST(Import, BadColmapModelsAreRefusedByLine) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const auto refusal = [&](const std::string& cameras, const std::string& images, const std::string& points) {
-    write_file(folder / "cameras.txt", cameras);
-    write_file(folder / "images.txt", images);
-    write_file(folder / "points3D.txt", points);
+    write_file(folder.path("cameras.txt"), cameras);
+    write_file(folder.path("images.txt"), images);
+    write_file(folder.path("points3D.txt"), points);
     return message_of<InputError>([&] { import_block("colmap-text", folder.path()); });
   };
   const std::string camera = "# comment\n1 SIMPLE_RADIAL 100 80 90 50 40 -0.1\n";

@@ -3,13 +3,13 @@
 #include "image_files.h"
 #include "io/error.h"
 #include "io/project.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
 
 using fixture::gps_tags;
 using fixture::message_of;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using fixture::write_picture;
 using ::testing::HasSubstr;
@@ -27,25 +27,25 @@ class ProjectRigs : public ::testing::Test {
     for (const std::string camera : {"left", "right"})
       for (const std::string number : {"1", "2", "3"}) {
         ++shade;
-        write_picture(folder_ / ("images/" + camera + "/" + number + ".jpg"), camera == "left" ? 64 : 80, 48, shade,
+        write_picture(folder_.path("images/" + camera + "/" + number + ".jpg"), camera == "left" ? 64 : 80, 48, shade,
                       gps_tags(52.52, 13.4 + 0.001 * shade, 40));
       }
   }
 
   Project read(const std::string& cameras, const std::string& assignments, const std::string& more = "") {
-    write_file(folder_ / "rig_cameras.json", cameras);
-    write_file(folder_ / "rig_assignments.json", assignments);
-    write_file(folder_ / "block.yaml",
+    write_file(folder_.path("rig_cameras.json"), cameras);
+    write_file(folder_.path("rig_assignments.json"), assignments);
+    write_file(folder_.path("block.yaml"),
                "images: images\ncameras: {grouping: folder}\n"
                "rigs:\n  cameras: rig_cameras.json\n  assignments: rig_assignments.json\n" +
                    more);
-    return read_project(folder_ / "block.yaml");
+    return read_project(folder_.path("block.yaml"));
   }
   std::string refusal(const std::string& cameras, const std::string& assignments, const std::string& more = "") {
     return message_of<InputError>([&] { read(cameras, assignments, more); });
   }
 
-  TemporaryFolder folder_;
+  ScratchDirectory folder_;
 };
 
 TEST_F(ProjectRigs, JoinImagesOfAnExposure) {
@@ -89,7 +89,7 @@ TEST_F(ProjectRigs, NamedExposuresAndHeldMounts) {
 
 // Cameras fail, disks fill: frames do with the images that are there, and what refers to the others is no error.
 TEST_F(ProjectRigs, MissingImagesAreToldAndDoneWithout) {
-  write_file(folder_ / "poses.csv",
+  write_file(folder_.path("poses.csv"),
              "name,qw,qx,qy,qz,x,y,z,pass\nfirst,1,0,0,0,1,2,3,7\ngone,1,0,0,0,1,2,3,7\nleft/9.jpg,1,0,0,0,1,2,3,7\n");
   const Project project = read(kCameras,
                                R"({"first": [["left/1.jpg", "left"], ["right/9.jpg", "right"]],
@@ -127,8 +127,8 @@ TEST_F(ProjectRigs, Refusals) {
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "left"]], [["right/1.jpg", "left"]]])"),
               HasSubstr("has images of two cameras"));
   EXPECT_THAT(refusal(kCameras, kAssignments, "  sigma_position_m: 0\n"), HasSubstr("both be positive, or both 0"));
-  write_file(folder_ / "block.yaml", "images: images\nrigs: {cameras: rig_cameras.json}\n");
-  EXPECT_THAT(message_of<InputError>([&] { read_project(folder_ / "block.yaml"); }),
+  write_file(folder_.path("block.yaml"), "images: images\nrigs: {cameras: rig_cameras.json}\n");
+  EXPECT_THAT(message_of<InputError>([&] { read_project(folder_.path("block.yaml")); }),
               HasSubstr("block.yaml:2: rigs needs 'cameras' and 'assignments'"));
 }
 

@@ -8,6 +8,7 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/held_priors.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -17,7 +18,6 @@ using fixture::joined;
 using fixture::message_of;
 using fixture::read_file;
 using fixture::Tags;
-using fixture::TemporaryFolder;
 using fixture::write_file;
 using fixture::write_picture;
 using ::testing::Each;
@@ -29,19 +29,19 @@ using ::testing::SizeIs;
 const Tags kDji = {{"Exif.Image.Make", "DJI"}, {"Exif.Image.Model", "FC300S"}, {"Exif.Photo.FocalLength", "361/100"}};
 
 // Five photos on a line to the east, about 76 m apart, at 46.84 N 91.99 W, 250 m.
-void write_line(const TemporaryFolder& folder, int count = 5) {
+void write_line(const ScratchDirectory& folder, int count = 5) {
   for (int i = 0; i < count; ++i)
-    write_picture(folder / ("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
+    write_picture(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
                   joined(kDji, gps_tags(46.84, -91.99 + 0.001 * i, 250)));
 }
 
-Project read_text(const TemporaryFolder& folder, const std::string& text) {
-  write_file(folder / "block.yaml", text);
-  return read_project(folder / "block.yaml");
+Project read_text(const ScratchDirectory& folder, const std::string& text) {
+  write_file(folder.path("block.yaml"), text);
+  return read_project(folder.path("block.yaml"));
 }
 
 // The message without the path of the folder.
-std::string refusal(const TemporaryFolder& folder, const std::string& text) {
+std::string refusal(const ScratchDirectory& folder, const std::string& text) {
   std::string message = message_of<InputError>([&] { read_text(folder, text); });
   for (std::size_t at; (at = message.find(folder.path() + "/")) != std::string::npos;)
     message.erase(at, folder.path().size() + 1);
@@ -51,18 +51,18 @@ std::string refusal(const TemporaryFolder& folder, const std::string& text) {
 FrameIndex frame(std::int64_t i) { return FrameIndex(i); }
 
 TEST(Project, ScansImagesInByteOrderAndGroupsThem) {
-  TemporaryFolder folder;
-  write_picture(folder / "images/b/2.JPG", 64, 48, 1, kDji);
-  write_picture(folder / "images/B.jpeg", 64, 48, 2, kDji);
-  write_picture(folder / "images/a.png", 64, 48, 3);
-  write_picture(folder / "images/b/10.jpg", 32, 48, 4, kDji);
-  write_file(folder / "images/readme.txt", "no image");
+  ScratchDirectory folder;
+  write_picture(folder.path("images/b/2.JPG"), 64, 48, 1, kDji);
+  write_picture(folder.path("images/B.jpeg"), 64, 48, 2, kDji);
+  write_picture(folder.path("images/a.png"), 64, 48, 3);
+  write_picture(folder.path("images/b/10.jpg"), 32, 48, 4, kDji);
+  write_file(folder.path("images/readme.txt"), "no image");
   const Project project = read_text(folder, "images: images\n");
   std::vector<std::string> names;
   for (const Image& image : project.block.images) names.push_back(image.name);
   EXPECT_THAT(names, ElementsAre("B.jpeg", "a.png", "b/10.jpg", "b/2.JPG"));
-  EXPECT_EQ(project.block.path_of(project.block.images[ImageIndex(3)]), folder / "images/b/2.JPG");
-  EXPECT_EQ(project.block.images[ImageIndex(3)].file_hash, hash_file(folder / "images/b/2.JPG"));
+  EXPECT_EQ(project.block.path_of(project.block.images[ImageIndex(3)]), folder.path("images/b/2.JPG"));
+  EXPECT_EQ(project.block.images[ImageIndex(3)].file_hash, hash_file(folder.path("images/b/2.JPG")));
   ASSERT_THAT(project.block.cameras, SizeIs(3));
   const Camera& dji = project.block.cameras[CameraIndex(0)];
   EXPECT_EQ(dji.name, "DJI FC300S 64x48 3.61mm");
@@ -84,7 +84,7 @@ TEST(Project, ScansImagesInByteOrderAndGroupsThem) {
 }
 
 TEST(Project, GpsBecomesPositionPriorsAboutTheRoundedMedian) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder);
   const Block block = read_text(folder, "images: images\n").block;
   EXPECT_TRUE(block.ground.georeferenced);
@@ -99,7 +99,7 @@ TEST(Project, GpsBecomesPositionPriorsAboutTheRoundedMedian) {
 }
 
 TEST(Project, GpsOptionsAndOriginOverride) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder);
   const Block block = read_text(folder,
                                 "images: images\norigin: [46.8, -91.9, 100]\n"
@@ -117,21 +117,21 @@ TEST(Project, GpsOptionsAndOriginOverride) {
     EXPECT_TRUE(held(*f.position_prior));
   // A running job's ground frame wins over both.
   const GroundFrame running{true, 46.9, -92, 0, "EPSG:4979"};
-  EXPECT_EQ(read_project(folder / "block.yaml", running).block.ground.latitude_deg, 46.9);
+  EXPECT_EQ(read_project(folder.path("block.yaml"), running).block.ground.latitude_deg, 46.9);
 }
 
 TEST(Project, AccuracyInTheHeaderGivesTheSigmas) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const Tags gps = gps_tags(46.84, -91.99, 250);
-  write_picture(folder / "images/0_dop.jpg", 64, 48, 0, joined(gps, {{"Exif.GPSInfo.GPSDOP", "10/1"}}));
-  write_picture(folder / "images/1_good_dop.jpg", 64, 48, 1, joined(gps, {{"Exif.GPSInfo.GPSDOP", "9/10"}}));
-  write_picture(folder / "images/2_rtk.jpg", 64, 48, 2,
+  write_picture(folder.path("images/0_dop.jpg"), 64, 48, 0, joined(gps, {{"Exif.GPSInfo.GPSDOP", "10/1"}}));
+  write_picture(folder.path("images/1_good_dop.jpg"), 64, 48, 1, joined(gps, {{"Exif.GPSInfo.GPSDOP", "9/10"}}));
+  write_picture(folder.path("images/2_rtk.jpg"), 64, 48, 2,
                 joined(gps, {{"Xmp.drone-dji.RtkStdLon", "0.01"},
                              {"Xmp.drone-dji.RtkStdLat", "0.02"},
                              {"Xmp.drone-dji.RtkStdHgt", "0.03"}}));
   Tags flat = gps;
   flat.erase("Exif.GPSInfo.GPSAltitude");
-  write_picture(folder / "images/3_flat.jpg", 64, 48, 3, flat);
+  write_picture(folder.path("images/3_flat.jpg"), 64, 48, 3, flat);
   const Block block = read_text(folder, "images: images\n").block;
   EXPECT_EQ(block.frames[frame(0)].position_prior->sigma, Eigen::Vector3d(10, 10, 20));
   EXPECT_EQ(block.frames[frame(1)].position_prior->sigma, Eigen::Vector3d(3, 3, 6));
@@ -141,12 +141,12 @@ TEST(Project, AccuracyInTheHeaderGivesTheSigmas) {
 }
 
 TEST(Project, WrongPositionsAreDroppedAndNamed) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder, 8);
-  write_picture(folder / "images/far.jpg", 64, 48, 100, gps_tags(46.93, -91.99, 250));
-  write_picture(folder / "images/null.jpg", 64, 48, 101, gps_tags(0, 0, 0));
-  write_picture(folder / "images/swapped.jpg", 64, 48, 102, gps_tags(-91.99, 46.84, 250));
-  write_picture(folder / "images/high.jpg", 64, 48, 103, gps_tags(46.84, -91.99, 9000));
+  write_picture(folder.path("images/far.jpg"), 64, 48, 100, gps_tags(46.93, -91.99, 250));
+  write_picture(folder.path("images/null.jpg"), 64, 48, 101, gps_tags(0, 0, 0));
+  write_picture(folder.path("images/swapped.jpg"), 64, 48, 102, gps_tags(-91.99, 46.84, 250));
+  write_picture(folder.path("images/high.jpg"), 64, 48, 103, gps_tags(46.84, -91.99, 9000));
   const Project project = read_text(folder, "images: images\n");
   for (const Frame& f : project.block.frames) {
     const bool wrong = f.name == "far.jpg" || f.name == "null.jpg" || f.name == "swapped.jpg";
@@ -164,20 +164,20 @@ TEST(Project, WrongPositionsAreDroppedAndNamed) {
 }
 
 TEST(Project, SwappedPositionsInsideTheRangesAreTold) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   for (int i = 0; i < 5; ++i)
-    write_picture(folder / ("images/" + std::to_string(i) + ".jpg"), 64, 48, i, gps_tags(52.5, 13.4 + 0.001 * i, 30));
-  write_picture(folder / "images/s.jpg", 64, 48, 9, gps_tags(13.4, 52.5, 30));
+    write_picture(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i, gps_tags(52.5, 13.4 + 0.001 * i, 30));
+  write_picture(folder.path("images/s.jpg"), 64, 48, 9, gps_tags(13.4, 52.5, 30));
   EXPECT_THAT(read_text(folder, "images: images\n").warnings, ElementsAre(HasSubstr("look swapped")));
 }
 
 TEST(Project, GimbalAnglesBecomeAttitudesInTheBlock) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   const Tags nadir = {{"Xmp.drone-dji.GimbalYawDegree", "90"},
                       {"Xmp.drone-dji.GimbalPitchDegree", "-90"},
                       {"Xmp.drone-dji.GimbalRollDegree", "0"}};
-  write_picture(folder / "images/0.jpg", 64, 48, 0, joined(nadir, gps_tags(46.84, -91.99, 250)));
-  write_picture(folder / "images/1.jpg", 64, 48, 1, joined(nadir, gps_tags(46.93, -91.99, 250)));
+  write_picture(folder.path("images/0.jpg"), 64, 48, 0, joined(nadir, gps_tags(46.84, -91.99, 250)));
+  write_picture(folder.path("images/1.jpg"), 64, 48, 1, joined(nadir, gps_tags(46.93, -91.99, 250)));
   const Block block = read_text(folder, "images: images\norigin: [46.84, -91.99, 250]\n").block;
   const AttitudePrior& near = *block.frames[frame(0)].attitude_prior;
   // Nadir with the top of the image to the east: camera x points south, y (down the image) west, z down.
@@ -200,11 +200,11 @@ TEST(Project, GimbalAnglesBecomeAttitudesInTheBlock) {
 }
 
 TEST(Project, BadFilesAndCopiesAreLeftOut) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder, 2);
-  write_file(folder / "images/empty.jpg", "");
-  write_file(folder / "images/text.jpg", "only words");
-  write_file(folder / "images/9_copy.jpg", read_file(folder / "images/1.jpg"));
+  write_file(folder.path("images/empty.jpg"), "");
+  write_file(folder.path("images/text.jpg"), "only words");
+  write_file(folder.path("images/9_copy.jpg"), read_file(folder.path("images/1.jpg")));
   const Project project = read_text(folder, "images: images\n");
   EXPECT_THAT(project.block.images, SizeIs(2));
   ASSERT_THAT(project.unreadable, SizeIs(2));
@@ -214,10 +214,10 @@ TEST(Project, BadFilesAndCopiesAreLeftOut) {
 }
 
 TEST(Project, CameraSettingsOverrideTheHeaders) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder, 1);
-  write_picture(folder / "images/x.jpg", 100, 80, 50);
-  write_picture(folder / "mask.png", 64, 48, 0);
+  write_picture(folder.path("images/x.jpg"), 100, 80, 50);
+  write_picture(folder.path("mask.png"), 64, 48, 0);
   const Block block = read_text(folder,
                                 "images: images\n"
                                 "cameras:\n"
@@ -236,38 +236,38 @@ TEST(Project, CameraSettingsOverrideTheHeaders) {
   EXPECT_EQ(camera.intrinsics[kRadial1], -0.1);
   EXPECT_EQ(camera.intrinsics[kDecentring2], 1e-3);
   EXPECT_EQ(camera.prior_sigma, (IntrinsicSigmas{1.6, 1.28, 1.28, 0.2, 0, 0, 0, 0}));
-  EXPECT_EQ(camera.mask_path, folder / "mask.png");
+  EXPECT_EQ(camera.mask_path, folder.path("mask.png"));
   EXPECT_THAT(block.cameras[CameraIndex(1)].prior_sigma, Each(0.0));
 }
 
 TEST(Project, MaskFolderIsReadByCameraName) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder, 1);
-  write_picture(folder / "masks/DJI FC300S 64x48 3.61mm.png", 64, 48, 0);
-  write_picture(folder / "masks/other.png", 64, 48, 0);
+  write_picture(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 64, 48, 0);
+  write_picture(folder.path("masks/other.png"), 64, 48, 0);
   const Project project = read_text(folder, "images: images\nmasks: masks\n");
-  EXPECT_EQ(project.block.cameras[CameraIndex(0)].mask_path, folder / "masks/DJI FC300S 64x48 3.61mm.png");
+  EXPECT_EQ(project.block.cameras[CameraIndex(0)].mask_path, folder.path("masks/DJI FC300S 64x48 3.61mm.png"));
   EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("other.png")));
-  write_picture(folder / "masks/DJI FC300S 64x48 3.61mm.png", 32, 48, 0);
+  write_picture(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 32, 48, 0);
   EXPECT_THAT(refusal(folder, "images: images\nmasks: masks\n"), HasSubstr("32 x 48"));
 }
 
 TEST(Project, StageSectionsKeepFileAndLine) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder, 1);
   const Project project =
       read_text(folder, "images: images\nfeatures:\n  max_features: 4000\nmatching: {ratio: 0.7}\n");
   ASSERT_THAT(project.settings.entries, SizeIs(2));
   const auto& entry = project.settings.entries[0];
   EXPECT_EQ(entry.section + "." + entry.key + "=" + entry.value, "features.max_features=4000");
-  EXPECT_EQ(entry.where, folder / "block.yaml" + std::string(":3"));
-  EXPECT_EQ(project.settings.entries[1].where, folder / "block.yaml" + std::string(":4"));
+  EXPECT_EQ(entry.where, folder.path("block.yaml") + std::string(":3"));
+  EXPECT_EQ(project.settings.entries[1].where, folder.path("block.yaml") + std::string(":4"));
 }
 
 TEST(Project, RefusalsNameFileAndLine) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder, 2);
-  std::filesystem::create_directories(folder / "nothing");
+  std::filesystem::create_directories(folder.path("nothing"));
   const std::string images = "images: images\n";
   EXPECT_THAT(refusal(folder, "imagse: images\n"), HasSubstr("block.yaml:1: "));
   EXPECT_THAT(refusal(folder, "# a comment\nimges: images\n"),
@@ -300,17 +300,17 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "tie_points: none.h5\n"), HasSubstr("file 'none.h5' does not exist"));
   EXPECT_THAT(refusal(folder, ""), HasSubstr("key 'images'"));
   EXPECT_THAT(refusal(folder, "just words"), HasSubstr("must be a mapping"));
-  EXPECT_THAT(message_of<InputError>([&] { read_project(folder / "missing.yaml"); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(message_of<InputError>([&] { read_project(folder.path("missing.yaml")); }), HasSubstr("cannot be read"));
   EXPECT_THAT(message_of<InputError>([&] { read_project(folder.path()); }), HasSubstr("cannot be read"));
 }
 
 TEST(InitProject, WritesWhatTheReaderReads) {
-  TemporaryFolder folder;
+  ScratchDirectory folder;
   write_line(folder);
-  write_file(folder / "images/broken.jpg", "");
+  write_file(folder.path("images/broken.jpg"), "");
   InitOptions options;
-  options.images = folder / "images/";
-  options.output = folder / "block.yaml";
+  options.images = folder.path("images/");
+  options.output = folder.path("block.yaml");
   const std::string summary = init_project(options);
   EXPECT_THAT(summary, HasSubstr("5 images of 1 camera, 5 with a position, 0 with angles, 1 unreadable"));
   EXPECT_THAT(summary, HasSubstr("broken.jpg"));
@@ -321,21 +321,22 @@ TEST(InitProject, WritesWhatTheReaderReads) {
   EXPECT_DOUBLE_EQ(project.block.ground.longitude_deg, -91.988);
   // The origin is in the file: an image added later does not move it.
   for (int i = 0; i < 20; ++i)
-    write_picture(folder / ("images/new" + std::to_string(i) + ".jpg"), 64, 48, 200 + i, gps_tags(46.86, -91.99, 250));
+    write_picture(folder.path("images/new" + std::to_string(i) + ".jpg"), 64, 48, 200 + i,
+                  gps_tags(46.86, -91.99, 250));
   EXPECT_DOUBLE_EQ(read_project(options.output).block.ground.latitude_deg, 46.84);
   EXPECT_THAT(message_of<InputError>([&] { init_project(options); }), HasSubstr("exists already"));
 }
 
 TEST(InitProject, LeavesNothingBehindWhenItFails) {
-  TemporaryFolder folder;
-  std::filesystem::create_directories(folder / "images");
+  ScratchDirectory folder;
+  std::filesystem::create_directories(folder.path("images"));
   InitOptions options;
-  options.images = folder / "images";
-  options.output = folder / "block.yaml";
+  options.images = folder.path("images");
+  options.output = folder.path("block.yaml");
   EXPECT_THROW(init_project(options), InputError);
   EXPECT_FALSE(std::filesystem::exists(options.output));
   EXPECT_FALSE(std::filesystem::exists(options.output + ".draft"));
-  options.images = folder / "absent";
+  options.images = folder.path("absent");
   EXPECT_THAT(message_of<InputError>([&] { init_project(options); }), HasSubstr("is not a folder"));
 }
 

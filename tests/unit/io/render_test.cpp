@@ -14,6 +14,7 @@
 #include "io/pose_csv.h"
 #include "io/project.h"
 #include "io/unit_files.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -155,10 +156,9 @@ TEST_P(RenderTest, PicturesDoNotDependOnThreads) {
 
 TEST_P(RenderTest, FilesAreAProject) {
   const bool street = GetParam() == SimulationOptions::Scene::kStreet;
-  const fs::path folder = fs::path(testing::TempDir()) / (street ? "rendered_street" : "rendered_aerial");
-  fs::remove_all(folder);
-  write_rendered_block(options_, folder.string());
-  const Project project = read_project((folder / "block.yaml").string());
+  const ScratchDirectory folder;
+  write_rendered_block(options_, folder.path());
+  const Project project = read_project(folder.path("block.yaml"));
   ASSERT_EQ(std::ssize(project.block.frames), options_.frames);
   ASSERT_EQ(std::ssize(project.block.images), options_.frames * (street ? options_.rig_cameras : 1));
   EXPECT_TRUE(project.unreadable.empty());
@@ -168,8 +168,8 @@ TEST_P(RenderTest, FilesAreAProject) {
     EXPECT_TRUE(c.focal_known);
     EXPECT_NEAR(c.intrinsics[kFocal], options_.focal_px, 0.01);
   }
-  const PoseTable truth = read_pose_csv((folder / "truth.csv").string());
-  const BlockState state = read_state((folder / "truth.h5").string());
+  const PoseTable truth = read_pose_csv(folder.path("truth.csv"));
+  const BlockState state = read_state(folder.path("truth.h5"));
   ASSERT_EQ(truth.names.size(), project.block.frames.size());
   ASSERT_TRUE(truth.ground);
   EXPECT_NEAR(truth.ground->latitude_deg, project.block.ground.latitude_deg, 1e-12);
@@ -196,18 +196,17 @@ TEST_P(RenderTest, FilesAreAProject) {
     EXPECT_LT(rotation_angle(mount.pose.rotation, state.mounts.front()[m].rotation), 1e-12);
   }
   // The approximate poses can be used in place of the images.
-  std::ofstream(folder / "block.yaml", std::ios::app) << "poses: poses.csv\n";
-  const Block with_poses = read_project((folder / "block.yaml").string()).block;
+  std::ofstream(folder.path("block.yaml"), std::ios::app) << "poses: poses.csv\n";
+  const Block with_poses = read_project(folder.path("block.yaml")).block;
   for (std::size_t f = 0; f < truth.names.size(); ++f) {
     const Frame& frame = with_poses.frames[FrameIndex(static_cast<std::int64_t>(f))];
     ASSERT_TRUE(frame.given_pose);
     EXPECT_LT((frame.given_pose->centre - truth.poses[f].centre).norm(), 5 * options_.start_position_error_m);
   }
-  const std::string image = (folder / "images" / project.block.images[ImageIndex(3)].name).string();
+  const std::string image = folder.path("images/" + project.block.images[ImageIndex(3)].name);
   const std::uint64_t before = hash_file(image);
-  write_rendered_block(options_, folder.string());
+  write_rendered_block(options_, folder.path());
   EXPECT_EQ(hash_file(image), before);
-  fs::remove_all(folder);
 }
 
 // Control as read from the project lies where the true cameras see it, in both files.
@@ -216,18 +215,17 @@ TEST_P(RenderTest, ControlFitsTheTruth) {
   options_.check_points = 2;
   options_.image_noise_px = 0.3;
   options_.frames = GetParam() == SimulationOptions::Scene::kStreet ? 3 : 6;
-  const fs::path folder =
-      fs::path(testing::TempDir()) / ("rendered_control" + std::to_string(static_cast<int>(GetParam())));
-  fs::remove_all(folder);
-  write_rendered_block(options_, folder.string());
-  const BlockState truth = read_state((folder / "truth.h5").string());
+  const ScratchDirectory folder;
+  write_rendered_block(options_, folder.path());
+  const BlockState truth = read_state(folder.path("truth.h5"));
   for (const std::string file : {"control.csv", "gcp_list.txt"}) {
-    std::ofstream(folder / "block.yaml") << "images: images\norigin: [48.85, 2.35, 100]\n"
-                                         << "control: " << file << "\n"
-                                         << (truth.mounts.front().size() > 1 ? "rigs: {cameras: rig_cameras.json, "
-                                                                               "assignments: rig_assignments.json}\n"
-                                                                             : "");
-    const Block block = read_project((folder / "block.yaml").string()).block;
+    std::ofstream(folder.path("block.yaml"))
+        << "images: images\norigin: [48.85, 2.35, 100]\n"
+        << "control: " << file << "\n"
+        << (truth.mounts.front().size() > 1 ? "rigs: {cameras: rig_cameras.json, "
+                                              "assignments: rig_assignments.json}\n"
+                                            : "");
+    const Block block = read_project(folder.path("block.yaml")).block;
     double chi2 = 0, n = 0;
     std::int64_t control = 0;
     for (const ControlPoint& point : block.control_points) {
@@ -250,18 +248,15 @@ TEST_P(RenderTest, ControlFitsTheTruth) {
     EXPECT_LT(chi2 / n, GetParam() == SimulationOptions::Scene::kStreet ? 4 : 2) << file;
     EXPECT_GT(chi2 / n, 0.3) << file;
   }
-  fs::remove_all(folder);
 }
 
 TEST_P(RenderTest, HeldCamerasAreInTheProject) {
   options_.calibrate = false;
   options_.frames = 2;
-  const fs::path folder =
-      fs::path(testing::TempDir()) / ("rendered_held" + std::to_string(static_cast<int>(GetParam())));
-  fs::remove_all(folder);
-  write_rendered_block(options_, folder.string());
-  const Project project = read_project((folder / "block.yaml").string());
-  const BlockState truth = read_state((folder / "truth.h5").string());
+  const ScratchDirectory folder;
+  write_rendered_block(options_, folder.path());
+  const Project project = read_project(folder.path("block.yaml"));
+  const BlockState truth = read_state(folder.path("truth.h5"));
   ASSERT_EQ(project.block.cameras.size(), truth.cameras.size());
   for (std::size_t c = 0; c < truth.cameras.size(); ++c) {
     const Camera& held = project.block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
@@ -270,7 +265,6 @@ TEST_P(RenderTest, HeldCamerasAreInTheProject) {
       EXPECT_EQ(held.prior_sigma[p], 0);
     }
   }
-  fs::remove_all(folder);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, RenderTest,
@@ -278,10 +272,10 @@ INSTANTIATE_TEST_SUITE_P(Scenes, RenderTest,
                          [](const auto& scene) { return scene.index == 0 ? "aerial" : "street"; });
 
 TEST(RenderFolder, AFolderThatCannotBeMadeIsReported) {
-  const fs::path occupied = fs::path(testing::TempDir()) / "rendered_occupied";
+  const ScratchDirectory folder;
+  const std::string occupied = folder.path("occupied");
   std::ofstream(occupied) << "a file";
-  EXPECT_THROW(write_rendered_block(small_options(SimulationOptions::Scene::kAerial), occupied.string()), InputError);
-  fs::remove(occupied);
+  EXPECT_THROW(write_rendered_block(small_options(SimulationOptions::Scene::kAerial), occupied), InputError);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "io/simulate/simulate.h"
 #include "io/track_writer.h"
 #include "io/unit_files.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -17,15 +18,7 @@ namespace fs = std::filesystem;
 
 class SimulateWriteTest : public testing::Test {
  protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / (std::string("simulate_write_") + info->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string file(const std::string& name) const { return scratch_.path(name); }
   void write_text(const std::string& name, const std::string& text) const { std::ofstream(file(name)) << text; }
   // The message of the error that reading the file causes.
   std::string reading_fails(const std::string& text) const {
@@ -38,7 +31,7 @@ class SimulateWriteTest : public testing::Test {
     return "";
   }
 
-  fs::path folder_;
+  ScratchDirectory scratch_;
 };
 
 TEST_F(SimulateWriteTest, FilesHoldTheBlock) {
@@ -46,7 +39,7 @@ TEST_F(SimulateWriteTest, FilesHoldTheBlock) {
   options.frames = 12;
   options.control_points = 4;
   const SimulatedBlock s = simulate_block(options);
-  write_simulated_block(options, folder_.string());
+  write_simulated_block(options, scratch_.path());
 
   const Block block = read_block(file("given.h5"));
   ASSERT_EQ(block.frames.size(), s.block.frames.size());
@@ -86,7 +79,7 @@ TEST_F(SimulateWriteTest, BatchesLeaveNoTrace) {
     options.scene = scene;
     const SimulatedBlock s = simulate_block(options);
     for (const std::int64_t batch : {std::int64_t{1}, std::int64_t{37}, kTrackBatch}) {
-      write_simulated_block(options, folder_.string(), batch);
+      write_simulated_block(options, scratch_.path(), batch);
       const TrackSet tracks = read_tracks(file("tie_points.h5"));
       EXPECT_EQ(tracks.id, s.tracks.id);
       EXPECT_EQ(tracks.begin, s.tracks.begin);
@@ -122,7 +115,7 @@ TEST_F(SimulateWriteTest, StreamedFilesAreSmall) {
   SimulationOptions options;
   options.frames = 30;
   options.points_per_frame = 40;
-  write_simulated_block(options, folder_.string());
+  write_simulated_block(options, scratch_.path());
   write_tracks(file("plain.h5"), read_tracks(file("tie_points.h5")));
   EXPECT_LT(fs::file_size(file("tie_points.h5")), fs::file_size(file("plain.h5")) + 10000);
 }

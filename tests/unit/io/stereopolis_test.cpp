@@ -14,6 +14,7 @@
 #include "io/simulate/simulate.h"
 #include "io/simulate/trajectory.h"
 #include "io/unit_files.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -376,11 +377,10 @@ TEST(StereopolisRendered, FilesAreAProject) {
   options.image_width = 160;
   options.image_height = 90;
   options.focal_px = 117;
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "rendered_stereopolis";
-  std::filesystem::remove_all(folder);
-  write_rendered_block(options, folder.string());
-  const Block block = read_project((folder / "block.yaml").string()).block;
-  const BlockState truth = read_state((folder / "truth.h5").string());
+  const ScratchDirectory folder;
+  write_rendered_block(options, folder.path());
+  const Block block = read_project(folder.path("block.yaml")).block;
+  const BlockState truth = read_state(folder.path("truth.h5"));
   ASSERT_EQ(block.images.size(), 12u);
   EXPECT_EQ(block.images.front().name, "f000000_c22.jpg");
   ASSERT_EQ(block.frames.size(), 4u);
@@ -405,9 +405,8 @@ TEST(StereopolisRendered, FilesAreAProject) {
     EXPECT_NEAR(camera.intrinsics[kRadial1], 0.09, 1e-6);
     EXPECT_GT(camera.prior_sigma[kFocal], 0);
   }
-  std::filesystem::remove_all(folder);
   options.scene = Kind::kTargetField;
-  EXPECT_THROW(write_rendered_block(options, folder.string()), InputError);
+  EXPECT_THROW(write_rendered_block(options, folder.path("targets")), InputError);
 }
 
 class TargetFieldTest : public testing::TestWithParam<Path> {};

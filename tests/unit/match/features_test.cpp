@@ -16,6 +16,7 @@
 
 #include "io/error.h"
 #include "io/tracks.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -68,11 +69,7 @@ cv::Mat noise_texture(int width, int height, double amplitude, int seed) {
 
 class Features : public testing::Test {
  protected:
-  Features() : folder_(fs::temp_directory_path() / ("features_" + std::to_string(::getpid()))) {
-    fs::create_directories(folder_);
-  }
-  ~Features() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return scratch_.path(name); }
   std::string write(const std::string& name, const cv::Mat& pixels) const {
     EXPECT_TRUE(cv::imwrite(path(name), pixels));
     return path(name);
@@ -91,7 +88,7 @@ class Features : public testing::Test {
   }
 
  private:
-  fs::path folder_;
+  ScratchDirectory scratch_;
 };
 
 // Mean and number of differences found - true over blobs that have a feature within reach.
@@ -217,7 +214,7 @@ TEST_F(Features, BadFilesAreFailuresWithAReason) {
   EXPECT_THAT(detect(truncate(jpeg, "cut.jpg", 0.7)).failure, testing::HasSubstr("truncated"));
   const std::string png = write("good.png", noise_texture(400, 300, 50, 6));
   EXPECT_NE(detect(truncate(png, "cut.png", 0.5)).failure, "");
-  EXPECT_NE(detect(fs::temp_directory_path().string()).failure, "");  // a folder
+  EXPECT_NE(detect(path("")).failure, "");  // a folder
 }
 
 TEST_F(Features, ProgressiveJpegsAndTrailingBytesAreComplete) {

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "geometry/rotation.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -20,13 +21,10 @@ namespace fs = std::filesystem;
 class ImageVerticalTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("megablock_verticals_" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
     camera_.width = 900;
     camera_.height = 600;
     camera_.intrinsics = Intrinsics{800, 450, 300};
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   // Camera axes of a ground with y down, z ahead.
   Eigen::Matrix3d attitude() const {
@@ -59,12 +57,12 @@ class ImageVerticalTest : public ::testing::Test {
             cv::fillConvexPoly(picture, window, cv::Scalar(60), cv::LINE_AA, 4);
           }
     cv::GaussianBlur(picture, picture, {}, 0.7);
-    const std::string file = (folder_ / (windows ? "windows.png" : "plain.png")).string();
+    const std::string file = scratch_.path(windows ? "windows.png" : "plain.png");
     cv::imwrite(file, picture);
     return file;
   }
 
-  fs::path folder_;
+  ScratchDirectory scratch_;
   Camera camera_;
 };
 
@@ -99,7 +97,7 @@ TEST_F(ImageVerticalTest, NoneWithoutEdgesAndForBadFiles) {
   EXPECT_FALSE(plain.found);
   EXPECT_EQ(plain.segments, 0);
 
-  const ImageVertical missing = find_image_vertical((folder_ / "gone.jpg").string(), camera_, {}, 1);
+  const ImageVertical missing = find_image_vertical(scratch_.path("gone.jpg"), camera_, {}, 1);
   EXPECT_FALSE(missing.failure.empty());
   EXPECT_FALSE(missing.found);
   const std::string windows = draw(true);
@@ -107,7 +105,7 @@ TEST_F(ImageVerticalTest, NoneWithoutEdgesAndForBadFiles) {
   other.width = 901;
   EXPECT_NE(find_image_vertical(windows, other, {}, 1).failure.find("900 x 600"), std::string::npos);
   other = camera_;
-  other.mask_path = (folder_ / "mask.png").string();
+  other.mask_path = scratch_.path("mask.png");
   EXPECT_NE(find_image_vertical(windows, other, {}, 1).failure.find("mask"), std::string::npos);
   cv::imwrite(other.mask_path, cv::Mat(600, 900, CV_8U, cv::Scalar(0)));
   const ImageVertical masked = find_image_vertical(windows, other, {}, 1);

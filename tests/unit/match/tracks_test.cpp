@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "io/error.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -124,8 +125,8 @@ TEST(Tracks, EqualBruteForceHoweverLittleMemorySorts) {
   }
   const std::vector<Sightings> expected = tracks_by_brute_force(pairs);
   ASSERT_GT(expected.size(), 100u);
-  const std::string scratch =
-      (std::filesystem::temp_directory_path() / ("megablock-tracks-" + std::to_string(::getpid()))).string();
+  const ScratchDirectory directory;
+  const std::string scratch = directory.path("matches");
   for (const std::int64_t bytes : {std::int64_t{1} << 30, std::int64_t{4000}, std::int64_t{1}}) {
     std::shuffle(pairs.begin(), pairs.end(), generator);
     TrackBuilder builder(kImages, {bytes, scratch});

@@ -11,6 +11,7 @@
 #include "merge/memory.h"
 #include "merge/plan.h"
 #include "merge/scratch_file.h"
+#include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
@@ -117,22 +118,17 @@ TEST(FrontTest, CostsCountInnerNodesAlone) {
 
 class ScratchTest : public testing::Test {
  protected:
-  ScratchTest() : folder_(testing::TempDir() + "megablock_front_test") {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~ScratchTest() override { std::filesystem::remove_all(folder_); }
-  std::string folder_;
+  ScratchDirectory scratch_;
 };
 
 TEST_F(ScratchTest, FilesAreWrittenOverAndEndWhereTheyWereWritten) {
-  const std::string path = folder_ + "/file";
+  const std::string path = scratch_.path("file");
   for (const std::string text : {"a long first text", "short", "and a longer one again"}) {
     ASSERT_TRUE(write_scratch_file(path, [&](std::ofstream& file) { file << text; }));
     std::ifstream in(path);
     EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), text);
   }
-  EXPECT_FALSE(write_scratch_file(folder_ + "/no/such/file", [](std::ofstream& file) { file << "text"; }));
+  EXPECT_FALSE(write_scratch_file(scratch_.path("no/such/file"), [](std::ofstream& file) { file << "text"; }));
 }
 
 TEST_F(ScratchTest, BytesOfAFileAreThoseOfMemory) {
@@ -166,7 +162,7 @@ NodeFactors factors_of_size(std::size_t values) {
 }
 
 TEST_F(ScratchTest, FactorsMakeRoomForOthersAndAreDiscarded) {
-  FactorStore store({1 << 20, folder_});
+  FactorStore store({1 << 20, scratch_.path()});
   for (std::int64_t node = 0; node < 4; ++node) store.put(node, factors_of_size(20000));  // 160 kB each
   EXPECT_EQ(store.statistics().spilled, 0);
   store.leave_room(700 << 10);

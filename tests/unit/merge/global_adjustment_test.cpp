@@ -7,6 +7,7 @@
 
 #include "adjust/linearise.h"
 #include "merge/monolithic.h"
+#include "tests/unit/io/scratch_directory.h"
 #include "tests/unit/merge/ceres_cost.h"
 #include "tests/unit/merge/tiled_block.h"
 
@@ -160,8 +161,8 @@ class MemoryTest : public testing::Test {
 };
 
 TEST_F(MemoryTest, SpillGivesTheBitsOfKeep) {
-  const std::string folder = testing::TempDir() + "megablock_spill_test";
-  std::filesystem::remove_all(folder);
+  const ScratchDirectory scratch;
+  const std::string folder = scratch.path("spill");
   {
     auto keep = run({}), spill = run({1 << 16, folder});
     EXPECT_EQ(keep->memory().spilled, 0);
@@ -171,7 +172,6 @@ TEST_F(MemoryTest, SpillGivesTheBitsOfKeep) {
     expect_same(*keep, *spill);
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder));
-  std::filesystem::remove_all(folder);
 }
 
 TEST_F(MemoryTest, RecomputingGivesTheBitsOfKeep) {
