@@ -77,6 +77,20 @@ std::string remark_on(const std::vector<ImageVertical>& verticals) {
 
 namespace {
 
+// One line that names the first pictures in which no straight edge was found; empty where there are none.
+std::string edgeless_text(const Block& block, const std::vector<ImageVertical>& verticals) {
+  constexpr std::size_t kNamed = 5;
+  std::size_t count = 0;
+  std::string names;
+  for (std::size_t k = 0; k < verticals.size(); ++k) {
+    if (verticals[k].segments > 0 || !verticals[k].failure.empty() || ++count > kNamed) continue;
+    names += (count > 1 ? ", " : "") + block.images[ImageIndex(static_cast<std::int64_t>(k))].name;
+  }
+  if (count == 0) return "";
+  if (count > kNamed) names += fmt::format(" and {} more", count - kNamed);
+  return fmt::format("{} {} without straight edges: {}\n", count, count == 1 ? "image" : "images", names);
+}
+
 SeenVertical seen_vertical(ImageIndex image, const ImageVertical& found, const Intrinsics& camera) {
   return {image, found.down.direction, found.down.covariance,
           Eigen::Map<const Eigen::VectorXd>(camera.data(), camera.size()), found.by_camera};
@@ -130,7 +144,7 @@ int write_verticals(VerticalsOptions options) {
   }
   JobStore(output.parent_path().string()).write_text(output.filename().string(), table);
   std::printf("%d of %zu images show the vertical: %s\n", found, verticals.size(), options.output.c_str());
-  std::printf("%s", remark_on(verticals).c_str());
+  std::printf("%s%s", edgeless_text(block, verticals).c_str(), remark_on(verticals).c_str());
   std::printf("To use them, give 'verticals: FILE' in the project file.\n");
   return failed > 0 ? kExitFailedUnits : kExitDone;
 }

@@ -48,15 +48,36 @@ class Exif:
         self.file.write_bytes(self.data)
 
 
-def strip_exif(file):
-    """Takes all APP1 segments (EXIF, XMP) out of a JPEG file."""
-    data, at, kept = file.read_bytes(), 2, b"\xff\xd8"
+def segments(data):
+    """Marker and bytes of the segments of a JPEG file before its pixels."""
+    at = 2
     while data[at + 1] != 0xDA:
         length = 2 + struct.unpack_from(">H", data, at + 2)[0]
-        if data[at + 1] != 0xE1:
-            kept += data[at:at + length]
+        yield data[at + 1], data[at:at + length]
         at += length
-    file.write_bytes(kept + data[at:])
+
+
+def strip_exif(file):
+    """Takes all APP1 segments (EXIF, XMP) out of a JPEG file."""
+    data = file.read_bytes()
+    every = list(segments(data))
+    pixels = data[2 + sum(len(each) for _, each in every):]
+    file.write_bytes(b"\xff\xd8" + b"".join(kept for marker, kept in every if marker != 0xE1) + pixels)
+
+
+def make_blank(file, width, height):
+    """Leaves the APP1 segments (EXIF, XMP) of a JPEG file and makes its picture one of middle grey."""
+    def segment(marker, content):
+        return b"\xff" + bytes([marker]) + struct.pack(">H", 2 + len(content)) + content
+
+    one_code = bytes([1] + [0] * 15 + [0])  # of one bit, which says: no difference to the block before; no more terms
+    blank = [kept for marker, kept in segments(file.read_bytes()) if marker == 0xE1]
+    blank += [segment(0xDB, b"\0" + b"\x01" * 64),
+              segment(0xC0, struct.pack(">BHHB", 8, height, width, 1) + b"\x01\x11\0"),
+              segment(0xC4, b"\0" + one_code), segment(0xC4, b"\x10" + one_code),
+              segment(0xDA, b"\x01\x01\0\0\x3f\0")]
+    blocks = -(-width // 8) * -(-height // 8)
+    file.write_bytes(b"\xff\xd8" + b"".join(blank) + b"\0" * -(-blocks // 4) + b"\xff\xd9")
 
 
 def write_png(file, width, height, row):

@@ -7,6 +7,7 @@ import math
 import pathlib
 import tempfile
 
+from pictures import make_blank
 from program import FAILED_UNITS, megablock
 
 
@@ -64,6 +65,20 @@ def held_upside_down(folder, table):
     picture.write_bytes(upright)
 
 
+def blank(folder, table):
+    """A picture of one grey shows no edge: it is named in one line, the others stay what they are."""
+    before = table.read_text().splitlines()
+    picture = folder / "images" / "f000000_c3.jpg"
+    content = picture.read_bytes()
+    make_blank(picture, 1440, 960)
+    said = megablock("verticals", folder / "block.yaml", "-o", table)
+    assert "7 of 8 images show the vertical" in said, said
+    remarks = [line for line in said.splitlines() if "without straight edges" in line]
+    assert remarks == ["1 image without straight edges: f000000_c3.jpg"], said
+    assert [a for a, b in zip(table.read_text().splitlines(), before) if a != b] == ["f000000_c3.jpg,,,,,,,,,,,0,0,0,,,"]
+    picture.write_bytes(content)
+
+
 def against_given_poses(folder):
     """A block of given poses, which is not oriented: verticals that contradict them are named and take no part."""
     megablock("simulate", "--frames", 12, "--no-calibration", "-o", folder)
@@ -100,7 +115,9 @@ def main():
         first = table.read_bytes()
         megablock("verticals", folder / "block.yaml", "-o", table)
         assert table.read_bytes() == first
+        assert "without straight edges" not in said, said
         held_upside_down(folder, table)
+        blank(folder, table)
         picture = folder / "images" / "f000001_c2.jpg"
         picture.write_bytes(picture.read_bytes()[:20000])
         said = megablock("verticals", folder / "block.yaml", "-o", table, expect=FAILED_UNITS)

@@ -111,6 +111,24 @@ TEST(KnownPositions, TKP16WholeTileAdjustmentFindsTheDrone) {
   expect_at_most(runs.worst_angles, 2e-6, "drone, worst angle error, rad");
 }
 
+// Six cameras and 64 points: a common rotation is known from the attitude priors alone to satellites, not to a drone.
+TEST(KnownPositions, TKP10WeakCommonRotationOfSatellitesOnly) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+    for (const bool drone : {false, true}) {
+      const KnownPositionsScene scene(drone ? KnownPositionsOptions::drone(64, seed)
+                                            : KnownPositionsOptions::satellite(64, 0.1, seed));
+      SingleTile tile(scene.block(), adjustment_of(scene));
+      adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
+      const MotionVerdict verdict = verdict_of(tile);
+      EXPECT_EQ(verdict.weak_common_rotation(), !drone) << seed;
+      EXPECT_EQ(verdict.sound(), drone) << seed;
+      EXPECT_FALSE(verdict.collinear) << seed;
+      if (drone) continue;
+      const double mean_of_six = scene.options.angle_sigma_rad / std::sqrt(6.0);
+      EXPECT_NEAR(verdict.common_sigma_rad / mean_of_six, 1, 0.3) << seed;
+    }
+}
+
 // Mean over the points of the expected squared error of their positions: the best that an unbiased estimate can do with
 // these images, attitudes and control points, from the normal equations at the truth by central differences.
 double expected_squared_error(const KnownPositionsScene& scene) {

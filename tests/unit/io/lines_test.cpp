@@ -64,6 +64,8 @@ TEST_F(LinesFile, BadRowsAreNamed) {
   EXPECT_THAT(message("a,upright," + image(0) + ",1,1,1,90,\n"), HasSubstr("lines.csv:2: direction: 'upright'"));
   EXPECT_THAT(message("a,vertical,nowhere.jpg,1,1,1,90,\n"), HasSubstr("nowhere.jpg"));
   EXPECT_THAT(message("a,vertical," + image(0) + ",1,1,1,5,\n"), HasSubstr("less than 10 px"));
+  EXPECT_THAT(message("a,vertical," + image(0) + ",7,9,7,9,\n"), HasSubstr("less than 10 px")) << "no direction";
+  EXPECT_THAT(message("a,vertical," + image(0) + ",1,1,1,nan,\n"), HasSubstr("lines.csv:2"));
   EXPECT_THAT(message("a,vertical," + image(0) + ",1,1,1,99999,\n"), HasSubstr("outside the image"));
   EXPECT_THAT(message("a,vertical," + image(0) + ",1,1,1,90,0\n"), HasSubstr("sigma_px"));
   EXPECT_THAT(message("a,vertical," + image(0) + ",1,1,1,90,\na,horizontal," + image(1) + ",1,1,90,1,\n"),
