@@ -1,4 +1,5 @@
-// Camera matrix P ~ K R [I | -C] into calibration, rotation and centre (KP-02).
+// Camera matrix P ~ K R [I | -C] into calibration, rotation and centre (KP-02; A. Barrier and S. Martin, "Bundle
+// adjustment with known positions", appendix A; R. Hartley and A. Zisserman, "Multiple view geometry", 2004, 6.2.4).
 //
 // The rows of the left block are taken from the last to the first: r3 along the third, r2 along what the second has
 // across r3, r1 = r2 x r3, so that det R = +1 whatever the matrix. K is upper triangular with K33 = 1 and K11 > 0. Two

@@ -22,7 +22,9 @@
 // two more than nine: that L1 and L2 are perpendicular and that both give the same p is lost, and measures the quality
 // of (2).
 //
-// (J.-F. Haas, "Mathematiques de la photogrammetrie numerique"; ENSG course of A. Pinte.)
+// (J.-F. Haas, "Mathematiques de la photogrammetrie numerique"; ENSG course of A. Pinte. From control points: Y. I.
+// Abdel-Aziz and H. M. Karara, "Direct linear transformation from comparator coordinates into object space coordinates
+// in close-range photogrammetry", Symposium on Close-Range Photogrammetry, 1971.) Each way has one solution.
 #pragma once
 
 #include <Eigen/Core>

@@ -6,8 +6,8 @@
 // IEEE PAMI 19(6), 1997); unit rays need none of that. Seven: the two matrices the equations leave are combined so that
 // det(F1 + s F2) = 0, a cubic with one or three real roots (Hartley and Zisserman 2004, 11.1.2).
 //
-// Degenerate: all points in one plane (any base fits, the equations have rank six), points and centres on a common
-// quadric, no base.
+// Solutions: seven points one or three, more points one. Degenerate: all points in one plane (any base fits, the
+// equations have rank six), points and centres on a common quadric, no base.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,5 @@
-// Least squares where several measurements, all with errors, stand in one equation (Gauss-Helmert model, M31).
+// Least squares where several measurements, all with errors, stand in one equation (Gauss-Helmert model; Kalantari
+// 2009, M31).
 //
 // Unknowns x and measurements l with covariance S satisfy f(x, l + v) = 0 and, where there are constraints, g(x) = 0;
 // sought is the x for which v' S^-1 v is least. At x0 and l0 = l + v0, with A = df/dx, B = df/dl, C = dg/dx:

@@ -9,6 +9,10 @@
 // with them the third becomes bilinear in s_2 and s_3, and both are eliminated: an octic in s_1 (Nister and Stewenius,
 // "A minimal solution to the generalised 3-point pose problem", J. Math. Imaging Vision 27, 2007, have the same degree
 // from two circles on a ruled surface). Distances are polished by Newton iterations on the three quadrics.
+//
+// Degenerate: points on one line; three parallel rays, along which the rig slides. Two solutions coincide where the
+// triangle of the points can move to first order with each of its corners along its ray: for one centre that is the
+// danger cylinder (p3p.h). Errors there grow as the root of those of the rays.
 #pragma once
 
 #include <Eigen/Core>

@@ -7,6 +7,9 @@
 // are two solutions, each with n, t or -n, -t (Y. Ma, S. Soatto, J. Kosecka and S. Sastry, "An invitation to 3-D
 // vision", 2004, 5.3.3). Points seen from one side only give n.a > 0 and leave one or both: the twins of a plane.
 //
+// H itself is the null vector of the equations b x (H a) = 0, two of every point (R. Hartley and A. Zisserman,
+// "Multiple view geometry", 2004, 4.1): one solution.
+//
 // Degenerate: three of four points on one line. p = q = 1: no base, H is a rotation. p or q = 1: the base along the
 // normal, where both solutions coincide.
 #pragma once

@@ -1,4 +1,4 @@
-// Straight lines in an image with their covariance (M14), and the feet of their perpendiculars (M25).
+// Straight lines in an image with their covariance (Kalantari 2009, M14), and the feet of their perpendiculars (M25).
 //
 // A line is rho = -x sin(theta) + y cos(theta): theta its direction, rho its signed distance from the origin. Of n
 // points with centre (xb, yb), a = sum (x - xb)^2, b = 2 sum (x - xb)(y - yb), c = sum (y - yb)^2 and an error sigma in

@@ -1,4 +1,4 @@
-// The plane through a perspective centre and a line of the image, by its unit normal (M32, M34).
+// The plane through a perspective centre and a line of the image, by its unit normal (Kalantari 2009, M32, M34).
 //
 // All planes of lines that are parallel in space hold their common direction V: V'N = 0. This is so for any centre on
 // the normal of the image plane, as the planes of lines that meet in a vanishing point P hold the line to P wherever

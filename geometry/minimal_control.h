@@ -1,6 +1,6 @@
-// Similarity of a model to control of which some points have only a height or only a place (M54): seven equations for
-// seven unknowns. Full points count as both. The minimal mixes that determine a similarity are two; each has up to two
-// solutions.
+// Similarity of a model to control of which some points have only a height or only a place (Kalantari 2009, M54, which
+// counts the equations; the solutions are derived here): seven equations for seven unknowns. Full points count as both.
+// The minimal mixes that determine a similarity are two; each has up to two solutions.
 //
 // Two places and three heights (two full points and a height among them). With Y = s R X + t let u = s r_3 be the
 // scaled third row of R. Height differences give u . (X_i - X_1) = Z_i - Z_1, so that u = u_0 + k n along the normal n

@@ -1,4 +1,5 @@
-// Least squares of a relative orientation over many matches, with covariance.
+// Least squares of a relative orientation over many matches, with covariance, from a start that is near. Residuals are
+// those of P. D. Sampson, "Fitting conic sections to 'very scattered' data", CGIP 18, 1982.
 //
 //     E = [t]x R,  n = x_b' E x_a,  d = |(E x_a)_{1,2}|^2 + |(E' x_b)_{1,2}|^2,  r = n / sqrt(d)   (Sampson)
 //

@@ -1,7 +1,11 @@
 // Rotation between two images from one centre (or of points very far away): two rays in each, b = R a. One solution.
 //
 // Each pair spans the axes: bisector, normal, and what completes them. That shares the misfit of the angle between the
-// two rays, as least squares over both does (rotation_fit.h takes more than two). Degenerate: two rays along one line.
+// two rays, as least squares over both does (rotation_fit.h takes more than two). H. D. Black, "A passive system for
+// determining the attitude of a satellite", AIAA Journal 2(7), 1964, has axes from two directions; both alike: F. L.
+// Markley, "Attitude determination using two vector measurements", Flight Mechanics Symposium, NASA, 1999.
+//
+// Degenerate: two rays along one line; the nearer they are, the less certain is the turn about them.
 #pragma once
 
 #include <Eigen/Core>

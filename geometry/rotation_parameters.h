@@ -1,5 +1,5 @@
-// Parameters of rotations and of unit bases in which relative orientation and similarity become polynomials (M37, M38).
-// rotation.h is what everything else uses.
+// Parameters of rotations and of unit bases in which relative orientation and similarity become polynomials (Kalantari
+// 2009, M37, M38). rotation.h is what everything else uses.
 //
 // Cayley, (x, y, z) = axis tan(angle / 2), R = (I - [v]x)^-1 (I + [v]x); Thompson (1959), twice that. Both are the
 // vector part of the quaternion over its real part, and infinite for half turns. A unit base t is (u, v) by

@@ -1,4 +1,4 @@
-// Similarity between two sets of points that both carry errors, with its covariance (M31, M50).
+// Similarity between two sets of points that both carry errors, with its covariance (Kalantari 2009, M31, M50).
 //
 // y = s R x + t for the corrected x and y; three equations and six measurements a point (gauss_helmert.h). Steps are
 // those of similarity.h. The adjustment refers to the centre of the x, so that places far

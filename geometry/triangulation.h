@@ -1,4 +1,5 @@
-// Intersection of the rays of one point.
+// Intersection of the two or more rays of one point: one solution (B. Cannelle 2013, CN-18, for the linear start; R.
+// Hartley and P. Sturm, "Triangulation", CVIU 68(2), 1997, for what it leaves to the refinement).
 //
 // Linear start: every ray gives M - lambda_i v_i = A_i with the point M, the projection centre A_i, the unit direction
 // v_i and the unknown distance lambda_i. Least squares eliminates lambda_i = v_i' (M - A_i) and leaves
@@ -7,6 +8,8 @@
 //
 // a 3x3 system in M, solved relative to the mean of the A_i. The residual of a ray is the distance of the point from
 // it, in metres: near rays weigh too little, so the refinement follows, Gauss-Newton on the pixel residuals.
+//
+// Degenerate: all rays parallel: the point is far away, or on the line of the centres.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,8 +1,12 @@
-// Intersection of two rays in closed form: the middle of their shortest distance. triangulation.h takes any number.
+// Intersection of two rays in closed form: the middle of their shortest distance. One solution. triangulation.h takes
+// any number.
 //
 // With the base m = C_2 - C_1 and the directions d_1, d_2 the nearest points are C_1 + a d_1 and C_2 + b d_2,
 //
-//     a = det(m, d_2, d_1 x d_2) / |d_1 x d_2|^2,    b = det(m, d_1, d_1 x d_2) / |d_1 x d_2|^2.
+//     a = det(m, d_2, d_1 x d_2) / |d_1 x d_2|^2,    b = det(m, d_1, d_1 x d_2) / |d_1 x d_2|^2
+//
+// (R. Goldman, "Intersection of two lines in three-space", Graphics Gems, 1990; as an estimate of a point compared with
+// better ones by R. Hartley and P. Sturm, "Triangulation", CVIU 68(2), 1997). Degenerate: parallel rays.
 #pragma once
 
 #include <Eigen/Geometry>

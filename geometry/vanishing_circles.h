@@ -1,5 +1,5 @@
-// Vanishing points by circles in the image (M24 to M30, M35): for comparison with vanishing_points.h, which has the
-// same statistics and needs no origin. A point comes as a pixel, so that one at infinity itself is none.
+// Vanishing points by circles in the image (Kalantari 2009, M24 to M30, M35): for comparison with vanishing_points.h,
+// which has the same statistics and needs no origin. A point comes as a pixel, so that one at infinity itself is none.
 //
 // The feet H of the perpendiculars from an origin O to lines that meet in P lie on the circle of diameter OP: its
 // centre is K = P / 2, its radius |K|, and |K - H| - |K| = 0. By |H|^2 = P'H two feet give a circle through O. With rho

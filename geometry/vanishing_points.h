@@ -1,4 +1,4 @@
-// Vanishing points of the lines of one image, by planes on the unit sphere (M33, M34).
+// Vanishing points of the lines of one image, by planes on the unit sphere (Kalantari 2009, M33, M34).
 //
 // The normals N of the interpretation planes of parallel lines lie on the great circle whose pole is their vanishing
 // point V (interpretation_plane.h). Great circles are taken away one by one, the fullest first:

@@ -1,5 +1,5 @@
-// Which vanishing point is that of the vertical (M44), and what follows from it: levelling (M20), the attitude from two
-// or three orthogonal axes (M19), the image seen from a levelled camera (M22).
+// Which vanishing point is that of the vertical (Kalantari 2009, M44), and what follows from it: levelling (M20), the
+// attitude from two or three orthogonal axes (M19), the image seen from a levelled camera (M22).
 //
 // Directions are in camera axes (x right, y down, z along the view), so that the vertical points down: +y in a picture
 // that was taken upright. How the camera was held gives the direction d that is expected. The rotation vector

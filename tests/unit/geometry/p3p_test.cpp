@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <random>
+#include <vector>
+
+#include "geometry/median.h"
 
 namespace megablock {
 namespace {
@@ -54,6 +57,38 @@ TEST(P3p, NothingForBadPoints) {
   for (const Pose& pose : solve_p3p(bad_rays, points))
     EXPECT_GT(rotation_angle(pose.rotation, Eigen::Quaterniond::Identity()) + pose.centre.norm(), 1e-3)
         << "a point behind";
+}
+
+// Centres on the circular cylinder over the circle through the points: two solutions coincide there. Errors grow as the
+// root of those of the rays, from rounding (1e-16) to 1e-7, and the truth is found all the same; elsewhere in
+// proportion.
+TEST(P3p, OnTheDangerCylinder) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<double> on, beside;
+  int missed = 0;
+  constexpr int kTrials = 1000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const auto on_circle = [&](double radius, double z) {
+      const double angle = 3.14 * uniform(random);
+      return Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z);
+    };
+    const std::array<Eigen::Vector3d, 3> points = {on_circle(1, 0), on_circle(1, 0), on_circle(1, 0)};
+    for (const bool danger : {true, false}) {
+      const Pose truth{rotation_exp<double>({uniform(random), uniform(random), uniform(random)}),
+                       on_circle(danger ? 1 : 0.5, 2 + uniform(random))};
+      std::array<Eigen::Vector3d, 3> rays;
+      for (std::size_t k = 0; k < 3; ++k) rays[k] = to_inside(truth, points[k]).normalized();
+      double nearest = 1;
+      for (const Pose& pose : solve_p3p(rays, points)) nearest = std::min(nearest, (pose.centre - truth.centre).norm());
+      (danger ? on : beside).push_back(nearest);
+      missed += danger && !(nearest < 1e-3);
+    }
+  }
+  EXPECT_LT(median(beside), 1e-12);
+  EXPECT_GT(median(on), 1e-11);
+  EXPECT_LT(median(on), 1e-6);
+  EXPECT_LE(missed, kTrials / 20) << "by rounding, or thin triangles";
 }
 
 TEST(P3p, RefusesPointsOnOneLine) {
