@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <iterator>
 #include <map>
@@ -12,6 +11,7 @@
 #include "adjust/ground_alignment.h"
 #include "adjust/model_assembly.h"
 #include "adjust/orientation_graph.h"
+#include "geometry/decompositions.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -317,8 +317,7 @@ class PartwiseOrientation {
     if (ground.known == GroundAngles::kLevel)
       ground.turn = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
     if (ground.known == GroundAngles::kAll) {
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(squares);
-      ground.turn.coeffs() = eigen.eigenvectors().col(3);
+      ground.turn.coeffs() = symmetric_eigen(squares).vectors.col(3);
       ground.turn = ground.turn.conjugate();
     }
     return ground;

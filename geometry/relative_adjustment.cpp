@@ -1,9 +1,9 @@
 #include "geometry/relative_adjustment.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "geometry/decompositions.h"
 #include "geometry/median.h"
 
 namespace megablock {
@@ -95,16 +95,15 @@ OrientationPrecision precision_from(const Matrix5& normal, double variance) {
   constexpr double kOpen = 1 / (std::numbers::pi * std::numbers::pi);  // weight of a direction that is open
   OrientationPrecision result;
   result.sigma = std::sqrt(variance);
-  const Eigen::SelfAdjointEigenSolver<Matrix5> eigen(normal / variance);
-  const Vector5 weights = eigen.eigenvalues().cwiseMax(kOpen);
+  const SymmetricEigen eigen = symmetric_eigen(normal / variance);
+  const Vector5 weights = eigen.values.cwiseMax(kOpen);
   if (!weights.allFinite()) return result;
-  result.covariance = eigen.eigenvectors() * weights.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  result.covariance = eigen.vectors * weights.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   return result;
 }
 
 double largest_sigma(const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
-  return std::sqrt(
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
+  return std::sqrt(symmetric_eigen(covariance).values.maxCoeff());
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "geometry/chi_square.h"
+#include "geometry/decompositions.h"
 
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
@@ -164,13 +165,12 @@ UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eige
   UnknownCheck check;
   // In units of what the tile knows.
   const Eigen::Matrix<double, Size, 1> scale = scale_of(own);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, Size, Size>> eigen(scale.asDiagonal() * left *
-                                                                               scale.asDiagonal());
-  const Eigen::Matrix<double, Size, 1> along = eigen.eigenvectors().transpose() * scale.cwiseProduct(score);
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * left * scale.asDiagonal());
+  const Eigen::Matrix<double, Size, 1> along = eigen.vectors.transpose() * scale.cwiseProduct(score);
   for (Eigen::Index i = 0; i < along.size(); ++i) {
-    if (eigen.eigenvalues()[i] < kShared) continue;
+    if (eigen.values[i] < kShared) continue;
     ++check.degrees;
-    check.statistic += along[i] * along[i] / eigen.eigenvalues()[i] / variance_factor;
+    check.statistic += along[i] * along[i] / eigen.values[i] / variance_factor;
   }
   if (check.degrees > 0) check.threshold = limits.of(check.degrees);
   return check;

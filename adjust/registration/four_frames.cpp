@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "geometry/angles.h"
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -167,7 +168,7 @@ bool FourFrames::iterate(double threshold_px) {
   for (const FourFrameTrack& track : tracks_) add_track(track, threshold_px);
   add_pairs();
   if (kept_tracks_ < 3) return false;
-  const Vector18 step = normal_.ldlt().solve(right_);
+  const Vector18 step = solve_symmetric(normal_, right_);
   if (!step.allFinite() || step.norm() > 100) return false;
   for (std::size_t f = 1; f < 4; ++f)
     poses_[f] = pose_update(poses_[f], step.segment<6>(6 * (static_cast<Eigen::Index>(f) - 1)));
@@ -190,7 +191,7 @@ std::vector<double> FourFrames::residuals() const {
 }
 
 std::optional<FourFrames::Matrix6> FourFrames::covariance() const {
-  const Eigen::LDLT<Matrix18> factor(normal_);
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal_);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return std::nullopt;
   const Matrix18 inverse = factor.solve(Matrix18::Identity());
   const double freedom = 2.0 * kept_ - 3.0 * kept_tracks_ - 6;

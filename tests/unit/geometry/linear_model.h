@@ -38,15 +38,16 @@ template <int N>
 class LinearModelEstimator {
  public:
   using Model = Eigen::Matrix<double, N, 1>;
-  using Square = Eigen::Matrix<double, N, N>;
+  // Of any size up to eight: Eigen's decompositions are compiled once and not for every N.
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 8, 8>;
   static constexpr std::size_t kSampleSize = N;
   explicit LinearModelEstimator(const LinearModelScene<N>& scene) : scene_(&scene) {}
   std::size_t size() const { return scene_->x.size(); }
   double chance(double residual) const { return std::min(1.0, residual / 3); }
 
   Solutions<Model, 1> solve(const std::array<std::size_t, N>& rows) const {
-    Square a;
-    Model y;
+    Square a(N, N);
+    Eigen::VectorXd y(N);
     for (int i = 0; i < N; ++i) {
       a.row(i) = scene_->x[rows[static_cast<std::size_t>(i)]].transpose();
       y[i] = scene_->y[rows[static_cast<std::size_t>(i)]];
@@ -64,8 +65,8 @@ class LinearModelEstimator {
   }
   std::optional<Model> refine(const Model& c, double threshold) const {
     const auto residual = squared_residuals(c);
-    Square normal = Square::Zero();
-    Model right = Model::Zero();
+    Square normal = Square::Zero(N, N);
+    Eigen::VectorXd right = Model::Zero();
     for (std::size_t i = 0; i < size(); ++i) {
       if (!(residual(i) <= threshold * threshold)) continue;
       normal += scene_->x[i] * scene_->x[i].transpose();
