@@ -238,24 +238,75 @@ std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eig
   return verdicts;
 }
 
+namespace {
+
+constexpr double kApproximate = 5 * kDegree;  // sigma of given poses
+
+// World -> camera by the frame's given pose.
+std::optional<Eigen::Quaterniond> given_rotation(const Block& block, ImageIndex image) {
+  const std::optional<Pose>& given = block.frames[block.images[image].frame].given_pose;
+  if (!given) return std::nullopt;
+  return block.mount_of(image).pose.rotation * given->rotation;
+}
+
+struct JudgedByPose {
+  ImageIndex image;
+  bool down = false;
+  Eigen::Vector3d direction;   // of the world
+  Eigen::Matrix3d covariance;  // of both
+};
+
+// The most that show one direction, which is that of one of at most fifty of them.
+std::size_t most_alike(const std::vector<JudgedByPose>& judged) {
+  constexpr std::size_t kTried = 50;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < judged.size(); i += 1 + judged.size() / kTried) {
+    const JudgedByPose& one = judged[i];
+    if (one.down) continue;
+    most = std::max(most, static_cast<std::size_t>(std::ranges::count_if(judged, [&](const JudgedByPose& other) {
+                      return same_direction(one.direction, other.direction, one.covariance + other.covariance);
+                    })));
+  }
+  return most;
+}
+
+}  // namespace
+
 std::vector<SetAsideVertical> against_given_poses(const Block& block) {
-  constexpr double kApproximate = 5 * kDegree;
   const GroundVertical ground(block.ground);
-  std::vector<SetAsideVertical> aside;
+  std::vector<JudgedByPose> judged;
   for (const SeenVertical& vertical : block.verticals) {
-    const std::optional<Pose>& given = block.frames[block.images[vertical.image].frame].given_pose;
-    if (!given) continue;
+    const auto rotation = given_rotation(block, vertical.image);
+    if (!rotation) continue;
     const Camera& camera = block.cameras[block.camera_of(vertical.image)];
     const AxisDirection seen = whole_error(vertical, camera, camera.intrinsics);
-    const Eigen::Vector3d down =
-        block.mount_of(vertical.image).pose.rotation * (given->rotation * ground.down(given->centre));
-    const double variance = kApproximate * kApproximate + kLeaning * kLeaning;
-    if (!same_direction(down, seen.direction, seen.covariance + variance * Eigen::Matrix3d::Identity()))
-      aside.push_back({vertical.image, VerticalVerdict::kAgainstGround});
+    const Eigen::Matrix3d to_world = rotation->conjugate().toRotationMatrix();
+    JudgedByPose by_pose{vertical.image, false, to_world * seen.direction,
+                         to_world * seen.covariance * to_world.transpose() +
+                             (kApproximate * kApproximate + kLeaning * kLeaning) * Eigen::Matrix3d::Identity()};
+    const Eigen::Vector3d down = ground.down(block.frames[block.images[vertical.image].frame].given_pose->centre);
+    by_pose.down = same_direction(by_pose.direction, down, by_pose.covariance);
+    judged.push_back(by_pose);
   }
+  const bool level = judged.size() < 2 || 5 * most_alike(judged) < 4 * judged.size();
+  std::vector<SetAsideVertical> aside;
+  for (const JudgedByPose& one : judged)
+    if (!level || !one.down)
+      aside.push_back({one.image, level ? VerticalVerdict::kAgainstGround : VerticalVerdict::kAgainstPoses});
   std::sort(aside.begin(), aside.end(),
             [](const SetAsideVertical& a, const SetAsideVertical& b) { return a.image < b.image; });
   return aside;
+}
+
+bool given_poses_join(const Block& block, ImageIndex a, const AxisDirection& seen_a, ImageIndex b,
+                      const AxisDirection& seen_b) {
+  const auto rotation_a = given_rotation(block, a), rotation_b = given_rotation(block, b);
+  if (!rotation_a || !rotation_b) return true;
+  const Eigen::Matrix3d relative = (*rotation_b * rotation_a->conjugate()).toRotationMatrix();
+  const double variance = 2 * (kApproximate * kApproximate + kLeaning * kLeaning);
+  return same_direction(
+      relative * seen_a.direction, seen_b.direction,
+      relative * seen_a.covariance * relative.transpose() + seen_b.covariance + variance * Eigen::Matrix3d::Identity());
 }
 
 }  // namespace megablock

@@ -13,7 +13,7 @@
 // another the largest group is believed when it has a third of all and four fifths of those who agree with anybody:
 // rows of a field agree with themselves, but in strips flown to and fro half of them the other way round. Last, what a
 // group takes for down must be down by the positions or attitudes, where these tell. Frames with a given pose are not
-// oriented, so theirs are held against the pose alone, one by one.
+// oriented, so theirs are held against the poses alone.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -46,7 +46,14 @@ std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eig
                                              const std::optional<AxisDirection>& down);
 
 // Verticals of frames with a given pose that are wrong by it: farther off than an approximate pose can be, which is
-// taken to have a sigma of five degrees. By image.
+// taken to have a sigma of five degrees. By image. Where four fifths show one direction of the poses' world that is
+// not down (kAgainstPoses), the poses are not level, as those of an imported model, or pictures from above show rows:
+// then all are set aside.
 std::vector<SetAsideVertical> against_given_poses(const Block& block);
+
+// Whether the given poses of two images, as good as above, take what one sees to what the other sees; true where a pose
+// is not given. Asks nothing of what is down in their world.
+bool given_poses_join(const Block& block, ImageIndex a, const AxisDirection& seen_a, ImageIndex b,
+                      const AxisDirection& seen_b);
 
 }  // namespace megablock

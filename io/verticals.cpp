@@ -149,7 +149,8 @@ std::string set_aside_text(const Block& block, std::span<const SetAsideVertical>
   for (const auto& [verdict, reason] :
        {std::pair(VerticalVerdict::kContradicted, "contradicted by most others"),
         std::pair(VerticalVerdict::kNoConsensus, "that agree with too few others"),
-        std::pair(VerticalVerdict::kAgainstGround, "not down by the positions or attitudes")}) {
+        std::pair(VerticalVerdict::kAgainstGround, "not down by the positions or attitudes"),
+        std::pair(VerticalVerdict::kAgainstPoses, "that show one direction, but not down by the given poses")}) {
     std::string names;
     std::size_t count = 0;
     for (const SetAsideVertical& vertical : aside) {
@@ -162,6 +163,9 @@ std::string set_aside_text(const Block& block, std::span<const SetAsideVertical>
   std::string text =
       fmt::format("{} of {} verticals take{} no part: {}", aside.size(), all, aside.size() == 1 ? "s" : "", reasons);
   if (2 * aside.size() > all) text += "; pictures from above show no vertical, leave out 'verticals' for them";
+  if (std::any_of(aside.begin(), aside.end(),
+                  [](const auto& a) { return a.verdict == VerticalVerdict::kAgainstPoses; }))
+    text += "; given poses may have axes that are not level: positions or control points say what is down";
   return text;
 }
 

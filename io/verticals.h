@@ -39,6 +39,7 @@ enum class VerticalVerdict : std::uint8_t {
   kContradicted,   // most others contradict it
   kNoConsensus,    // those it can be compared with agree on no direction
   kAgainstGround,  // what it and others take for down is not, by the positions or attitudes
+  kAgainstPoses,   // as most others with given poses, it shows another direction than theirs of down
 };
 
 struct SetAsideVertical {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 
+#include "adjust/vertical_check.h"
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/stages.h"
 #include "geometry/angles.h"
@@ -47,12 +48,20 @@ struct Knowledge {
         filter(job.settings.matching.filter_model.empty() ? MatchFilter::shipped()
                                                           : MatchFilter::load(job.settings.matching.filter_model)),
         filtered(job.settings.matching.filter),
-        verticals(good_verticals(job.block)) {}
+        verticals(good_verticals(job.block)),
+        block(job.block) {}
   PairKnowledge of(const ImagePair& pair) const {
+    const bool joined = joined_by_verticals(pair);
     return {.orientation = trajectory.relate(pair.a, pair.b),
             .filter = filtered ? &filter : nullptr,
-            .vertical_a = vertical(pair.a),
-            .vertical_b = vertical(pair.b)};
+            .vertical_a = joined ? vertical(pair.a) : std::nullopt,
+            .vertical_b = joined ? vertical(pair.b) : std::nullopt};
+  }
+  // Both have one, and their given poses allow for both.
+  bool joined_by_verticals(const ImagePair& pair) const {
+    const auto a = verticals.find(pair.a), b = verticals.find(pair.b);
+    return a != verticals.end() && b != verticals.end() &&
+           given_poses_join(block, pair.a, a->second, pair.b, b->second);
   }
   std::optional<AxisDirection> vertical(ImageIndex image) const {
     const auto found = verticals.find(image);
@@ -62,10 +71,11 @@ struct Knowledge {
   MatchFilter filter;
   bool filtered;
   std::map<ImageIndex, AxisDirection> verticals;
+  const Block& block;
 };
 
 // Algorithm number of what verticals do in matching: pairs without them stay valid when it is raised.
-constexpr int kUprightMatching = 2;
+constexpr int kUprightMatching = 3;
 
 std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs,
                                const Knowledge& knowledge) {
@@ -80,10 +90,11 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
       if (knowledge.filtered) hasher.add(knowledge.filter.hash());
     }
   for (const ImagePair& pair : pairs) {
+    const bool joined = knowledge.joined_by_verticals(pair);
     for (const ImageIndex image : {pair.a, pair.b}) {
       hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
       add_camera(hasher, job.block.cameras[job.block.camera_of(image)]);
-      if (const auto vertical = knowledge.vertical(image)) {
+      if (const auto vertical = joined ? knowledge.vertical(image) : std::nullopt) {
         hasher.add(kUprightMatching);
         add_to_hash(hasher, vertical->direction);
         for (const double value : vertical->covariance.reshaped()) hasher.add(value);
@@ -97,14 +108,15 @@ using UprightSectors = std::map<ImageIndex, std::vector<std::int8_t>>;  // of im
 
 std::vector<StandingPair> standing_of(const Job& job, const std::vector<ImagePair>& pairs,
                                       const std::vector<const ImageFeatures*>& a,
-                                      const std::vector<const ImageFeatures*>& b, const UprightSectors& upright) {
+                                      const std::vector<const ImageFeatures*>& b, const Knowledge& knowledge,
+                                      const UprightSectors& upright) {
   std::vector<StandingPair> standing(pairs.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     standing[i] = {pairs[i].a, pairs[i].b, Standing::kUnknown};
-    const auto of_a = upright.find(pairs[i].a), of_b = upright.find(pairs[i].b);
-    if (of_a != upright.end() && of_b != upright.end())
-      standing[i].standing = standing_of_coarsest(*a[i], *b[i], of_a->second, of_b->second, job.settings.matching);
+    if (knowledge.joined_by_verticals(pairs[i]))
+      standing[i].standing =
+          standing_of_coarsest(*a[i], *b[i], upright.at(pairs[i].a), upright.at(pairs[i].b), job.settings.matching);
   }
   return standing;
 }
@@ -126,11 +138,11 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
     if (const auto vertical = knowledge.vertical(image); vertical && !upright.contains(image))
       upright[image] =
           upright_sectors(cache.features(image), block.cameras[block.camera_of(image)], vertical->direction);
-  const std::vector<StandingPair> standing = standing_of(job, pairs, a, b, upright);
+  const std::vector<StandingPair> standing = standing_of(job, pairs, a, b, knowledge, upright);
   const std::vector<std::uint8_t> stands_upright = upright_pairs(standing);
   const auto known = [&](std::size_t i) {
     PairKnowledge of_pair = knowledge.of(pairs[i]);
-    if (stands_upright[i]) {
+    if (stands_upright[i] && of_pair.vertical_a) {
       of_pair.upright_a = &upright.at(pairs[i].a);
       of_pair.upright_b = &upright.at(pairs[i].b);
     }

@@ -263,5 +263,44 @@ TEST(VerticalCheck, AgainstGivenPoses) {
   EXPECT_TRUE(against_given_poses(block).empty());
 }
 
+// Given poses in the axes of an imported model, which are any: no vertical is down by them, but all show one direction.
+// So none takes part and it is said why; pairs are joined by them, but for the wrong one's.
+TEST(VerticalCheck, GivenPosesInAxesOfTheirOwn) {
+  SimulationOptions options;
+  options.scene = SimulationOptions::Scene::kStreet;
+  options.frames = 20;
+  options.rig_cameras = 2;
+  SimulatedBlock scene = simulate_block(options);
+  Block& block = scene.block;
+  add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1});
+  const Eigen::Quaterniond turn = rotation_exp<double>({0.6, 0.4, -1});
+  for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
+    Pose& pose = *block.frames[f].given_pose;
+    pose = {pose.rotation * turn.conjugate(), turn * pose.centre};
+  }
+  ASSERT_GT(block.verticals.size(), 20u);
+  constexpr std::size_t kWrong = 7;
+  block.verticals[kWrong].down = block.verticals[kWrong].down.unitOrthogonal().eval();
+
+  const std::vector<SetAsideVertical> aside = against_given_poses(block);
+  EXPECT_EQ(aside.size(), block.verticals.size());
+  for (const SetAsideVertical& vertical : aside) EXPECT_EQ(vertical.verdict, VerticalVerdict::kAgainstPoses);
+  EXPECT_NE(set_aside_text(block, aside, aside.size()).find("axes that are not level"), std::string::npos);
+
+  const auto seen = [&](std::size_t v) {
+    const SeenVertical& vertical = block.verticals[v];
+    const Camera& camera = block.cameras[block.camera_of(vertical.image)];
+    return whole_error(vertical, camera, camera.intrinsics);
+  };
+  for (std::size_t v = 0; v < block.verticals.size(); ++v)
+    for (std::size_t w = 0; w < v; ++w)
+      EXPECT_EQ(given_poses_join(block, block.verticals[v].image, seen(v), block.verticals[w].image, seen(w)),
+                v != kWrong && w != kWrong);
+
+  // Nothing is said of images without a given pose.
+  block.frames[block.images[block.verticals[kWrong].image].frame].given_pose.reset();
+  EXPECT_TRUE(given_poses_join(block, block.verticals[kWrong].image, seen(kWrong), block.verticals[0].image, seen(0)));
+}
+
 }  // namespace
 }  // namespace megablock
