@@ -8,6 +8,7 @@
 #include <span>
 
 #include "geometry/angles.h"
+#include "geometry/chi_square.h"
 #include "geometry/homography.h"
 #include "geometry/median.h"
 #include "geometry/pair_estimators.h"
@@ -26,6 +27,8 @@ constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
 constexpr double kDoubtfulVertical = 0.25;
 // Steps of an adjustment below it change nothing that matters: radians, of orientations good to some 1e-4.
 constexpr double kSettled = 1e-7;
+// Of the right matches, within the limit of transfer residuals that follows from the matches' sigma.
+constexpr double kRightShare = 0.999;
 // Of the best orientation's support, for a plane's other one to be its twin.
 constexpr double kTwinShare = 0.95;
 
@@ -34,9 +37,9 @@ constexpr double kSecondLook = 0.9;
 // Support of what they find, over that of what verticals gave, that leaves it the same.
 constexpr double kSameSupport = 1.05;
 
-RansacOptions sampling(const TwoViewOptions& options, int max_draws, double inlier_share = 0) {
+RansacOptions sampling(const TwoViewOptions& options, double limit, int max_draws, double inlier_share = 0) {
   RansacOptions sampling;
-  sampling.threshold = options.max_residual;
+  sampling.threshold = limit;
   sampling.confidence = 0.999;
   sampling.max_draws = max_draws;
   sampling.inlier_share = inlier_share;
@@ -80,7 +83,11 @@ struct Hypothesis {
 class PairEstimation {
  public:
   PairEstimation(const PointPairs& points, const TwoViewOptions& options)
-      : points_(points), options_(options), five_points_(points, options.max_residual), needed_(inliers_needed()) {}
+      : points_(points),
+        options_(options),
+        five_points_(points, options.max_residual),
+        transfer_limit_(options.max_residual),
+        needed_(inliers_needed()) {}
 
   TwoView estimate() {
     TwoView none;
@@ -89,8 +96,11 @@ class PairEstimation {
     if (const auto general = orientation()) refine_all(std::array{*general});
     const double share =
         hypotheses_.empty() ? 0 : hypotheses_.front().support.count / static_cast<double>(points_.size());
-    const auto rotation = ransac(RotationPairEstimator(points_), sampling(options_, 300, kRotationShare * share));
-    const auto plane = ransac(HomographyEstimator(points_), sampling(options_, 1000, kPlaneShare * share));
+    transfer_limit_ = transfer_limit();
+    const auto rotation =
+        ransac(RotationPairEstimator(points_), sampling(options_, transfer_limit_, 300, kRotationShare * share));
+    const auto plane =
+        ransac(HomographyEstimator(points_), sampling(options_, transfer_limit_, 1000, kPlaneShare * share));
     const int rotation_count = rotation ? rotation->consensus.count : 0,
               plane_count = plane ? plane->consensus.count : 0;
     draws_ += (rotation ? rotation->draws : 0) + (plane ? plane->draws : 0);
@@ -142,7 +152,7 @@ class PairEstimation {
     if (options_.vertical_a && options_.vertical_b) {
       const VerticalPairEstimator estimator(points_, options_.max_residual, options_.vertical_a->direction,
                                             options_.vertical_b->direction);
-      if (const auto found = ransac(estimator, sampling(options_, 1000))) {
+      if (const auto found = ransac(estimator, sampling(options_, options_.max_residual, 1000))) {
         draws_ += found->draws;
         starts.push_back(adjust_orientation(found->model, points_, adjustment(0.5 * options_.max_residual)));
         by_vertical_ = found->consensus.count >= needed_ &&
@@ -150,7 +160,7 @@ class PairEstimation {
                        agrees_with_verticals(starts.front(), found->consensus);
       }
     }
-    RansacOptions five = sampling(options_, 3000);
+    RansacOptions five = sampling(options_, options_.max_residual, 3000);
     if (by_vertical_) five.confidence = kSecondLook;
     const auto found = ransac(five_points_, five, std::span<const RelativeOrientation>(starts));
     if (!found) return std::nullopt;
@@ -209,6 +219,56 @@ class PairEstimation {
     return result.support.score > 0.98 * start.support.score ? result : start;
   }
 
+  // Of a component of the residuals, from their median and the redundancy of a model with that many unknowns; as wide
+  // as it can be where they are too few.
+  template <typename Estimator>
+  double sigma_of(const Estimator& estimator, const typename Estimator::Model& model, const Consensus& within,
+                  int components, int unknowns) const {
+    const auto squared_residual = estimator.squared_residuals(model);
+    std::vector<double> squares;
+    for (const std::size_t i : rows_of(within.inlier)) squares.push_back(squared_residual(i));
+    const double equations = components * static_cast<double>(within.count);
+    if (!(equations > unknowns)) return options_.max_residual;
+    const double sigma = std::sqrt(median(std::move(squares)) / chi_square_quantile(0.5, components) * equations /
+                                   (equations - unknowns));
+    return std::max(sigma, 1e-3 * options_.max_residual);  // matches are never exact
+  }
+
+  // A transfer residual has the errors of both points in two components: with the limit of Sampson residuals, planes
+  // and rotations of less exact matches would not be seen as such.
+  double transfer_limit() const {
+    const double limit = options_.max_residual;
+    if (hypotheses_.empty() || std::isinf(options_.max_sigmas)) return limit;
+    const Hypothesis& general = hypotheses_.front();
+    const double sigma = sigma_of(five_points_, general.orientation, general.support, 1, 5),
+                 largest = limit / threshold_of_sigma(1, 1, kRightShare);
+    return std::max(limit, threshold_of_sigma(std::numbers::sqrt2 * std::min(sigma, largest), 2, kRightShare));
+  }
+
+  // Those of the consensus within `limit` that their sigma allows.
+  template <typename Estimator>
+  Consensus selected(const Estimator& estimator, const typename Estimator::Model& model, const Consensus& within,
+                     double limit, int components, int unknowns) const {
+    const double narrow = options_.max_sigmas * sigma_of(estimator, model, within, components, unknowns);
+    if (!(narrow < limit)) return within;
+    Consensus result = consensus_of(estimator, model, narrow);
+    return result.count < options_.min_inliers ? within : result;
+  }
+
+  // The last selection, and a refinement over it.
+  Hypothesis selected(const Hypothesis& wide) const {
+    Hypothesis last = wide;
+    const auto select = [&] {
+      const Consensus within = consensus_of(five_points_, last.orientation, options_.max_residual);
+      last.support = selected(five_points_, last.orientation, within, options_.max_residual, 1, 5);
+      last.weights = leverage_weights(last.orientation, points_, last.support.inlier);
+    };
+    select();
+    last.orientation = adjust_orientation(last.orientation, points_, adjustment(last.scale), last.weights);
+    select();
+    return last;
+  }
+
   TwoView finish(PairModel model, const Eigen::Quaterniond& rotation, Consensus support) const {
     TwoView result;
     result.model = model;
@@ -235,9 +295,10 @@ class PairEstimation {
 
   TwoView oriented(bool planar) {
     const Hypothesis best = polished(hypotheses_.front());
+    const Hypothesis last = selected(best);
     TwoView result =
-        finish(planar ? PairModel::kHomography : PairModel::kEssential, best.orientation.rotation, best.support);
-    set_base(result, best);
+        finish(planar ? PairModel::kHomography : PairModel::kEssential, last.orientation.rotation, last.support);
+    set_base(result, last);
     result.by_vertical = by_vertical_;
     for (const Hypothesis& other : std::span(hypotheses_).subspan(1)) {
       if (!planar || other.support.score < kTwinShare * best.support.score) continue;
@@ -259,11 +320,12 @@ class PairEstimation {
     for (int round = 0; round < 10; ++round) {
       const InlierRays rays = rays_of(points_, best.consensus.inlier);
       const Eigen::Quaterniond rotation = fit_rotation(rays.a, rays.b);
-      Consensus support = consensus_of(estimator, rotation, options_.max_residual);
+      Consensus support = consensus_of(estimator, rotation, transfer_limit_);
       if (!(support.score > best.consensus.score)) break;
       best.model = rotation;
       best.consensus = std::move(support);
     }
+    best.consensus = selected(estimator, best.model, best.consensus, transfer_limit_, 2, 3);
     TwoView result = finish(PairModel::kRotationOnly, best.model, best.consensus);
     const InlierRays rays = rays_of(points_, result.inlier);
     result.precision = precision_of_rotation(best.model, rays.a, rays.b, 1e-3 * options_.max_residual);
@@ -273,7 +335,7 @@ class PairEstimation {
 
   // Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate.
   std::optional<TwoView> uncalibrated() {
-    const auto found = ransac(FundamentalEstimator(points_), sampling(options_, 3000));
+    const auto found = ransac(FundamentalEstimator(points_), sampling(options_, options_.max_residual, 3000));
     if (!found || found->consensus.count < needed_) return std::nullopt;
     draws_ += found->draws;
     const double limit = 4 * options_.max_residual;
@@ -295,6 +357,7 @@ class PairEstimation {
   const PointPairs& points_;
   const TwoViewOptions& options_;
   FivePointEstimator five_points_;
+  double transfer_limit_;  // of residuals of rotations and planes
   int needed_;
   int draws_ = 0;
   bool by_vertical_ = false;

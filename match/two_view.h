@@ -15,7 +15,10 @@
 namespace megablock {
 
 struct TwoViewOptions {
-  double max_residual = 3e-3;  // Sampson or transfer residual, normalised units (pixels / focal length)
+  double max_residual = 3e-3;  // largest Sampson residual, normalised units (pixels / focal length)
+  // Limit of the last selection in sigmas of the residuals, where it is narrower. Sigma also makes room for transfer
+  // residuals of rotations and planes, up to 1.6 times max_residual. Infinite: neither.
+  double max_sigmas = 6;
   int min_inliers = 20;
   double by_chance = 0;  // share of wrong matches that fit the model by chance; 0: of matches anywhere in the image
   double max_base_sigma_deg = 1;  // of the base's direction; beyond it the pair is ill-conditioned

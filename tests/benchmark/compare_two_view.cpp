@@ -2,6 +2,8 @@
 // right models, errors of rotation and base (medians; root mean square; pairs where ours is the nearer one).
 //
 //   compare_two_view [PAIRS = 40 [SCENE]]    simulated: general, plane, rotation (all); 10 to 70 % wrong matches
+//   compare_two_view selection [PAIRS]       the same, verification alone: wrong matches that are accepted, right ones
+//                                            that are lost; limit of 3 px, and the last selection by sigma
 //   compare_two_view FOLDER FOCAL_PX [STEP]  photographs: each with its next STEP (4) by name; matches, inliers
 //
 // Simulated: 2000 x 1500 px, focal length 1400 px, 800 matches with 0.5 px of noise, base 0.15 (plane: 0.3) of the
@@ -12,6 +14,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include "geometry/angles.h"
@@ -46,9 +49,10 @@ struct Pair {
   PointPairs points;
   RelativeOrientation truth;
   AxisDirection vertical_a, vertical_b;
+  std::vector<std::uint8_t> right;
 };
 
-Pair simulated(Scene scene, double wrong, std::uint64_t seed) {
+Pair simulated(Scene scene, double wrong, std::uint64_t seed, double noise_px = 0.5) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::normal_distribution<double> normal(0, 1);
@@ -79,9 +83,10 @@ Pair simulated(Scene scene, double wrong, std::uint64_t seed) {
     const double depth = scene == Scene::kPlane ? 1 : 1 + 0.3 * uniform(random);
     Eigen::Vector2d b = (pair.truth.rotation * (depth * a.homogeneous()) + t).hnormalized();
     if (std::abs(b.x()) > 1000 / kFocal || std::abs(b.y()) > 750 / kFocal) continue;
-    if (0.5 * (uniform(random) + 1) < wrong) b = anywhere();
-    pair.points.a.push_back(a + small(0.5 / kFocal).head<2>());
-    pair.points.b.push_back(b + small(0.5 / kFocal).head<2>());
+    pair.right.push_back(!(0.5 * (uniform(random) + 1) < wrong));
+    if (!pair.right.back()) b = anywhere();
+    pair.points.a.push_back(a + small(noise_px / kFocal).head<2>());
+    pair.points.b.push_back(b + small(noise_px / kFocal).head<2>());
   }
   return pair;
 }
@@ -150,6 +155,57 @@ void compare_simulated(int pairs, const std::string& only) {
   }
 }
 
+// What the last selection does to a pair.
+struct Selected {
+  int models = 0;
+  double seconds = 0, wrong = 0, right = 0, accepted = 0, lost = 0;
+  std::vector<double> rotation_deg, base_deg;
+
+  void run(const Pair& pair, PairModel model, const TwoViewOptions& options) {
+    const double start = processor_seconds();
+    const TwoView found = estimate_two_view(pair.points, options);
+    seconds += processor_seconds() - start;
+    models += found.model == model;
+    for (std::size_t i = 0; i < pair.right.size(); ++i) {
+      (pair.right[i] ? right : wrong) += 1;
+      if (pair.right[i] != found.inlier[i]) (pair.right[i] ? lost : accepted) += 1;
+    }
+    rotation_deg.push_back(rotation_angle(found.rotation, pair.truth.rotation) / kDegree);
+    base_deg.push_back(std::acos(std::clamp(found.translation.dot(pair.truth.base), -1.0, 1.0)) / kDegree);
+  }
+  void print() const {
+    std::printf(" | %d, %.2f %%, %.2f %%, %.4f, %.3f (%.3f)", models, 100 * accepted / wrong, 100 * lost / right,
+                median(rotation_deg), median(base_deg), root_mean_square(base_deg));
+  }
+};
+
+void compare_selection(int pairs) {
+  std::printf(
+      "models right, wrong matches accepted, right ones lost, rotation, base (rms), degrees\n"
+      "| scene | noise | wrong | 3 px | by sigma |\n");
+  for (const auto& [name, scene, model] : {std::tuple{"general", Scene::kGeneral, PairModel::kEssential},
+                                           std::tuple{"plane", Scene::kPlane, PairModel::kHomography},
+                                           std::tuple{"rotation", Scene::kRotation, PairModel::kRotationOnly}})
+    for (const double noise_px : {0.2, 0.3, 0.5, 1.0, 2.0})
+      for (const double wrong : {0.1, 0.3, 0.5}) {
+        Selected constant, by_sigma;
+        for (int i = 0; i < pairs; ++i) {
+          const Pair pair = simulated(scene, wrong, static_cast<std::uint64_t>(i), noise_px);
+          TwoViewOptions options;
+          options.max_residual = 3 / kFocal;
+          options.seed = static_cast<std::uint64_t>(i);
+          by_sigma.run(pair, model, options);
+          options.max_sigmas = std::numeric_limits<double>::infinity();
+          constant.run(pair, model, options);
+        }
+        std::printf("| %s | %.1f px | %.0f %%", name, noise_px, 100 * wrong);
+        constant.print();
+        by_sigma.print();
+        std::printf(" |\n");
+        std::fflush(stdout);
+      }
+}
+
 // The matches of two photographs as normalised points.
 PointPairs matched(const ImageFeatures& a, const ImageFeatures& b, const Intrinsics& camera) {
   PointPairs points;
@@ -216,6 +272,8 @@ void compare_photographs(const std::string& folder, double focal_px, std::size_t
 int main(int argc, char** argv) {
   if (argc > 2 && std::filesystem::is_directory(argv[1]))
     compare_photographs(argv[1], std::atof(argv[2]), argc > 3 ? static_cast<std::size_t>(std::atoi(argv[3])) : 4);
+  else if (argc > 1 && std::string(argv[1]) == "selection")
+    compare_selection(argc > 2 ? std::atoi(argv[2]) : 200);
   else
     compare_simulated(argc > 1 ? std::atoi(argv[1]) : 40, argc > 2 ? argv[2] : "");
 }

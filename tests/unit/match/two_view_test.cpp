@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <random>
 
 #include "geometry/angles.h"
@@ -237,6 +239,90 @@ TEST(TwoView, PrecisionIsThatOfTheErrors) {
     }
     EXPECT_GT(sum / kTrials, 0.8) << outliers;
     EXPECT_LT(sum / kTrials, 1.25) << outliers;
+  }
+}
+
+// Matches of 0.2 px, every tenth of them moved across its epipolar line, to a residual of 2 px: a limit of 3 px lets
+// them pass, their sigma does not.
+TEST(TwoView, WrongMatchesOfTwoPixelsAreRefusedWhereOthersAreExact) {
+  for (const Relief scene : {Relief::kGeneral, Relief::kPlane, Relief::kRotation}) {
+    Simulation s;
+    s.scene = scene;
+    s.outlier_share = 0;
+    s.noise_px = 0.2;
+    SimulatedPair pair = simulate(s);
+    const Eigen::Matrix3d essential = essential_from(pair.truth);
+    for (std::size_t i = 0; i < pair.good.size(); i += 10) {
+      const Eigen::Vector2d across = scene == Relief::kRotation
+                                         ? Eigen::Vector2d(1, 0)
+                                         : (essential * pair.points.a[i].homogeneous()).head<2>().normalized();
+      pair.points.b[i] +=
+          (i % 20 == 0 ? 1 : -1) * (scene == Relief::kRotation ? 2.8 : 2 * std::numbers::sqrt2) / kFocal * across;
+      pair.good[i] = 0;
+    }
+    TwoViewOptions options = options_for(s.seed);
+    const auto [good, wrong] = accepted_shares(estimate_two_view(pair.points, options), pair);
+    EXPECT_GT(good, 0.99);
+    EXPECT_EQ(wrong, 0);
+    options.max_sigmas = std::numeric_limits<double>::infinity();
+    EXPECT_GT(accepted_shares(estimate_two_view(pair.points, options), pair).second, 0.6);
+  }
+}
+
+// Less exact matches: none of the right ones that 3 px leave is lost, and planes and rotations are seen as such, which
+// the limit of 3 px for their transfer residuals does not do.
+TEST(TwoView, MatchesOfTwoPixelsKeepTheRightOnes) {
+  int right_models = 0, by_constant = 0, pairs = 0;
+  for (const Relief scene : {Relief::kGeneral, Relief::kPlane, Relief::kRotation})
+    for (const double noise_px : {1.0, 2.0})
+      for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+        Simulation s;
+        s.scene = scene;
+        s.baseline = 0.3;
+        s.outlier_share = 0.3;
+        s.noise_px = noise_px;
+        s.seed = seed;
+        const SimulatedPair pair = simulate(s);
+        TwoViewOptions options = options_for(seed);
+        const TwoView found = estimate_two_view(pair.points, options);
+        options.max_sigmas = std::numeric_limits<double>::infinity();
+        const TwoView constant = estimate_two_view(pair.points, options);
+        const PairModel model = scene == Relief::kGeneral ? PairModel::kEssential
+                                : scene == Relief::kPlane ? PairModel::kHomography
+                                                          : PairModel::kRotationOnly;
+        ++pairs;
+        right_models += found.model == model;
+        by_constant += constant.model == model;
+        if (found.model != constant.model) continue;
+        EXPECT_GE(accepted_shares(found, pair).first, accepted_shares(constant, pair).first - 0.003);
+        EXPECT_GT(accepted_shares(found, pair).first, noise_px > 1 ? 0.7 : 0.99);
+      }
+  EXPECT_GE(right_models, pairs - 5);
+  EXPECT_GT(right_models, by_constant + 5);
+}
+
+TEST(TwoView, MatchesThatAreNoNumbersTakeNoPart) {
+  SimulatedPair pair = simulate({});
+  for (std::size_t i = 0; i < pair.good.size(); i += 40) {
+    (i % 80 == 0 ? pair.points.a : pair.points.b)[i].x() = std::nan("");
+    pair.good[i] = 0;
+  }
+  const TwoView found = estimate_two_view(pair.points, options_for(1));
+  EXPECT_EQ(found.model, PairModel::kEssential);
+  EXPECT_LT(translation_error_deg(found, pair), 2);
+  for (std::size_t i = 0; i < pair.good.size(); i += 40) EXPECT_EQ(found.inlier[i], 0);
+}
+
+TEST(TwoView, FewMatchesAreNotMadeFewer) {
+  Simulation s;
+  s.outlier_share = 0;
+  s.noise_px = 0.2;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    s.seed = seed;
+    s.matches = 22;
+    EXPECT_GE(estimate_two_view(simulate(s).points, options_for(seed)).inlier_count, 20);
+    s.matches = 19;
+    EXPECT_EQ(estimate_two_view(simulate(s).points, options_for(seed)).model, PairModel::kNone);
   }
 }
 
