@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
-"""Photographs oriented without and with what `megablock verticals` finds in them: images, points, seconds.
+"""Photographs oriented without and with what `megablock verticals` finds in them, in turns: images, points, seconds of
+each turn. Every second turn begins with verticals, as the first run of a set reads its files from a colder cache.
 
-usage: with_verticals.py MEGABLOCK DATA [SET ...]    e.g. with_verticals.py build/release/megablock /data lund berlin
+usage: with_verticals.py MEGABLOCK DATA [TURNS [SET ...]]    e.g. with_verticals.py build/release/megablock /data 3 lund
 """
 import csv
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 
 megablock, data = sys.argv[1], pathlib.Path(sys.argv[2])
-sets = sys.argv[3:] or ["lund", "berlin", "brighton_beach", "seneca"]
+turns = int(sys.argv[3]) if len(sys.argv) > 3 else 1
+sets = sys.argv[4:] or ["lund", "berlin", "brighton_beach", "seneca"]
 
 
 def call(*arguments):
@@ -25,27 +28,35 @@ def figures(project, job):
     seconds = call("run", project, "-j", job, "--quiet")
     status = json.loads(subprocess.check_output([megablock, "status", str(job), "--json"]))
     stages = {stage["name"]: stage["seconds"] for stage in status["stages"]}
-    kinds = status["observation_kinds"]
-    return status, seconds, stages, kinds
+    return status, seconds, stages.get("matching", 0)
 
 
-print("| set | verticals | images oriented | points | observations | residual, px | matching, s | orientation, s | whole run, s |")
-print("|---|---|---|---|---|---|---|---|---|")
+def listed(seconds):
+    return ", ".join(f"{s:.1f}" for s in seconds)
+
+
+print("| set | verticals | oriented | points | observations | rms residual, px | matching, s | whole run, s |")
+print("|---|---|---|---|---|---|---|---|")
 with tempfile.TemporaryDirectory() as folder:
     for name in sets:
         work = pathlib.Path(folder) / name
         work.mkdir()
-        project = work / "block.yaml"
-        call("init", data / name, "-o", project)
-        seconds = call("verticals", project, "-o", work / "verticals.csv")
+        without, beside = work / "block.yaml", work / "with.yaml"
+        call("init", data / name, "-o", without)
+        beside.write_text(without.read_text() + "verticals: verticals.csv\n")
+        finding, status, runs, matching = [], {}, {without: [], beside: []}, {without: [], beside: []}
+        for turn in range(turns):
+            for project in (without, beside) if turn % 2 == 0 else (beside, without):
+                if project is beside:
+                    finding.append(call("verticals", without, "-o", work / "verticals.csv"))
+                job = work / f"{project.stem}{turn}"
+                status[project], seconds, of_matching = figures(project, job)
+                runs[project].append(seconds)
+                matching[project].append(of_matching)
+                shutil.rmtree(job)
         with open(work / "verticals.csv") as table:
             found = sum(bool(row["down_x"]) for row in csv.DictReader(table))
-        with_verticals = work / "with.yaml"
-        with_verticals.write_text(project.read_text() + "verticals: verticals.csv\n")
-        for file, said in (project, "none"), (with_verticals, f"{found} in {seconds:.1f} s"):
-            status, run_seconds, stages, kinds = figures(file, work / file.stem)
-            print(f"| {name} | {said} | {status['oriented']}/{status['images']} | {status['points']} | "
-                  f"{status['observations']} | {status['rms_reprojection_px']:.3f} | {stages.get('matching', 0):.1f} | "
-                  f"{stages.get('orientation', 0):.1f} | {run_seconds:.1f} |", flush=True)
-            if file is with_verticals:
-                print(json.dumps(kinds.get("vertical")), file=sys.stderr)
+        for project, said in (without, "without"), (beside, f"{found} ({listed(finding)} s)"):
+            now = status[project]
+            print(f"| {name} | {said} | {now['oriented']}/{now['images']} | {now['points']} | {now['observations']} | "
+                  f"{now['rms_reprojection_px']:.3f} | {listed(matching[project])} | {listed(runs[project])} |", flush=True)

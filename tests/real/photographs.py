@@ -20,13 +20,27 @@ if not (data / "brighton_beach").is_dir():
 
 def oriented(work, name, *init):
     """Figures of a whole run with default options."""
-    project, job = work / f"{name}.yaml", work / name
+    project = work / f"{name}.yaml"
     subprocess.run([megablock, "init", str(data / name), "-o", str(project), *init], check=True,
                    stdout=subprocess.DEVNULL)
+    return figures_of(project, name)
+
+
+def with_verticals(work, name):
+    """The same with what `megablock verticals` finds; features are those of the run without."""
+    project, table = work / f"{name}_verticals.yaml", work / f"{name}.csv"
+    subprocess.run([megablock, "verticals", str(work / f"{name}.yaml"), "-o", str(table)], check=True,
+                   stdout=subprocess.DEVNULL)
+    project.write_text((work / f"{name}.yaml").read_text() + f"verticals: {table}\n")
+    return figures_of(project, name)
+
+
+def figures_of(project, name):
+    job = project.with_name(name)
     start = time.monotonic()
     subprocess.run([megablock, "run", str(project), "-j", str(job), "--quiet"], check=True, stdout=subprocess.DEVNULL)
     figures = json.loads(subprocess.check_output([megablock, "status", str(job), "--json"]))
-    print(f"{name}: {figures['oriented']} of {figures['images']} images, {figures['points']} points, "
+    print(f"{project.stem}: {figures['oriented']} of {figures['images']} images, {figures['points']} points, "
           f"{figures['observations']} observations, mean track {figures['mean_track_length']:.2f}, mean residual "
           f"{figures['mean_reprojection_px']:.3f} px, decrement {figures['newton_decrement']:.1e}, "
           f"{figures['global_iterations']} iterations, {time.monotonic() - start:.0f} s")
@@ -50,6 +64,11 @@ with tempfile.TemporaryDirectory() as folder:
     expect(brighton["mean_track_length"] >= 3.5, "brighton_beach: mean track 3.5")
     berlin = oriented(work, "berlin", "--control", str(data / "berlin" / "ground_control_points.json"))
     expect(berlin["oriented"] == 3, "berlin: all 3 images")
+    # At least as many images with verticals.
+    lund = oriented(work, "lund")
+    expect(lund["oriented"] == 29, "lund: all 29 images")
+    for name, without in ("berlin", berlin), ("lund", lund), ("brighton_beach", brighton):
+        expect(with_verticals(work, name)["oriented"] >= without["oriented"], f"{name}: as many images with verticals")
     # Verticals that are wrong in every picture are said to be so, and do no harm.
     project, names = work / "berlin.yaml", sorted(path.name for path in (data / "berlin").glob("*.jpg"))
     rows = [f"{name},{down},0.1\n" for name, down in zip(names, ["1,0,0", "-1,0,0", "0,-0.6,0.8"])]
