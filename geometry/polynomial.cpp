@@ -20,8 +20,8 @@ Value value_of(std::span<const double> c, double x) {
   return v;
 }
 
-// The root between two places of different sign.
-double root_between(std::span<const double> c, double low, double high, bool rising) {
+// The root between two places of different sign; a step shorter than `settled` (relative) is the last.
+double root_between(std::span<const double> c, double low, double high, bool rising, double settled) {
   double x = 0.5 * (low + high);
   for (int iteration = 0; iteration < 200; ++iteration) {
     double f = 0, slope = 0;
@@ -33,11 +33,15 @@ double root_between(std::span<const double> c, double low, double high, bool ris
     ((f > 0) == rising ? high : low) = x;
     double next = x - f / slope;
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - x) <= 1e-16 * std::abs(x) || next == low || next == high) return next;
+    if (std::abs(next - x) <= settled * std::abs(x) || next == low || next == high) return next;
     x = next;
   }
   return x;
 }
+
+// Roots to the last bit. Extrema only tell the roots apart, and a value there moves with the square of the place's
+// error, which after a last step of Newton's is that of the step squared.
+constexpr double kRootSettled = 1e-16, kExtremumSettled = 1e-6;
 
 // Of the coefficients, against the largest of them: a double root at zero leaves nothing else.
 constexpr double kRounding = 1e-14;
@@ -74,6 +78,7 @@ std::size_t detail::roots_within(std::span<const double> c, double low, double h
     places[count] = high;
     const std::size_t intervals = count + 1;
     const double tolerance = k == degree ? double_root : kDoubleRoot;
+    const double settled = k == degree ? kRootSettled : kExtremumSettled;
     count = 0;
     bool crossed = false;  // the sign changed in the interval before
     double start = low;
@@ -83,7 +88,7 @@ std::size_t detail::roots_within(std::span<const double> c, double low, double h
       const bool crosses = (left.f < 0) != (right.f < 0);
       if (i > 0 && !crossed && !crosses && std::abs(left.f) < tolerance * left.magnitude + kRounding * largest)
         roots[count++] = start;
-      if (crosses) roots[count++] = root_between(d, start, places[i], left.f < 0);
+      if (crosses) roots[count++] = root_between(d, start, places[i], left.f < 0, settled);
       crossed = crosses;
       start = places[i];
       left = right;
