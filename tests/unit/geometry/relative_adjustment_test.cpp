@@ -123,7 +123,9 @@ TEST(RelativeAdjustment, WithoutABaseItIsOpenAndTheRotationIsNot) {
 TEST(RelativeAdjustment, WhatCannotBeKnownIsOpen) {
   const PointPairs one_point{std::vector<Eigen::Vector2d>(20, {0.1, 0.2}),
                              std::vector<Eigen::Vector2d>(20, {0.1, 0.1})};
-  const std::vector<std::uint8_t> all(20, 1), few = {1, 1, 1, 1, 1, 0};
+  const std::vector<std::uint8_t> all(20, 1);
+  std::vector<std::uint8_t> few(20, 0);
+  std::fill_n(few.begin(), 5, std::uint8_t{1});
   const RelativeOrientation some;
   EXPECT_NEAR(precision_of(some, one_point, all, 1e-2, 1e-3).base_sigma(), std::numbers::pi, 1e-6);
   EXPECT_NEAR(precision_of(some, one_point, few, 1e-2, 1e-3).rotation_sigma(), std::numbers::pi, 1e-6);
