@@ -225,15 +225,19 @@ TEST(VerticalCheck, IsRepeatable) {
   EXPECT_EQ(block.judge(sights.seen), block.judge(sights.seen));
 }
 
-// One by one: a pose says of its own frame alone. What is off by as much as an approximate pose may be stays.
-TEST(VerticalCheck, AgainstGivenPoses) {
+Block street_with_verticals() {
   SimulationOptions options;
   options.scene = SimulationOptions::Scene::kStreet;
   options.frames = 20;
   options.rig_cameras = 2;
   SimulatedBlock scene = simulate_block(options);
-  Block& block = scene.block;
   add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1});
+  return scene.block;
+}
+
+// One by one: a pose says of its own frame alone. What is off by as much as an approximate pose may be stays.
+TEST(VerticalCheck, AgainstGivenPoses) {
+  Block block = street_with_verticals();
   EXPECT_TRUE(against_given_poses(block).empty());
 
   std::set<ImageIndex> wrong;
@@ -266,13 +270,7 @@ TEST(VerticalCheck, AgainstGivenPoses) {
 // Given poses in the axes of an imported model, which are any: no vertical is down by them, but all show one direction.
 // So none takes part and it is said why; pairs are joined by them, but for the wrong one's.
 TEST(VerticalCheck, GivenPosesInAxesOfTheirOwn) {
-  SimulationOptions options;
-  options.scene = SimulationOptions::Scene::kStreet;
-  options.frames = 20;
-  options.rig_cameras = 2;
-  SimulatedBlock scene = simulate_block(options);
-  Block& block = scene.block;
-  add_seen_verticals(scene, {.sigma_deg = 0.1, .noise_deg = 0.1});
+  Block block = street_with_verticals();
   const Eigen::Quaterniond turn = rotation_exp<double>({0.6, 0.4, -1});
   for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
     Pose& pose = *block.frames[f].given_pose;
