@@ -82,21 +82,31 @@ def blank(folder, table):
 
 
 def against_given_poses(folder):
-    """A block of given poses, which is not oriented: verticals that contradict them are named and take no part."""
+    """A block of given poses, which is not oriented: verticals that contradict them are named and take no part, and all
+    where they agree on another direction than down."""
     megablock("simulate", "--frames", 12, "--no-calibration", "-o", folder)
     project, wrong = folder / "block.yaml", ("f000003.jpg", "f000007.jpg")
     with project.open("a") as file:
         file.write("verticals: verticals.csv\n")
-    table = ["image,down_x,down_y,down_z,sigma_deg"]
-    for row in rows(folder / "truth.csv"):
-        down = by_quaternion([float(row[k]) for k in ("qw", "qx", "qy", "qz")], [0, 0, -1])
-        if row["name"] in wrong:
-            down = down[1:] + down[:1]  # rows of a field
-        table.append(",".join([row["name"], *map(str, down), "0.1"]))
-    (folder / "verticals.csv").write_text("\n".join(table) + "\n")
-    said = megablock("run", project, "-j", folder / "job")
+
+    def run(job, seen):
+        """`seen`: what an image sees, in its axes, given its name and the rotation from the ground's."""
+        table = ["image,down_x,down_y,down_z,sigma_deg"]
+        for row in rows(folder / "truth.csv"):
+            down = seen(row["name"], [float(row[k]) for k in ("qw", "qx", "qy", "qz")])
+            table.append(",".join([row["name"], *map(str, down), "0.1"]))
+        (folder / "verticals.csv").write_text("\n".join(table) + "\n")
+        return megablock("run", project, "-j", folder / job)
+
+    def rows_of_a_field_in_two(name, rotation):
+        down = by_quaternion(rotation, [0, 0, -1])
+        return down[1:] + down[:1] if name in wrong else down
+
+    said = run("job", rows_of_a_field_in_two)
     assert "2 of 12 verticals take no part: 2" in said and all(name in said for name in wrong), said
     assert all(name in (folder / "job/result/report.html").read_text() for name in wrong)
+    said = run("turned", lambda name, rotation: by_quaternion(rotation, [0, 0.8, -0.6]))
+    assert "12 of 12 verticals take no part: 12 that show one direction, but not down by the given poses" in said, said
 
 
 def main():
