@@ -16,13 +16,6 @@ namespace megablock {
 
 namespace {
 
-std::vector<ImagePair> cell_pairs(const CandidateGraph& graph, std::size_t cell) {
-  std::vector<ImagePair> pairs;
-  for (std::int64_t row = graph.cell_begin[cell]; row < graph.cell_begin[cell + 1]; ++row)
-    pairs.push_back(graph.pairs[static_cast<std::size_t>(graph.cell_pairs[static_cast<std::size_t>(row)])]);
-  return pairs;
-}
-
 void add_camera(Hasher& hasher, const Camera& camera) {
   hasher.add(camera.width).add(camera.height).add(camera.focal_known);
   add_to_hash(hasher, camera.intrinsics);
@@ -41,6 +34,12 @@ std::map<ImageIndex, AxisDirection> good_verticals(const Block& block) {
   return good;
 }
 
+// A pair of a cell; it goes by its verticals where both images have one and their given poses allow for both.
+struct CellPair {
+  ImageIndex a, b;
+  bool by_verticals = false;
+};
+
 // What the trajectory and the images' verticals say of pairs before they are matched.
 struct Knowledge {
   explicit Knowledge(const Job& job)
@@ -50,22 +49,18 @@ struct Knowledge {
         filtered(job.settings.matching.filter),
         verticals(good_verticals(job.block)),
         block(job.block) {}
-  PairKnowledge of(const ImagePair& pair) const {
-    const bool joined = joined_by_verticals(pair);
-    return {.orientation = trajectory.relate(pair.a, pair.b),
-            .filter = filtered ? &filter : nullptr,
-            .vertical_a = joined ? vertical(pair.a) : std::nullopt,
-            .vertical_b = joined ? vertical(pair.b) : std::nullopt};
-  }
-  // Both have one, and their given poses allow for both.
-  bool joined_by_verticals(const ImagePair& pair) const {
+  CellPair in_cell(const ImagePair& pair) const {
     const auto a = verticals.find(pair.a), b = verticals.find(pair.b);
-    return a != verticals.end() && b != verticals.end() &&
-           given_poses_join(block, pair.a, a->second, pair.b, b->second);
+    const bool both = a != verticals.end() && b != verticals.end();
+    return {pair.a, pair.b, both && given_poses_join(block, pair.a, a->second, pair.b, b->second)};
   }
-  std::optional<AxisDirection> vertical(ImageIndex image) const {
-    const auto found = verticals.find(image);
-    return found == verticals.end() ? std::nullopt : std::optional(found->second);
+  PairKnowledge of(const CellPair& pair) const {
+    PairKnowledge known{.orientation = trajectory.relate(pair.a, pair.b), .filter = filtered ? &filter : nullptr};
+    if (pair.by_verticals) {
+      known.vertical_a = verticals.at(pair.a);
+      known.vertical_b = verticals.at(pair.b);
+    }
+    return known;
   }
   TrustedPairs trajectory;
   MatchFilter filter;
@@ -74,31 +69,38 @@ struct Knowledge {
   const Block& block;
 };
 
+std::vector<CellPair> cell_pairs(const CandidateGraph& graph, std::size_t cell, const Knowledge& knowledge) {
+  std::vector<CellPair> pairs;
+  for (std::int64_t row = graph.cell_begin[cell]; row < graph.cell_begin[cell + 1]; ++row)
+    pairs.push_back(
+        knowledge.in_cell(graph.pairs[static_cast<std::size_t>(graph.cell_pairs[static_cast<std::size_t>(row)])]));
+  return pairs;
+}
+
 // Algorithm number of what verticals do in matching: pairs without them stay valid when it is raised.
 constexpr int kUprightMatching = 3;
 
-std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<ImagePair>& pairs,
+std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<CellPair>& pairs,
                                const Knowledge& knowledge) {
   Hasher hasher;
   hasher.add(algorithm::kMatching);
   add_to_hash(hasher, job.settings.matching);
-  for (const ImagePair& pair : pairs)
+  for (const CellPair& pair : pairs)
     if (const auto known = knowledge.trajectory.relate(pair.a, pair.b)) {
       add_to_hash(hasher, known->a);
       add_to_hash(hasher, known->b);
       hasher.add(known->rotation_sigma_rad).add(known->position_sigma_m);
       if (knowledge.filtered) hasher.add(knowledge.filter.hash());
     }
-  for (const ImagePair& pair : pairs) {
-    const bool joined = knowledge.joined_by_verticals(pair);
+  for (const CellPair& pair : pairs) {
     for (const ImageIndex image : {pair.a, pair.b}) {
       hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
       add_camera(hasher, job.block.cameras[job.block.camera_of(image)]);
-      if (const auto vertical = joined ? knowledge.vertical(image) : std::nullopt) {
-        hasher.add(kUprightMatching);
-        add_to_hash(hasher, vertical->direction);
-        for (const double value : vertical->covariance.reshaped()) hasher.add(value);
-      }
+      if (!pair.by_verticals) continue;
+      const AxisDirection& vertical = knowledge.verticals.at(image);
+      hasher.add(kUprightMatching);
+      add_to_hash(hasher, vertical.direction);
+      for (const double value : vertical.covariance.reshaped()) hasher.add(value);
     }
   }
   return hasher.value();
@@ -106,15 +108,14 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
 
 using UprightSectors = std::map<ImageIndex, std::vector<std::int8_t>>;  // of images with a vertical
 
-std::vector<StandingPair> standing_of(const Job& job, const std::vector<ImagePair>& pairs,
+std::vector<StandingPair> standing_of(const Job& job, const std::vector<CellPair>& pairs,
                                       const std::vector<const ImageFeatures*>& a,
-                                      const std::vector<const ImageFeatures*>& b, const Knowledge& knowledge,
-                                      const UprightSectors& upright) {
+                                      const std::vector<const ImageFeatures*>& b, const UprightSectors& upright) {
   std::vector<StandingPair> standing(pairs.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     standing[i] = {pairs[i].a, pairs[i].b, Standing::kUnknown};
-    if (knowledge.joined_by_verticals(pairs[i]))
+    if (pairs[i].by_verticals)
       standing[i].standing =
           standing_of_coarsest(*a[i], *b[i], upright.at(pairs[i].a), upright.at(pairs[i].b), job.settings.matching);
   }
@@ -122,9 +123,9 @@ std::vector<StandingPair> standing_of(const Job& job, const std::vector<ImagePai
 }
 
 std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const Knowledge& knowledge,
-                                     const std::vector<ImagePair>& pairs) {
+                                     const std::vector<CellPair>& pairs) {
   std::vector<ImageIndex> images;
-  for (const ImagePair& pair : pairs) images.insert(images.end(), {pair.a, pair.b});
+  for (const CellPair& pair : pairs) images.insert(images.end(), {pair.a, pair.b});
   cache.load(images);
   std::vector<const ImageFeatures*> a(pairs.size()), b(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -134,15 +135,18 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
   std::vector<VerifiedPair> verified(pairs.size());
   const Block& block = job.block;
   UprightSectors upright;
-  for (const ImageIndex image : images)
-    if (const auto vertical = knowledge.vertical(image); vertical && !upright.contains(image))
-      upright[image] =
-          upright_sectors(cache.features(image), block.cameras[block.camera_of(image)], vertical->direction);
-  const std::vector<StandingPair> standing = standing_of(job, pairs, a, b, knowledge, upright);
+  for (const CellPair& pair : pairs) {
+    if (!pair.by_verticals) continue;
+    for (const ImageIndex image : {pair.a, pair.b})
+      if (!upright.contains(image))
+        upright[image] = upright_sectors(cache.features(image), block.cameras[block.camera_of(image)],
+                                         knowledge.verticals.at(image).direction);
+  }
+  const std::vector<StandingPair> standing = standing_of(job, pairs, a, b, upright);
   const std::vector<std::uint8_t> stands_upright = upright_pairs(standing);
   const auto known = [&](std::size_t i) {
     PairKnowledge of_pair = knowledge.of(pairs[i]);
-    if (stands_upright[i] && of_pair.vertical_a) {
+    if (stands_upright[i] && pairs[i].by_verticals) {
       of_pair.upright_a = &upright.at(pairs[i].a);
       of_pair.upright_b = &upright.at(pairs[i].b);
     }
@@ -166,7 +170,7 @@ std::vector<std::string> run_matching(Job& job, const FeatureStage& features, co
   std::vector<Unit> units;
   std::vector<std::string> names;
   for (std::size_t cell = 0; cell + 1 < graph.cell_begin.size(); ++cell) {
-    const std::vector<ImagePair> pairs = cell_pairs(graph, cell);
+    const std::vector<CellPair> pairs = cell_pairs(graph, cell, knowledge);
     Unit unit;
     unit.name = unit_name("matches", static_cast<std::int64_t>(cell));
     unit.fingerprint = cell_fingerprint(job, features, pairs, knowledge);
