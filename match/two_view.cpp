@@ -255,17 +255,16 @@ class PairEstimation {
     return result.count < options_.min_inliers ? within : result;
   }
 
-  // The last selection, and a refinement over it.
+  // The last selection, and a refinement over it. The support of `wide` is what max_residual lets in.
   Hypothesis selected(const Hypothesis& wide) const {
     Hypothesis last = wide;
-    const auto select = [&] {
-      const Consensus within = consensus_of(five_points_, last.orientation, options_.max_residual);
+    const auto select = [&](const Consensus& within) {
       last.support = selected(five_points_, last.orientation, within, options_.max_residual, 1, 5);
       last.weights = leverage_weights(last.orientation, points_, last.support.inlier);
     };
-    select();
+    select(wide.support);
     last.orientation = adjust_orientation(last.orientation, points_, adjustment(last.scale), last.weights);
-    select();
+    select(consensus_of(five_points_, last.orientation, options_.max_residual));
     return last;
   }
 
