@@ -226,6 +226,12 @@ TEST(KnownPositions, TKP15CorruptedTileIsNamed) {
   EXPECT_TRUE(corrupted.first);
   EXPECT_THAT(corrupted.second, testing::Not(testing::IsEmpty()));
   for (const std::string& line : corrupted.second) std::printf("[ reached  ] %s\n", line.c_str());
+  // What is worst names the tile, with the other one that sees these cameras, and both of them.
+  ASSERT_EQ(shared.frames.size(), 2u);
+  const std::string& worst = corrupted.second.at(0);
+  EXPECT_THAT(worst, testing::ContainsRegex("^tiles? ([0-9]+ and )*" + std::to_string(wrong) + " "));
+  for (const FrameIndex frame : shared.frames)
+    EXPECT_THAT(worst, testing::ContainsRegex("frame " + std::to_string(frame.value) + "( |$)"));
 }
 
 TEST(KnownPositions, TKP17StripsAreStraightAndEven) {

@@ -172,23 +172,24 @@ double expected_squared_error(const KnownPositionsScene& scene) {
   return sum / static_cast<double>(scene.points.size());
 }
 
-// Published: means of twenty scenes, which do not say how their cameras lie on a line. Satellite scenes of ours allow
-// no such mean in four cases, whatever the method: there the mean must be as good as the best one that they do allow.
-// The verdict is of what the attitude priors alone tell: the rotation about the line, a common rotation.
+// Published: means of twenty scenes, which do not say how their cameras lie on a line. Limits are these means, and what
+// is asked for where that is less (spread satellites; their angles, and those of collinear ones with two control
+// points, reach 2.4 and 4.6 for 2.5 and 4.8). Satellite scenes of ours allow no such mean error of points in five
+// cases, whatever the method: there it must be as good as the best one that they do allow. The verdict is of what the
+// attitude priors alone tell: the rotation about the line, a common rotation.
 TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
   struct Case {
     bool drone, collinear;
     int control;
     double least_gain, largest_rms;
     bool line_flagged, common_flagged;
-    int runs;
   };
-  const Case cases[] = {{true, true, 0, 3, 1, true, false, 20},          {true, true, 1, 100, 0.015, false, false, 20},
-                        {true, true, 2, 100, 0.015, false, false, 20},   {true, true, 4, 200, 0.008, false, false, 20},
-                        {true, false, 0, 1000, 0.002, false, false, 20}, {false, false, 0, 2, 7, false, true, 200},
-                        {false, false, 1, 2.5, 2.5, false, true, 200},   {false, true, 0, 1.5, 1000, true, true, 20},
-                        {false, true, 1, 2.5, 2.5, false, true, 200},    {false, true, 2, 2.5, 2, false, true, 200},
-                        {false, true, 4, 2.5, 1.9, false, true, 200}};
+  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},     {true, true, 1, 121, 0.011, false, false},
+                        {true, true, 2, 175, 0.008, false, false},   {true, true, 4, 228, 0.006, false, false},
+                        {true, false, 0, 3000, 0.001, false, false}, {false, false, 0, 2, 7, false, true},
+                        {false, false, 1, 3.8, 2.5, false, true},    {false, true, 0, 2.1, 160, true, true},
+                        {false, true, 1, 3.8, 2.5, false, true},     {false, true, 2, 4.5, 2, false, true},
+                        {false, true, 4, 4.8, 1.9, false, true}};
   for (const Case& c : cases) {
     const auto scene_of = [&](std::uint64_t seed) {
       KnownPositionsOptions options =
@@ -198,27 +199,27 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
       options.control_points = c.control;
       return options;
     };
-    const Runs runs = adjusted(c.runs, scene_of);
+    constexpr int kRuns = 200;
+    const Runs runs = adjusted(kRuns, scene_of);
     const std::string what = std::string(c.drone ? "drone" : "satellite") +
                              (c.collinear ? ", collinear, " : ", spread, ") + std::to_string(c.control) +
                              " control points: ";
     const double mean = runs.mean(runs.point_rms), middle = median(runs.point_rms_of_runs);
     expect_at_least(runs.angle_gain(), c.least_gain, what + "angle error divided by");
     double reached = 0, expected = 0, best_mean = 0;
-    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(c.runs); ++seed) {
+    for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
       const double squared = expected_squared_error(KnownPositionsScene(scene_of(seed)));
-      reached += std::pow(runs.point_rms_of_runs[seed - 1], 2) / c.runs;
-      expected += squared / c.runs;
-      best_mean += std::sqrt(squared) / c.runs;
+      reached += std::pow(runs.point_rms_of_runs[seed - 1], 2) / kRuns;
+      expected += squared / kRuns;
+      best_mean += std::sqrt(squared) / kRuns;
     }
     std::printf("[ reached  ] %smean %.4g m, median %.4g; rms of all %.4g, expected %.4g; mean of the expected %.4g\n",
                 what.c_str(), mean, middle, std::sqrt(reached), std::sqrt(expected), best_mean);
     expect_at_most(mean, std::max(c.largest_rms, best_mean), what + "mean rms of the points, m");
     if (!c.drone && !c.collinear) expect_at_most(middle, c.largest_rms, what + "median rms of the points, m");
-    if (c.runs >= 200)
-      expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, what + "off the expected rms by");
-    EXPECT_EQ(runs.collinear, c.line_flagged ? c.runs : 0) << what;
-    EXPECT_EQ(runs.weak_common, c.common_flagged ? c.runs : 0) << what;
+    expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, what + "off the expected rms by");
+    EXPECT_EQ(runs.collinear, c.line_flagged ? kRuns : 0) << what;
+    EXPECT_EQ(runs.weak_common, c.common_flagged ? kRuns : 0) << what;
   }
 }
 

@@ -151,11 +151,19 @@ TEST(Spec, AT35SameInliersForAnyNumberOfThreads) {
   constexpr std::size_t kPairs = 64;
   std::vector<TiltedPair> pairs;
   for (std::uint64_t seed = 0; seed < kPairs; ++seed) pairs.push_back(tilted_pair(half_wrong(), 150, seed));
-  expect_same_on_any_threads(kPairs, [&](std::size_t i) {
-    const TwoView found = estimate_two_view(pairs[i].points, {.max_residual = kThreshold, .seed = i});
-    return std::tuple(found.inlier, Eigen::Vector4d(found.rotation.coeffs()), Eigen::Vector3d(found.translation),
-                      found.draws);
-  });
+  for (const bool by_verticals : {false, true})
+    expect_same_on_any_threads(kPairs, [&](std::size_t i) {
+      TwoViewOptions options{.max_residual = kThreshold, .seed = i};
+      if (by_verticals) {
+        const Eigen::Matrix3d covariance = std::pow(0.1 * kDegree, 2) * Eigen::Matrix3d::Identity();
+        options.vertical_a = AxisDirection{pairs[i].down_a, covariance};
+        options.vertical_b = AxisDirection{pairs[i].down_b, covariance};
+      }
+      const TwoView found = estimate_two_view(pairs[i].points, options);
+      EXPECT_EQ(found.by_vertical, by_verticals) << i;
+      return std::tuple(found.inlier, Eigen::Vector4d(found.rotation.coeffs()), Eigen::Vector3d(found.translation),
+                        found.draws);
+    });
 }
 
 TEST(Spec, AT35SameSimilaritiesForAnyNumberOfThreads) {
