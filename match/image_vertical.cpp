@@ -44,6 +44,49 @@ Eigen::Matrix3Xd derivatives_by_camera(const std::vector<ImageLine>& lines, cons
   return result;
 }
 
+struct Look {
+  SegmentOptions segments;
+  VanishingOptions search;
+};
+
+// Of a large picture two: the first one reduced, for shorter edges, and with every vanishing point that accident lets
+// expect once in a picture.
+std::vector<Look> looks_at(const cv::Mat& picture, const SegmentOptions& options, std::uint64_t seed) {
+  constexpr double kReducedMegapixels = 0.5, kShortestPx = 20, kTimesLarger = 4;
+  Look whole{options, {}};
+  whole.search.seed = seed;
+  if (std::min(1e-6 * static_cast<double>(picture.total()), options.max_megapixels) < kTimesLarger * kReducedMegapixels)
+    return {whole};
+  Look reduced = whole;
+  reduced.segments.max_megapixels = kReducedMegapixels;
+  reduced.segments.min_length_px = std::min(kShortestPx, options.min_length_px);
+  reduced.search.max_log10_nfa = 0;
+  return {reduced, whole};
+}
+
+struct EdgesSeen {
+  int segments = 0;
+  std::vector<ImageLine> lines;  // of those that have a plane
+  VanishingPoints found;         // of these lines
+  std::optional<Vertical> vertical;
+};
+
+EdgesSeen edges_seen(const cv::Mat& picture, const cv::Mat& mask, const Camera& camera, const VerticalPrior& prior,
+                     const Look& look) {
+  EdgesSeen seen;
+  std::vector<InterpretationPlane> planes;
+  const std::vector<LineSegment> segments = find_line_segments(picture, mask, look.segments);
+  seen.segments = static_cast<int>(segments.size());
+  for (const LineSegment& segment : segments)
+    if (const auto plane = interpretation_plane(segment.line, camera.intrinsics)) {
+      seen.lines.push_back(segment.line);
+      planes.push_back(*plane);
+    }
+  seen.found = find_vanishing_points(planes, look.search);
+  seen.vertical = find_vertical(seen.found.points, prior);
+  return seen;
+}
+
 }  // namespace
 
 ImageVertical find_image_vertical(const std::string& path, const Camera& camera, const VerticalPrior& prior,
@@ -68,37 +111,29 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
       return result;
     }
   }
-  std::vector<LineSegment> segments;
+  EdgesSeen seen;
   try {
-    segments = find_line_segments(image.pixels, mask.pixels, options);
+    for (const Look& look : looks_at(image.pixels, options, seed)) {
+      seen = edges_seen(image.pixels, mask.pixels, camera, prior, look);
+      if (!seen.vertical) break;
+    }
   } catch (const cv::Exception& e) {
     result.failure = "no segments: " + e.err;
     return result;
   }
-  result.segments = static_cast<int>(segments.size());
-  std::vector<ImageLine> lines;  // that have a plane
-  std::vector<InterpretationPlane> planes;
-  for (const LineSegment& segment : segments)
-    if (const auto plane = interpretation_plane(segment.line, camera.intrinsics)) {
-      lines.push_back(segment.line);
-      planes.push_back(*plane);
-    }
-
-  VanishingOptions search;
-  search.seed = seed;
-  const VanishingPoints found = find_vanishing_points(planes, search);
-  result.vanishing_points = static_cast<int>(found.points.size());
-  const auto vertical = find_vertical(found.points, prior);
-  if (!vertical) return result;
-  const VanishingPoint& point = found.points[static_cast<std::size_t>(vertical->point)];
+  result.segments = seen.segments;
+  result.vanishing_points = static_cast<int>(seen.found.points.size());
+  if (!seen.vertical) return result;
+  const Vertical& vertical = *seen.vertical;
+  const VanishingPoint& point = seen.found.points[static_cast<std::size_t>(vertical.point)];
   result.found = true;
-  result.down = vertical->down;
-  result.roll = vertical->roll;
+  result.down = vertical.down;
+  result.roll = vertical.roll;
   result.lines = static_cast<int>(point.lines.size());
   result.variance_factor = point.weighted_squares / static_cast<double>(std::max<std::int64_t>(1, point.redundancy));
   result.down.covariance *= std::max(1.0, result.variance_factor);
   std::vector<ImageLine> own;
-  for (const int i : point.lines) own.push_back(lines[static_cast<std::size_t>(i)]);
+  for (const int i : point.lines) own.push_back(seen.lines[static_cast<std::size_t>(i)]);
   result.by_camera = derivatives_by_camera(own, camera, result.down.direction);
   result.log10_nfa = point.log10_nfa;
   return result;

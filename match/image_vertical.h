@@ -1,5 +1,8 @@
 // The vertical in one picture, from its straight edges (M45): segments, vanishing points, the one of the vertical.
 // Nothing of any other picture is needed.
+//
+// A large picture is looked at reduced first, which takes a sixth of the time: what shows a vertical shows it there
+// too, by fewer and longer edges. Where not even an accident looks like one, no more is looked for.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +15,8 @@
 namespace megablock {
 
 struct ImageVertical {
-  std::string failure;  // of reading the picture; one line
-  int segments = 0, vanishing_points = 0;
+  std::string failure;                     // of reading the picture; one line
+  int segments = 0, vanishing_points = 0;  // of the last look
   // Below, where there is a vertical.
   bool found = false;
   // Camera axes, pointing down. Its covariance is that of the lines times their variance factor, where that is above

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "geometry/rotation.h"
+#include "match/line_segments.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
@@ -88,6 +89,47 @@ TEST_F(ImageVerticalTest, IsFoundInAPicture) {
     const Eigen::Vector3d difference =
         find_image_vertical(draw(true), changed, {}, 1).down.direction - v.down.direction;
     EXPECT_LT((difference - change * v.by_camera.col(p)).norm(), 0.15 * difference.norm() + 5e-5) << p;
+  }
+}
+
+// Two and a half times as large: looked at reduced, where windows are too small for most edges, and then as a whole,
+// for what is found.
+TEST_F(ImageVerticalTest, IsFoundInALargePictureByAllItsEdges) {
+  const std::string file = scratch_.path("large.png");
+  cv::Mat picture = cv::imread(draw(true), cv::IMREAD_GRAYSCALE);
+  cv::resize(picture, picture, {}, 2.5, 2.5, cv::INTER_CUBIC);
+  cv::imwrite(file, picture);
+  camera_.width = 2250;
+  camera_.height = 1500;
+  camera_.intrinsics = Intrinsics{2000, 1125, 750};
+  const ImageVertical v = find_image_vertical(file, camera_, {}, 1);
+  ASSERT_TRUE(v.found);
+  EXPECT_EQ(v.segments, std::ssize(find_line_segments(picture, {})));
+  const Eigen::Vector3d truth = attitude() * Eigen::Vector3d::UnitY();
+  EXPECT_LT(std::acos(v.down.direction.dot(truth)) * kDegreesPerRadian, 0.1);
+}
+
+// Of a large picture whose edges lie anywhere no more than the reduced one is looked at.
+TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
+  camera_.width = 2250;
+  camera_.height = 1500;
+  camera_.intrinsics = Intrinsics{2000, 1125, 750};
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    cv::Mat picture(1500, 2250, CV_8U, cv::Scalar(170));
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int bar = 0; bar < 200; ++bar) {
+      const double x = 2250 * uniform(random), y = 1500 * uniform(random), angle = EIGEN_PI * uniform(random);
+      const double length = bar % 4 == 0 ? 120 : 40;  // most too short for the reduced picture
+      const cv::Point2d along(length * std::cos(angle), length * std::sin(angle));
+      cv::line(picture, cv::Point2d(x, y), cv::Point2d(x, y) + along, cv::Scalar(60), 7, cv::LINE_AA);
+    }
+    const std::string file = scratch_.path("clutter.png");
+    cv::imwrite(file, picture);
+    const ImageVertical v = find_image_vertical(file, camera_, {}, 1);
+    EXPECT_FALSE(v.found);
+    EXPECT_GT(v.segments, 20);
+    EXPECT_LT(2 * v.segments, std::ssize(find_line_segments(picture, {}))) << "of the whole picture";
   }
 }
 
