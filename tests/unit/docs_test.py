@@ -23,12 +23,13 @@ def test_names():
     for path in (source / "tests").rglob("*.cpp"):
         cases = re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)\)", path.read_text(), re.MULTILINE)
         names |= {f"{suite}.{case}" for suite, case in cases}
-    text = (source / "tests/CMakeLists.txt").read_text()
+    text = "".join((source / "tests" / folder / "CMakeLists.txt").read_text() for folder in ("", "benchmark"))
     labels |= set(re.findall(r"LABELS? (\w+)", text))
     for label, name in re.findall(r"megablock_script\((\w+) (\w+)", text):
         names.add(f"{label}.{name}")
         labels.add(label)
     names |= set(re.findall(r"add_test\(NAME (\w+\.\w+)", text))
+    names |= {f"bench.{name}" for name in re.findall(r"megablock_bench\((\w+)", text)}
     return names, labels
 
 

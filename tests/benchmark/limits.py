@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+"""Acceptance tests at their full size, and speeds against their limits; fails where one is missed.
+
+usage: limits.py tracks COMPARE_TRACKS      T-KP11: 10^8 matches, in one cell and in 64
+       limits.py solvers BENCH_SOLVERS      microseconds of minimal solvers, medians of five
+"""
+import json
+import re
+import subprocess
+import sys
+
+# Processor time for five times as many matches: five times, sorted on disk; a quadratic step would take 25 times.
+LARGEST_GROWTH = 8
+# Microseconds a solve, in every scene; shares of exact samples whose truth is found.
+LIMITS = {"vertical_pair": 2.5, "five_point": 25, "p3p": 2, "similarity": 1}
+LEAST_FOUND = 0.9
+
+
+def check(reached, limit, what):
+    print(f"{what}: {reached:.4g}, limit {limit:.4g}")
+    return reached <= limit
+
+
+def tracks_of(program, matches, cells):
+    """What the tracks are, and seconds of processor time."""
+    line = subprocess.check_output([program, str(matches), str(cells)], text=True)
+    print(line, end="")
+    return re.search(r": (.*hash \w+);", line)[1], sum(float(s) for s in re.findall(r"([\d.]+) s to ", line))
+
+
+def tracks(program):
+    _, few = tracks_of(program, 20_000_000, 1)
+    one, seconds = tracks_of(program, 100_000_000, 1)
+    several, _ = tracks_of(program, 100_000_000, 64)
+    assert one == several, "the tracks depend on the cells in which pairs were matched"
+    return check(seconds / few, LARGEST_GROWTH, "processor time for five times as many matches")
+
+
+def solvers(program):
+    names = "|".join(LIMITS)
+    runs = json.loads(subprocess.check_output(
+        [program, f"--benchmark_filter=^({names})/", "--benchmark_repetitions=5", "--benchmark_min_time=0.1",
+         "--benchmark_report_aggregates_only", "--benchmark_format=json"], stderr=subprocess.DEVNULL))["benchmarks"]
+    good = True
+    for run in runs:
+        if run["aggregate_name"] != "median":
+            continue
+        solver, _, noise = run["run_name"].split("/")
+        good &= check(run["cpu_time"], LIMITS[solver], f"{run['run_name']}, us")
+        if noise == "0":
+            good &= check(1 - run["success"], 1 - LEAST_FOUND, f"{run['run_name']}, share without the truth")
+    return good
+
+
+sys.exit(0 if {"tracks": tracks, "solvers": solvers}[sys.argv[1]](sys.argv[2]) else 1)
