@@ -100,8 +100,11 @@ TEST(Spec, AT30SimilarityFromNoisyPoints) {
     for (const Similarity& truth : configurations()) {
       const DisturbedClouds clouds(truth, sigma, random);
       SimilarityErrors three;
-      for (int draw = 0; draw < 500; ++draw)
-        if (const auto found = clouds.draw(random)) three.add(*found, truth);
+      for (int draw = 0; draw < 500; ++draw) {
+        const auto found = clouds.draw(random);
+        ASSERT_TRUE(found);
+        three.add(*found, truth);
+      }
       worst_median = std::max(worst_median, median(three.rotation_deg));
       all.add(fit_similarity(clouds.from, clouds.to).value(), truth);
     }
