@@ -5,7 +5,7 @@
 //   mpirun --bind-to none -n 2 megablock run block.yaml -j job
 
 #include "cluster/arithmetic.h"
-#include "cluster/command_line.h"
+#include "cluster/commands/command_line.h"
 #include "cluster/signals.h"
 
 int main(int argc, char** argv) {

@@ -1,5 +1,5 @@
 // What the command 'verticals' expects of a picture, and what it says of all of them.
-#include "cluster/verticals_command.h"
+#include "cluster/commands/verticals_command.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

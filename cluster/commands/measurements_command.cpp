@@ -1,4 +1,4 @@
-#include "cluster/measurements_command.h"
+#include "cluster/commands/measurements_command.h"
 
 #include <fmt/core.h>
 
@@ -9,8 +9,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "cluster/commands/option_checks.h"
 #include "cluster/exit_codes.h"
-#include "cluster/option_checks.h"
 #include "cluster/status.h"
 #include "io/error.h"
 #include "io/measurements.h"

@@ -1,4 +1,4 @@
-#include "cluster/train_filter_command.h"
+#include "cluster/commands/train_filter_command.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "cluster/camera_modes.h"
+#include "cluster/commands/camera_modes.h"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "cluster/masks_command.h"
+#include "cluster/commands/masks_command.h"
 
 #include <fmt/core.h>
 

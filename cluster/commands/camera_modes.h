@@ -1,7 +1,7 @@
 // The modes of `calibrate` for single cameras: --panoramic and --compare-models.
 #pragma once
 
-#include "cluster/calibrate_command.h"
+#include "cluster/commands/calibrate_command.h"
 
 namespace megablock {
 

@@ -1,4 +1,4 @@
-#include "cluster/verticals_command.h"
+#include "cluster/commands/verticals_command.h"
 
 #include <fmt/core.h>
 

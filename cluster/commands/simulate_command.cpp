@@ -1,4 +1,4 @@
-#include "cluster/simulate_command.h"
+#include "cluster/commands/simulate_command.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdio>

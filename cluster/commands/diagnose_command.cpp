@@ -1,4 +1,4 @@
-#include "cluster/diagnose_command.h"
+#include "cluster/commands/diagnose_command.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdio>

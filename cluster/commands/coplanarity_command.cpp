@@ -1,4 +1,4 @@
-#include "cluster/coplanarity_command.h"
+#include "cluster/commands/coplanarity_command.h"
 
 #include <fmt/core.h>
 
@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 
 #include "adjust/coplanarity_block.h"
+#include "cluster/commands/option_checks.h"
 #include "cluster/exit_codes.h"
 #include "cluster/job_options.h"
 #include "cluster/job_so_far.h"
-#include "cluster/option_checks.h"
 #include "geometry/angles.h"
 #include "io/error.h"
 #include "io/pose_csv.h"

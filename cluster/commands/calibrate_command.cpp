@@ -1,13 +1,13 @@
-#include "cluster/calibrate_command.h"
+#include "cluster/commands/calibrate_command.h"
 
 #include <CLI/CLI.hpp>
 #include <map>
 #include <memory>
 #include <vector>
 
-#include "cluster/camera_modes.h"
 #include "cluster/collective.h"
-#include "cluster/option_checks.h"
+#include "cluster/commands/camera_modes.h"
+#include "cluster/commands/option_checks.h"
 #include "cluster/pipeline.h"
 
 namespace megablock {

@@ -1,4 +1,4 @@
-#include "cluster/register_command.h"
+#include "cluster/commands/register_command.h"
 
 #include <fmt/core.h>
 
@@ -9,8 +9,8 @@
 #include <filesystem>
 
 #include "adjust/registration/frame_resection.h"
+#include "cluster/commands/option_checks.h"
 #include "cluster/exit_codes.h"
-#include "cluster/option_checks.h"
 #include "cluster/pipeline.h"
 #include "geometry/angles.h"
 #include "io/error.h"
