@@ -1,12 +1,12 @@
 #include "adjust/baselines.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
 #include "geometry/angles.h"
+#include "geometry/decompositions.h"
 #include "geometry/median.h"
 #include "io/disjoint_sets.h"
 
@@ -76,7 +76,7 @@ std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>
         }
         normal += weight * n * n.transpose();
       }
-      const Eigen::Vector3d next = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normal).eigenvectors().col(0);
+      const Eigen::Vector3d next = symmetric_eigen3(normal).vectors.col(0);
       const double change = t ? next.cross(*t).norm() : 1;
       t = next;
       if (change < 1e-12) break;

@@ -1,8 +1,9 @@
 #include "adjust/ground_alignment.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -141,13 +142,13 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
         spread += (moved - mean / count) * (moved - mean / count).transpose() / count;
     }
   if (count < 2) return std::nullopt;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
-  const double length = std::sqrt(std::max(0.0, eigen.eigenvalues()(2)));
-  const double width = std::sqrt(std::max(0.0, eigen.eigenvalues()(1)));
+  const SymmetricEigen3 eigen = symmetric_eigen3(spread);
+  const double length = std::sqrt(std::max(0.0, eigen.values(2)));
+  const double width = std::sqrt(std::max(0.0, eigen.values(1)));
   const bool line = count < 3 || width < std::max(0.03 * length, 2 * known.stated_sigma / std::sqrt(count));
   if (!line && known_angles != GroundAngles::kLevel) return similarity;
 
-  const Eigen::Vector3d axis = eigen.eigenvectors().col(2), up = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d axis = eigen.vectors.col(2), up = Eigen::Vector3d::UnitZ();
   Eigen::Quaterniond rotation;
   if (known_angles == GroundAngles::kLevel) {
     rotation = line ? turn_about(up, similarity->rotation.conjugate() * axis, axis)
@@ -194,15 +195,15 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
   Similarity result;
   if (!keep_scale && baselines > 0) result.scale = links / baselines;
   if (known != GroundAngles::kAll) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
+    const SymmetricEigen3 eigen = symmetric_eigen3(spread);
     const MeanAxes axes = mean_axes(graph, values);
-    const bool line = eigen.eigenvalues()(1) < 1e-3 * eigen.eigenvalues()(2);
-    Eigen::Vector3d up = line ? Eigen::Vector3d(-axes.down) : Eigen::Vector3d(eigen.eigenvectors().col(0));
+    const bool line = eigen.values(1) < 1e-3 * eigen.values(2);
+    Eigen::Vector3d up = line ? Eigen::Vector3d(-axes.down) : Eigen::Vector3d(eigen.vectors.col(0));
     if (up.dot(axes.view + axes.down) > 0) up = -up;
     Eigen::Vector3d east = farthest.normalized();
     up = (up - east * east.dot(up)).normalized();
     if (!line) {
-      up = eigen.eigenvectors().col(0) * (eigen.eigenvectors().col(0).dot(axes.view + axes.down) > 0 ? -1.0 : 1.0);
+      up = eigen.vectors.col(0) * (eigen.vectors.col(0).dot(axes.view + axes.down) > 0 ? -1.0 : 1.0);
       east = (east - up * up.dot(east)).normalized();
     }
     if (known == GroundAngles::kLevel) {

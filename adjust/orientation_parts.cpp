@@ -12,6 +12,7 @@
 #include "adjust/model_assembly.h"
 #include "adjust/orientation_graph.h"
 #include "geometry/decompositions.h"
+#include "geometry/rotation_fit.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -314,8 +315,7 @@ class PartwiseOrientation {
       up += weight * (rotation * Eigen::Vector3d::UnitZ());
       squares += weight * rotation.coeffs() * rotation.coeffs().transpose();
     }
-    if (ground.known == GroundAngles::kLevel)
-      ground.turn = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+    if (ground.known == GroundAngles::kLevel) ground.turn = rotation_between(up, Eigen::Vector3d::UnitZ());
     if (ground.known == GroundAngles::kAll) {
       ground.turn.coeffs() = symmetric_eigen(squares).vectors.col(3);
       ground.turn = ground.turn.conjugate();

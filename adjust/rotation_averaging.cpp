@@ -8,6 +8,7 @@
 
 #include "adjust/orientation_graph.h"
 #include "geometry/angles.h"
+#include "geometry/rotation_fit.h"
 #include "io/disjoint_sets.h"
 
 namespace megablock {
@@ -233,7 +234,7 @@ void turn_to_verticals(const Verticals& verticals, const std::vector<std::uint8_
     if (active[row(v.node)]) seen.push_back({rotation[row(v.node)].conjugate() * v.seen, v.ground});
   if (seen.empty()) return;
   constexpr double kSpread = 5 * kDegree;
-  const auto turn_of = [](const Seen& s) { return Eigen::Quaterniond::FromTwoVectors(s.to, s.from); };
+  const auto turn_of = [](const Seen& s) { return rotation_between(s.to, s.from); };
   const auto cost = [&](const Eigen::Quaterniond& g) {
     double sum = 0;
     for (const Seen& s : seen) sum += std::log1p((g * s.to - s.from).squaredNorm() / (kSpread * kSpread));

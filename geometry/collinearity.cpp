@@ -1,11 +1,10 @@
 #include "geometry/collinearity.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
 
+#include "geometry/decompositions.h"
 #include "geometry/row_qr.h"
 
 namespace megablock {
@@ -68,8 +67,8 @@ std::optional<PhysicalParameters> nine_from(const ElevenParameters& e) {
   // Not regular: rows along one another, or none.
   if (!(length > 0) || !rows.allFinite() || !(normal.norm() > 1e-9)) return std::nullopt;
   if (rows.determinant() < 0) rows = -rows;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  image.rotation = svd.matrixU() * svd.matrixV().transpose();
+  const SingularValues3 svd = singular_values3(rows);
+  image.rotation = svd.u * svd.v.transpose();
   // The rows of the system, each scaled to one.
   Eigen::Matrix3d system;
   system << e.a.transpose() / e.a.norm(), e.b.transpose() / e.b.norm(), unit.transpose();
@@ -97,7 +96,7 @@ std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> grou
   // Of the ground alone: errors of the image hide that points in one plane leave the equations open.
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& m : ground) scatter += (m - origin) * (m - origin).transpose() / (extent * extent);
-  const double thinnest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(0);
+  const double thinnest = symmetric_eigen3(scatter).values(0);
   constexpr double kPlane = 1e-5;  // of the extent
   if (!(thinnest > kPlane * kPlane * static_cast<double>(count))) return std::nullopt;
   RowQr<12> equations;
@@ -223,9 +222,9 @@ std::optional<Eigen::Vector3d> restitute(std::span<const ElevenParameters> image
       }
     }
     const Eigen::Matrix3d triangle = equations.factor().topLeftCorner<3, 3>();
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(triangle, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    if (!triangle.allFinite() || !(svd.singularValues()[2] > 1e-7 * svd.singularValues()[0])) return std::nullopt;
-    point = svd.solve(equations.factor().topRightCorner<3, 1>());
+    const SingularValues3 svd = singular_values3(triangle);
+    if (!triangle.allFinite() || !(svd.values[2] > 1e-7 * svd.values[0])) return std::nullopt;
+    point = svd.v * (svd.u.transpose() * equations.factor().topRightCorner<3, 1>()).cwiseQuotient(svd.values);
   }
   point += reference;
   if (!point.allFinite()) return std::nullopt;

@@ -1,12 +1,11 @@
 #include "geometry/five_point.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <cmath>
 #include <complex>
 #include <limits>
 
+#include "geometry/decompositions.h"
 #include "geometry/polynomial.h"
 
 namespace megablock {
@@ -54,20 +53,18 @@ using CoplanarityBasis = Eigen::Matrix<double, 9, 4>;  // of the matrices, by ro
 
 // False where the equations are not independent.
 bool coplanarity_basis(const FiveRays& a, const FiveRays& b, CoplanarityBasis& basis) {
-  Eigen::Matrix<double, 9, 5> equations;
+  NineRows equations(9, 5), vectors = NineRows::Zero(9, 4);
   for (int i = 0; i < 5; ++i) {
     const Eigen::Vector3d &p = a[static_cast<std::size_t>(i)], &q = b[static_cast<std::size_t>(i)];
     for (int r = 0; r < 3; ++r) equations.block<3, 1>(3 * r, i) = q[r] * p;
   }
-  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 5>> qr(equations);
-  if (!(std::abs(qr.matrixQR()(4, 4)) > 1e-12)) return false;
   // Four numbers that no structured scene brings together: a rotation of four dimensions.
   const Eigen::Vector4d q = Eigen::Vector4d(0.3127, 0.4891, 0.6533, 0.4172).normalized();
-  basis.setZero();
-  basis.bottomRows<4>() << q[0], q[1], q[2], q[3], -q[1], q[0], -q[3], q[2], -q[2], q[3], q[0], -q[1], -q[3], -q[2],
+  vectors.bottomRows<4>() << q[0], q[1], q[2], q[3], -q[1], q[0], -q[3], q[2], -q[2], q[3], q[0], -q[1], -q[3], -q[2],
       q[1], q[0];
-  basis.applyOnTheLeft(qr.householderQ());
-  return true;
+  const PivotedQr qr = pivoted_qr(equations, vectors);
+  basis = qr.q_times;
+  return qr.smallest > 1e-12;
 }
 
 // Multiple roots suffer from the rounding of the elimination. What is none is found out by polishing.
@@ -226,13 +223,13 @@ EssentialCoefficients by_eigenvectors(const ConstraintSystem& system) {
   LeadingBlock times_z = LeadingBlock::Zero();
   times_z.topRows<6>() = -reduced.bottomRows<6>();
   times_z(6, 3) = times_z(7, 4) = times_z(8, 5) = times_z(9, 8) = 1;
-  const Eigen::EigenSolver<LeadingBlock> eigen(times_z);
-  if (eigen.info() != Eigen::Success) return found;
+  const std::optional<GeneralEigen> eigen = general_eigen(times_z);
+  if (!eigen) return found;
   for (int i = 0; i < 10; ++i) {
     // The pair of a double root may come out complex by rounding: its real part is as good a start.
-    const std::complex<double> value = eigen.eigenvalues()[i];
+    const std::complex<double> value = eigen->values[i];
     if (!(std::abs(value.imag()) <= kComplexPair * std::abs(value)) || value.imag() < 0) continue;
-    found.push_back(eigen.eigenvectors().col(i).tail<4>().real());
+    found.push_back(eigen->vectors.col(i).tail<4>().real());
   }
   return found;
 }

@@ -1,10 +1,9 @@
 #include "geometry/fundamental.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <cmath>
 
+#include "geometry/decompositions.h"
 #include "geometry/polynomial.h"
 #include "geometry/relative_orientation.h"
 #include "geometry/row_qr.h"
@@ -48,17 +47,15 @@ Solutions<Eigen::Matrix3d, 3> solve_seven_point(const std::array<Eigen::Vector2d
   Solutions<Eigen::Matrix3d, 3> found;
   const auto normal_a = normalising_transformation(a), normal_b = normalising_transformation(b);
   if (!normal_a || !normal_b) return found;
-  Eigen::Matrix<double, 9, 7> equations;
+  NineRows equations(9, 7), vectors = NineRows::Zero(9, 2);
   for (int i = 0; i < 7; ++i)
     equations.col(i) = epipolar_row(*normal_a * a[static_cast<std::size_t>(i)].homogeneous(),
                                     *normal_b * b[static_cast<std::size_t>(i)].homogeneous())
                            .transpose();
-  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 7>> qr(equations);
-  if (!(std::abs(qr.matrixQR()(6, 6)) > kRankTolerance * std::abs(qr.matrixQR()(0, 0)))) return found;
-  Eigen::Matrix<double, 9, 2> null = Eigen::Matrix<double, 9, 2>::Zero();
-  null.bottomRows<2>() << 0.8, 0.6, -0.6, 0.8;  // mixed, so that structured scenes do not lie at infinity
-  null.applyOnTheLeft(qr.householderQ());
-  const Eigen::Matrix3d f1 = matrix_from_rows(null.col(0)), f2 = matrix_from_rows(null.col(1));
+  vectors.bottomRows<2>() << 0.8, 0.6, -0.6, 0.8;  // mixed, so that structured scenes do not lie at infinity
+  const PivotedQr qr = pivoted_qr(equations, vectors);
+  if (!(qr.smallest > kRankTolerance * qr.largest)) return found;
+  const Eigen::Matrix3d f1 = matrix_from_rows(qr.q_times.col(0)), f2 = matrix_from_rows(qr.q_times.col(1));
   // det(F1 + s F2): the middle terms by the cofactors.
   const Polynomial<3> cubic = {f1.determinant(), cofactors(f1).cwiseProduct(f2).sum(),
                                cofactors(f2).cwiseProduct(f1).sum(), f2.determinant()};
@@ -78,11 +75,10 @@ std::optional<Eigen::Matrix3d> fit_fundamental(std::span<const Eigen::Vector2d> 
     equations.add(epipolar_row(*normal_a * a[i].homogeneous(), *normal_b * b[i].homogeneous()));
   const auto null = equations.null_vector(kRankTolerance);
   if (null.rank < 8) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix_from_rows(null.vector), Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d values = svd.singularValues();
+  const SingularValues3 svd = singular_values3(matrix_from_rows(null.vector));
+  Eigen::Vector3d values = svd.values;
   values.z() = 0;
-  const Eigen::Matrix3d f =
-      normal_b->transpose() * (svd.matrixU() * values.asDiagonal() * svd.matrixV().transpose()) * *normal_a;
+  const Eigen::Matrix3d f = normal_b->transpose() * (svd.u * values.asDiagonal() * svd.v.transpose()) * *normal_a;
   return f / f.norm();
 }
 

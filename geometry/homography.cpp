@@ -1,9 +1,8 @@
 #include "geometry/homography.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <cmath>
 
+#include "geometry/decompositions.h"
 #include "geometry/fundamental.h"
 #include "geometry/row_qr.h"
 
@@ -42,7 +41,7 @@ std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector3d> a
   std::size_t front = 0;
   for (std::size_t i = 0; i < a.size(); ++i) front += b[i].dot(*h * a[i]) > 0;
   if (a.size() == 4 && front != 0 && front != 4) return std::nullopt;
-  const double middle = Eigen::JacobiSVD<Eigen::Matrix3d>(*h).singularValues()[1];
+  const double middle = singular_values3(*h).values[1];
   if (!(middle > kHomographyRank)) return std::nullopt;
   return *h * ((2 * front >= a.size() ? 1 : -1) / middle);
 }
@@ -92,14 +91,13 @@ std::optional<Eigen::Matrix3d> fit_pixel_homography(std::span<const Eigen::Vecto
 Solutions<PlanarOrientation, 4> orientations_of_homography(const Eigen::Matrix3d& h, double min_base_to_distance) {
   Solutions<PlanarOrientation, 4> found;
   if (!h.allFinite()) return found;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(h.transpose() * h);
-  const Eigen::Vector3d v1 = eigen.eigenvectors().col(2), v2 = eigen.eigenvectors().col(1),
-                        v3 = eigen.eigenvectors().col(0);
-  const double p = std::max(eigen.eigenvalues()[2], 1.0), q = std::min(eigen.eigenvalues()[0], 1.0);
+  const SymmetricEigen3 eigen = symmetric_eigen3(h.transpose() * h);
+  const Eigen::Vector3d v1 = eigen.vectors.col(2), v2 = eigen.vectors.col(1), v3 = eigen.vectors.col(0);
+  const double p = std::max(eigen.values[2], 1.0), q = std::min(eigen.values[0], 1.0);
   // |t|/d = sigma_1 - sigma_3.
   if (!(std::sqrt(p) - std::sqrt(std::max(q, 0.0)) > min_base_to_distance)) {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(h, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+    const SingularValues3 svd = singular_values3(h);
+    const Eigen::Matrix3d rotation = svd.u * svd.v.transpose();
     if (rotation.determinant() > 0) found.push_back({{Eigen::Quaterniond(rotation).normalized()}});
     return found;
   }

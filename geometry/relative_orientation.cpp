@@ -1,7 +1,8 @@
 #include "geometry/relative_orientation.h"
 
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -27,8 +28,8 @@ Solutions<RelativeOrientation, 4> orientations_of_essential(const Eigen::Matrix3
 }
 
 Eigen::Matrix3d nearest_essential(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixU() * Eigen::Vector3d(std::sqrt(0.5), std::sqrt(0.5), 0).asDiagonal() * svd.matrixV().transpose();
+  const SingularValues3 svd = singular_values3(m);
+  return svd.u * Eigen::Vector3d(std::sqrt(0.5), std::sqrt(0.5), 0).asDiagonal() * svd.v.transpose();
 }
 
 double mean_depth(const RelativeOrientation& o, std::span<const Eigen::Vector3d> a,

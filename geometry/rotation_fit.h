@@ -1,4 +1,5 @@
-// Rotation between two sets of directions, y = R x: least squares in closed form (Kabsch 1976) and a robust variant.
+// Rotation between two directions, and between two sets of them, y = R x: least squares in closed form (Kabsch 1976)
+// and a robust variant.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,6 +7,10 @@
 #include <span>
 
 namespace megablock {
+
+// The least rotation that turns `from` into `to`, sure to rounding / (1 + cosine of the angle between them); where they
+// are opposite to 1e-6 rad, a half turn about any axis across them, sure to rounding.
+Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 // Minimises sum w |y - R x|^2; weights empty = all one. Directions all on one line leave the rotation about it
 // arbitrary (but proper). Not a number where some of them is not.

@@ -4,8 +4,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -39,9 +40,9 @@ class RowQr {
   NullVector null_vector(double tolerance) const {
     NullVector result{Eigen::Matrix<double, Columns, 1>::Zero()};
     if (!factor_.allFinite()) return result;
-    const Eigen::JacobiSVD<Eigen::Matrix<double, Columns, Columns>> svd(factor_, Eigen::ComputeFullV);
-    result.vector = svd.matrixV().col(Columns - 1);
-    for (int i = 0; i < Columns; ++i) result.rank += svd.singularValues()[i] > tolerance * svd.singularValues()[0];
+    const RightSingularVectors svd = right_singular_vectors(factor_);
+    result.vector = svd.v.col(Columns - 1);
+    for (int i = 0; i < Columns; ++i) result.rank += svd.values[i] > tolerance * svd.values[0];
     return result;
   }
 

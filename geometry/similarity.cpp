@@ -1,11 +1,10 @@
 #include "geometry/similarity.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "geometry/decompositions.h"
 #include "geometry/gauss_helmert.h"
 #include "geometry/ransac.h"
 #include "geometry/rotation.h"
@@ -47,15 +46,15 @@ std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, 
     covariance += weight(i) * y * x.transpose();
   }
   if (!covariance.allFinite()) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (!(spread > 0) || !(svd.singularValues()(0) > 0)) return std::nullopt;
+  const SingularValues3 svd = singular_values3(covariance);
+  if (!(spread > 0) || !(svd.values(0) > 0)) return std::nullopt;
   Eigen::Vector3d sign(1, 1, 1);  // a reflection would fit better: give up the weakest axis
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
+  if (svd.u.determinant() * svd.v.determinant() < 0) sign.z() = -1;
 
   Similarity result;
-  const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d rotation = svd.u * sign.asDiagonal() * svd.v.transpose();
   result.rotation = Eigen::Quaterniond(rotation).normalized();
-  result.scale = svd.singularValues().dot(sign) / spread;
+  result.scale = svd.values.dot(sign) / spread;
   result.translation = mean_to - result.scale * (result.rotation * mean_from);
   if (!(result.scale > 0) || !result.translation.allFinite()) return std::nullopt;
   return result;
@@ -84,12 +83,12 @@ std::optional<SimilarityCovariance> similarity_covariance(const Similarity& fitt
     moments += weight(i) * (from[i] - centre) * (from[i] - centre).transpose();
   const double squares = fitted.scale * fitted.scale;
   const Eigen::Matrix3d turns = squares * (moments.trace() * Eigen::Matrix3d::Identity() - moments);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(turns);
+  const SymmetricEigen3 eigen = symmetric_eigen3(turns);
   constexpr double kLine = 1e-12;  // moment of inertia about a line through the points, of the largest
-  if (!(eigen.eigenvalues()(0) > kLine * eigen.eigenvalues()(2)) || !turns.allFinite()) return std::nullopt;
+  if (!(eigen.values(0) > kLine * eigen.values(2)) || !turns.allFinite()) return std::nullopt;
   SimilarityCovariance about_centre = SimilarityCovariance::Zero();
   about_centre.topLeftCorner<3, 3>() =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+      eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   about_centre(3, 3) = 1 / (squares * moments.trace());
   about_centre.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / total;
   return covariance_about_origin(fitted, centre, about_centre);

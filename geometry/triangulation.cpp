@@ -1,10 +1,11 @@
 #include "geometry/triangulation.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "geometry/decompositions.h"
 
 namespace megablock {
 
@@ -33,11 +34,10 @@ std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays) {
     right += across * (ray.origin - reference);
   }
   // Smallest eigenvalue / weights ~ (spread of the directions)^2.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal);
+  const SymmetricEigen3 eigen = symmetric_eigen3(normal);
   constexpr double kParallel = 1e-12;
-  if (!(eigen.eigenvalues()(0) > kParallel * weights)) return std::nullopt;
-  const Eigen::Vector3d offset =
-      eigen.eigenvectors() * (eigen.eigenvectors().transpose() * right).cwiseQuotient(eigen.eigenvalues());
+  if (!(eigen.values(0) > kParallel * weights)) return std::nullopt;
+  const Eigen::Vector3d offset = eigen.vectors * (eigen.vectors.transpose() * right).cwiseQuotient(eigen.values);
   for (const Ray& ray : rays)
     if (!(ray.direction.dot(offset - (ray.origin - reference)) > 0)) return std::nullopt;
   return reference + offset;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "geometry/binomial.h"
+#include "geometry/decompositions.h"
 #include "geometry/gauss_helmert.h"
 #include "geometry/median.h"
 
@@ -71,9 +72,9 @@ std::optional<Eigen::Vector2d> null_vector_fit(std::span<const LineFoot> feet, i
       if (variance > 0) sum += row * row.transpose() / variance;
     }
     if (!sum.allFinite()) return std::nullopt;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum);
-    if (!(solver.eigenvalues()(1) > 1e-14 * solver.eigenvalues()(2))) return std::nullopt;
-    solution = solver.eigenvectors().col(0);
+    const SymmetricEigen3 eigen = symmetric_eigen3(sum);
+    if (!(eigen.values(1) > 1e-14 * eigen.values(2))) return std::nullopt;
+    solution = eigen.vectors.col(0);
   }
   const double away = solution.tail<2>().norm();
   if (!solution.allFinite() || !(away > 1e-9 * std::abs(solution(0)))) return std::nullopt;

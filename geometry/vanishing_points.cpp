@@ -1,6 +1,5 @@
 #include "geometry/vanishing_points.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
@@ -8,6 +7,7 @@
 
 #include "geometry/binomial.h"
 #include "geometry/camera.h"
+#include "geometry/decompositions.h"
 #include "geometry/gauss_helmert.h"
 #include "geometry/median.h"
 
@@ -38,8 +38,7 @@ struct AxisEquation {
 };
 
 double largest_sigma(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, solver.eigenvalues()(2)));
+  return std::sqrt(std::max(0.0, symmetric_eigen3(covariance).values(2)));
 }
 
 // Sum of N N' / (V' S V) over planes that are added; its null vector is the next V.
@@ -50,9 +49,7 @@ struct WeightedNormals {
     sum += plane.normal * plane.normal.transpose() / axis.dot(plane.covariance * axis);
     ++count;
   }
-  Eigen::Vector3d null_vector() const {
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvectors().col(0);
-  }
+  Eigen::Vector3d null_vector() const { return symmetric_eigen3(sum).vectors.col(0); }
 };
 
 bool is_usable(const InterpretationPlane& plane, double max_sigma) {
@@ -309,7 +306,7 @@ std::optional<FittedAxis> fit_axis(std::span<const InterpretationPlane> planes) 
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const InterpretationPlane& plane : planes) sum += plane.normal * plane.normal.transpose();
   if (!sum.allFinite()) return std::nullopt;
-  const Eigen::Vector3d start = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvectors().col(0);
+  const Eigen::Vector3d start = symmetric_eigen3(sum).vectors.col(0);
   std::vector<Eigen::Vector3d> normals;
   std::vector<Eigen::Matrix3d> covariances;
   normals.reserve(planes.size());

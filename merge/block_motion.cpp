@@ -1,8 +1,8 @@
 #include "merge/block_motion.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "geometry/decompositions.h"
 #include "geometry/rotation.h"
 #include "merge/unknowns.h"
 
@@ -33,7 +33,7 @@ BlockMotion motion_of(const MotionSums::Row& sums) {
   const double squared_extent = spread > 0 ? spread / frames : 1;
   const Eigen::Matrix3d normal =
       (frames + spread / squared_extent) * Eigen::Matrix3d::Identity() - scatter / squared_extent;
-  motion.rotation = normal.ldlt().solve(moment / squared_extent - sums.segment<3>(16));
+  motion.rotation = solve_symmetric3(normal, moment / squared_extent - sums.segment<3>(16));
   if (spread > 0) motion.scale = growth / spread;
   return motion;
 }

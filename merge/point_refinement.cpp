@@ -1,6 +1,5 @@
 #include "merge/point_refinement.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "adjust/residual_squares.h"
+#include "geometry/decompositions.h"
 #include "geometry/triangulation.h"
 #include "merge/point_equations.h"
 
@@ -29,9 +29,9 @@ struct PointCost {
 
   double whole() const { return images + prior; }
   bool finite() const { return std::isfinite(whole()); }
-  double decrement_squared() const { return b.dot(reweighted.ldlt().solve(b)); }
+  double decrement_squared() const { return b.dot(solve_symmetric3(reweighted, b)); }
   Eigen::Vector3d step(double damping) const {
-    return (curved + damping * Eigen::Matrix3d(reweighted.diagonal().asDiagonal())).ldlt().solve(b);
+    return solve_symmetric3(curved + damping * Eigen::Matrix3d(reweighted.diagonal().asDiagonal()), b);
   }
 
   void add(const RobustLoss& loss, const Eigen::Vector2d& residual, const Eigen::Matrix<double, 2, 3>& by_point) {

@@ -193,7 +193,7 @@ bool PanoramicSystem::add_track(std::int64_t track, const PanoramicState& state,
     for (int axis = 0; axis < 3; ++axis)
       column.push_back(column_of_image_[image] < 0 ? -1 : p + column_of_image_[image] + axis);
   }
-  const Eigen::Matrix2d weight = (h.transpose() * h).inverse();
+  const Eigen::Matrix2d weight = inverse(h.transpose() * h);
   u -= h * (weight * (h.transpose() * u)).eval();
   e -= h * (weight * (h.transpose() * e)).eval();
   const Eigen::MatrixXd square = u.transpose() * u;

@@ -30,7 +30,7 @@ std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const 
     right += across * ray.origin;
     ++count;
   }
-  const Eigen::Vector3d point = normal.ldlt().solve(right);
+  const Eigen::Vector3d point = solve_symmetric3(normal, right);
   if (count < 2 || !point.allFinite() || point.norm() > kFarthest) return std::nullopt;
   return point;
 }
@@ -77,7 +77,7 @@ std::optional<FourFrames::Intersection> FourFrames::intersect(const FourFrameTra
       normal += w * by_point.transpose() * by_point;
       right -= w * by_point.transpose() * r->pixels;
     }
-    const Eigen::Vector3d step = normal.ldlt().solve(right);
+    const Eigen::Vector3d step = solve_symmetric3(normal, right);
     if (!step.allFinite()) return std::nullopt;
     *point += step;
     if (!(point->norm() < kFarthest)) return std::nullopt;

@@ -5,6 +5,7 @@
 #include "geometry/camera_matrix.h"
 #include "geometry/collinearity.h"
 #include "geometry/coplanarity.h"
+#include "geometry/rotation_fit.h"
 #include "geometry/triangulation.h"
 #include "reached.h"
 #include "tests/unit/geometry/pair_scene.h"
@@ -138,7 +139,7 @@ TEST(Spec, TKP03NoiseFreeDeterminantsVanish) {
                           point = 20 * random_direction(random);
     const auto seen = [&](const Eigen::Vector3d& centre, XyzAngles& angles) {
       // A camera that looks near the point, turned at random.
-      const Eigen::Quaterniond aim = Eigen::Quaterniond::FromTwoVectors(point - centre, Eigen::Vector3d::UnitZ());
+      const Eigen::Quaterniond aim = rotation_between(point - centre, Eigen::Vector3d::UnitZ());
       const Eigen::Quaterniond r = rotation_exp<double>(0.3 * random_direction(random)) * aim;
       angles = xyz_angles(r);
       const Eigen::Vector3d q = rotation_from(angles) * (point - centre);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "geometry/rotation.h"
@@ -25,6 +27,21 @@ TEST(RotationFit, FindsTheRotationOfExactDirections) {
   const Directions d;
   EXPECT_LT(rotation_angle(fit_rotation(d.from, d.to), d.rotation), 1e-12);
   EXPECT_LT(rotation_angle(fit_rotation_robust(d.from, d.to), d.rotation), 1e-12);
+}
+
+TEST(RotationFit, BetweenTwoDirectionsIsTheLeastOne) {
+  const Eigen::Vector3d from(0.3, -2, 1), axis = from.unitOrthogonal();
+  for (const double angle :
+       {0.0, 1e-9, 0.5, 2.0, 3.1, std::numbers::pi - 1e-4, std::numbers::pi - 1e-7, std::numbers::pi}) {
+    const Eigen::Vector3d to = 7 * (rotation_exp<double>(angle * axis) * from);
+    const Eigen::Quaterniond rotation = rotation_between(from, to);
+    const bool opposite = angle > std::numbers::pi - 1e-6;
+    EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(),
+              opposite ? 1e-14 : 1e-14 + 1e-15 / (1 + std::cos(angle)))
+        << angle;
+    EXPECT_NEAR(rotation_angle(rotation, Eigen::Quaterniond::Identity()), opposite ? std::numbers::pi : angle, 1e-9)
+        << angle;
+  }
 }
 
 TEST(RotationFit, WeightsOfZeroLeavePairsOut) {
