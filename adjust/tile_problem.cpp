@@ -68,6 +68,7 @@ template <typename Value>
 void make_distinct(std::vector<Value>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
+  values.shrink_to_fit();  // tables of frames, cameras and mounts begin with an entry per image
 }
 
 // Row of `value` in an ascending table, -1 when it is not there.
@@ -204,6 +205,7 @@ class TileBuilder {
     make_distinct(problem_.cameras);
     make_distinct(problem_.mounts);
 
+    problem_.images.reserve(images.size());
     for (ImageIndex image : images) {
       problem_.images.push_back({image, LocalFrame(row_of(frames, block_.images[image].frame)),
                                  LocalCamera(row_of(problem_.cameras, block_.camera_of(image))),

@@ -153,13 +153,13 @@ void run_stages(Job& job, const std::string& tie_points) {
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   update_measurement_index(job, tracks);
   if (last == "match") return;
-  const BlockState oriented = run_orientation(job, matches);
+  BlockState oriented = run_orientation(job, matches);
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
     throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
   if (last == "orient") return;
   const std::vector<std::string> adjusted = run_adjustment(job, oriented, tiles, tracks);
   if (last == "adjust") return;
-  run_merge(job, oriented, tiles, tracks, adjusted);
+  run_merge(job, std::move(oriented), tiles, tracks, adjusted);
   remove_surplus(job, tracks);
 }
 

@@ -148,8 +148,8 @@ TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& mo
       next.frames[f] = movers[at(plan.part_of_frame[f])].pose(
           state.frames[f],
           Eigen::Map<const PoseIncrement>(step.unknowns.find({UnknownKind::kFrame, 0, problem.frames[f].value})));
-  for (const auto& cell : plan.points)
-    for (std::int64_t p : cell) {
+  for (const RowList& cell : plan.points)
+    for (const std::int64_t p : cell.rows()) {
       const Mover& mover = movers[at(plan.part_of_frame[at(frame_of_point(problem, p))])];
       next.points[at(p)] = mover.position(state.points[at(p)], step.points[at(p)]);
     }

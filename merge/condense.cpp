@@ -16,7 +16,8 @@ void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState
                const PlanNode& node, PointEquations& equations, PairBlocks& pair_blocks, std::vector<double>& diagonal,
                Front& front) {
   CellAssembler assembler(plan, front, pair_blocks);
-  for (std::span<const std::int32_t> rest = plan.points[at(node.leaf)]; !rest.empty();) {
+  const std::vector<std::int32_t> points = plan.points[at(node.leaf)].rows();
+  for (std::span<const std::int32_t> rest = points; !rest.empty();) {
     rest = rest.subspan(equations.linearise(rest, pass));
     assembler.add_points(equations);
   }
@@ -137,8 +138,9 @@ void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const T
   step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
   const UnknownMotions motions(plan, step.unknowns.values.data());
   PointEquations equations(problem, plan, state);
-  for (const auto& cell : plan.points) {
-    for (std::span<const std::int32_t> rest = cell; !rest.empty();) {
+  for (const RowList& cell : plan.points) {
+    const std::vector<std::int32_t> points = cell.rows();
+    for (std::span<const std::int32_t> rest = points; !rest.empty();) {
       rest = rest.subspan(equations.linearise(rest, pass));
       equations.steps(motions, step.points);
       for (std::size_t i = 0; i < equations.points().size(); ++i)

@@ -15,6 +15,7 @@
 #include "io/observation_statistics.h"
 #include "merge/front.h"
 #include "merge/plan.h"
+#include "merge/row_list.h"
 
 namespace megablock {
 
@@ -25,11 +26,11 @@ UnknownList tile_unknowns(const TileProblem& problem, const std::vector<Paramete
 
 // Symbolic work of a tile, done once per verdict on observations.
 struct TilePlan {
-  UnknownList unknowns;                           // touched, ascending
-  UnknownList boundary;                           // passed to the merge tree, ascending
-  UnknownList owned;                              // no tile with a lower number touches them
-  EliminationPlan cells;                          // leaves = cells
-  std::vector<std::vector<std::int32_t>> points;  // [cells] active points (rows), ascending; all tiles' are kept
+  UnknownList unknowns;         // touched, ascending
+  UnknownList boundary;         // passed to the merge tree, ascending
+  UnknownList owned;            // no tile with a lower number touches them
+  EliminationPlan cells;        // leaves = cells
+  std::vector<RowList> points;  // [cells] active points (rows), ascending
   // Rows of the problem's tables of observations without a point, [cells].
   std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, lines, verticals, intrinsic_priors,
       mount_priors;

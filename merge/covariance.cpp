@@ -103,7 +103,8 @@ class TileCovarianceBuilder {
     cell_rows_ = offsets.back();
     for (std::size_t i = 0; i < covariance.unknowns.size(); ++i)
       row_of_unknown_[at(find_unknown(plan_.unknowns, covariance.unknowns[i].id))] = offsets[i];
-    for (std::span<const std::int32_t> rest = plan_.points[cell]; !rest.empty();) {
+    const std::vector<std::int32_t> points = plan_.points[cell].rows();
+    for (std::span<const std::int32_t> rest = points; !rest.empty();) {
       rest = rest.subspan(equations_.linearise(rest, 0));
       equations_.reduce(frame_sums_);
       for (std::size_t i = 0; i < equations_.points().size(); ++i) {

@@ -90,8 +90,8 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
     transform(covariance.frames[f], columns_of(unknowns, id, *c),
               Eigen::MatrixXd(c->move(state.frames[f].centre).leftCols(c->defect)), inverses[row_of(c)], k[row_of(c)]);
   }
-  for (const auto& cell : plan.points)
-    for (std::int64_t p : cell) {
+  for (const RowList& cell : plan.points)
+    for (const std::int64_t p : cell.rows()) {
       const BlockComponent* c = components[at(frame_of_point(problem, p))];
       if (c == nullptr) continue;
       transform(covariance.points[at(p)],

@@ -281,8 +281,8 @@ double refine_points(const TileProblem& problem, const TilePlan& plan, TileState
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
   ResidualSquares residuals(problem, state);
   LossSums sums(problem.image_loss);
-  for (const auto& cell : plan.points)
-    residuals.visit(cell, [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
+  for (const RowList& cell : plan.points)
+    residuals.visit(cell.rows(), [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
   sums.finish();
   double images = 0.5 * sums.settled();
   if (!sums.tail().empty()) {

@@ -70,8 +70,8 @@ double initial_lambda(const TileProblem& problem, const TilePlan& plan, double c
                                          [](const auto& term) { return held(term.prior); });
   if (held_frames == std::ssize(problem.frames)) return kNear;
   std::int64_t observations = 0;
-  for (const auto& cell : plan.points)
-    for (const std::int64_t point : cell)
+  for (const RowList& cell : plan.points)
+    for (const std::int64_t point : cell.rows())
       observations += std::count(problem.kept.begin() + problem.begin[static_cast<std::size_t>(point)],
                                  problem.kept.begin() + problem.begin[static_cast<std::size_t>(point) + 1], 1);
   return cost > kPoor * static_cast<double>(observations) ? kFar : kNear;
@@ -79,7 +79,7 @@ double initial_lambda(const TileProblem& problem, const TilePlan& plan, double c
 
 std::int64_t unknown_count(const TilePlan& plan) {
   std::int64_t count = total_dimension(plan.unknowns);
-  for (const auto& cell : plan.points) count += 3 * std::ssize(cell);
+  for (const RowList& cell : plan.points) count += 3 * cell.size();
   return count;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "cluster/matrix_bytes.h"
 #include "cluster/stages/merge_start.h"
@@ -24,21 +25,38 @@ std::vector<SeamCheck> seam_checks(const RankRunner::Posterior& posterior) {
   return checks;
 }
 
-void send_covariances(Job& job, const Adjusted& adjusted, int tag) {
+constexpr int kCovarianceTag = 1 << 20;  // beyond those of the merge tree's nodes
+
+// A message per tile, after their number and the cameras.
+void send_covariances(Job& job, const Adjusted& adjusted) {
   ByteWriter writer;
-  write_matrices<BlockResult::Matrix6>(writer, adjusted.frame_covariance);
+  writer.value(adjusted.frame_covariances.size());
   for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(writer, covariance);
-  job.ranks.send(0, tag, writer.take());
+  job.ranks.send(0, kCovarianceTag, writer.take());
+  for (const TileFrameCovariances& tile : adjusted.frame_covariances) {
+    writer.values(tile.frames);
+    write_matrices(writer, tile.covariances);
+    job.ranks.send(0, kCovarianceTag, writer.take());
+  }
 }
 
-void receive_covariances(Job& job, int from, int tag, Adjusted& adjusted) {
-  const Bytes bytes = job.ranks.receive(from, tag);
+void take_covariances(const TileFrameCovariances& tile, Adjusted& adjusted) {
+  for (std::size_t f = 0; f < tile.frames.size(); ++f)
+    if (!tile.covariances[f].isZero(0)) adjusted.frame_covariance[tile.frames[f]] = tile.covariances[f];
+}
+
+void receive_covariances(Job& job, int from, Adjusted& adjusted) {
+  const Bytes bytes = job.ranks.receive(from, kCovarianceTag);
   ByteReader reader(bytes);
-  const auto frames = read_matrices<BlockResult::Matrix6>(reader);
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    if (!frames[f].isZero(0)) adjusted.frame_covariance[FrameIndex(static_cast<std::int64_t>(f))] = frames[f];
+  const auto tiles = reader.value<std::size_t>();
   for (Eigen::MatrixXd& covariance : adjusted.camera_covariance)
     if (Eigen::MatrixXd camera = read_matrix(reader); !camera.isZero(0)) covariance = std::move(camera);
+  for (std::size_t t = 0; t < tiles; ++t) {
+    const Bytes tile_bytes = job.ranks.receive(from, kCovarianceTag);
+    ByteReader tile_reader(tile_bytes);
+    const auto frames = tile_reader.values<FrameIndex>();
+    take_covariances({frames, read_matrices<BlockResult::Matrix6>(tile_reader)}, adjusted);
+  }
 }
 
 }  // namespace
@@ -47,15 +65,13 @@ std::string part_path(const Job& job, std::int64_t tile) {
   return job.store.path("merge/parts/" + std::to_string(tile) + ".bin");
 }
 
-void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adjusted& adjusted) {
-  adjusted.frame_covariance.assign(job.block.frames.size(), BlockResult::Matrix6::Zero());
-  for (const Camera& camera : job.block.cameras)
-    adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.intrinsics.size(), camera.intrinsics.size()));
+void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
+                    RankRunner& runner, Adjusted& adjusted) {
+  for (const Intrinsics& camera : adjusted.state.cameras)
+    adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
   std::filesystem::create_directories(job.store.path("merge/parts"));
-  const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
-    for (std::size_t f = 0; f < tile.problem.frames.size(); ++f)
-      if (!covariance.frames[f].isZero(0)) adjusted.frame_covariance[tile.problem.frames[f]] = covariance.frames[f];
+    adjusted.frame_covariances.push_back({tile.problem.frames, covariance.frames});
     for (std::size_t c = 0; c < tile.problem.cameras.size(); ++c)
       if (!covariance.cameras[c].isZero(0)) adjusted.camera_covariance[tile.problem.cameras[c]] = covariance.cameras[c];
     const auto t = static_cast<std::size_t>(tile.tile);
@@ -86,9 +102,14 @@ std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size
 }
 
 void gather_covariances(Job& job, Adjusted& adjusted) {
-  constexpr int kTag = 1 << 20;  // beyond those of the merge tree's nodes
-  if (!job.is_first_rank()) send_covariances(job, adjusted, kTag);
-  for (int r = 1; job.is_first_rank() && r < job.ranks.size(); ++r) receive_covariances(job, r, kTag, adjusted);
+  if (job.is_first_rank()) {
+    adjusted.frame_covariance.assign(adjusted.state.frames.size(), BlockResult::Matrix6::Zero());
+    for (const TileFrameCovariances& tile : std::exchange(adjusted.frame_covariances, {}))
+      take_covariances(tile, adjusted);
+    for (int r = 1; r < job.ranks.size(); ++r) receive_covariances(job, r, adjusted);
+  } else {
+    send_covariances(job, adjusted);
+  }
   job.ranks.flush_sends();
 }
 

@@ -28,13 +28,20 @@ struct MergeOutcome {
   ObservationTable observations;
 };
 
+// Of the frames of a tile; a frame of several tiles has the same bits in all of them, zero where one does not touch it.
+struct TileFrameCovariances {
+  std::vector<FrameIndex> frames;
+  std::vector<BlockResult::Matrix6> covariances;  // [frames]
+};
+
 // An adjusted block as a rank knows it.
 struct Adjusted {
   RankRunner::Posterior posterior;
   std::vector<TilePart> parts;                                       // of this rank's tiles
-  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;  // of this rank's frames, others zero
-  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
-  double image_sigma_px = 0;  // of tie point measurements
+  std::vector<TileFrameCovariances> frame_covariances;               // of the same, until they are gathered
+  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;  // of the block, when they are: on the first rank
+  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;     // of this rank's tiles; then of the block
+  double image_sigma_px = 0;                                         // of tie point measurements
   MergePosition position;
   BlockState state;
   bool converged = false;
@@ -43,11 +50,12 @@ struct Adjusted {
 // File of a tile's tracks until the result is written; lies with the checkpoints and goes with them.
 std::string part_path(const Job& job, std::int64_t tile);
 
-// Covariances at the solution; each tile's part of the result is written. Collective.
-void find_posterior(Job& job, const MergeInputs& inputs, RankRunner& runner, Adjusted& adjusted);
+// Covariances at the solution; each tile's part of the result is written. `references` of the block's components.
+// Collective.
+void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
+                    RankRunner& runner, Adjusted& adjusted);
 
-// All tiles' parts, on every rank; collective. Then all ranks' covariances on the first one. All tiles that hold a
-// frame or camera have the same bits of its covariance.
+// All tiles' parts, on every rank; collective. Then all ranks' covariances on the first one, which knows the state.
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);
 void gather_covariances(Job& job, Adjusted& adjusted);
 

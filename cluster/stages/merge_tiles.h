@@ -15,7 +15,7 @@ namespace megablock {
 
 // What the merge is computed from; unit names by tile, empty ones of tiles that could not be adjusted.
 struct MergeInputs {
-  const BlockState& oriented;
+  BlockState oriented;  // until the tiles are loaded
   const Tiles& tiles;
   const std::vector<std::string>& tracks;
   const std::vector<std::string>& adjusted;

@@ -89,8 +89,8 @@ TEST(PointRefinement, EndsWhereEveryPointIsAtItsOptimum) {
   refine_points(problem, plan, after);
   EXPECT_LT(evaluate_cost(problem, after), evaluate_cost(problem, before));
   int moved = 0;
-  for (const auto& cell : plan.points)
-    for (const std::int64_t p : cell) {
+  for (const RowList& cell : plan.points)
+    for (const std::int64_t p : cell.rows()) {
       const auto row = static_cast<std::size_t>(p);
       if (after.points[row] == before.points[row]) continue;
       if (++moved > 20) continue;
@@ -117,8 +117,8 @@ TEST(PointRefinement, BringsPointsBackFromBehindTheirCameras) {
   TileState expected = runner.states().front(), state = expected;
   refine_points(problem, plan, expected);
   int refined = 0;
-  for (const auto& cell : plan.points)
-    for (const std::int64_t p : cell) {
+  for (const RowList& cell : plan.points)
+    for (const std::int64_t p : cell.rows()) {
       const auto row = static_cast<std::size_t>(p);
       if (expected.points[row] == state.points[row]) continue;
       const Eigen::Vector3d& camera = state.frames[static_cast<std::size_t>(frame_of_point(problem, p))].centre;
