@@ -15,12 +15,11 @@ namespace megablock {
 namespace {
 
 // Grown as the block grew, so that earlier frames keep their tiles.
-Tiles grow_tiles(const Job& job, LinkWeights links) {
+Tiles grow_tiles(const Job& job, const LinkWeights& links) {
   Tiles tiles;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const std::int64_t frames = frames_of_first_images(job.block, job.generations[g]);
-    const bool last = g + 1 == job.generations.size();
-    const FrameGraph graph = last ? std::move(links).graph(frames) : links.graph(frames);
+    const FrameGraph graph = links.graph(frames);
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);
   }
   return tiles;
