@@ -35,6 +35,7 @@ void describe(Visitor& visit, MatchOptions& o) {
   visit.integer("k_best", o.k_best);
   visit.number("ratio", o.ratio);
   visit.number("max_residual_px", o.max_residual_px);
+  visit.number("sample_spacing_px", o.sample_spacing_px);
   visit.integer("min_inliers", o.min_inliers);
   visit.flag("guided", o.guided);
   visit.number("min_distance_m", o.min_distance_m);

@@ -37,9 +37,9 @@ class OrientationEstimator {
  public:
   using Model = RelativeOrientation;
   // `parallel`: rays closer to parallel than this count as in front [rad]; the threshold of the residuals, or the
-  // largest one.
-  OrientationEstimator(const PointPairs& points, double parallel)
-      : points_(&points), shares_(points), parallel_(parallel) {}
+  // largest one. `spacing`: least distance between the points of a sample in the image a.
+  OrientationEstimator(const PointPairs& points, double parallel, double spacing = 0)
+      : points_(&points), shares_(points), parallel_(parallel), spacing_(spacing) {}
   std::size_t size() const { return points_->size(); }
   double chance(double residual) const { return shares_.near_line(residual); }
 
@@ -53,6 +53,9 @@ class OrientationEstimator {
   };
   Residuals squared_residuals(const RelativeOrientation& o) const;
   std::optional<RelativeOrientation> refine(const RelativeOrientation& o, double threshold) const;
+  bool apart(std::size_t i, std::size_t j) const {
+    return !(spacing_ > 0) || (points_->a[i] - points_->a[j]).squaredNorm() >= spacing_ * spacing_;
+  }
 
  protected:
   Eigen::Vector3d ray_a(std::size_t i) const { return points_->a[i].homogeneous().normalized(); }
@@ -61,7 +64,7 @@ class OrientationEstimator {
  private:
   const PointPairs* points_;
   ImageShares shares_;
-  double parallel_;
+  double parallel_, spacing_;
 };
 
 class FivePointEstimator : public OrientationEstimator {
@@ -76,8 +79,8 @@ class VerticalPairEstimator : public OrientationEstimator {
   static constexpr std::size_t kSampleSize = 3;
   // Unit, both up or both down, in the axes of their images.
   VerticalPairEstimator(const PointPairs& points, double parallel, const Eigen::Vector3d& vertical_a,
-                        const Eigen::Vector3d& vertical_b)
-      : OrientationEstimator(points, parallel), vertical_a_(vertical_a), vertical_b_(vertical_b) {}
+                        const Eigen::Vector3d& vertical_b, double spacing = 0)
+      : OrientationEstimator(points, parallel, spacing), vertical_a_(vertical_a), vertical_b_(vertical_b) {}
   Solutions<RelativeOrientation, 4> solve(const std::array<std::size_t, 3>& rows) const;
 
  private:

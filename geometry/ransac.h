@@ -29,6 +29,7 @@
 //     squared_residuals(model)      a function of the row; infinite or not a number where it cannot be an inlier
 //     refine(model, threshold)      optional model, better for the observations within the threshold
 //     chance(residual)              a(t), where thresholds are to be chosen a contrario
+//     apart(row, row)               whether they are far enough apart for a sample, where that matters
 //
 // Nothing is allocated in a draw. The outcome depends on the estimator and the seed alone.
 #pragma once
@@ -136,6 +137,26 @@ bool next_sample(std::array<std::size_t, N>& rows, std::size_t size) {
     return true;
   }
   return false;
+}
+
+// Distinct observations, apart from one another where the estimator knows what that is.
+template <typename Estimator>
+std::array<std::size_t, Estimator::kSampleSize> draw(const Estimator& estimator, std::mt19937_64& random) {
+  constexpr int kTries = 20;  // an observation that is too near to others; where all crowd, any must do
+  std::array<std::size_t, Estimator::kSampleSize> rows;
+  int tries = 0;
+  for (std::size_t k = 0; k < rows.size();) {
+    rows[k] = random() % estimator.size();
+    bool same = false, near = false;
+    for (std::size_t j = 0; j < k; ++j) {
+      same |= rows[j] == rows[k];
+      if constexpr (requires { estimator.apart(rows[j], rows[k]); }) near |= !estimator.apart(rows[j], rows[k]);
+    }
+    if (same || (near && ++tries < kTries)) continue;
+    tries = 0;
+    ++k;
+  }
+  return rows;
 }
 
 struct Score {
@@ -273,16 +294,7 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
     } while (ransac_detail::next_sample(rows, size));
   } else {
     std::mt19937_64 random(options.seed);
-    for (; draws < needed; ++draws) {
-      Rows rows;
-      for (std::size_t k = 0; k < kSize;) {
-        rows[k] = random() % size;
-        bool again = false;
-        for (std::size_t j = 0; j < k; ++j) again |= rows[j] == rows[k];
-        k += !again;
-      }
-      attempt(rows);
-    }
+    for (; draws < needed; ++draws) attempt(ransac_detail::draw(estimator, random));
   }
   if (best.empty()) return std::nullopt;
   const Score& score = best.front().score;

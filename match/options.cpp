@@ -19,6 +19,8 @@ void MatchOptions::check() const {
   if (k_best < 1 || k_best > 7) throw InputError("k_best must be 1 to 7, not " + std::to_string(k_best));
   if (!(ratio > 0 && ratio <= 1)) throw InputError("ratio must be in (0, 1]");
   if (!(max_residual_px > 0 && max_residual_px <= 100)) throw InputError("max_residual_px must be in (0, 100]");
+  if (!(sample_spacing_px >= 0 && sample_spacing_px <= 1000))
+    throw InputError("sample_spacing_px must be in [0, 1000]");
   if (!(min_distance_m > 0)) throw InputError("min_distance_m must be positive");
   if (!(max_distance_m > min_distance_m)) throw InputError("max_distance_m must be more than min_distance_m");
   trust.check();

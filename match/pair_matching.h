@@ -21,6 +21,7 @@ struct MatchOptions {
   int k_best = 1;                // neighbours kept per feature: 1, or 3 on repeated facades (CN-12)
   double ratio = 0.85;           // a neighbour passes when its distance < ratio x distance of neighbour k + 1
   double max_residual_px = 3.0;  // of verification: largest epipolar (Sampson) residual (see TwoViewOptions)
+  double sample_spacing_px = 0;  // least distance of the points of a sample of verification in the first image
   int min_inliers = 20;          // fewer: the pair is not verified
   // Of pairs whose relative orientation is trusted (trusted_pair.h).
   bool guided = false;          // only features near the epipolar line are compared

@@ -85,7 +85,7 @@ class PairEstimation {
   PairEstimation(const PointPairs& points, const TwoViewOptions& options)
       : points_(points),
         options_(options),
-        five_points_(points, options.max_residual),
+        five_points_(points, options.max_residual, options.sample_spacing),
         transfer_limit_(options.max_residual),
         needed_(inliers_needed()) {}
 
@@ -151,7 +151,7 @@ class PairEstimation {
     std::vector<RelativeOrientation> starts;
     if (options_.vertical_a && options_.vertical_b) {
       const VerticalPairEstimator estimator(points_, options_.max_residual, options_.vertical_a->direction,
-                                            options_.vertical_b->direction);
+                                            options_.vertical_b->direction, options_.sample_spacing);
       if (const auto found = ransac(estimator, sampling(options_, options_.max_residual, 1000))) {
         draws_ += found->draws;
         starts.push_back(adjust_orientation(found->model, points_, adjustment(0.5 * options_.max_residual)));

@@ -4,6 +4,7 @@
 //   compare_two_view [PAIRS = 40 [SCENE]]    simulated: general, plane, rotation (all); 10 to 70 % wrong matches
 //   compare_two_view selection [PAIRS]       the same, verification alone: wrong matches that are accepted, right ones
 //                                            that are lost; limit of 3 px, and the last selection by sigma
+//   compare_two_view spacing [PAIRS]         the same with points of a sample at any distance, 50, 100, 200 px apart
 //   compare_two_view FOLDER FOCAL_PX [STEP]  photographs: each with its next STEP (4) by name; matches, inliers
 //
 // Simulated: 2000 x 1500 px, focal length 1400 px, 800 matches with 0.5 px of noise, base 0.15 (plane: 0.3) of the
@@ -206,6 +207,31 @@ void compare_selection(int pairs) {
       }
 }
 
+void compare_spacing(int pairs) {
+  for (const auto& [name, scene, model] : {std::tuple{"general", Scene::kGeneral, PairModel::kEssential},
+                                           std::tuple{"plane", Scene::kPlane, PairModel::kHomography}})
+    for (const double wrong : {0.1, 0.3, 0.5, 0.7})
+      for (const bool verticals : {false, true}) {
+        std::printf("%s, %.0f %% wrong%s\n", name, 100 * wrong, verticals ? ", verticals" : "");
+        for (const double spacing_px : {0, 50, 100, 200}) {
+          Measured measured;
+          for (int i = 0; i < pairs; ++i) {
+            const Pair pair = simulated(scene, wrong, static_cast<std::uint64_t>(i));
+            TwoViewOptions options;
+            options.max_residual = 3 / kFocal;
+            options.seed = static_cast<std::uint64_t>(i);
+            options.sample_spacing = spacing_px / kFocal;
+            if (verticals) {
+              options.vertical_a = pair.vertical_a;
+              options.vertical_b = pair.vertical_b;
+            }
+            measured.run(pair, model, [&] { return estimate_two_view(pair.points, options); });
+          }
+          measured.print((std::to_string(static_cast<int>(spacing_px)) + " px").c_str(), true);
+        }
+      }
+}
+
 // The matches of two photographs as normalised points.
 PointPairs matched(const ImageFeatures& a, const ImageFeatures& b, const Intrinsics& camera) {
   PointPairs points;
@@ -274,6 +300,8 @@ int main(int argc, char** argv) {
     compare_photographs(argv[1], std::atof(argv[2]), argc > 3 ? static_cast<std::size_t>(std::atoi(argv[3])) : 4);
   else if (argc > 1 && std::string(argv[1]) == "selection")
     compare_selection(argc > 2 ? std::atoi(argv[2]) : 200);
+  else if (argc > 1 && std::string(argv[1]) == "spacing")
+    compare_spacing(argc > 2 ? std::atoi(argv[2]) : 200);
   else
     compare_simulated(argc > 1 ? std::atoi(argv[1]) : 40, argc > 2 ? argv[2] : "");
 }

@@ -106,6 +106,31 @@ TEST(PairEstimators, PointsBehindAreNoInliers) {
   EXPECT_EQ(consensus_of(HomographyEstimator(points), -Eigen::Matrix3d::Identity(), 1e3).count, 0);
 }
 
+// How close to one another, in the image a, points of the samples that are drawn lie at least.
+double closest_of_samples(const PointPairs& points, double spacing) {
+  struct Watched : FivePointEstimator {
+    Watched(const PointPairs& p, double s) : FivePointEstimator(p, kLimit, s), points(p) {}
+    Solutions<RelativeOrientation, 10> solve(const std::array<std::size_t, 5>& rows) const {
+      for (std::size_t k = 1; k < 5; ++k)
+        for (std::size_t j = 0; j < k; ++j) closest = std::min(closest, (points.a[rows[j]] - points.a[rows[k]]).norm());
+      return FivePointEstimator::solve(rows);
+    }
+    const PointPairs& points;
+    mutable double closest = std::numeric_limits<double>::infinity();
+  };
+  const Watched estimator(points, spacing);
+  EXPECT_TRUE(ransac(estimator, {.threshold = kLimit, .min_draws = 300, .seed = 1}));
+  return estimator.closest;
+}
+
+TEST(PairEstimators, PointsOfSamplesAreSpreadOut) {
+  const PointPairs points = normalised_points(half_wrong_scene({0.3, 0, 0.05}, false, 9));
+  const double spacing = 50 / kSceneFocalPx;
+  EXPECT_LT(closest_of_samples(points, 0), 0.1 * spacing);
+  EXPECT_GE(closest_of_samples(points, spacing), spacing);
+  EXPECT_LT(closest_of_samples(points, 1e3), 1e3) << "no points are so far apart: any sample must do";
+}
+
 template <typename Estimator>
 void expect_harmless(const Estimator& estimator) {
   for (const RansacOptions& options :
