@@ -56,7 +56,7 @@ class TrackEvidence {
   std::vector<FrameIndex> frames_;  // of one track
 };
 
-BlockDiagnostics diagnose_with(TrackEvidence& evidence, const Block& block, const BlockState& state,
+BlockDiagnostics diagnose_with(const TrackEvidence& evidence, const Block& block, const BlockState& state,
                                const DiagnosticsOptions& options) {
   return diagnose(block, state, evidence.ground_height(), evidence.graph(), options);
 }

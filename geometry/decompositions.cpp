@@ -1,6 +1,7 @@
 #include "geometry/decompositions.h"
 
 #include <Eigen/Dense>
+#include <cmath>
 
 namespace megablock {
 

@@ -9,7 +9,8 @@
 namespace megablock {
 
 // The least rotation that turns `from` into `to`, sure to rounding / (1 + cosine of the angle between them); where they
-// are opposite to 1e-6 rad, a half turn about any axis across them, sure to rounding.
+// are opposite to 1e-6 rad, where Eigen's FromTwoVectors takes other axes, a half turn about any axis across them, sure
+// to rounding.
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 // Minimises sum w |y - R x|^2; weights empty = all one. Directions all on one line leave the rotation about it

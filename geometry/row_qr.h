@@ -40,6 +40,7 @@ class RowQr {
   NullVector null_vector(double tolerance) const {
     NullVector result{Eigen::Matrix<double, Columns, 1>::Zero()};
     if (!factor_.allFinite()) return result;
+    static_assert(Columns <= SmallMatrix::MaxColsAtCompileTime);
     const RightSingularVectors svd = right_singular_vectors(factor_);
     result.vector = svd.v.col(Columns - 1);
     for (int i = 0; i < Columns; ++i) result.rank += svd.values[i] > tolerance * svd.values[0];

@@ -115,7 +115,7 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
   try {
     for (const Look& look : looks_at(image.pixels, options, seed)) {
       seen = edges_seen(image.pixels, mask.pixels, camera, prior, look);
-      if (!seen.vertical) break;
+      if (!seen.vertical && seen.segments > 0) break;  // without any, edges may be too short for the reduced picture
     }
   } catch (const cv::Exception& e) {
     result.failure = "no segments: " + e.err;

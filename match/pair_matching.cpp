@@ -143,7 +143,7 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
   TwoViewOptions two_view;
   const double focal = 0.5 * (camera_a.intrinsics[kFocal] + camera_b.intrinsics[kFocal]);
   two_view.max_residual = options.max_residual_px / focal;
-  two_view.sample_spacing = options.sample_spacing_px / focal;
+  two_view.sample_spacing = options.sample_spacing_px / camera_a.intrinsics[kFocal];
   two_view.min_inliers = options.min_inliers;
   two_view.by_chance = by_chance;
   two_view.seed = pair_seed(a.image, b.image);

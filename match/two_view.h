@@ -21,7 +21,8 @@ struct TwoViewOptions {
   double max_sigmas = 6;
   int min_inliers = 20;
   double by_chance = 0;  // share of wrong matches that fit the model by chance; 0: of matches anywhere in the image
-  // Points of a sample of three or five are at least so far apart in the image a (Kalantari 2009, M42), same units.
+  // Points of a sample of three or five are at least so far apart in the image a, same units, where twenty draws find
+  // such a point (Kalantari 2009, M42).
   double sample_spacing = 0;
   double max_base_sigma_deg = 1;  // of the base's direction; beyond it the pair is ill-conditioned
   std::uint64_t seed = 0;

@@ -3,6 +3,7 @@
 // their measurements are in scratch; of a million images their lists of points would take 80 MiB as numbers.
 #pragma once
 
+#include <cassert>
 #include <cstdint>
 #include <vector>
 
@@ -10,8 +11,9 @@ namespace megablock {
 
 class RowList {
  public:
-  // Larger than all before.
+  // Larger than all before, and not the largest number there is.
   void push_back(std::int32_t row) {
+    assert(row > last_);
     std::int32_t distance = row - last_;
     for (; distance >= kMore; distance -= kMore) distances_.push_back(kMore);
     distances_.push_back(static_cast<std::uint8_t>(distance));

@@ -2,33 +2,37 @@
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
 #include <string>
+
+#include "io/error.h"
 
 namespace megablock {
 
 namespace {
 
-std::uint32_t narrow(std::int64_t value) {
-  if (value < 0 || value > std::numeric_limits<std::uint32_t>::max())
-    throw std::overflow_error("links of frames: " + std::to_string(value) + " does not fit in 32 bits");
-  return static_cast<std::uint32_t>(value);
-}
+constexpr std::int64_t kLargest = std::numeric_limits<std::uint32_t>::max();
 
 }  // namespace
 
 void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
   if (a == b) return;
   const auto first = static_cast<std::size_t>(std::min(a, b).value);
-  const std::uint32_t further = narrow(std::max(a, b).value - std::min(a, b).value);
+  const std::int64_t apart = std::max(a, b).value - std::min(a, b).value;
+  if (apart > kLargest)
+    throw ComputeError("frames " + std::to_string(a.value) + " and " + std::to_string(b.value) +
+                       " are linked: a block holds at most 2^32 frames; split it");
+  const auto further = static_cast<std::uint32_t>(apart);
   if (first >= links_.size()) links_.resize(first + 1);
   std::vector<Link>& links = links_[first];
   const auto it = std::lower_bound(links.begin(), links.end(), further,
                                    [](const Link& link, std::uint32_t value) { return link.further < value; });
-  if (it != links.end() && it->further == further)
-    it->tracks = narrow(it->tracks + tracks);
+  const bool known = it != links.end() && it->further == further;
+  const auto sum =
+      static_cast<std::uint32_t>(std::min(kLargest, (known ? it->tracks : 0) + std::min(kLargest, tracks)));
+  if (known)
+    it->tracks = sum;
   else
-    links.insert(it, {further, narrow(tracks)});
+    links.insert(it, {further, sum});
 }
 
 FrameGraph LinkWeights::graph(std::int64_t frames) const {

@@ -1,5 +1,5 @@
-// Adds up the links between frames of a block into its graph: of every frame a list of its links to later ones, 8 bytes
-// each. A million images of a street have some twenty links a frame.
+// Adds up the links between frames of a block into its graph: of every frame a list of its links to later ones, of 8
+// bytes each and what a list that grows has in reserve.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@ namespace megablock {
 
 class LinkWeights {
  public:
-  // `tracks` more between two frames; nothing when they are the same. Throws std::overflow_error where frames are 2^32
-  // apart or have so many tracks in common.
+  // `tracks` more between two frames, 2^32 - 1 in all at most; nothing when they are the same. Throws ComputeError for
+  // frames that are 2^32 apart.
   void add(FrameIndex a, FrameIndex b, std::int64_t tracks);
   // The links among the first `frames` frames. Does not depend on the order of add().
   FrameGraph graph(std::int64_t frames) const;

@@ -86,27 +86,30 @@ void say_iteration(const Job& job, const GlobalState& state) {
 }
 
 // What tables of images and frames say is in the tiles now. Of a million images they take 110 MiB on every rank, beside
-// which tiles and fronts are at work; run_merge() reads them again for the result.
+// which tiles and fronts are at work.
 void release_tables(Job& job, MergeInputs& inputs) {
   job.block.images = {};
   job.block.frames = {};
   job.block.relative_poses = {};
   job.block.lines = {};
-  job.block.verticals = {};
   inputs.oriented = {};
   return_freed_memory();
 }
 
-Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
-  const std::size_t frames = job.block.frames.size();
-  const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
-  const std::vector<int> rank_of_tile =
-      distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
-  const std::optional<MergePosition> found = checkpoint.find();
+// The same for the result. Verticals that orientation set aside are not in the block any more, but in its file.
+void restore_tables(Job& job) {
+  Block block = read_block(job.store.verified_path("block.h5"));
+  block.verticals = std::move(job.block.verticals);
+  job.block = std::move(block);
+}
+
+// This rank's tiles from their own adjustments, or from the checkpoint that was found, and the block's state.
+BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
+                      const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
+                      TileStore& tiles) {
   MergeStart start =
       found ? MergeStart{checkpoint.state(), {}, {}} : merge_start(job, inputs.oriented, inputs.adjusted);
   const double start_sigma = found ? 0 : start_image_sigma(job, inputs.adjusted);
-  TileStore tiles(memory_of_tiles(job));
   load_own_tiles(
       job, inputs, start, rank_of_tile,
       [&](RankTile& tile) {
@@ -118,10 +121,19 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
         }
       },
       tiles);
+  return std::move(start.state);
+}
+
+Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
+  const std::size_t frames = job.block.frames.size();
+  const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
+  const std::vector<int> rank_of_tile =
+      distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
+  const std::optional<MergePosition> found = checkpoint.find();
+  TileStore tiles(memory_of_tiles(job));
   Adjusted adjusted;
   BlockState& block = adjusted.state;
-  block = std::move(start.state);
-  start = {};
+  block = load_block(job, inputs, checkpoint, found, rank_of_tile, tiles);
   release_tables(job, inputs);
 
   MergePosition& position = adjusted.position;
@@ -246,7 +258,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
     event.peak_rss_mib = std::max(event.peak_rss_mib, std::stod(text));
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
-    job.block = read_block(job.store.verified_path("block.h5"));
+    restore_tables(job);
     write_final(job, inputs, fingerprint, adjusted, make_outcome(adjusted, job.block), parts, event);
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());  // what was written could not say it of itself
     event.seconds = monotonic_seconds() - start;

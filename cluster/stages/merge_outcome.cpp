@@ -27,15 +27,17 @@ std::vector<SeamCheck> seam_checks(const RankRunner::Posterior& posterior) {
 
 constexpr int kCovarianceTag = 1 << 20;  // beyond those of the merge tree's nodes
 
-// A message per tile, after their number and the cameras.
-void send_covariances(Job& job, const Adjusted& adjusted) {
-  ByteWriter writer;
-  writer.value(adjusted.frame_covariances.size());
-  for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(writer, covariance);
-  job.ranks.send(0, kCovarianceTag, writer.take());
-  for (const TileFrameCovariances& tile : adjusted.frame_covariances) {
+// A message per tile, after their number and the cameras. Each tile's go as they are written: messages wait here.
+void send_covariances(Job& job, Adjusted& adjusted) {
+  std::vector<TileFrameCovariances> tiles = std::exchange(adjusted.covariances_of_tiles, {});
+  ByteWriter head;
+  head.value(tiles.size());
+  for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(head, covariance);
+  job.ranks.send(0, kCovarianceTag, head.take());
+  for (TileFrameCovariances& tile : tiles) {
+    ByteWriter writer;
     writer.values(tile.frames);
-    write_matrices(writer, tile.covariances);
+    write_matrices(writer, std::exchange(tile.covariances, {}));
     job.ranks.send(0, kCovarianceTag, writer.take());
   }
 }
@@ -71,7 +73,7 @@ void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<Motio
     adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
   std::filesystem::create_directories(job.store.path("merge/parts"));
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
-    adjusted.frame_covariances.push_back({tile.problem.frames, covariance.frames});
+    adjusted.covariances_of_tiles.push_back({tile.problem.frames, covariance.frames});
     for (std::size_t c = 0; c < tile.problem.cameras.size(); ++c)
       if (!covariance.cameras[c].isZero(0)) adjusted.camera_covariance[tile.problem.cameras[c]] = covariance.cameras[c];
     const auto t = static_cast<std::size_t>(tile.tile);
@@ -104,7 +106,7 @@ std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size
 void gather_covariances(Job& job, Adjusted& adjusted) {
   if (job.is_first_rank()) {
     adjusted.frame_covariance.assign(adjusted.state.frames.size(), BlockResult::Matrix6::Zero());
-    for (const TileFrameCovariances& tile : std::exchange(adjusted.frame_covariances, {}))
+    for (const TileFrameCovariances& tile : std::exchange(adjusted.covariances_of_tiles, {}))
       take_covariances(tile, adjusted);
     for (int r = 1; r < job.ranks.size(); ++r) receive_covariances(job, r, adjusted);
   } else {

@@ -38,7 +38,7 @@ struct TileFrameCovariances {
 struct Adjusted {
   RankRunner::Posterior posterior;
   std::vector<TilePart> parts;                                       // of this rank's tiles
-  std::vector<TileFrameCovariances> frame_covariances;               // of the same, until they are gathered
+  std::vector<TileFrameCovariances> covariances_of_tiles;            // of the same, until they are gathered
   IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;  // of the block, when they are: on the first rank
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;     // of this rank's tiles; then of the block
   double image_sigma_px = 0;                                         // of tie point measurements

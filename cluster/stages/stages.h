@@ -72,7 +72,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches);
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks);
 
-// Merge and result: merge/..., result/block.h5, result/report.html. The job's block is gone afterwards.
+// Merge and result: merge/..., result/block.h5, result/report.html. The job's block is not to be used afterwards.
 void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
                const std::vector<std::string>& adjusted);
 

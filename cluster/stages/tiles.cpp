@@ -2,9 +2,11 @@
 
 #include <algorithm>
 
+#include "cluster/collective.h"
 #include "cluster/stages/given_tracks.h"
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
+#include "io/error.h"
 #include "io/hash.h"
 #include "io/track_reader.h"
 #include "io/unit_files.h"
@@ -34,7 +36,8 @@ Tiles run_tiles_unit(Job& job, std::uint64_t inputs, const std::function<LinkWei
   unit.name = "tiles.h5";
   unit.fingerprint = hasher.value();
   unit.write = [&](const std::string& path) { write_tiles(path, grow_tiles(job, links())); };
-  run_stage(job, "tiles", {unit});
+  const StageOutcome outcome = run_stage(job, "tiles", {unit});
+  if (!outcome.failures.empty()) throw AgreedError<ComputeError>("tiles failed: " + outcome.failures.front().reason);
   return read_tiles(job.store.verified_path(unit.name));
 }
 

@@ -41,14 +41,16 @@ def solvers(program):
     runs = json.loads(subprocess.check_output(
         [program, f"--benchmark_filter=^({names})/", "--benchmark_repetitions=5", "--benchmark_min_time=0.1",
          "--benchmark_report_aggregates_only", "--benchmark_format=json"], stderr=subprocess.DEVNULL))["benchmarks"]
-    good = True
+    good, seen = True, set()
     for run in runs:
         if run["aggregate_name"] != "median":
             continue
         solver, _, noise = run["run_name"].split("/")
+        seen.add(solver)
         good &= check(run["cpu_time"], LIMITS[solver], f"{run['run_name']}, us")
         if noise == "0":
             good &= check(1 - run["success"], 1 - LEAST_FOUND, f"{run['run_name']}, share without the truth")
+    assert seen == set(LIMITS), f"bench_solvers ran {sorted(seen)} of {sorted(LIMITS)}"
     return good
 
 

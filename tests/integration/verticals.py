@@ -9,6 +9,7 @@ import pathlib
 import sys
 import tempfile
 
+import h5py
 from pictures import make_blank
 from program import FAILED_UNITS, megablock
 
@@ -105,6 +106,8 @@ def against_given_poses(folder):
     said = run("job", rows_of_a_field_in_two)
     assert "2 of 12 verticals take no part: 2" in said and all(name in said for name in wrong), said
     assert all(name in (folder / "job/result/report.html").read_text() for name in wrong)
+    with h5py.File(folder / "job/result/block.h5") as result:  # nor in what the result says was observed
+        assert len(result["verticals/image"]) == 10
     said = run("turned", lambda name, rotation: by_quaternion(rotation, [0, 0.8, -0.6]))
     assert "12 of 12 verticals take no part: 12 that show one direction, but not down by the given poses" in said, said
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "adjust/vertical_check.h"
 #include "cluster/stages/stages.h"

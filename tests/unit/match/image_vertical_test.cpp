@@ -109,6 +109,24 @@ TEST_F(ImageVerticalTest, IsFoundInALargePictureByAllItsEdges) {
   EXPECT_LT(std::acos(v.down.direction.dot(truth)) * kDegreesPerRadian, 0.1);
 }
 
+// Edges that are too short for the reduced picture are edges all the same.
+TEST_F(ImageVerticalTest, ALargePictureOfShortEdgesHasEdges) {
+  camera_.width = 2250;
+  camera_.height = 1500;
+  camera_.intrinsics = Intrinsics{2000, 1125, 750};
+  cv::Mat picture(1500, 2250, CV_8U, cv::Scalar(170));
+  for (int x = 100; x < 2200; x += 150)
+    for (int y = 100; y < 1400; y += 150)
+      cv::line(picture, cv::Point(x, y), cv::Point(x + 25, y + 30), cv::Scalar(60), 7, cv::LINE_AA);
+  const std::string file = scratch_.path("short.png");
+  cv::imwrite(file, picture);
+  SegmentOptions reduced;
+  reduced.max_megapixels = 0.5;
+  reduced.min_length_px = 20;
+  ASSERT_TRUE(find_line_segments(picture, {}, reduced).empty());
+  EXPECT_EQ(find_image_vertical(file, camera_, {}, 1).segments, std::ssize(find_line_segments(picture, {})));
+}
+
 // Of a large picture whose edges lie anywhere no more than the reduced one is looked at.
 TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
   camera_.width = 2250;
