@@ -40,6 +40,16 @@ double sigma_of(const BlockResult& result, FrameIndex frame, int k) {
   return std::sqrt(result.frame_covariance[frame](k, k) / factor);
 }
 
+// The job's own where a dense covariance of the one problem would take more than 2 GiB.
+std::optional<FrameSigmas> sigmas_to_compare_by(const BlockResult& result, const TileProblem& problem) {
+  constexpr std::size_t kDenseFrames = 2500;
+  if (problem.frames.size() <= kDenseFrames) return std::nullopt;
+  FrameSigmas sigmas(6, std::ssize(problem.frames));
+  for (Eigen::Index f = 0; f < sigmas.cols(); ++f)
+    for (int k = 0; k < 6; ++k) sigmas(k, f) = sigma_of(result, problem.frames[static_cast<std::size_t>(f)], k);
+  return sigmas;
+}
+
 // Every component off by a normal deviate of a tenth of its sigma.
 TileState disturbed(const BlockResult& result, const ResultTile& tile) {
   constexpr double kShare = 0.1;
@@ -94,7 +104,8 @@ std::string compare_with_monolithic(const JobStore& store) {
             {"newton_decrement", std::sqrt(sums.decrement_squared)},
             {"free_datum", runner.block_gauge().defect()}};
   json["max_pose_difference_sigmas"] =
-      max_pose_difference_sigmas(tile.problem, tile.state, runner.block_gauge(), runner.tile_plans().front());
+      max_pose_difference_sigmas(tile.problem, tile.state, runner.block_gauge(), runner.tile_plans().front(),
+                                 sigmas_to_compare_by(result, tile.problem));
   json["relative_cost_difference"] = (sums.cost - cost_after_ceres(tile)) / sums.cost;
   if (runner.block_gauge().free()) return json.dump();
   const OwnRun own = adjust_single_tile(result, tile);

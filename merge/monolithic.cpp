@@ -27,12 +27,6 @@ Eigen::SparseMatrix<double> to_eigen(ceres::CRSMatrix& m) {
                                     m.cols.data(), m.values.data());
 }
 
-Eigen::SparseMatrix<double> normal_matrix(const MonolithicSystem& system, const DatumRows& datum) {
-  Eigen::SparseMatrix<double> normal = system.jacobian.transpose() * system.jacobian;
-  if (datum.rows() > 0) normal += Eigen::SparseMatrix<double>(datum.transpose() * datum);
-  return normal;
-}
-
 // Rows that hold the frames of the constraints along their directions, as heavy as what observes them.
 DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem, const BlockGauge& gauge) {
   const Eigen::VectorXd root = system.diagonal().unaryExpr([](double d) { return d > 0 ? std::sqrt(d) : 1; });
@@ -90,12 +84,64 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
   return s;
 }
 
-double largest_over_sigma(const MonolithicSystem& system, const Eigen::VectorXd& step,
-                          const Eigen::MatrixXd& covariance) {
+// The normal equations of everything but points, sparse: W = N - C' P^-1 C of the points' 3 x 3 blocks P, and its right
+// side.
+struct ReducedEquations {
+  Eigen::SparseMatrix<double> normal;
+  Eigen::VectorXd right;
+};
+
+ReducedEquations reduced_equations(const MonolithicSystem& system, const DatumRows& datum) {
+  using Sparse = Eigen::SparseMatrix<double>;
+  const Eigen::Index n = system.reduced_dimension, points = system.jacobian.cols() - n;
+  const Sparse poses = system.jacobian.leftCols(n), rays = system.jacobian.rightCols(points);
+  const Sparse coupling = rays.transpose() * poses, own = rays.transpose() * rays;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index p = 0; p < points; p += 3) {
+    const Eigen::Matrix3d inverse = Eigen::Matrix3d(Eigen::MatrixXd(own.block(p, p, 3, 3))).inverse();
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) entries.emplace_back(p + i, p + j, inverse(i, j));
+  }
+  Sparse inverse(points, points);
+  inverse.setFromTriplets(entries.begin(), entries.end());
+  const Sparse carried = inverse * coupling;
+  ReducedEquations reduced;
+  reduced.normal = poses.transpose() * poses;
+  reduced.normal -= Sparse(coupling.transpose() * carried);
+  if (datum.rows() > 0) {
+    const Sparse rows = datum.leftCols(n);
+    reduced.normal += Sparse(rows.transpose() * rows);
+  }
+  reduced.right = carried.transpose() * (rays.transpose() * system.residual) - poses.transpose() * system.residual;
+  return reduced;
+}
+
+// The undamped Newton step of everything but points.
+Eigen::VectorXd reduced_step(const MonolithicSystem& system, const DatumRows& datum) {
+  const ReducedEquations reduced = reduced_equations(system, datum);
+  const Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> solver(reduced.normal);
+  if (solver.info() != Eigen::Success) throw ComputeError("monolithic reference: the normal equations are singular");
+  Eigen::VectorXd x = solver.solve(reduced.right);
+  x += solver.solve(reduced.right - reduced.normal * x);  // one step of iterative refinement
+  return x;
+}
+
+// Of the frames that are in the system; zero for the others.
+FrameSigmas sigmas_of(const MonolithicSystem& system, const Eigen::MatrixXd& covariance) {
+  FrameSigmas sigmas = FrameSigmas::Zero(6, std::ssize(system.frame_column));
+  for (std::size_t f = 0; f < system.frame_column.size(); ++f)
+    if (const std::int64_t first = system.frame_column[f]; first >= 0)
+      sigmas.col(static_cast<Eigen::Index>(f)) = covariance.diagonal().segment<6>(first).cwiseSqrt();
+  return sigmas;
+}
+
+double largest_over_sigma(const MonolithicSystem& system, const Eigen::VectorXd& step, const FrameSigmas& sigmas) {
   double largest = 0;
-  for (std::int64_t first : system.frame_column)
-    for (std::int64_t k = first; first >= 0 && k < first + 6; ++k)
-      largest = std::max(largest, std::abs(step[k]) / std::sqrt(covariance(k, k)));
+  for (std::size_t f = 0; f < system.frame_column.size(); ++f)
+    if (const std::int64_t first = system.frame_column[f]; first >= 0)
+      largest = std::max(
+          largest,
+          step.segment<6>(first).cwiseAbs().cwiseQuotient(sigmas.col(static_cast<Eigen::Index>(f))).maxCoeff());
   return largest;
 }
 
@@ -146,8 +192,8 @@ MonolithicSystem monolithic_system(const TileProblem& problem, const TileState& 
   return system;
 }
 
-Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda, const DatumRows& datum) {
-  Eigen::SparseMatrix<double> normal = normal_matrix(system, datum);
+Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda) {
+  Eigen::SparseMatrix<double> normal = system.jacobian.transpose() * system.jacobian;
   normal.diagonal() += lambda * system.diagonal();
   const Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> solver(normal);
   if (solver.info() != Eigen::Success) throw ComputeError("monolithic reference: the normal equations are singular");
@@ -158,24 +204,10 @@ Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda, c
 }
 
 Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const DatumRows& datum) {
-  const Eigen::Index n = system.reduced_dimension, points = system.jacobian.cols() - n;
-  const Eigen::SparseMatrix<double> normal = normal_matrix(system, datum);
-  Eigen::MatrixXd reduced = Eigen::MatrixXd(normal.topLeftCorner(n, n));
-  const Eigen::SparseMatrix<double> coupling = normal.bottomLeftCorner(points, n);  // [points x n]
-  const Eigen::SparseMatrix<double> own = normal.bottomRightCorner(points, points);
-  std::vector<Eigen::Triplet<double>> entries;
-  for (Eigen::Index p = 0; p < points; p += 3) {
-    const Eigen::Matrix3d inverse = Eigen::Matrix3d(Eigen::MatrixXd(own.block(p, p, 3, 3))).inverse();
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) entries.emplace_back(p + i, p + j, inverse(i, j));
-  }
-  Eigen::SparseMatrix<double> inverse(points, points);
-  inverse.setFromTriplets(entries.begin(), entries.end());
-  reduced -= Eigen::MatrixXd(Eigen::SparseMatrix<double>(coupling.transpose() * inverse * coupling));
-
+  Eigen::MatrixXd reduced = reduced_equations(system, datum).normal;
   const Eigen::VectorXd scale = reduced.diagonal().cwiseMax(0).cwiseSqrt().cwiseInverse();
   reduced = scale.asDiagonal() * reduced * scale.asDiagonal();
-  const int size = static_cast<int>(n);
+  const int size = static_cast<int>(reduced.rows());
   int failed = 0;
   dpotrf_("L", &size, reduced.data(), &size, &failed);
   if (failed == 0) dpotri_("L", &size, reduced.data(), &size, &failed);
@@ -186,17 +218,20 @@ Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const Datu
 
 double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state) {
   const MonolithicSystem system = monolithic_system(problem, state);
-  return largest_over_sigma(system, monolithic_step(system, 0), monolithic_covariance(system));
+  return largest_over_sigma(system, reduced_step(system, {}), sigmas_of(system, monolithic_covariance(system)));
 }
 
 double max_pose_difference_sigmas(const TileProblem& problem, const TileState& state, const BlockGauge& gauge,
-                                  const TilePlan& plan) {
-  if (!gauge.free()) return max_pose_difference_sigmas(problem, state);
+                                  const TilePlan& plan, const std::optional<FrameSigmas>& sigmas) {
   const MonolithicSystem system = monolithic_system(problem, state);
-  const DatumRows datum = datum_rows(system, problem, gauge);
+  const DatumRows datum = gauge.free() ? datum_rows(system, problem, gauge) : DatumRows();
+  Eigen::VectorXd step = reduced_step(system, datum);
+  if (!gauge.free())
+    return largest_over_sigma(system, step, sigmas ? *sigmas : sigmas_of(system, monolithic_covariance(system)));
   const InnerTransformation inner = inner_transformation(system, problem, state, gauge, plan);
-  const Eigen::VectorXd step = monolithic_step(system, 0, datum).head(system.reduced_dimension);
-  return largest_over_sigma(system, inner.step(step), inner.covariance(monolithic_covariance(system, datum)));
+  step = inner.step(step);
+  return largest_over_sigma(
+      system, step, sigmas ? *sigmas : sigmas_of(system, inner.covariance(monolithic_covariance(system, datum))));
 }
 
 }  // namespace megablock

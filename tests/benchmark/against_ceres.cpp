@@ -1,13 +1,13 @@
 // The merge of a block in tiles against Ceres, which holds it as one problem:
 //
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
-//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--exactness]
+//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--exactness|--speed]
 //
 // Scenes: tests/benchmark/scenes.h. A job of the block on two ranks, merged to a decrement of 1e-7, gives the tiles,
 // the observations it kept and its solution. How exact this is (cluster/monolithic_comparison.h):
 // max_pose_difference_sigmas, the largest component of the undamped Newton step of one Ceres problem with automatic
 // derivatives at the solution over its posterior sigma; relative_cost_difference, how far Ceres lowers the cost from
-// there with all tolerances 1e-16. With --exactness these alone.
+// there with all tolerances 1e-16. With --exactness these alone, with --speed all but these.
 //
 // How fast: from the same job's observations, points and sigmas, with every component of every pose moved off it by a
 // normal deviate of its sigma, run, each in processes of their own and with the arithmetic that the processor is best
@@ -90,8 +90,8 @@ struct Options {
   SceneOptions scene;
   std::string role;  // of a process that this program starts: "exactness", "ours" or the name of Ceres' linear solver
   bool analytic = false;
-  bool exactness = false;
-  int tile_frames = 0;  // 0: as the program chooses
+  bool exactness = true, speed = true;  // what is asked for
+  int tile_frames = 0;                  // 0: as the program chooses
   std::string loss = "huber";
   Options() { scene.frames = 2000; }
 };
@@ -378,12 +378,9 @@ void run_job(const Options& options, const Start& start) {
   if (!fs::exists(start.job() / "result/block.h5")) run_scene(start.folder, start.job(), kRanks, 1);
 }
 
-Json exactness(const Options& options, const Start& start, const std::string& self) {
+Json exactness(const Start& start, const std::string& self) {
   run_command(self + "exactness");
-  Json figures = json_of(start.file("exactness.json"));
-  figures["scene"] = options.scene.scene;
-  figures["frames"] = options.scene.frames;
-  return figures;
+  return json_of(start.file("exactness.json"));
 }
 
 Json speed(const Options& options, const Start& start, const std::string& self) {
@@ -429,8 +426,9 @@ Json compare(const Options& options, const fs::path& folder) {
   fs::create_directories(folder / "start");
   const std::string self =
       "'" + fs::canonical("/proc/self/exe").string() + "' --folder '" + folder.string() + "' --role ";
-  Json figures = exactness(options, start, self);
-  if (!options.exactness) figures.update(speed(options, start, self));
+  Json figures{{"scene", options.scene.scene}, {"frames", options.scene.frames}};
+  if (options.exactness) figures.update(exactness(start, self));
+  if (options.speed) figures.update(speed(options, start, self));
   return figures;
 }
 
@@ -446,7 +444,8 @@ int main(int argc, char** argv) {
   app.add_option("--loss", options.loss, "Robust loss of image measurements and positions")
       ->check(CLI::IsMember({"none", "huber", "cauchy"}));
   app.add_flag("--free", options.scene.free, "Without positions and attitudes");
-  app.add_flag("--exactness", options.exactness, "Only how exact the solution is, not how fast it is found");
+  CLI::Option* exact = app.add_flag("!--speed", options.exactness, "Only how fast the solution is found");
+  app.add_flag("!--exactness", options.speed, "Only how exact it is")->excludes(exact);
   app.add_option("--role", options.role)->group("");
   app.add_flag("--analytic", options.analytic)->group("");
   app.add_option(kArithmeticOption)->group("");  // pin_arithmetic() reads it
