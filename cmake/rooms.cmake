@@ -1,5 +1,5 @@
 # A room is a folder of sources that becomes one static library, megablock::<room>.
-# Every .cpp directly in the folder, or in one of its sub-folders other than `main`, belongs to it.
+# Every .cpp directly in the folder, or in one of its sub-folders other than `main` and `module`, belongs to it.
 # Files named *_avx2.cpp are compiled for AVX2 and FMA, *_avx512.cpp for AVX-512, *_portable.cpp for any processor; they
 # hold raw-pointer kernels only, reached by run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them:
 # their ABI depends on the flags). Without errno a square root is one instruction.
@@ -53,7 +53,7 @@ set(megablock_avx512_options -mavx512f -mavx512dq -mavx512vl -mprefer-vector-wid
 function(megablock_room name)
   cmake_parse_arguments(ROOM "" "" "DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${name}/*.cpp ${name}/*/*.cpp)
-  list(FILTER sources EXCLUDE REGEX "/${name}/main/")
+  list(FILTER sources EXCLUDE REGEX "/${name}/(main|module)/")
   if(NOT sources)
     set(type INTERFACE)
     add_library(megablock_${name} INTERFACE)

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <vector>
 
+#include "io/picture_codec.h"
+
 namespace megablock {
 
 namespace {
@@ -89,7 +91,7 @@ GreyImage read_grey_image(const std::string& path) {
   if (is_jpeg(bytes) && !is_complete_jpeg(bytes)) return {{}, "truncated JPEG: the file ends before the image does"};
   try {
     const cv::Mat decoded =
-        cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+        decode_picture(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
     if (decoded.empty()) return {{}, "not an image, damaged, or of an unsupported format"};
     return {to_eight_bits(decoded), {}};
   } catch (const cv::Exception& e) {

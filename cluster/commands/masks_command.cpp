@@ -15,6 +15,7 @@
 #include "cluster/exit_codes.h"
 #include "io/error.h"
 #include "io/job_store.h"
+#include "io/picture_codec.h"
 #include "io/project.h"
 #include "io/report/html.h"
 #include "match/image_file.h"
@@ -106,8 +107,8 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
     return judged;
   }
   judged.mask = finder.mask();
-  judged.sample = cv::imread(block.path_of(block.images[images[images.size() / 2]]),
-                             cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  judged.sample = read_picture(block.path_of(block.images[images[images.size() / 2]]),
+                               cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   return judged;
 }
 
@@ -120,8 +121,7 @@ std::string preview(const Judged& judged) {
   mixed.copyTo(picture, judged.mask == 0);
   const double factor = 800.0 / std::max(picture.cols, picture.rows);
   if (factor < 1) cv::resize(picture, picture, {}, factor, factor, cv::INTER_AREA);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
+  const auto bytes = encode_picture(".jpg", picture, {cv::IMWRITE_JPEG_QUALITY, 85});
   return {bytes.begin(), bytes.end()};
 }
 
@@ -147,8 +147,7 @@ Proposal propose(const Block& block, const Camera& camera, const std::vector<Ima
     return proposal;
   }
   const fs::path file = fs::path(options.output) / mask_file_name(camera.name);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", judged.mask, bytes);
+  const auto bytes = encode_picture(".png", judged.mask);
   const std::string png(bytes.begin(), bytes.end());
   if (!fs::exists(file)) {
     JobStore(options.output).write_text(file.filename().string(), png);

@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/error.h"
+#include "io/picture_codec.h"
 
 namespace megablock {
 
@@ -61,7 +62,7 @@ void set_position(Exiv2::ExifData& data, const SimulatedExif& exif) {
 }  // namespace
 
 void write_jpeg(const std::string& path, const cv::Mat& image, const SimulatedExif& exif) {
-  if (!cv::imwrite(path, image, {cv::IMWRITE_JPEG_QUALITY, 95})) throw InputError(path + ": cannot be written");
+  write_picture(path, image, {cv::IMWRITE_JPEG_QUALITY, 95});
   try {
     const auto file = Exiv2::ImageFactory::open(path);
     file->readMetadata();

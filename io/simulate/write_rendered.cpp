@@ -5,12 +5,12 @@
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "io/control_file.h"
 #include "io/crs.h"
 #include "io/error.h"
+#include "io/picture_codec.h"
 #include "io/pose_csv.h"
 #include "io/project.h"
 #include "io/simulate/image_file.h"
@@ -59,8 +59,7 @@ std::optional<VehicleView> vehicle_seen(const SimulationOptions& options, const 
 
 void write_mask(const VehicleView& vehicle, const fs::path& folder, const Camera& camera) {
   fs::create_directories(folder);
-  const std::string path = (folder / mask_file_name(name_by_headers(camera))).string();
-  if (!cv::imwrite(path, vehicle.mask())) throw InputError(path + ": cannot be written");
+  write_picture((folder / mask_file_name(name_by_headers(camera))).string(), vehicle.mask());
 }
 
 void write_images(const SimulationOptions& options, const Layout& layout, const Block& with_priors,

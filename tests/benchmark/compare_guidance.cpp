@@ -9,8 +9,8 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <opencv2/imgcodecs.hpp>
 
+#include "io/picture_codec.h"
 #include "io/simulate/render.h"
 #include "io/tracks.h"
 #include "match/features.h"
@@ -69,7 +69,8 @@ Town make_town(std::int64_t frames, double repeated, std::uint64_t seed) {
     const RayTable rays(town.block.cameras[camera], town.layout.truth.cameras[camera]);
     for (ImageIndex i(0); town.block.images.contains(i); ++i.value) {
       if (town.block.camera_of(i) != camera) continue;
-      cv::imwrite(file, render_image(city, rays, true_pose(town, i), o.focal_px, static_cast<std::uint64_t>(i.value)));
+      write_picture(file,
+                    render_image(city, rays, true_pose(town, i), o.focal_px, static_cast<std::uint64_t>(i.value)));
       town.features[static_cast<std::size_t>(i.value)] = detect_features(file, "", i, {});
     }
   }

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <string>
+
+#include "io/picture_codec.h"
 
 namespace megablock::fixture {
 
@@ -25,7 +27,7 @@ using Tags = std::map<std::string, std::string>;  // EXIF or XMP keys of Exiv2 a
 // A grey picture; `shade` makes the bytes differ.
 inline void write_picture(const std::string& path, int width, int height, int shade, const Tags& tags = {}) {
   std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  ASSERT_TRUE(cv::imwrite(path, cv::Mat(height, width, CV_8UC3, cv::Scalar(shade % 256, shade / 256, 90))));
+  megablock::write_picture(path, cv::Mat(height, width, CV_8UC3, cv::Scalar(shade % 256, shade / 256, 90)));
   auto image = Exiv2::ImageFactory::open(path);
   image->readMetadata();
   static const int registered = [] {

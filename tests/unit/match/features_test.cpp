@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "io/error.h"
+#include "io/picture_codec.h"
 #include "io/tracks.h"
 #include "tests/unit/io/scratch_directory.h"
 
@@ -71,7 +72,7 @@ class Features : public testing::Test {
  protected:
   std::string path(const std::string& name) const { return scratch_.path(name); }
   std::string write(const std::string& name, const cv::Mat& pixels) const {
-    EXPECT_TRUE(cv::imwrite(path(name), pixels));
+    write_picture(path(name), pixels);
     return path(name);
   }
   // Copies the first bytes of a file.
@@ -219,8 +220,7 @@ TEST_F(Features, BadFilesAreFailuresWithAReason) {
 
 TEST_F(Features, ProgressiveJpegsAndTrailingBytesAreComplete) {
   const cv::Mat pixels = noise_texture(400, 300, 50, 7);
-  ASSERT_TRUE(cv::imwrite(path("progressive.jpg"), pixels,
-                          {cv::IMWRITE_JPEG_PROGRESSIVE, 1, cv::IMWRITE_JPEG_RST_INTERVAL, 4}));
+  write_picture(path("progressive.jpg"), pixels, {cv::IMWRITE_JPEG_PROGRESSIVE, 1, cv::IMWRITE_JPEG_RST_INTERVAL, 4});
   EXPECT_EQ(detect(path("progressive.jpg")).failure, "");
   std::ofstream(path("progressive.jpg"), std::ios::binary | std::ios::app) << "maker's trailer";
   EXPECT_EQ(detect(path("progressive.jpg")).failure, "");

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "geometry/rotation.h"
+#include "io/picture_codec.h"
 #include "match/line_segments.h"
 #include "tests/unit/io/scratch_directory.h"
 
@@ -59,7 +60,7 @@ class ImageVerticalTest : public ::testing::Test {
           }
     cv::GaussianBlur(picture, picture, {}, 0.7);
     const std::string file = scratch_.path(windows ? "windows.png" : "plain.png");
-    cv::imwrite(file, picture);
+    write_picture(file, picture);
     return file;
   }
 
@@ -96,9 +97,9 @@ TEST_F(ImageVerticalTest, IsFoundInAPicture) {
 // for what is found.
 TEST_F(ImageVerticalTest, IsFoundInALargePictureByAllItsEdges) {
   const std::string file = scratch_.path("large.png");
-  cv::Mat picture = cv::imread(draw(true), cv::IMREAD_GRAYSCALE);
+  cv::Mat picture = read_picture(draw(true), cv::IMREAD_GRAYSCALE);
   cv::resize(picture, picture, {}, 2.5, 2.5, cv::INTER_CUBIC);
-  cv::imwrite(file, picture);
+  write_picture(file, picture);
   camera_.width = 2250;
   camera_.height = 1500;
   camera_.intrinsics = Intrinsics{2000, 1125, 750};
@@ -119,7 +120,7 @@ TEST_F(ImageVerticalTest, ALargePictureOfShortEdgesHasEdges) {
     for (int y = 100; y < 1400; y += 150)
       cv::line(picture, cv::Point(x, y), cv::Point(x + 25, y + 30), cv::Scalar(60), 7, cv::LINE_AA);
   const std::string file = scratch_.path("short.png");
-  cv::imwrite(file, picture);
+  write_picture(file, picture);
   SegmentOptions reduced;
   reduced.max_megapixels = 0.5;
   reduced.min_length_px = 20;
@@ -143,7 +144,7 @@ TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
       cv::line(picture, cv::Point2d(x, y), cv::Point2d(x, y) + along, cv::Scalar(60), 7, cv::LINE_AA);
     }
     const std::string file = scratch_.path("clutter.png");
-    cv::imwrite(file, picture);
+    write_picture(file, picture);
     const ImageVertical v = find_image_vertical(file, camera_, {}, 1);
     EXPECT_FALSE(v.found);
     EXPECT_GT(v.segments, 20);
@@ -167,7 +168,7 @@ TEST_F(ImageVerticalTest, NoneWithoutEdgesAndForBadFiles) {
   other = camera_;
   other.mask_path = scratch_.path("mask.png");
   EXPECT_NE(find_image_vertical(windows, other, {}, 1).failure.find("mask"), std::string::npos);
-  cv::imwrite(other.mask_path, cv::Mat(600, 900, CV_8U, cv::Scalar(0)));
+  write_picture(other.mask_path, cv::Mat(600, 900, CV_8U, cv::Scalar(0)));
   const ImageVertical masked = find_image_vertical(windows, other, {}, 1);
   EXPECT_EQ(masked.failure, "");
   EXPECT_EQ(masked.segments, 0);

@@ -1,0 +1,52 @@
+#include "io/picture_codec.h"
+
+#include <dlfcn.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "io/error.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kLibrary = "libmegablock_pictures.so";
+
+PictureCodecs load_codecs() {
+  void* library = dlopen(kLibrary, RTLD_NOW | RTLD_LOCAL);  // stays until the end
+  if (library == nullptr)
+    throw InputError(std::string("pictures cannot be read or written: ") + dlerror() +
+                     "; build the target megablock_pictures, or install the program with 'cmake --install'");
+  return reinterpret_cast<decltype(&megablock_picture_codecs)>(dlsym(library, "megablock_picture_codecs"))();
+}
+
+const PictureCodecs& codecs() {
+  static const PictureCodecs loaded = load_codecs();
+  return loaded;
+}
+
+}  // namespace
+
+cv::Mat decode_picture(const std::vector<unsigned char>& file, int flags) { return codecs().decode(file, flags); }
+
+cv::Mat read_picture(const std::string& path, int flags) {
+  std::ifstream file(path, std::ios::binary);
+  return decode_picture({std::istreambuf_iterator<char>(file), {}}, flags);
+}
+
+std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
+                                          const std::vector<int>& parameters) {
+  return codecs().encode(extension, picture, parameters);
+}
+
+void write_picture(const std::string& path, const cv::Mat& picture, const std::vector<int>& parameters) {
+  const std::vector<unsigned char> bytes =
+      encode_picture(std::filesystem::path(path).extension().string(), picture, parameters);
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
+  if (!file.flush()) throw InputError(path + ": cannot be written");
+}
+
+}  // namespace megablock
