@@ -84,6 +84,8 @@ std::optional<StageRecord> read_record(const JobStore& store, const std::string&
   }
 }
 
+void remove_record(const JobStore& store, const std::string& stage) { store.remove(file_of(stage)); }
+
 const char* name_of(StageState state) {
   static constexpr const char* kNames[] = {"waiting", "partial", "done", "stale"};
   return kNames[static_cast<int>(state)];

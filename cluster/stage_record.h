@@ -28,6 +28,8 @@ struct StageRecord {
 void write_record(const JobStore& store, const StageRecord& record);
 // Empty when there is none; StoreError when it is not readable.
 std::optional<StageRecord> read_record(const JobStore& store, const std::string& stage);
+// Of a stage that the job as it is asked for now does without. Fine when there is none.
+void remove_record(const JobStore& store, const std::string& stage);
 
 enum class StageState { kWaiting, kPartial, kDone, kStale };
 const char* name_of(StageState state);  // "waiting" ...

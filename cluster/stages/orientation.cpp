@@ -190,6 +190,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   std::vector<SetAsideVertical> aside;
   set_aside(job, against_given_poses(job.block), aside);
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
+    if (job.is_first_rank()) remove_record(job.store, "orientation");  // an earlier run may have needed the stage
     tell_of_verticals(job, aside, verticals);
     return held_in_place(job, std::move(start));
   }

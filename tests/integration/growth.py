@@ -141,6 +141,23 @@ class Growth(unittest.TestCase):
         after = unit_files(self.folder)
         self.assertEqual({file for file in before if after[file] != before[file]}, {"features/000000.h5"})
 
+    def test_poses_added_later_end_the_orientation_stage(self):
+        poses = (self.folder / "truth.csv").read_text().splitlines(keepends=True)
+        (self.folder / "poses.csv").write_text("".join(row for row in poses if not row.startswith(tuple(ADDED))))
+        with (self.folder / "block.yaml").open("a") as project:
+            project.write("poses: poses.csv\n")
+        units = run(self.folder)
+        self.assertNotIn("orientation", units)
+        self.assertIn("merge", units)
+        stages = {stage["name"]: stage["state"] for stage in status(self.folder / "job")["stages"]}
+        self.assertEqual(set(stages.values()), {"done"}, stages)
+        self.assertNotIn("orientation", stages)
+        self.assertEqual(status(self.folder / "job")["result"], "current")
+        self.assertEqual(run(self.folder), {})
+        write_project(self.folder, OPTIONS)  # and back
+        self.assertIn("orientation", run(self.folder))
+        self.assertEqual(status(self.folder / "job")["result"], "current")
+
     def test_the_result_is_the_same_on_two_ranks(self):
         if not shutil.which("mpirun"):
             self.skipTest("needs mpirun")

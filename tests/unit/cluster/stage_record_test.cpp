@@ -64,6 +64,17 @@ TEST_F(StageRecordTest, EverythingAfterAChangeIsStaleThoughItsFilesAreThere) {
   EXPECT_THAT(states(), testing::ElementsAre("tiles done", "tracks stale", "adjustment stale", "merge stale"));
 }
 
+TEST_F(StageRecordTest, AStageTheJobDoesWithoutLeavesNoTrace) {
+  const StageRecord tiles = add("tiles", nullptr, 1, true);
+  const StageRecord tracks = add("tracks", &tiles, 2, true);
+  add("orientation", &tracks, 3, true);
+  const StageRecord adjustment = add("adjustment", &tracks, 4, true);  // of a run that had all poses
+  add("merge", &adjustment, 5, true);
+  remove_record(store_, "orientation");
+  remove_record(store_, "orientation");  // none there
+  EXPECT_THAT(states(), testing::ElementsAre("tiles done", "tracks done", "adjustment done", "merge done"));
+}
+
 TEST_F(StageRecordTest, KeepsFailuresAndRefusesAnUnreadableRecord) {
   StageRecord record{"features", 7, {{"features/000000.h5", 8}}, {{"features", "a.jpg", "is empty"}}};
   write_record(store_, record);
