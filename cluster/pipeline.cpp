@@ -38,11 +38,31 @@ void check_job_json(const JobStore& store, const JobJson& job) {
                      " on a processor that has it, or start a new job directory");
 }
 
+// An image is the same when its file is, or its name where there is no file.
+std::set<std::string> identities(const Block& block) {
+  std::set<std::string> all;
+  for (const Image& image : block.images)
+    all.insert(image.file_hash != 0 ? std::to_string(image.file_hash) : image.name);
+  return all;
+}
+
+// A job is not replaced by that of quite another block, which mostly is a slip of -j.
+void refuse_another_block(const JobStore& store, const Block& previous, const Project& project) {
+  const std::set<std::string> own = identities(previous), given = identities(project.block);
+  if (std::any_of(given.begin(), given.end(), [&](const std::string& image) { return own.contains(image); })) return;
+  throw InputError(store.directory() + ": is the job of another block: " + project.file + " has none of its " +
+                   std::to_string(previous.images.size()) +
+                   " images; name another folder with -j, or delete this one to begin anew");
+}
+
 // The images of an earlier run keep their indices; new ones follow. Records when the block grew.
-std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job, Block& block) {
+std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job,
+                                              Project& project) {
+  Block& block = project.block;
   std::vector<std::int64_t> generations;
   if (job && store.seal("block.h5")) {
     const Block previous = read_block(store.verified_path("block.h5"));
+    refuse_another_block(store, previous, project);
     Block merged = append_to(previous, block);
     // Images taken away or changed start a new block; growing keeps what is there.
     const bool grown = merged.images.size() == block.images.size();
@@ -83,7 +103,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   if (before) check_job_json(store, *before);
   if (project.block.images.empty())
     throw InputError(options.project + ": no readable image in the block; check the images folder");
-  const std::vector<std::int64_t> generations = merge_with_previous(store, before, project.block);
+  const std::vector<std::int64_t> generations = merge_with_previous(store, before, project);
   check(project.block);
   Hasher fingerprint;
   fingerprint.add(hash_file(options.project)).add(generations);

@@ -83,6 +83,19 @@ class BadInput(CopyOfTheBlock):
         self.assertIn("holds other files and no job", line)
         self.assertEqual(sorted(self.images.iterdir()), before)
 
+    def test_job_of_another_block(self):
+        shutil.copytree(work / "clean_job", self.job)
+        before = {file: file.stat().st_mtime_ns for file in self.job.rglob("*.*")}
+        megablock("simulate", "--frames", 6, "-o", self.folder / "other")
+        line = one_line(megablock("run", self.folder / "other/block.yaml", "-j", self.job, "-q", expect=BAD_INPUT))
+        self.assertRegex(line, f"{self.job}: is the job of another block: .*other/block.yaml has none of its 12 images; "
+                               "name another folder with -j, or delete this one")
+        self.assertEqual({file: file.stat().st_mtime_ns for file in self.job.rglob("*.*")}, before)
+        for picture in self.pictures()[8:]:
+            picture.unlink()
+        self.run_job()  # some are left: the block begins anew
+        self.assertEqual(status(self.job)["images"], 8)
+
     def test_control_point_in_another_country(self):
         image = self.pictures()[0].name
         gcp = self.folder / "gcp_list.txt"
