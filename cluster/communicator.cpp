@@ -30,6 +30,8 @@ void wait_politely(MPI_Request& request) {
   }
 }
 
+enum Counted : MPI_Aint { kClaimed, kDone, kCounters };
+
 constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // counts of MPI 3 are int
 
 }  // namespace
@@ -38,7 +40,7 @@ struct Communicator::Mpi {
   MPI_Comm world = MPI_COMM_NULL;
   MPI_Comm progress_world = MPI_COMM_NULL;
   MPI_Win window = MPI_WIN_NULL;
-  std::int64_t* counter = nullptr;  // memory of the window, significant on rank 0
+  std::int64_t* counters = nullptr;  // memory of the window, significant on rank 0; below what is counted where
   std::atomic<bool> stop{false};
   std::thread progress;
   struct Sent {
@@ -46,6 +48,14 @@ struct Communicator::Mpi {
     std::vector<MPI_Request> requests;
   };
   std::list<Sent> sent;  // buffers of sends under way
+
+  // Returns the value before.
+  std::int64_t change(Counted which, std::int64_t value, MPI_Op operation) {
+    std::int64_t before = 0;
+    MPI_Fetch_and_op(&value, &before, MPI_INT64_T, 0, which, operation, window);
+    MPI_Win_flush(0, window);
+    return before;
+  }
 };
 
 Communicator::Communicator(int* argc, char*** argv) {
@@ -66,9 +76,9 @@ Communicator::Communicator(int* argc, char*** argv) {
   MPI_Comm_size(host, &ranks_on_host_);
   MPI_Comm_free(&host);
 
-  const MPI_Aint bytes = rank_ == 0 ? sizeof(std::int64_t) : 0;
-  MPI_Win_allocate(bytes, sizeof(std::int64_t), MPI_INFO_NULL, mpi_->world, &mpi_->counter, &mpi_->window);
-  if (rank_ == 0) *mpi_->counter = 0;
+  const MPI_Aint bytes = rank_ == 0 ? kCounters * sizeof(std::int64_t) : 0;
+  MPI_Win_allocate(bytes, sizeof(std::int64_t), MPI_INFO_NULL, mpi_->world, &mpi_->counters, &mpi_->window);
+  if (rank_ == 0) std::fill_n(mpi_->counters, kCounters, std::int64_t{0});
   MPI_Win_lock_all(0, mpi_->window);
   barrier();
 
@@ -186,42 +196,38 @@ void Communicator::flush_sends() {
 void Communicator::reset_counter() {
   if (!mpi_) {
     local_counter_ = 0;
+    local_done_ = 0;
     return;
   }
   barrier();
   if (rank_ == 0) {
-    const std::int64_t zero = 0;
-    std::int64_t before = 0;
-    MPI_Fetch_and_op(&zero, &before, MPI_INT64_T, 0, 0, MPI_REPLACE, mpi_->window);
-    MPI_Win_flush(0, mpi_->window);
+    mpi_->change(kClaimed, 0, MPI_REPLACE);
+    mpi_->change(kDone, 0, MPI_REPLACE);
   }
   barrier();
 }
 
-std::int64_t Communicator::claim() {
-  if (!mpi_) return local_counter_++;
-  const std::int64_t one = 1;
-  std::int64_t number = 0;
-  MPI_Fetch_and_op(&one, &number, MPI_INT64_T, 0, 0, MPI_SUM, mpi_->window);
-  MPI_Win_flush(0, mpi_->window);
-  return number;
-}
+std::int64_t Communicator::claim() { return mpi_ ? mpi_->change(kClaimed, 1, MPI_SUM) : local_counter_++; }
 
 void Communicator::use_up_counter() {
   const std::int64_t beyond = std::int64_t{1} << 62;
-  if (!mpi_) {
+  if (mpi_)
+    mpi_->change(kClaimed, beyond, MPI_REPLACE);
+  else
     local_counter_ = beyond;
-    return;
-  }
-  std::int64_t before = 0;
-  MPI_Fetch_and_op(&beyond, &before, MPI_INT64_T, 0, 0, MPI_REPLACE, mpi_->window);
-  MPI_Win_flush(0, mpi_->window);
 }
 
-std::int64_t Communicator::counter() const {
-  if (!mpi_) return local_counter_;
+void Communicator::add_done(std::int64_t parts) {
+  if (mpi_)
+    mpi_->change(kDone, parts, MPI_SUM);
+  else
+    local_done_ += parts;
+}
+
+std::int64_t Communicator::done() const {
+  if (!mpi_) return local_done_;
   // Its memory is read as it is: the progress display asks from a thread of its own and must not enter the window.
-  return rank_ == 0 ? std::atomic_ref<std::int64_t>(*mpi_->counter).load() : 0;
+  return rank_ == 0 ? std::atomic_ref<std::int64_t>(mpi_->counters[kDone]).load() : 0;
 }
 
 void Communicator::abort(int exit_code) {

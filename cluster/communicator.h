@@ -4,6 +4,7 @@
 // that more ranks than cores, and a rank in the middle of a unit, do not starve one another.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -42,9 +43,11 @@ class Communicator {
 
   // The shared counter from which units are claimed. reset() is collective.
   void reset_counter();
-  std::int64_t claim();          // next number, from 0; never given twice between resets
-  void use_up_counter();         // every later claim gets a number beyond any list
-  std::int64_t counter() const;  // numbers given so far, for display; on rank 0 only, 0 elsewhere
+  std::int64_t claim();   // next number, from 0; never given twice between resets
+  void use_up_counter();  // every later claim gets a number beyond any list
+  // How far all ranks together are, for display; 0 after a reset. One thread of a rank at a time.
+  void add_done(std::int64_t parts);
+  std::int64_t done() const;  // on rank 0 only, 0 elsewhere
 
   // Ends all ranks at once with this exit code (a rank that fails alone must not leave the others waiting).
   [[noreturn]] void abort(int exit_code);
@@ -54,6 +57,7 @@ class Communicator {
   std::unique_ptr<Mpi> mpi_;  // null: one rank without MPI
   int rank_ = 0, size_ = 1, ranks_on_host_ = 1;
   std::int64_t local_counter_ = 0;
+  std::atomic<std::int64_t> local_done_{0};
   std::map<int, std::string> to_self_;  // by tag
 };
 

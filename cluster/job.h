@@ -34,11 +34,12 @@ struct Job {
   JobOptions settings;
   EventLog events;
   Block block;
-  std::vector<std::int64_t> generations;  // image counts at which the block grew; the last is its size
-  std::vector<StageRecord> records;       // of the stages so far, in order
-  std::vector<FailedUnit> failures;       // of all stages so far
+  std::vector<std::int64_t> generations;           // image counts at which the block grew; the last is its size
+  std::vector<StageRecord> records;                // of the stages so far, in order
+  std::vector<FailedUnit> failures;                // of all stages so far
   std::map<FrameIndex, std::string> not_oriented;  // by the initial orientation, and why
-  std::vector<std::string> notes;         // warnings for the report
+  std::vector<std::string> notes;                  // warnings for the report
+  std::int64_t parts_done = 0;                     // of the unit in hand (work_queue.h)
 
   bool is_first_rank() const { return ranks.rank() == 0; }
 };

@@ -21,21 +21,23 @@ std::string duration_text(double seconds) {
   return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
 }
 
-Progress::Progress(std::string stage, std::int64_t units, std::function<std::int64_t()> units_done, bool quiet)
+Progress::Progress(std::string stage, std::int64_t count, std::string name, std::function<std::int64_t()> done,
+                   bool quiet)
     : stage_(std::move(stage)),
-      units_(units),
-      units_done_(std::move(units_done)),
+      count_(count),
+      name_(std::move(name)),
+      done_(std::move(done)),
       terminal_(isatty(STDERR_FILENO) != 0),
       start_s_(monotonic_seconds()),
       history_{{start_s_, 0}} {
-  if (quiet || units == 0) return;
+  if (quiet || count == 0) return;
   thread_ = std::thread([this] {
     const double interval_s = terminal_ ? 0.25 : 5;
     double next_s = start_s_ + interval_s;
     while (!stop_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
       if (monotonic_seconds() < next_s) continue;
-      print(units_done_(), false);
+      print(done_(), false);
       next_s = monotonic_seconds() + interval_s;
     }
   });
@@ -45,11 +47,11 @@ Progress::~Progress() {
   stop_ = true;
   if (!thread_.joinable()) return;
   thread_.join();
-  if (terminal_) print(units_, true);
+  if (terminal_) print(done_(), true);
 }
 
-// Of the last half minute: units that were there already, which a resumed run passes at once, do not count for long.
-double Progress::units_per_second(std::int64_t done) {
+// Of the last half minute: what was there already, which a resumed run passes at once, does not count for long.
+double Progress::rate_per_second(std::int64_t done) {
   constexpr double kWindow_s = 30;
   const double now_s = monotonic_seconds();
   history_.emplace_back(now_s, done);
@@ -59,7 +61,7 @@ double Progress::units_per_second(std::int64_t done) {
 }
 
 void Progress::print(std::int64_t done, bool last) {
-  done = std::clamp<std::int64_t>(last ? units_ : done, 0, units_);
+  done = std::clamp<std::int64_t>(done, 0, count_);
   const double elapsed = monotonic_seconds() - start_s_;
   std::string line = stage_;
   line.resize(std::max<std::size_t>(line.size(), 12), ' ');
@@ -67,16 +69,16 @@ void Progress::print(std::int64_t done, bool last) {
     winsize size{};
     const int columns = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
     const int width = std::clamp(columns - 58, 0, 40);
-    const int filled = units_ > 0 ? static_cast<int>(width * done / units_) : width;
+    const int filled = count_ > 0 ? static_cast<int>(width * done / count_) : width;
     if (width > 4) line += " [" + std::string(filled, '#') + std::string(width - filled, '.') + "]";
   }
-  line += " " + std::to_string(done) + "/" + std::to_string(units_) + " units, " + duration_text(elapsed);
-  const double rate = units_per_second(done);
+  line += " " + std::to_string(done) + "/" + std::to_string(count_) + " " + name_ + ", " + duration_text(elapsed);
+  const double rate = rate_per_second(done);
   if (!last && rate > 0) {
     std::array<char, 32> text{};
     std::snprintf(text.data(), text.size(), rate >= 1 ? ", %.1f/s" : ", %.1f/min", rate >= 1 ? rate : 60 * rate);
     line += text.data();
-    line += ", " + duration_text(static_cast<double>(units_ - done) / rate) + " left";
+    line += ", " + duration_text(static_cast<double>(count_ - done) / rate) + " left";
   }
   if (terminal_) {
     const std::string padding(printed_width_ > line.size() ? printed_width_ - line.size() : 0, ' ');

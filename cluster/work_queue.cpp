@@ -102,7 +102,12 @@ void add_failures(Job& job, const std::vector<FailedUnit>& failures) {
                                     failures.front().reason);
 }
 
-StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units) {
+void part_done(Job& job, std::int64_t parts) {
+  job.parts_done += parts;
+  job.ranks.add_done(parts);
+}
+
+StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units, const std::string& parts) {
   begin_stage(job, stage, units);
   return_freed_memory();
   reset_peak_rss();
@@ -110,10 +115,10 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   RankRecord mine;
   std::string fatal;  // concerns the run, not the unit: a full disk, a read-only job
   {
-    // Every rank has one claim more than it has finished units: the one in hand, or one beyond the end.
+    const std::int64_t count = std::accumulate(units.begin(), units.end(), std::int64_t{0},
+                                               [](std::int64_t sum, const Unit& unit) { return sum + unit.parts; });
     Progress progress(
-        stage, static_cast<std::int64_t>(units.size()), [&] { return job.ranks.counter() - job.ranks.size(); },
-        job.options.quiet || !job.is_first_rank());
+        stage, count, parts, [&] { return job.ranks.done(); }, job.options.quiet || !job.is_first_rank());
     const std::vector<std::size_t> order = claim_order(units);
     while (!stop_requested()) {
       const double before_claim = monotonic_seconds();
@@ -122,10 +127,12 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       if (number >= static_cast<std::int64_t>(order.size())) break;
       const std::size_t index = order[static_cast<std::size_t>(number)];
       const Unit& unit = units[index];
-      if (is_current(job.store, unit)) continue;
+      job.parts_done = 0;
       try {
-        compute_unit(job, stage, unit, claim_s);
-        ++mine.computed;
+        if (!is_current(job.store, unit)) {
+          compute_unit(job, stage, unit, claim_s);
+          ++mine.computed;
+        }
       } catch (const InputError& error) {
         fatal = error.what();
         break;
@@ -133,9 +140,10 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
         mine.failures.emplace_back(index, error.what());
         if (job.options.strict) job.ranks.use_up_counter();
       }
+      part_done(job, unit.parts - job.parts_done);
     }
+    share_error(job.ranks, 'i', fatal);  // the others' units are shown until they are done
   }
-  share_error(job.ranks, 'i', fatal);
   if (job.ranks.any(stop_requested()))
     throw AgreedError<Interrupted>("stopped in stage '" + stage + "' as asked; run the same command to resume");
 

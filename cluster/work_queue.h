@@ -20,6 +20,7 @@ struct Unit {
   std::uint64_t fingerprint = 0;  // of everything it is computed from
   double cost = 0;                // any scale; units are claimed by decreasing cost, then in list order
   std::function<void(const std::string& path)> write;  // computes and writes the payload
+  std::int64_t parts = 1;  // that progress counts; write() reports what it has done of them by part_done()
 };
 
 struct StageOutcome {
@@ -29,8 +30,11 @@ struct StageOutcome {
 
 // Collective. Throws Interrupted (on every rank) after a graceful stop. With job.options.strict a failed unit ends the
 // run with ComputeError.
-// The stage's record (stage_record.h) grows by these units.
-StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units);
+// The stage's record (stage_record.h) grows by these units. Progress counts their parts by this name.
+StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units,
+                       const std::string& parts = "units");
+// Of the unit in hand, from one thread at a time.
+void part_done(Job& job, std::int64_t parts = 1);
 
 // What run_stage does around its units, for a stage that has another way of computing: its units join the record of
 // the stage, which rank 0 writes.

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cluster/collective.h"
+#include "cluster/progress.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -64,19 +65,74 @@ std::vector<ImageFeatures> features_to_keep(const JobStore& store, const std::st
   return {};
 }
 
-void write_shard(const Job& job, const Shard& shard, const std::string& path) {
-  std::vector<ImageFeatures> images = features_to_keep(job.store, shard.name, shard.image_fingerprints);
-  const auto kept = static_cast<std::int64_t>(images.size());
+// The features of a shard in the making. Its first images are saved now and then, as if the shard ended there, so that
+// an interruption costs seconds and not the whole unit: what is there is kept (features_to_keep).
+class GrowingShard {
+ public:
+  GrowingShard(const JobStore& store, const Shard& shard)
+      : store_(store), shard_(shard), images_(features_to_keep(store, shard.name, shard.image_fingerprints)) {
+    saved_ = images_.size();
+    done_.assign(shard.image_fingerprints.size(), 0);
+    std::fill_n(done_.begin(), saved_, 1);
+    images_.resize(done_.size());
+  }
+  std::int64_t kept() const { return static_cast<std::int64_t>(saved_); }
+  const std::vector<ImageFeatures>& images() const { return images_; }
+
+  // One thread at a time; others may be at work on later images.
+  void add(std::int64_t image, ImageFeatures features) {
+    images_[static_cast<std::size_t>(image)] = std::move(features);
+    done_[static_cast<std::size_t>(image)] = 1;
+    const auto end = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), 0) - done_.begin());
+    if (end == saved_ || end == done_.size() || monotonic_seconds() < next_save_s_) return;
+    save(end);
+  }
+
+ private:
+  void save(std::size_t count) {
+    const double start = monotonic_seconds();
+    const auto end = images_.begin() + static_cast<std::ptrdiff_t>(count);
+    std::vector<ImageFeatures> first(std::make_move_iterator(images_.begin()), std::make_move_iterator(end));
+    const auto& fingerprints = shard_.image_fingerprints;
+    const auto fingerprint =
+        shard_fingerprint({fingerprints.begin(), fingerprints.begin() + static_cast<std::ptrdiff_t>(count)});
+    try {
+      store_.write(shard_.name, fingerprint, [&](const std::string& path) { write_features(path, first); });
+      saved_ = count;
+    } catch (const std::exception&) {
+      // The unit itself will be written to the same disk, and says what is wrong with it.
+    }
+    std::move(first.begin(), first.end(), images_.begin());
+    next_save_s_ = monotonic_seconds() + std::max(kInterval_s, 20 * (monotonic_seconds() - start));
+  }
+
+  static constexpr double kInterval_s = 3;  // and at most a twentieth of the time goes into saving
+  const JobStore& store_;
+  const Shard& shard_;
+  std::vector<ImageFeatures> images_;
+  std::vector<std::uint8_t> done_;
+  std::size_t saved_ = 0;
+  double next_save_s_ = monotonic_seconds() + kInterval_s;
+};
+
+void write_shard(Job& job, const Shard& shard, const std::string& path) {
+  GrowingShard growing(job.store, shard);
+  const std::int64_t kept = growing.kept();
+  part_done(job, kept);
   const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());
-  images.resize(shard.image_fingerprints.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::int64_t i = kept; i < count; ++i) {
     const ImageIndex image(shard.first + i);
     const std::string& mask = job.block.cameras[job.block.camera_of(image)].mask_path;
-    images[static_cast<std::size_t>(i)] =
+    ImageFeatures features =
         detect_features(job.block.path_of(job.block.images[image]), mask, image, job.settings.features);
+#pragma omp critical(features_of_a_shard)
+    {
+      growing.add(i, std::move(features));
+      part_done(job);
+    }
   }
-  write_features(path, images);
+  write_features(path, growing.images());
 }
 
 // Images without features become failures of the run, with their reasons.
@@ -108,12 +164,13 @@ FeatureStage run_features(Job& job) {
     Unit unit;
     unit.name = shard.name;
     unit.fingerprint = shard_fingerprint(shard.image_fingerprints);
-    unit.cost = static_cast<double>(end - first);
+    unit.parts = end - first;
+    unit.cost = static_cast<double>(unit.parts);
     unit.write = [&job, shard](const std::string& path) { write_shard(job, shard, path); };
     stage.shards.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  const StageOutcome outcome = run_stage(job, "features", units);
+  const StageOutcome outcome = run_stage(job, "features", units, "images");
   if (!outcome.failures.empty()) throw AgreedError<ComputeError>("features: " + outcome.failures.front().reason);
   list_unreadable(job, stage);
   return stage;

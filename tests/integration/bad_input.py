@@ -8,6 +8,7 @@ of their own (full disk, read-only job) mount a tmpfs and are skipped, saying so
 import json
 import os
 import pathlib
+import pty
 import random
 import re
 import shutil
@@ -463,6 +464,34 @@ class Signals(CopyOfTheBlock):
             self.assertLess(time.monotonic() - asked, 1)
             megablock("run", self.project, "-j", job, "-q")
             self.assertEqual(status(job)["digest"], reference, stage)
+
+    def test_features_are_saved_and_shown_within_a_unit(self):
+        megablock("simulate", "--rendered", "--frames", 8, "--width", 1600, "--image-height", 1200, "--focal", 1250,
+                  "-o", work / "large")
+        project, job, whole = work / "large/block.yaml", self.folder / "large_job", self.folder / "whole_job"
+        command = [MEGABLOCK, "partition", project, "--threads", "1"]
+        terminal, its_end = pty.openpty()
+        run = subprocess.Popen([*command, "-j", job], stdout=subprocess.DEVNULL, stderr=its_end)
+        os.close(its_end)
+        while not (job / "features/000000.h5").exists():
+            self.assertIsNone(run.poll())
+            time.sleep(0.01)
+        run.send_signal(signal.SIGINT)
+        self.assertEqual(run.wait(), INTERRUPTED)
+        said = os.read(terminal, 1 << 16).decode()
+        os.close(terminal)
+        self.assertRegex(said, r"features +\[#+\.+\] [1-7]/8 images, ")
+        self.assertEqual(status(job)["stages"][0]["units"], 0)  # it was interrupted
+        megablock("check", job, expect=FAILED_UNITS)
+
+        ranks = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", "2"] if shutil.which("mpirun") else []
+        start = time.monotonic()
+        told = subprocess.run([*ranks, *command, "-j", whole], capture_output=True, text=True, check=True,
+                              env=dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1"))
+        if time.monotonic() - start > 8:  # a line every five seconds, whichever rank has the unit
+            self.assertRegex(told.stderr, "features +[1-7]/8 images, ")
+        megablock(*command[1:], "-j", job, "-q")
+        self.assertEqual((job / "features/000000.h5").read_bytes(), (whole / "features/000000.h5").read_bytes())
 
     def test_sigusr1_stops_gracefully(self):
         run = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stderr=subprocess.PIPE, text=True)
