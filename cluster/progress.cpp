@@ -10,6 +10,21 @@
 
 namespace megablock {
 
+namespace {
+
+std::atomic<bool>& line_is_open() {
+  static std::atomic<bool> open{false};  // there is one terminal
+  return open;
+}
+
+}  // namespace
+
+void end_progress_line() {
+  if (!line_is_open().exchange(false)) return;
+  std::fputc('\n', stderr);
+  std::fflush(stderr);
+}
+
 double monotonic_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -83,6 +98,7 @@ void Progress::print(std::int64_t done, bool last) {
   if (terminal_) {
     const std::string padding(printed_width_ > line.size() ? printed_width_ - line.size() : 0, ' ');
     printed_width_ = line.size();
+    line_is_open() = !last;
     std::fprintf(stderr, "\r%s%s%s", line.c_str(), padding.c_str(), last ? "\n" : "");
   } else {
     std::fprintf(stderr, "%s\n", line.c_str());

@@ -36,6 +36,9 @@ class Progress {
   std::thread thread_;
 };
 
+// Of whatever else goes to standard error: ends the line that a progress bar stands on, if one does.
+void end_progress_line();
+
 // Seconds on a clock that only goes forward.
 double monotonic_seconds();
 // "42 s", "3 min 20 s", "5 h 12 min".

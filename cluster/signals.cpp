@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "cluster/exit_codes.h"
+#include "cluster/progress.h"
 
 namespace megablock {
 
@@ -40,6 +41,7 @@ void watch_signals() {
         continue;
       }
       constexpr char kText[] = "megablock: stopped; the units in hand are abandoned, run the same command to resume\n";
+      end_progress_line();
       write_line(kText, sizeof kText - 1);
       std::_Exit(kExitInterrupted);
     }

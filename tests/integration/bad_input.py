@@ -481,6 +481,7 @@ class Signals(CopyOfTheBlock):
         said = os.read(terminal, 1 << 16).decode()
         os.close(terminal)
         self.assertRegex(said, r"features +\[#+\.+\] [1-7]/8 images, ")
+        self.assertRegex(said, "[0-9a-z] *\r\nmegablock: stopped; ")  # on a line of its own
         self.assertEqual(status(job)["stages"][0]["units"], 0)  # it was interrupted
         megablock("check", job, expect=FAILED_UNITS)
 
