@@ -14,6 +14,7 @@
 #include "cluster/commands/calibrate_command.h"
 #include "cluster/commands/coplanarity_command.h"
 #include "cluster/commands/diagnose_command.h"
+#include "cluster/commands/help_text.h"
 #include "cluster/commands/masks_command.h"
 #include "cluster/commands/measurements_command.h"
 #include "cluster/commands/option_checks.h"
@@ -332,6 +333,7 @@ int run_action(const Action& action, Communicator& ranks) {
 int command_line(int argc, char** argv) {
   CLI::App app{"megablock orients image blocks of any size: tiles on ranks, exact block-wise compensation, resumable."};
   app.name("megablock");
+  app.formatter(std::make_shared<HelpText>());
   app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + arithmetic_level() + ")");
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* command, const CLI::Error& error) {
@@ -347,7 +349,8 @@ int command_line(int argc, char** argv) {
     return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
   });
   app.footer(
-      "Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input, 75 interrupted and resumable.\n"
+      "Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input,\n"
+      "            75 interrupted and resumable.\n"
       "Forms:\n  megablock init IMAGES -o block.yaml\n  megablock run block.yaml -j JOB      (again = resume)\n"
       "  mpirun --bind-to none -n N megablock run block.yaml -j JOB\n  megablock status JOB [--json|--digest]\n");
   try {

@@ -78,6 +78,19 @@ class BadInput(CopyOfTheBlock):
         said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
         self.assertIn("argument '--thread' was not expected; see 'megablock run --help'", said)
 
+    def test_help_is_as_wide_as_the_terminal(self):
+        def help_of(columns, *command):
+            text = megablock(*command, "--help", env=dict(os.environ, COLUMNS=str(columns)))
+            return re.split("^(?:Example|Exit codes): ", text, flags=re.MULTILINE)[0]
+
+        commands = re.findall("^  ([a-z-]+)  ", help_of(1000).partition("Subcommands:")[2], flags=re.MULTILINE)
+        self.assertIn("simulate", commands)
+        for command in ([], *([name] for name in commands)):
+            narrow, wide = help_of(60, *command), help_of(1000, *command)
+            self.assertLessEqual(max(map(len, narrow.splitlines())), 60, narrow)
+            self.assertEqual("".join(narrow.split()), "".join(wide.split()))
+        self.assertIn("of the\n" + 30 * " " + "merge, MiB", help_of(80, "run"))  # below the description
+
     def test_job_among_photographs(self):
         before = sorted(self.images.iterdir())
         line = one_line(megablock("run", self.project, "-j", self.images, "-q", expect=BAD_INPUT))
