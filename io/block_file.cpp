@@ -172,7 +172,7 @@ void get_frame_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& 
 
 void put_frames(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& frames) {
   file.group("frames", "one row per frame: a pose of a rig");
-  file.texts("frames/name", column(frames, [](const Frame& f) { return f.name; }));
+  file.texts("frames/name", std::ssize(frames), [&](std::int64_t i) { return frames[FrameIndex(i)].name; });
   file.vector("frames/rig", column(frames, [](const Frame& f) { return f.rig.value; }), {"", "row in rigs"});
   file.vector("frames/pass", column(frames, [](const Frame& f) { return f.pass; }),
               {"", "acquisition line, -1: unknown"});
@@ -201,8 +201,9 @@ IndexedVector<FrameIndex, Frame> get_frames(const Hdf5Reader& file) {
 
 void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images, const Block& block) {
   file.group("images", "one row per exposure");
-  file.texts("images/name", column(images, [](const Image& i) { return i.name; }));
-  file.texts("images/path", column(images, [&](const Image& i) { return block.path_of(i); }),
+  const std::int64_t count = std::ssize(images);
+  file.texts("images/name", count, [&](std::int64_t i) { return images[ImageIndex(i)].name; });
+  file.texts("images/path", count, [&](std::int64_t i) { return block.path_of(images[ImageIndex(i)]); },
              {"", "image file; empty for simulated tie points"});
   file.vector("images/frame", column(images, [](const Image& i) { return i.frame.value; }), {"", "row in frames"});
   file.vector("images/mount", column(images, [](const Image& i) { return static_cast<std::int32_t>(i.mount); }),
@@ -231,15 +232,21 @@ std::string get_image_folder(const Hdf5Reader& file) {
 }
 
 IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
-  std::vector<std::string> names = file.texts("images/name");
-  const auto count = static_cast<std::int64_t>(names.size());
-  const auto frames = file.vector<std::int64_t>("images/frame", count);
-  const auto mounts = file.vector<std::int32_t>("images/mount", count);
-  const auto hashes = file.vector<std::uint64_t>("images/file_hash", count);
+  constexpr std::int64_t kBatch = 1 << 16;
+  const std::vector<std::int64_t> shape = file.shape("images/name");
+  for (const char* name : {"images/frame", "images/mount", "images/file_hash"})
+    if (shape.size() != 1 || file.shape(name) != shape) file.fail(name, "has not a row per image");
   IndexedVector<ImageIndex, Image> images;
-  images.reserve(names.size());
-  for (std::size_t i = 0; i < names.size(); ++i)
-    images.push_back({std::move(names[i]), FrameIndex(frames[i]), mounts[i], hashes[i]});
+  images.reserve(static_cast<std::size_t>(shape[0]));
+  for (std::int64_t first = 0; first < shape[0]; first += kBatch) {
+    const std::vector<RowRange> rows = {{first, std::min(kBatch, shape[0] - first)}};
+    std::vector<std::string> names = file.text_rows("images/name", rows);
+    const auto frames = file.rows<std::int64_t>("images/frame", rows);
+    const auto mounts = file.rows<std::int32_t>("images/mount", rows);
+    const auto hashes = file.rows<std::uint64_t>("images/file_hash", rows);
+    for (std::size_t i = 0; i < names.size(); ++i)
+      images.push_back({std::move(names[i]), FrameIndex(frames[i]), mounts[i], hashes[i]});
+  }
   return images;
 }
 

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -69,6 +70,11 @@ struct DatasetNote {
   std::string units, description;
 };
 
+// Rows [first, first + count) of a dataset.
+struct RowRange {
+  std::int64_t first = 0, count = 0;
+};
+
 // HDF5 cannot recover from a disk that fills up under it, and crashes when the process ends. So a file is put together
 // in memory (compressed) and written by close() in one go; one that is too large for that (kDisk) is written as its
 // rows are appended, on disk space that is reserved before HDF5 needs it.
@@ -106,6 +112,9 @@ class Hdf5Writer {
   void integers(const std::string& name, const std::vector<std::int64_t>& values, const DatasetNote& note = {});
   // Fixed-length UTF-8 strings, padded with zero bytes to the longest.
   void texts(const std::string& name, const std::vector<std::string>& values, const DatasetNote& note = {});
+  // The same of `count` rows, which `row` says twice each: a million of them are nowhere at once.
+  void texts(const std::string& name, std::int64_t count, const std::function<std::string(std::int64_t)>& row,
+             const DatasetNote& note = {});
   void dataset(const std::string& name, ElementType type, const void* values, const std::vector<std::int64_t>& shape,
                const DatasetNote& note);
 
@@ -134,6 +143,10 @@ class Hdf5Writer {
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, const void* value);
   void write_dataset(const std::string& name, std::int64_t file_type, std::int64_t memory_type, const void* values,
                      const std::vector<std::int64_t>& shape, const DatasetNote& note);
+  Hdf5Handle make_dataset(const std::string& name, std::int64_t file_type, const std::vector<std::int64_t>& shape);
+  void write_rows(std::int64_t set, const std::string& name, std::int64_t memory_type, const void* values,
+                  const std::vector<std::int64_t>& row, RowRange range);
+  void describe(const std::string& name, const DatasetNote& note);
   void growing_dataset(const std::string& name, ElementType type, const std::vector<std::int64_t>& row,
                        const DatasetNote& note);
   void append_rows(const std::string& name, ElementType type, const void* values, std::int64_t count);
@@ -155,10 +168,6 @@ class Hdf5Writer {
   std::map<std::string, Growing> growing_;
 };
 
-// Rows [first, first + count) of a dataset.
-struct RowRange {
-  std::int64_t first = 0, count = 0;
-};
 // Ascending rows as few ranges, each with all rows between its first and its last: rows closer than `gap` join.
 std::vector<RowRange> ranges_of(const std::vector<std::int64_t>& rows, std::int64_t gap);
 

@@ -18,6 +18,7 @@ namespace {
 
 constexpr std::size_t kCompressFrom = 16384;  // bytes; smaller datasets are stored as they are
 constexpr hsize_t kChunkBytes = 1 << 16;      // of one chunk before compression: what a query of some rows reads
+constexpr hsize_t kTextChunks = 16;           // of texts that are written at a time
 constexpr std::size_t kMemoryStep = 1 << 20;  // bytes by which the file in memory grows
 constexpr unsigned kDeflateLevel = 1;         // higher levels gain a few per cent for several times the time
 
@@ -51,6 +52,8 @@ void set_chunks(hid_t properties, int rank, const std::vector<hsize_t>& chunk, h
   H5Pset_deflate(properties, kDeflateLevel);
 }
 
+hsize_t rows_of_chunk(std::size_t row_bytes) { return std::max<hsize_t>(1, kChunkBytes / row_bytes); }
+
 // Chunks are whole rows; the longest dimension is the first.
 void set_compression(hid_t properties, const std::vector<hsize_t>& extent, hid_t type) {
   if (!worth_compressing(type)) return;
@@ -58,7 +61,7 @@ void set_compression(hid_t properties, const std::vector<hsize_t>& extent, hid_t
   for (std::size_t d = 1; d < extent.size(); ++d) row_bytes *= extent[d];
   if (row_bytes == 0 || row_bytes * extent[0] < kCompressFrom) return;
   std::vector<hsize_t> chunk = extent;
-  chunk[0] = std::min(extent[0], std::max<hsize_t>(1, kChunkBytes / row_bytes));
+  chunk[0] = std::min(extent[0], rows_of_chunk(row_bytes));
   set_chunks(properties, static_cast<int>(chunk.size()), chunk, type);
 }
 
@@ -186,12 +189,27 @@ void Hdf5Writer::integers(const std::string& name, const std::vector<std::int64_
 }
 
 void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& values, const DatasetNote& note) {
+  texts(
+      name, std::ssize(values), [&](std::int64_t i) { return values[static_cast<std::size_t>(i)]; }, note);
+}
+
+void Hdf5Writer::texts(const std::string& name, std::int64_t count, const std::function<std::string(std::int64_t)>& row,
+                       const DatasetNote& note) {
   std::size_t length = 1;
-  for (const std::string& value : values) length = std::max(length, value.size());
-  std::string padded(length * values.size(), '\0');
-  for (std::size_t i = 0; i < values.size(); ++i) std::memcpy(&padded[i * length], values[i].data(), values[i].size());
-  const Hdf5Handle type = text_type(length);
-  write_dataset(name, type.id(), type.id(), padded.data(), {static_cast<std::int64_t>(values.size())}, note);
+  for (std::int64_t i = 0; i < count; ++i) length = std::max(length, row(i).size());
+  const Hdf5Handle type = text_type(length), set = make_dataset(name, type.id(), {count});
+  const auto batch = static_cast<std::int64_t>(kTextChunks * rows_of_chunk(length));
+  std::string padded;
+  for (std::int64_t first = 0; first < count; first += batch) {
+    const std::int64_t rows = std::min(batch, count - first);
+    padded.assign(length * static_cast<std::size_t>(rows), '\0');
+    for (std::int64_t i = 0; i < rows; ++i) {
+      const std::string text = row(first + i);
+      std::memcpy(&padded[static_cast<std::size_t>(i) * length], text.data(), text.size());
+    }
+    write_rows(set.id(), name, type.id(), padded.data(), {}, {first, rows});
+  }
+  describe(name, note);
 }
 
 void Hdf5Writer::dataset(const std::string& name, ElementType type, const void* values,
@@ -201,16 +219,36 @@ void Hdf5Writer::dataset(const std::string& name, ElementType type, const void* 
 
 void Hdf5Writer::write_dataset(const std::string& name, std::int64_t file_type, std::int64_t memory_type,
                                const void* values, const std::vector<std::int64_t>& shape, const DatasetNote& note) {
+  const Hdf5Handle set = make_dataset(name, file_type, shape);
+  if (std::find(shape.begin(), shape.end(), 0) == shape.end())
+    checked(H5Dwrite(set.id(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
+  describe(name, note);
+}
+
+Hdf5Handle Hdf5Writer::make_dataset(const std::string& name, std::int64_t file_type,
+                                    const std::vector<std::int64_t>& shape) {
   const std::vector<hsize_t> extent(shape.begin(), shape.end());
   const Hdf5Handle space(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
   const Hdf5Handle creation = without_times(H5P_DATASET_CREATE);
   set_compression(creation.id(), extent, file_type);
-  const Hdf5Handle set(
-      checked(H5Dcreate2(file_.id(), name.c_str(), file_type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
-              name),
-      &H5Dclose);
-  if (H5Sget_simple_extent_npoints(space.id()) > 0)
-    checked(H5Dwrite(set.id(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
+  return {checked(H5Dcreate2(file_.id(), name.c_str(), file_type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
+                  name),
+          &H5Dclose};
+}
+
+// Rows of the shape `row` each.
+void Hdf5Writer::write_rows(std::int64_t set, const std::string& name, std::int64_t memory_type, const void* values,
+                            const std::vector<std::int64_t>& row, RowRange range) {
+  std::vector<hsize_t> start(row.size() + 1, 0);
+  start[0] = static_cast<hsize_t>(range.first);
+  const std::vector<hsize_t> extent = shape_of(static_cast<hsize_t>(range.count), row);
+  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
+  const Hdf5Handle space(checked(H5Dget_space(set), name), &H5Sclose);
+  checked(H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr), name);
+  checked(H5Dwrite(set, memory_type, memory.id(), space.id(), H5P_DEFAULT, values), name);
+}
+
+void Hdf5Writer::describe(const std::string& name, const DatasetNote& note) {
   if (!note.units.empty()) attribute(name, "units", note.units);
   if (!note.description.empty()) attribute(name, "description", note.description);
 }
@@ -224,16 +262,14 @@ void Hdf5Writer::growing_dataset(const std::string& name, ElementType type, cons
   const Hdf5Handle space(H5Screate_simple(rank, none.data(), most.data()), &H5Sclose);
   const Hdf5Handle creation = without_times(H5P_DATASET_CREATE);
   const std::size_t row_bytes = H5Tget_size(file_type(type)) * static_cast<std::size_t>(values);
-  set_chunks(creation.id(), rank, shape_of(std::max<hsize_t>(1, kChunkBytes / row_bytes), row),
-             file_type(type));
+  set_chunks(creation.id(), rank, shape_of(rows_of_chunk(row_bytes), row), file_type(type));
   Hdf5Handle set(checked(H5Dcreate2(file_.id(), name.c_str(), file_type(type), space.id(), H5P_DEFAULT, creation.id(),
                                     H5P_DEFAULT),
                          name),
                  &H5Dclose);
   growing_.insert_or_assign(name, Growing{std::move(set), type, row, values, 0});
   reserve_disk(0);
-  if (!note.units.empty()) attribute(name, "units", note.units);
-  if (!note.description.empty()) attribute(name, "description", note.description);
+  describe(name, note);
 }
 
 void Hdf5Writer::append_rows(const std::string& name, ElementType type, const void* values, std::int64_t count) {
@@ -244,15 +280,9 @@ void Hdf5Writer::append_rows(const std::string& name, ElementType type, const vo
   const std::int64_t rows = count / growing.values;
   if (rows == 0) return;
   reserve_disk(count * static_cast<std::int64_t>(H5Tget_size(file_type(type))));
-  std::vector<hsize_t> start(growing.row.size() + 1, 0);
-  start[0] = static_cast<hsize_t>(growing.rows);
-  const std::vector<hsize_t> extent = shape_of(static_cast<hsize_t>(rows), growing.row),
-                             total = shape_of(static_cast<hsize_t>(growing.rows + rows), growing.row);
+  const std::vector<hsize_t> total = shape_of(static_cast<hsize_t>(growing.rows + rows), growing.row);
   checked(H5Dset_extent(growing.set.id(), total.data()), name);
-  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
-  const Hdf5Handle space(checked(H5Dget_space(growing.set.id()), name), &H5Sclose);
-  checked(H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr), name);
-  checked(H5Dwrite(growing.set.id(), memory_type(type), memory.id(), space.id(), H5P_DEFAULT, values), name);
+  write_rows(growing.set.id(), name, memory_type(type), values, growing.row, {growing.rows, rows});
   growing.rows += rows;
 }
 

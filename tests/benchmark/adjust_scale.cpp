@@ -4,7 +4,8 @@
 //                [--seed 1] [--calibration held|shared]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
-// its last line; seconds are those of the run on the wall clock. What --folder holds is not simulated again.
+// its last line; seconds are those of the run on the wall clock. stage_peak_rss_mib: that of the merge without its
+// result, which peak_rss_mib_per_rank has in it. What --folder holds is not simulated again.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -60,10 +61,10 @@ double peak_rss_mib(const fs::path& job) {
   return peak;
 }
 
-nlohmann::json stage_seconds(const BlockResult& result) {
-  nlohmann::json seconds = nlohmann::json::object();
-  for (const StageStatistics& stage : result.stages) seconds[stage.name] = stage.seconds;
-  return seconds;
+nlohmann::json by_stage(const BlockResult& result, double StageStatistics::*figure) {
+  nlohmann::json figures = nlohmann::json::object();
+  for (const StageStatistics& stage : result.stages) figures[stage.name] = stage.*figure;
+  return figures;
 }
 
 // Points with kept observations in frames of several tiles.
@@ -110,11 +111,12 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
           {"arithmetic", options.arithmetic},
           {"seconds", seconds},
           {"seconds_to_last_step", seconds_to_last_step(job, start_s)},
-          {"stage_seconds", stage_seconds(result)},
+          {"stage_seconds", by_stage(result, &StageStatistics::seconds)},
           {"seconds_per_iteration", per_iteration},
           {"global_iterations", result.global_iterations},
           {"chi2_per_dof", result.variance_factor},
           {"peak_rss_mib_per_rank", peak_rss_mib(job)},
+          {"stage_peak_rss_mib", by_stage(result, &StageStatistics::peak_rss_mib)},
           {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), std::uint8_t{1})},
           {"tiles", result.tiles.tile_count},
           {"points_across_tiles", points_across_tiles(result, tracks)},

@@ -137,6 +137,20 @@ TEST_F(UnitFiles, EmptyBlockComesBack) {
   expect_equal(read_block(path_), Block{});
 }
 
+// They are written and read in batches.
+TEST_F(UnitFiles, ManyImagesComeBack) {
+  Block block = example_block();
+  const auto some = static_cast<std::int64_t>(block.images.size());
+  for (std::int64_t i = some; i < 150000; ++i) {
+    Image image = block.images[ImageIndex(i % some)];
+    image.name = std::to_string(i) + std::string(static_cast<std::size_t>(i * 7919 % 23), 'x') + ".jpg";
+    image.file_hash = static_cast<std::uint64_t>(i);
+    block.images.push_back(image);
+  }
+  write_block(path_, block);
+  expect_equal(read_block(path_), block);
+}
+
 TEST_F(UnitFiles, TracksComeBack) {
   write_tracks(path_, example_tracks());
   expect_equal(read_tracks(path_), example_tracks());
