@@ -16,10 +16,11 @@ constexpr const char* kLibrary = "libmegablock_pictures.so";
 
 PictureCodecs load_codecs() {
   void* library = dlopen(kLibrary, RTLD_NOW | RTLD_LOCAL);  // stays until the end
-  if (library == nullptr)
+  void* symbol = library == nullptr ? nullptr : dlsym(library, "megablock_picture_codecs");
+  if (symbol == nullptr)
     throw InputError(std::string("pictures cannot be read or written: ") + dlerror() +
-                     "; build the target megablock_pictures, or install the program with 'cmake --install'");
-  return reinterpret_cast<decltype(&megablock_picture_codecs)>(dlsym(library, "megablock_picture_codecs"))();
+                     "; it belongs beside the program, or where 'cmake --install' puts it");
+  return reinterpret_cast<decltype(&megablock_picture_codecs)>(symbol)();
 }
 
 const PictureCodecs& codecs() {
@@ -29,16 +30,21 @@ const PictureCodecs& codecs() {
 
 }  // namespace
 
+void load_picture_codecs() { codecs(); }
+
 cv::Mat decode_picture(const std::vector<unsigned char>& file, int flags) { return codecs().decode(file, flags); }
 
 cv::Mat read_picture(const std::string& path, int flags) {
   std::ifstream file(path, std::ios::binary);
-  return decode_picture({std::istreambuf_iterator<char>(file), {}}, flags);
+  const std::vector<unsigned char> bytes(std::istreambuf_iterator<char>(file), {});
+  return bytes.empty() ? cv::Mat() : decode_picture(bytes, flags);
 }
 
 std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
                                           const std::vector<int>& parameters) {
-  return codecs().encode(extension, picture, parameters);
+  std::vector<unsigned char> bytes = codecs().encode(extension, picture, parameters);
+  if (bytes.empty()) throw ComputeError("OpenCV cannot encode a picture as " + extension);
+  return bytes;
 }
 
 void write_picture(const std::string& path, const cv::Mat& picture, const std::vector<int>& parameters) {

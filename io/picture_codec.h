@@ -4,7 +4,8 @@
 // linked with it. So it is not: libmegablock_pictures.so is, which is loaded from beside the program (or, installed,
 // from ../lib/megablock) when the first picture is read or written. Ranks that only adjust never load it.
 //
-// All throw InputError when the library is not there, and cv::Exception where OpenCV does.
+// All throw InputError when the library is not there, and cv::Exception where OpenCV does. Before pictures are read by
+// threads, from which nothing may be thrown, load_picture_codecs() makes sure of the library.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -13,13 +14,16 @@
 
 namespace megablock {
 
+void load_picture_codecs();
+
 // As cv::imdecode, `flags` of cv::ImreadModes: empty when it is no picture that imgcodecs knows.
 cv::Mat decode_picture(const std::vector<unsigned char>& file, int flags);
 
 // As cv::imread: the same of a file, empty also when it cannot be read.
 cv::Mat read_picture(const std::string& path, int flags);
 
-// As cv::imencode. `extension`: ".jpg", ".png"; `parameters`: pairs of cv::ImwriteFlags and values.
+// As cv::imencode. `extension`: ".jpg", ".png"; `parameters`: pairs of cv::ImwriteFlags and values. ComputeError where
+// imgcodecs cannot.
 std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
                                           const std::vector<int>& parameters = {});
 

@@ -90,6 +90,7 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
   std::vector<cv::Mat> gradients(images.size());
   std::vector<cv::Size> sizes(images.size());
   cv::setNumThreads(1);
+  load_picture_codecs();
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::int64_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::size_t>(k);

@@ -16,6 +16,7 @@
 #include "io/hash.h"
 #include "io/image_header.h"
 #include "io/job_store.h"
+#include "io/picture_codec.h"
 #include "io/project.h"
 #include "io/verticals.h"
 #include "match/image_vertical.h"
@@ -123,6 +124,7 @@ int write_verticals(VerticalsOptions options) {
   std::vector<ImageVertical> verticals(block.images.size());
   const auto count = static_cast<std::int64_t>(block.images.size());
   cv::setNumThreads(1);
+  load_picture_codecs();
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::int64_t k = 0; k < count; ++k) {
     const ImageIndex i(k);

@@ -1,5 +1,7 @@
 #include "match/features.h"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -9,6 +11,7 @@
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
+#include "io/picture_codec.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -83,6 +86,9 @@ class GrowingShard {
   void add(std::int64_t image, ImageFeatures features) {
     images_[static_cast<std::size_t>(image)] = std::move(features);
     done_[static_cast<std::size_t>(image)] = 1;
+  }
+  // The same; on the main thread, to which HDF5 belongs.
+  void save_now_and_then() {
     const auto end = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), 0) - done_.begin());
     if (end == saved_ || end == done_.size() || monotonic_seconds() < next_save_s_) return;
     save(end);
@@ -106,7 +112,7 @@ class GrowingShard {
     next_save_s_ = monotonic_seconds() + std::max(kInterval_s, 20 * (monotonic_seconds() - start));
   }
 
-  static constexpr double kInterval_s = 3;  // and at most a twentieth of the time goes into saving
+  static constexpr double kInterval_s = 1;  // and at most a twentieth of the time goes into saving
   const JobStore& store_;
   const Shard& shard_;
   std::vector<ImageFeatures> images_;
@@ -120,6 +126,7 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
   const std::int64_t kept = growing.kept();
   part_done(job, kept);
   const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());
+  load_picture_codecs();
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::int64_t i = kept; i < count; ++i) {
     const ImageIndex image(shard.first + i);
@@ -129,6 +136,7 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
 #pragma omp critical(features_of_a_shard)
     {
       growing.add(i, std::move(features));
+      if (omp_get_thread_num() == 0) growing.save_now_and_then();
       part_done(job);
     }
   }
