@@ -231,6 +231,9 @@ Hdf5Handle Hdf5Writer::make_dataset(const std::string& name, std::int64_t file_t
   const Hdf5Handle space(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), &H5Sclose);
   const Hdf5Handle creation = without_times(H5P_DATASET_CREATE);
   set_compression(creation.id(), extent, file_type);
+  std::int64_t bytes = static_cast<std::int64_t>(H5Tget_size(file_type));
+  for (const std::int64_t length : shape) bytes *= length;
+  reserve_disk(bytes);
   return {checked(H5Dcreate2(file_.id(), name.c_str(), file_type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
                   name),
           &H5Dclose};

@@ -330,6 +330,30 @@ TEST_F(Store, FileSizeLimitIsSaidWhileTracksAreAppended) {
   EXPECT_EQ(status, 0);
 }
 
+// The tables of such a file, which are written at once.
+TEST_F(Store, FileSizeLimitIsSaidOfTables) {
+  for (const bool texts : {false, true}) {
+    const std::string path = scratch_.path("large.h5");
+    const int status = in_child([&] {
+      ::signal(SIGXFSZ, SIG_IGN);
+      const rlimit limit{20 << 20, 20 << 20};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      const std::string found = what_of<InputError>([&] {
+        Hdf5Writer file(path, "noise", Hdf5Storage::kDisk);
+        if (texts)
+          file.texts("noise", 1000000, [](std::int64_t i) { return std::to_string(i * 0x9e3779b97f4a7c15u) + "abcd"; });
+        else
+          file.vector("noise", std::vector<double>(3000000, 0.5));
+        file.close();
+      });
+      if (found.find(path + ": cannot be written: larger than the file size limit") == std::string::npos) ::_exit(1);
+      if (fs::exists(path)) ::_exit(2);
+      std::exit(0);
+    });
+    EXPECT_EQ(status, 0) << texts;
+  }
+}
+
 TEST_F(Store, FullDiskAndReadOnlyDiskAreSaid) {
   // A small file system of its own, where the test may mount one (root); elsewhere it is skipped, as nothing else fills
   // a disk or makes it read-only.
