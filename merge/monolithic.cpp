@@ -135,13 +135,17 @@ FrameSigmas sigmas_of(const MonolithicSystem& system, const Eigen::MatrixXd& cov
   return sigmas;
 }
 
+// ComputeError where a step is no number or a sigma not positive: their ratio would look like agreement.
 double largest_over_sigma(const MonolithicSystem& system, const Eigen::VectorXd& step, const FrameSigmas& sigmas) {
   double largest = 0;
-  for (std::size_t f = 0; f < system.frame_column.size(); ++f)
-    if (const std::int64_t first = system.frame_column[f]; first >= 0)
-      largest = std::max(
-          largest,
-          step.segment<6>(first).cwiseAbs().cwiseQuotient(sigmas.col(static_cast<Eigen::Index>(f))).maxCoeff());
+  for (std::size_t f = 0; f < system.frame_column.size(); ++f) {
+    const std::int64_t first = system.frame_column[f];
+    if (first < 0) continue;
+    const PoseIncrement own = step.segment<6>(first), sigma = sigmas.col(static_cast<Eigen::Index>(f));
+    if (!own.allFinite() || !(sigma.array() > 0).all())
+      throw ComputeError("monolithic reference: the step or the sigmas of a frame are not numbers");
+    largest = std::max(largest, own.cwiseAbs().cwiseQuotient(sigma).maxCoeff());
+  }
   return largest;
 }
 

@@ -4,8 +4,9 @@
 //                [--seed 1] [--calibration held|shared]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
-// its last line; seconds are those of the run on the wall clock. stage_peak_rss_mib: that of the merge without its
-// result, which peak_rss_mib_per_rank has in it. What --folder holds is not simulated again.
+// its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of the
+// stages, writing of result and report included, starting and the summary that is printed at the end not;
+// stage_peak_rss_mib: that of each, of the merge without its result. What --folder holds is not simulated again.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -48,10 +49,6 @@ double seconds_to_last_step(const fs::path& job, double start_s) {
   for (const UnitEvent& event : read_events(JobStore(job.string())))
     if (event.rank == 0 && event.unit.starts_with("merge/")) last = std::max(last, event.time_s);
   return last - start_s;
-}
-
-double seconds_since_1970() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 // Of all stages; the events know it of the writing of the result, too.

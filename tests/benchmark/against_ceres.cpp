@@ -359,8 +359,11 @@ double pose_difference_sigmas(const Start& start, const BlockResult& result, con
       const Pose &a = ceres.frames[f], &b = ours.frames[f];
       PoseIncrement d;
       d << rotation_log<double>(a.rotation.conjugate() * b.rotation), b.centre - a.centre;
-      for (int k = 0; k < 6; ++k)
-        largest = std::max(largest, std::abs(d[k]) / std::sqrt(result.frame_covariance[f](k, k)));
+      for (int k = 0; k < 6; ++k) {
+        const double share = std::abs(d[k]) / std::sqrt(result.frame_covariance[f](k, k));
+        if (!std::isfinite(share)) throw ComputeError("a pose or its sigma is not a number");
+        largest = std::max(largest, share);
+      }
     }
   }
   return largest;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "adjust/linearise.h"
@@ -42,6 +43,29 @@ TEST_P(SameOptimum, AsOneCeresProblem) {
   EXPECT_LE(max_pose_difference_sigmas(block.whole, solution), 1e-6);
   const double cost = evaluate_cost(block.whole, solution);
   EXPECT_NEAR(cost_after_ceres(block.whole, solution, 100), cost, 1e-9 * cost);
+}
+
+// What stands in for the dense covariance of a large block.
+TEST(MonolithicReference, DividesByTheSigmasThatAreGiven) {
+  const TiledBlock block(simulate_block(scene(SimulationOptions::Scene::kStreet, 30)), 30, {}, 0.3);
+  MergeTree alone;
+  alone.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
+  const TileState start = block.gathered(block.problems, block.states);
+  SerialRunner whole(alone, {block.whole}, {start});
+  whole.up(0);
+  const auto largest = [&](const std::optional<FrameSigmas>& sigmas) {
+    return max_pose_difference_sigmas(block.whole, start, whole.block_gauge(), whole.tile_plans().front(), sigmas);
+  };
+  const MonolithicSystem system = monolithic_system(block.whole, start);
+  const Eigen::VectorXd variances = monolithic_covariance(system).diagonal();
+  FrameSigmas sigmas = FrameSigmas::Zero(6, std::ssize(system.frame_column));
+  for (std::size_t f = 0; f < system.frame_column.size(); ++f)
+    sigmas.col(static_cast<Eigen::Index>(f)) = 2 * variances.segment<6>(system.frame_column[f]).cwiseSqrt();
+  const double dense = largest(std::nullopt);
+  EXPECT_GT(dense, 0.1);
+  EXPECT_NEAR(largest(sigmas), dense / 2, 1e-9 * dense);
+  sigmas(3, 7) = std::nan("");
+  EXPECT_THROW(largest(sigmas), ComputeError);
 }
 
 TEST_P(SameOptimum, BoundaryFramesAgreeToTheBit) {

@@ -89,8 +89,11 @@ double difference(const TiledBlock& block, const SerialRunner& runner, const Mon
                   const Eigen::VectorXd& expected, const Eigen::VectorXd& sigma) {
   double largest = 0;
   const auto compare = [&](std::int64_t column, const double* values, std::int64_t count) {
-    for (std::int64_t k = 0; k < count; ++k)
-      largest = std::max(largest, std::abs(values[k] - expected[column + k]) / sigma[column + k]);
+    for (std::int64_t k = 0; k < count; ++k) {
+      const double share = std::abs(values[k] - expected[column + k]) / sigma[column + k];
+      EXPECT_TRUE(std::isfinite(share));
+      largest = std::max(largest, share);
+    }
   };
   for (std::size_t t = 0; t < runner.problems().size(); ++t) {
     const TileProblem& tile = runner.problems()[t];
