@@ -146,10 +146,6 @@ bool Communicator::any(bool value) {
 }
 
 void Communicator::send(int to, int tag, std::string bytes) {
-  if (to == rank_) {
-    to_self_[tag] = std::move(bytes);
-    return;
-  }
   Mpi::Sent& sent = mpi_->sent.emplace_back(Mpi::Sent{std::move(bytes), {}});
   // In parts; one shorter than the largest (perhaps empty) is the last.
   std::size_t count = kLargestMessage;
@@ -161,13 +157,6 @@ void Communicator::send(int to, int tag, std::string bytes) {
 }
 
 std::string Communicator::receive(int from, int tag) {
-  if (from == rank_) {
-    const auto found = to_self_.find(tag);
-    if (found == to_self_.end()) throw std::logic_error("a rank waits for a message to itself that was never sent");
-    std::string bytes = std::move(found->second);
-    to_self_.erase(found);
-    return bytes;
-  }
   std::string bytes;
   int count = static_cast<int>(kLargestMessage);
   while (static_cast<std::size_t>(count) == kLargestMessage) {

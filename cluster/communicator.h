@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,8 +34,8 @@ class Communicator {
   // True everywhere when it is true on any rank.
   bool any(bool value);
 
-  // Point to point, for the merge tree: messages between two ranks are told apart by their tag (>= 0). A message to the
-  // own rank is kept until it is received. send() returns at once; flush_sends() waits for all of them.
+  // Point to point, for the merge tree: messages between two other ranks are told apart by their tag (>= 0).
+  // send() returns at once; flush_sends() waits for all of them.
   void send(int to, int tag, std::string bytes);
   std::string receive(int from, int tag);
   void flush_sends();
@@ -58,7 +57,6 @@ class Communicator {
   int rank_ = 0, size_ = 1, ranks_on_host_ = 1;
   std::int64_t local_counter_ = 0;
   std::atomic<std::int64_t> local_done_{0};
-  std::map<int, std::string> to_self_;  // by tag
 };
 
 }  // namespace megablock

@@ -39,17 +39,17 @@ void check_job_json(const JobStore& store, const JobJson& job) {
 }
 
 // An image is the same when its file is, or its name where there is no file.
-std::set<std::string> identities(const Block& block) {
-  std::set<std::string> all;
-  for (const Image& image : block.images)
-    all.insert(image.file_hash != 0 ? std::to_string(image.file_hash) : image.name);
-  return all;
+std::uint64_t identity(const Image& image) {
+  return image.file_hash != 0 ? image.file_hash : Hasher().add(image.name).value();
 }
 
 // A job is not replaced by that of quite another block, which mostly is a slip of -j.
 void refuse_another_block(const JobStore& store, const Block& previous, const Project& project) {
-  const std::set<std::string> own = identities(previous), given = identities(project.block);
-  if (std::any_of(given.begin(), given.end(), [&](const std::string& image) { return own.contains(image); })) return;
+  std::vector<std::uint64_t> own;
+  for (const Image& image : previous.images) own.push_back(identity(image));
+  std::sort(own.begin(), own.end());
+  const auto is_own = [&](const Image& image) { return std::binary_search(own.begin(), own.end(), identity(image)); };
+  if (std::any_of(project.block.images.begin(), project.block.images.end(), is_own)) return;
   throw InputError(store.directory() + ": is the job of another block: " + project.file + " has none of its " +
                    std::to_string(previous.images.size()) +
                    " images; name another folder with -j, or delete this one to begin anew");

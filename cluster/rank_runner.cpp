@@ -316,6 +316,7 @@ DownReport RankRunner::down(const Pass& pass) {
     double damping_norm = 0, trial_cost = 0;
   };
   const Stopwatch watch(seconds_.all);
+  last_pass_.reset();  // factors that are computed again have not what the posterior needs
   std::vector<TileStep> steps = steps_down(pass);
   std::vector<MotionSums> own;
   for (std::size_t row = 0; row < tiles_.size(); ++row) {

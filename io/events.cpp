@@ -17,13 +17,13 @@
 
 namespace megablock {
 
-namespace {
-
-using Json = nlohmann::json;
-
 double seconds_since_1970() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
+
+namespace {
+
+using Json = nlohmann::json;
 
 // "<job>/events/20261121T070000Z-3.jsonl"
 std::string path_for(const JobStore& store, int rank) {

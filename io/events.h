@@ -35,6 +35,8 @@ class EventLog {
   Descriptor file_;
 };
 
+double seconds_since_1970();  // now, by the system's clock
+
 // All events of all runs and ranks, ordered by time, then rank, then unit. A torn last line of a file is left out; a
 // malformed line before it is a StoreError with file and line.
 std::vector<UnitEvent> read_events(const JobStore& store);

@@ -64,12 +64,9 @@ void FactorStore::make_room() {
        bytes_ + others_ > options_.factor_bytes && std::next(oldest) != node_by_time_.end();) {
     const std::int64_t node = oldest->second;
     const auto entry = kept_.find(node);
-    if (!spill(node, entry->second)) {
-      if (never_lost_.contains(node)) {
-        ++oldest;
-        continue;
-      }
-      ++statistics_.dropped;
+    if (!spill(node, entry->second) && never_lost_.contains(node)) {
+      ++oldest;
+      continue;
     }
     bytes_ -= entry->second.byte_count();
     kept_.erase(entry);

@@ -29,9 +29,9 @@ struct MemoryOptions {
 void make_scratch_directory(const MemoryOptions& options);
 
 struct MemoryStatistics {
-  std::int64_t put = 0, spilled = 0, dropped = 0;  // factors put, moved to scratch, given up
-  std::int64_t recomputed = 0;                     // subtrees condensed again
-  std::int64_t peak_bytes = 0;                     // of kept factors
+  std::int64_t put = 0, spilled = 0;  // factors put, moved to scratch
+  std::int64_t recomputed = 0;        // subtrees condensed again
+  std::int64_t peak_bytes = 0;        // of kept factors
 };
 
 // Factors of one node of the merge tree: a tile's cells or an inner node's front; while seams are checked also a tile's

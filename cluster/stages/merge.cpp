@@ -1,7 +1,6 @@
 // The merge: exact block-wise compensation of all tiles over all ranks (design: merge.md), then the result.
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -21,6 +20,7 @@
 #include "cluster/stages/provenance.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
+#include "io/events.h"
 #include "io/hash.h"
 #include "io/report.h"
 #include "io/unit_files.h"
@@ -174,10 +174,6 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   }
   adjusted.image_sigma_px = common_image_sigma(job, tiles);
   return adjusted;
-}
-
-double seconds_since_1970() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 // Of all stages, this one as far as `event`, which ends it, says.
