@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "geometry/decompositions.h"
@@ -27,12 +28,17 @@ std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays) {
 
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double farthest = 0;
   for (const Ray& ray : rays) {
+    farthest = std::max(farthest, (ray.origin - reference).squaredNorm());
     const Eigen::Matrix3d across =
         ray.weight * (Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose());
     normal += across;
     right += across * (ray.origin - reference);
   }
+  // One centre but for rounding: no base, and chance decides what is in front.
+  constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
+  if (!(farthest > kRounding * kRounding * reference.squaredNorm())) return std::nullopt;
   // Smallest eigenvalue / weights ~ (spread of the directions)^2.
   const SymmetricEigen3 eigen = symmetric_eigen3(normal);
   constexpr double kParallel = 1e-12;

@@ -9,7 +9,7 @@
 // a 3x3 system in M, solved relative to the mean of the A_i. The residual of a ray is the distance of the point from
 // it, in metres: near rays weigh too little, so the refinement follows, Gauss-Newton on the pixel residuals.
 //
-// Degenerate: all rays parallel: the point is far away, or on the line of the centres.
+// Degenerate: all rays parallel: the point is far away, or on the line of the centres; all from one centre.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,8 +30,8 @@ struct Ray {
 // Ray of a pixel in the ground frame, `camera` from camera_pose(); empty where the distortion cannot be inverted.
 std::optional<Ray> ground_ray(const Pose& camera, const Intrinsics& intrinsics, const Eigen::Vector2d& pixel);
 
-// The point nearest to all rays; empty with fewer than two rays, rays parallel within about 1e-6 rad, or a point
-// behind one of the projection centres.
+// The point nearest to all rays; empty with fewer than two rays, rays parallel within about 1e-6 rad, one centre for
+// all but for rounding, or a point behind one of the projection centres.
 std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays);
 
 // One image measurement of a point.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -107,6 +108,24 @@ TEST(Triangulation, RefusesWhatHasNoIntersection) {
   EXPECT_FALSE(triangulate(broken)) << "not a number";
   EXPECT_FALSE(intersect_rays(std::vector<Ray>{{Eigen::Vector3d::Zero(), x}, {z, std::nan("") * apart}}));
   EXPECT_FALSE(refine_point(poses[0].centre - 5 * (kFar - poses[0].centre), views)) << "start behind a camera";
+}
+
+// In grid coordinates the mean of three equal centres is not always that centre, and the rays seem to meet before it.
+TEST(Triangulation, RefusesRaysOfOneCentre) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal(0, 1);
+  const auto vector = [&] {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Eigen::Vector3d(x, y, z);
+  };
+  for (const double rounding : {0.0, std::numeric_limits<double>::epsilon()})  // centres that are computed, too
+    for (int trial = 0; trial < 200; ++trial) {
+      const Eigen::Vector3d centre = Eigen::Vector3d(652123.4, 6862345.6, 321.7) + vector();
+      std::vector<Ray> rays;
+      for (int k = -1; k <= 1; ++k)
+        rays.push_back({(1 + k * rounding) * centre, (Eigen::Vector3d::UnitZ() + 0.3 * vector()).normalized()});
+      EXPECT_FALSE(intersect_rays(rays)) << trial;
+    }
 }
 
 TEST(Triangulation, LargestAngleOfAllPairs) {
