@@ -33,7 +33,8 @@ namespace megablock {
 
 using FiveRays = std::array<Eigen::Vector3d, 5>;
 
-// Unit rays. All orientations, behind the images or not, those of one essential matrix in a row. Empty for points that
+// Unit rays. All orientations, behind the images or not, those of one essential matrix in a row. A few per cent of
+// samples have one essential matrix twice, where polishing leads from two starts to one solution. Empty for points that
 // coincide, and where something is not a number.
 Solutions<RelativeOrientation, 40> solve_five_point(const FiveRays& a, const FiveRays& b);
 

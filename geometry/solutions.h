@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cstddef>
 
 namespace megablock {
@@ -13,8 +14,9 @@ class Solutions {
   using value_type = T;
   using const_iterator = const T*;
 
-  // What exceeds the capacity is dropped: no solver finds more than its problem has.
+  // No solver finds more than its problem has. What exceeds the capacity is dropped.
   void push_back(const T& solution) {
+    assert(count_ < Capacity);
     if (count_ < Capacity) entries_[count_++] = solution;
   }
   std::size_t size() const { return count_; }

@@ -11,9 +11,11 @@ import sys
 
 # Processor time for five times as many matches: five times, sorted on disk; a quadratic step would take 25 times.
 LARGEST_GROWTH = 8
-# Microseconds a solve, in every scene; shares of exact samples whose truth is found.
+# Microseconds a solve, in every scene; shares of exact samples whose truth is found. Without a base (scene 5) rounding
+# decides whether three points and the vertical have a solution.
 LIMITS = {"vertical_pair": 2.5, "five_point": 25, "p3p": 2, "similarity": 1}
-LEAST_FOUND = 0.9
+LEAST_FOUND = 0.99
+LEAST_FOUND_OF = {"vertical_pair/5/0": 0.9}
 
 
 def check(reached, limit, what):
@@ -49,7 +51,8 @@ def solvers(program):
         seen.add(solver)
         good &= check(run["cpu_time"], LIMITS[solver], f"{run['run_name']}, us")
         if noise == "0":
-            good &= check(1 - run["success"], 1 - LEAST_FOUND, f"{run['run_name']}, share without the truth")
+            least = LEAST_FOUND_OF.get(run["run_name"], LEAST_FOUND)
+            good &= check(1 - run["success"], 1 - least, f"{run['run_name']}, share without the truth")
     assert seen == set(LIMITS), f"bench_solvers ran {sorted(seen)} of {sorted(LIMITS)}"
     return good
 

@@ -105,6 +105,15 @@ TEST(Fundamental, NothingForBadPoints) {
   centre.base.setZero();
   const PairScene still(centre, 20, random);
   EXPECT_FALSE(fit_essential(still.a, still.b)) << "no base";
+  PairScene line(turned(), 0, random);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector3d point = Eigen::Vector3d(-0.5, 0.1, 2) + 0.05 * i * Eigen::Vector3d(1, 0.3, 0.5);
+    line.a.push_back(point.normalized());
+    line.b.push_back((turned().rotation * point + turned().base).normalized());
+  }
+  EXPECT_FALSE(fit_essential(line.a, line.b)) << "all on one line";
+  const PixelScene seen_line(line);
+  EXPECT_FALSE(fit_fundamental(seen_line.a, seen_line.b)) << "all on one line";
   std::vector<Eigen::Vector3d> unknown = rays.a;
   unknown[2].x() = std::nan("");
   EXPECT_FALSE(fit_essential(unknown, rays.b));

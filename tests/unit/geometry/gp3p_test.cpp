@@ -47,7 +47,6 @@ TEST(Gp3p, FindsTheTruthAmongSolutionsThatMeetTheRays) {
     for (int trial = 0; trial < kTrials; ++trial) {
       const Case c = make_case(random, baseline);
       const Solutions<Pose, 8> poses = solve_gp3p(c.origins, c.directions, c.points);
-      EXPECT_LE(poses.size(), 8u);
       for (const Pose& pose : poses)
         for (std::size_t k = 0; k < 3; ++k)
           EXPECT_LT(((to_inside(pose, c.points[k]) - c.origins[k]).normalized() - c.directions[k]).norm(), 1e-6);
