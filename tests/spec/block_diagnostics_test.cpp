@@ -163,7 +163,7 @@ TEST_F(AT36, ThreeImagesAndAFlightLineAreMissing) {
     double nearest = 1e9;
     for (const auto& proposal : d.proposals)
       nearest = std::min(nearest, (proposal.centre - simulated_.truth.frames[f].centre).head<2>().norm());
-    farthest = std::max(farthest, nearest);
+    keep_largest(farthest, nearest);
   }
   EXPECT_EQ(d.proposals.size(), removed.size());
   expect_at_most(farthest / d.usual_step_m, 0.5, "from a removed image to the nearest proposal, usual steps");

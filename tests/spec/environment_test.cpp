@@ -43,12 +43,12 @@ TEST(TCP07, InverseOfTheForwardCorrection) {
         const Eigen::Vector2d pixel(x, y);
         // Perspective -> what the lens makes of it -> perspective.
         const Eigen::Vector2d corrected = pixel + correction_at(camera, pixel).value;
-        radial = std::max(radial, (solve_correction(camera, corrected) - pixel).norm());
+        keep_largest(radial, (solve_correction(camera, corrected) - pixel).norm());
         const Eigen::Vector2d seen = seen_pixel(effect, perspective, pixel, down);
-        environment = std::max(environment, (geometric_pixel(effect, perspective, seen, down) - pixel).norm());
+        keep_largest(environment, (geometric_pixel(effect, perspective, seen, down) - pixel).norm());
         const Eigen::Vector2d both = seen_pixel(effect, camera, pixel, down);
-        all = std::max(all, (geometric_pixel(effect, camera, both, down) - pixel).norm());
-        largest = std::max(largest, (both - pixel).norm());
+        keep_largest(all, (geometric_pixel(effect, camera, both, down) - pixel).norm());
+        keep_largest(largest, (both - pixel).norm());
       }
   }
   EXPECT_GT(largest, 1);

@@ -50,7 +50,7 @@ void adjust_exactly(SerialRunner& runner) {
 double largest_angle(const std::vector<Pose>& a, const std::vector<Pose>& b) {
   double angle = 0;
   for (std::size_t f = 0; f < b.size(); ++f)
-    angle = std::max(angle, rotation_log<double>(a[f].rotation.conjugate() * b[f].rotation).norm());
+    keep_largest(angle, rotation_log<double>(a[f].rotation.conjugate() * b[f].rotation).norm());
   return angle;
 }
 
@@ -194,8 +194,8 @@ TEST(KnownPositions, TKP15TilesAgreeAboutTheCamerasTheyShare) {
     const Eigen::Vector3d difference =
         rotation_log<double>(states[0].frames[camera].rotation.conjugate() * states[1].frames[camera].rotation);
     for (int k = 0; k < 3; ++k)
-      worst = std::max(worst, std::abs(difference[k]) /
-                                  std::sqrt(covariances[0].frames[camera](k, k) + covariances[1].frames[camera](k, k)));
+      keep_largest(worst, std::abs(difference[k]) /
+                              std::sqrt(covariances[0].frames[camera](k, k) + covariances[1].frames[camera](k, k)));
   }
   expect_at_most(worst, 3, "difference of the shared cameras over its sigma");
 }

@@ -44,7 +44,7 @@ struct Runs {
     const double after = scene.angle_error(angles_of(tile.state));
     angles_before += scene.angle_error(scene.angles);
     angles_after += after;
-    worst_angles = std::max(worst_angles, after);
+    keep_largest(worst_angles, after);
     images_before += scene.image_error(scene.images);
     images_after += scene.image_error(images_of(scene, tile.state));
     chi2_per_freedom += summary.sigma0 * summary.sigma0;
@@ -183,13 +183,14 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
     int control;
     double least_gain, largest_rms;
     bool line_flagged, common_flagged;
+    bool out_of_reach = false;  // that mean error, in scenes of ours
   };
-  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},     {true, true, 1, 121, 0.011, false, false},
-                        {true, true, 2, 175, 0.008, false, false},   {true, true, 4, 228, 0.006, false, false},
-                        {true, false, 0, 3000, 0.001, false, false}, {false, false, 0, 2, 7, false, true},
-                        {false, false, 1, 3.8, 2.5, false, true},    {false, true, 0, 2.1, 160, true, true},
-                        {false, true, 1, 3.8, 2.5, false, true},     {false, true, 2, 4.5, 2, false, true},
-                        {false, true, 4, 4.8, 1.9, false, true}};
+  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},       {true, true, 1, 121, 0.011, false, false},
+                        {true, true, 2, 175, 0.008, false, false},     {true, true, 4, 228, 0.006, false, false},
+                        {true, false, 0, 3000, 0.001, false, false},   {false, false, 0, 2, 7, false, true, true},
+                        {false, false, 1, 3.8, 2.5, false, true},      {false, true, 0, 2.1, 160, true, true, true},
+                        {false, true, 1, 3.8, 2.5, false, true, true}, {false, true, 2, 4.5, 2, false, true, true},
+                        {false, true, 4, 4.8, 1.9, false, true, true}};
   for (const Case& c : cases) {
     const auto scene_of = [&](std::uint64_t seed) {
       KnownPositionsOptions options =
@@ -215,7 +216,7 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
     }
     std::printf("[ reached  ] %smean %.4g m, median %.4g; rms of all %.4g, expected %.4g; mean of the expected %.4g\n",
                 what.c_str(), mean, middle, std::sqrt(reached), std::sqrt(expected), best_mean);
-    expect_at_most(mean, std::max(c.largest_rms, best_mean), what + "mean rms of the points, m");
+    expect_at_most(mean, c.out_of_reach ? best_mean : c.largest_rms, what + "mean rms of the points, m");
     if (!c.drone && !c.collinear) expect_at_most(middle, c.largest_rms, what + "median rms of the points, m");
     expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, what + "off the expected rms by");
     EXPECT_EQ(runs.collinear, c.line_flagged ? kRuns : 0) << what;

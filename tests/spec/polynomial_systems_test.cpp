@@ -53,7 +53,7 @@ TEST(Spec, AT01EigenvectorsOfTheActionMatrix) {
     for (int v = 0; v < 3; ++v) {
       const std::complex<double> value = eigen->vectors(row_of(v), k) / eigen->vectors(0, k);
       const double size = v == 2 ? std::sqrt(2.0) : 1.0;
-      largest = std::max(largest, std::abs(value - (value.real() > 0 ? size : -size)));
+      keep_largest(largest, std::abs(value - (value.real() > 0 ? size : -size)));
       which = 2 * which + (value.real() > 0);
     }
     ++found[static_cast<std::size_t>(which)];

@@ -85,7 +85,7 @@ MeanErrors mean_errors(const Protocol& protocol, MinimalSolver solver, std::uint
     mean.base += share * base_error_deg(best.orientation, scene.truth);
     mean.refined_rotation += share * rotation_error_deg(refined, scene.truth);
     mean.refined_base += share * base_error_deg(refined, scene.truth);
-    mean.max_refined_base = std::max(mean.max_refined_base, base_error_deg(refined, scene.truth));
+    keep_largest(mean.max_refined_base, base_error_deg(refined, scene.truth));
   }
   return mean;
 }
@@ -123,28 +123,45 @@ double equation_7_9(const RelativeOrientation& o, const Eigen::Vector3d& first, 
   return (xb * x + yb * y + fb * z) / (4 + v.squaredNorm());
 }
 
+// Of solutions that differ: an essential matrix may be found from two starts.
+template <typename List>
+std::size_t number_of_distinct(const List& found) {
+  constexpr double kSameDeg = 1e-6;
+  std::size_t distinct = 0;
+  for (auto one = found.begin(); one != found.end(); ++one)
+    distinct += std::none_of(found.begin(), one, [&](const RelativeOrientation& other) {
+      return !(rotation_error_deg(*one, other) + base_error_deg(*one, other) > kSameDeg);
+    });
+  return distinct;
+}
+
 TEST(Spec, AT03FivePointIsExact) {
   Random random(3);
   std::uniform_real_distribution<double> uniform(0, 1);
   double worst = 0, equation = 0;
-  std::size_t most = 0, solutions = 0;
+  std::size_t solutions = 0, repeated = 0, odd = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     PairSceneOptions options;
     options.rotation = rotation_exp<double>(0.5 * uniform(random) * random_direction(random));
     options.base = 0.3 * std::cbrt(uniform(random)) * random_direction(random);
     const PairScene scene(options, 5, random);
     const auto found = solve_five_point(scene.first<5>(scene.a), scene.first<5>(scene.b));
-    worst = std::max(worst, nearest_error_deg(found, scene.truth));
-    most = std::max(most, found.size());
-    solutions += found.size();
+    keep_largest(worst, nearest_error_deg(found, scene.truth));
+    const std::size_t distinct = number_of_distinct(found);
+    solutions += distinct;
+    repeated += found.size() - distinct;
+    odd += distinct % 8 != 0;  // four of each essential matrix
     for (const RelativeOrientation& o : found)
-      for (std::size_t i = 0; i < 5; ++i)
-        equation = std::max(equation, std::abs(equation_7_9(o, scene.a[i], scene.b[i])));
+      for (std::size_t i = 0; i < 5; ++i) keep_largest(equation, std::abs(equation_7_9(o, scene.a[i], scene.b[i])));
   }
   expect_at_most(worst, 1e-4, "largest of the nearest solutions' errors, deg");
   expect_at_most(equation, 1e-9, "largest misfit of a solution in equation 7.9");
-  expect_at_most(static_cast<double>(most), 40, "most solutions");
-  std::printf("[ reached  ] mean number of real solutions %.2f\n", static_cast<double>(solutions) / 3000);
+  const double mean = static_cast<double>(solutions) / 3000;
+  expect_at_least(mean, 19, "mean number of real solutions that differ");
+  expect_at_most(mean, 20, "mean number of real solutions that differ");
+  // Complex roots of the polynomial of degree ten come in pairs.
+  expect_at_most(static_cast<double>(odd), 0, "of 3000 samples, those with an odd number of essential matrices");
+  std::printf("[ reached  ] solutions given twice: %.2f a sample\n", static_cast<double>(repeated) / 3000);
 }
 
 TEST(Spec, AT04FivePointLateral) {
@@ -222,12 +239,13 @@ TEST(Spec, AT10VerticalPairIsExactForEveryHeading) {
 
 TEST(Spec, AT11VerticalPairIsBetterThanFivePoint) {
   for (const auto& [name, axis] : {std::pair{"lateral", kLateral}, std::pair{"forward", kForward}}) {
-    const MeanErrors half = vertical(0.3 * axis, 0.5), one = vertical(0.3 * axis, 1);
-    expect_at_most(half.base, 0.8, std::string(name) + ", base at 0.5 px");
-    expect_at_most(one.base, 1.9, std::string(name) + ", base at 1 px");
-    const double five_points = five(0.3 * axis, 0.5).base;
-    expect_at_most(half.base, five_points, std::string(name) + " against five points");
-    EXPECT_LT(half.base, five_points);
+    for (const auto& [noise_px, limit] : {std::pair{0.5, 0.8}, std::pair{1.0, 1.9}}) {
+      const std::string what = std::string(name) + ", base at " + std::to_string(noise_px).substr(0, 3) + " px";
+      const double reached = vertical(0.3 * axis, noise_px).base, five_points = five(0.3 * axis, noise_px).base;
+      expect_at_most(reached, limit, what);
+      expect_at_most(reached, five_points, what + " against five points");
+      EXPECT_LT(reached, five_points);
+    }
   }
 }
 

@@ -41,10 +41,10 @@ TEST(Spec, AT17TableOfDraws) {
 }
 
 // Draws over those of the table, mean and largest of 100 runs for each of the seven shares; right observations have
-// normal errors.
+// normal errors. With p = 0.99 nearly all runs must find the model, too.
 template <int N>
 void expect_draws_of_table(bool share_known) {
-  double worst_mean = 0, worst = 0;
+  double worst_mean = 0, worst = 0, right = 0;
   for (std::size_t w = 0; w < 7; ++w) {
     double sum = 0;
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
@@ -54,14 +54,16 @@ void expect_draws_of_table(bool share_known) {
       const auto found = ransac(LinearModelEstimator<N>(scene), options);
       const double ratio = found ? found->draws / static_cast<double>(kTableA1[N - 2][w]) : 100;
       sum += ratio;
-      worst = std::max(worst, ratio);
+      right += found && (found->model - scene.truth).norm() < 0.05;
+      keep_largest(worst, ratio);
     }
-    worst_mean = std::max(worst_mean, sum / 100);
+    keep_largest(worst_mean, sum / 100);
   }
   const std::string name = "samples of " + std::to_string(N) + (share_known ? ", share known: " : ", share found: ");
   // What the share is the engine finds to one observation in some hundred: mean draws of few are up or down by one.
   expect_at_most(worst_mean, 1.2, name + "mean draws over the table's");
   if (share_known) expect_at_most(worst, 1.2, name + "most draws over the table's");
+  expect_at_least(right / 700, 0.97, name + "share of runs that find the model");
 }
 
 TEST(Spec, AT17AdaptiveDraws) {
@@ -100,9 +102,29 @@ PairSceneOptions half_wrong() {
 }
 constexpr double kThreshold = 1 / kSceneFocalPx;
 
+TwoViewOptions given_verticals(const TiltedPair& pair, TwoViewOptions options) {
+  const Eigen::Matrix3d covariance = std::pow(0.1 * kDegree, 2) * Eigen::Matrix3d::Identity();
+  options.vertical_a = AxisDirection{pair.down_a, covariance};
+  options.vertical_b = AxisDirection{pair.down_b, covariance};
+  return options;
+}
+
+// Seconds, the best of three calls: other programs may be at work.
+template <typename Call>
+double seconds_of(const Call& call) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int repetition = 0; repetition < 3; ++repetition) {
+    const auto start = std::chrono::steady_clock::now();
+    call();
+    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return best;
+}
+
 TEST(Spec, AT37ThreePointsAgainstFive) {
   constexpr int kPairs = 40;
   double draws_three = 0, draws_five = 0, time_three = 0, time_five = 0, wrong = 0;
+  double verified_three = 0, verified_five = 0;  // times of the whole verification
   for (std::uint64_t seed = 0; seed < kPairs; ++seed) {
     const TiltedPair pair = tilted_pair(half_wrong(), 600, seed);
     const FivePointEstimator five(pair.points, kThreshold);
@@ -110,22 +132,21 @@ TEST(Spec, AT37ThreePointsAgainstFive) {
     const RansacOptions options{.threshold = kThreshold, .inlier_share = 0.5, .seed = seed};
     const auto run = [&](const auto& estimator, double& draws, double& time) {
       std::optional<RansacResult<RelativeOrientation>> found;
-      double best = std::numeric_limits<double>::infinity();
-      for (int repetition = 0; repetition < 3; ++repetition) {  // other programs may be at work
-        const auto start = std::chrono::steady_clock::now();
-        found = ransac(estimator, options);
-        best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-      }
-      time += best;
+      time += seconds_of([&] { found = ransac(estimator, options); });
       draws += found->draws;
       wrong += rotation_error_deg(found->model, pair.scene.truth) > 0.5;
     };
     run(three, draws_three, time_three);
     run(five, draws_five, time_five);
+    const TwoViewOptions without{.max_residual = kThreshold, .seed = seed}, with = given_verticals(pair, without);
+    verified_three += seconds_of([&] { EXPECT_TRUE(estimate_two_view(pair.points, with).by_vertical) << seed; });
+    verified_five += seconds_of([&] { estimate_two_view(pair.points, without); });
   }
   expect_at_most(draws_three / kPairs, 35, "mean draws, three points");
   expect_at_most(draws_five / kPairs, 146, "mean draws, five points");
-  expect_at_most(time_three / time_five, 0.4, "time over that of five points");
+  expect_at_most(time_three / time_five, 0.4, "time of the samples over that of five points");
+  // 0.4 is asked for. Refinements, tests of models and the covariance take as long with three points.
+  expect_at_most(verified_three / verified_five, 0.85, "time of the whole verification over that of five points");
   expect_at_most(wrong, 4, "of 80 runs with p = 0.99, rotations off by more than half a degree");
 }
 
@@ -153,14 +174,11 @@ TEST(Spec, AT35SameInliersForAnyNumberOfThreads) {
   for (std::uint64_t seed = 0; seed < kPairs; ++seed) pairs.push_back(tilted_pair(half_wrong(), 150, seed));
   for (const bool by_verticals : {false, true})
     expect_same_on_any_threads(kPairs, [&](std::size_t i) {
-      TwoViewOptions options{.max_residual = kThreshold, .seed = i};
-      if (by_verticals) {
-        const Eigen::Matrix3d covariance = std::pow(0.1 * kDegree, 2) * Eigen::Matrix3d::Identity();
-        options.vertical_a = AxisDirection{pairs[i].down_a, covariance};
-        options.vertical_b = AxisDirection{pairs[i].down_b, covariance};
-      }
-      const TwoView found = estimate_two_view(pairs[i].points, options);
+      const TwoViewOptions options{.max_residual = kThreshold, .seed = i};
+      const TwoView found =
+          estimate_two_view(pairs[i].points, by_verticals ? given_verticals(pairs[i], options) : options);
       EXPECT_EQ(found.by_vertical, by_verticals) << i;
+      EXPECT_GT(found.inlier_count, 0) << i;
       return std::tuple(found.inlier, Eigen::Vector4d(found.rotation.coeffs()), Eigen::Vector3d(found.translation),
                         found.draws);
     });
@@ -182,6 +200,7 @@ TEST(Spec, AT35SameSimilaritiesForAnyNumberOfThreads) {
     }
   expect_same_on_any_threads(kSets, [&](std::size_t i) {
     const auto found = ransac(SimilarityEstimator(sets[i]), {.threshold = threshold_of_sigma(1, 3), .seed = i});
+    EXPECT_TRUE(found && found->consensus.count > 0) << i;
     return found ? std::tuple(found->consensus.inlier, found->model.scale, found->draws)
                  : std::tuple(std::vector<std::uint8_t>(), 0.0, 0);
   });
@@ -193,6 +212,7 @@ TEST(Spec, AT35SameVanishingPointsForAnyNumberOfThreads) {
   const auto scene = [](std::size_t i) { return fixture::urban_scene(i + 35, {0.05, -0.1}, 3); };
   expect_same_on_any_threads(kPictures, [&](std::size_t i) {
     const VanishingPoints found = find_vanishing_points(scene(i).planes(), {.seed = i});
+    EXPECT_FALSE(found.points.empty()) << i;
     std::vector<Eigen::Vector3d> directions;
     for (const VanishingPoint& point : found.points) directions.push_back(point.axis.direction);
     return std::pair(found.point_of, directions);
@@ -202,6 +222,7 @@ TEST(Spec, AT35SameVanishingPointsForAnyNumberOfThreads) {
     std::vector<std::vector<int>> lines;
     for (const CirclePoint& point : find_vanishing_points_by_circles(image.lines(), image.width, image.height))
       lines.push_back(point.lines);
+    EXPECT_TRUE(!lines.empty() && !lines.front().empty()) << i;
     return lines;
   });
 }
@@ -222,6 +243,7 @@ TEST(Spec, AT35SameResectionsForAnyNumberOfThreads) {
     }
   expect_same_on_any_threads(kPictures, [&](std::size_t i) {
     const auto found = ransac(ResectionEstimator(images[i]), {.threshold = 1e-3, .seed = i});
+    EXPECT_TRUE(found && found->consensus.count > 0) << i;
     return found ? std::tuple(found->consensus.inlier, Eigen::Vector3d(found->model.centre), found->draws)
                  : std::tuple(std::vector<std::uint8_t>(), Eigen::Vector3d(0, 0, 0), 0);
   });
@@ -315,11 +337,11 @@ TEST(Spec, AT07AlongTheNormalIsIllConditioned) {
       flagged += found.ill_conditioned;
       if (found.model == PairModel::kRotationOnly) continue;
       const double error = base_error_deg({found.rotation, found.translation}, truth);
-      over_sigma = std::max(over_sigma, error / degrees(found.precision.base_sigma()));
+      keep_largest(over_sigma, error / degrees(found.precision.base_sigma()));
     }
     const std::string name = " at " + std::to_string(noise_px).substr(0, 3) + " px";
     expect_at_most(50 - flagged, 0, "pairs of 50 without the flag" + name);
-    std::printf("[ reached  ] largest error of the base over its sigma%s: %.2f\n", name.c_str(), over_sigma);
+    expect_at_most(over_sigma, 3, "largest error of the base over its sigma" + name);
   }
   int flagged = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) flagged += two_view(half_wrong(), seed).ill_conditioned;

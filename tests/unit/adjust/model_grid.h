@@ -11,6 +11,7 @@
 
 #include "adjust/model_assembly.h"
 #include "geometry/rotation.h"
+#include "tests/spec/reached.h"
 
 namespace megablock::model_grid {
 
@@ -61,12 +62,12 @@ class ModelGrid {
       const Similarity& s = found.similarity[m];
       const Similarity truth = gauges[0] * gauges[m].inverse();
       if (found.part[m] != models[0].number) return {INFINITY, INFINITY, INFINITY, INFINITY, INFINITY};
-      e.scale = std::max(e.scale, std::abs(s.scale / truth.scale - 1));
+      keep_largest(e.scale, std::abs(s.scale / truth.scale - 1));
       for (int c = 0; c < 4; ++c, ++corners) {
         const Eigen::Vector3d x =
             gauges[m](corners_[m] + options_.side * Eigen::Vector3d(c % 2, static_cast<double>(c / 2), 0));
         const Eigen::Vector3d error = s(x) - truth(x);
-        e.corner = std::max(e.corner, error.norm() / gauges[0].scale);
+        keep_largest(e.corner, error.norm() / gauges[0].scale);
         e.corner_rms += error.squaredNorm() / std::pow(gauges[0].scale, 2);
         if (m == 0 || found.covariance.empty()) continue;
         const Eigen::Matrix3d turn = s.scale * s.rotation.toRotationMatrix();
@@ -74,7 +75,7 @@ class ModelGrid {
         by_step << -turn * skew(x), turn * x, Eigen::Matrix3d::Identity();
         const Eigen::Matrix3d covariance = by_step * found.covariance[m] * by_step.transpose();
         const double squares = error.dot(covariance.ldlt().solve(error));
-        e.normalised = std::max(e.normalised, std::sqrt(squares));
+        keep_largest(e.normalised, std::sqrt(squares));
         e.mean_squares += squares / (12.0 * static_cast<double>(models.size() - 1));
       }
     }
