@@ -119,7 +119,10 @@ Json status(const JobStore& store) {
   const std::vector<StageStatus> stages = stages_of(store, job);
   std::optional<BlockResult> result;
   if (store.seal(kResult)) result = read_result_without_tracks(store.verified_path(kResult));
-  Json json{{"job", store.directory()}, {"stages", stages_json(store, stages)}};
+  const std::optional<JobHolder> holder = holder_of(store);
+  Json json{{"job", store.directory()},
+            {"in_use_by", holder ? Json(holder->who) : Json()},
+            {"stages", stages_json(store, stages)}};
   for (const char* key : {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px",
                           "rms_reprojection_px", "chi2_per_dof", "degrees_of_freedom", "observation_kinds", "tiles",
                           "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
@@ -197,9 +200,14 @@ std::string status_text(const JobStore& store) {
   std::string text = "job " + store.directory() + "\n";
   for (const Json& stage : json["stages"]) text += stage_line(stage);
   text += failure_lines(json["failures"]);
-  if (json["result"] == "none") return text + "  no result yet: run the same command again to resume\n";
+  const std::optional<JobHolder> holder = holder_of(store);
+  if (holder)
+    text += "  " + holder->who + ", is at work on it; '" + holder->how_to_stop + "' stops it after the units in hand\n";
+  if (json["result"] == "none")
+    return text + "  no result yet" + (holder ? "" : ": run the same command again to resume") + "\n";
   if (json["result"] == "stale")
-    text += "  the result is older than what was asked of the job since: run it to the end again\n";
+    text += std::string("  the result is older than what was asked of the job since") +
+            (holder ? "" : ": run it to the end again") + "\n";
   text += figures_text(json);
   text += interest_points_text(json["interest_points"]);
   for (const std::string remark : json["remarks"]) text += "  look: " + remark + "\n";
@@ -212,15 +220,19 @@ bool job_is_done(const JobStore& store) {
 
 std::vector<std::string> unfinished_stages(const JobStore& store) {
   std::vector<std::string> lines;
+  const std::optional<JobHolder> holder = holder_of(store);
+  const auto remedy = [&](const std::string& purpose) {
+    return holder ? holder->who + ", is at work on it" : "run the job again to " + purpose;
+  };
   for (const StageStatus& stage : stages_of(store, JobJson::of_job(store))) {
     const auto units = static_cast<std::int64_t>(stage.record.units.size());
     const auto failed = static_cast<std::int64_t>(stage.record.failures.size());
     const std::string name = "stage '" + stage.record.stage + "': ";
     if (stage.state == StageState::kStale)
-      lines.push_back(name + "its input or options changed since; run the job again to bring it up to date");
+      lines.push_back(name + "its input or options changed since; " + remedy("bring it up to date"));
     else if (stage.done + failed < units)
-      lines.push_back(name + std::to_string(stage.done) + " of " + std::to_string(units) +
-                      " units are there; run the job again to complete it");
+      lines.push_back(name + std::to_string(stage.done) + " of " + std::to_string(units) + " units are there; " +
+                      remedy("complete it"));
   }
   return lines;
 }

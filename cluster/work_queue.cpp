@@ -142,7 +142,8 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       }
       part_done(job, unit.parts - job.parts_done);
     }
-    share_error(job.ranks, 'i', fatal);  // the others' units are shown until they are done
+    if (stop_requested()) job.ranks.use_up_counter();  // the other ranks stop too, if the signal was for this one alone
+    share_error(job.ranks, 'i', fatal);                // the others' units are shown until they are done
   }
   if (job.ranks.any(stop_requested()))
     throw AgreedError<Interrupted>("stopped in stage '" + stage + "' as asked; run the same command to resume");

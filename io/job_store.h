@@ -62,8 +62,12 @@ class JobStore {
   mutable std::map<std::string, std::pair<std::int64_t, std::int64_t>> verified_;  // unit -> (size, mtime in ns)
 };
 
-// Whether a run holds the job's lock.
-bool is_in_use(const JobStore& store);
+// The run that holds a job's lock.
+struct JobHolder {
+  std::string who = "another process";               // "process 1234 on host, started 2026-11-21T07:00:00Z"
+  std::string how_to_stop = "kill -USR1 <process>";  // after the units in hand: "kill -USR1 1234", on another host so
+};
+std::optional<JobHolder> holder_of(const JobStore& store);  // empty: nobody
 
 // The job's lock, held by rank 0 for the life of the object: flock on job/lock with host, pid and start time in it.
 class JobLock {

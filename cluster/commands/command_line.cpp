@@ -128,7 +128,7 @@ int watch(const JobStore& store) {
     std::printf("%s%s", terminal ? "\033[H\033[J" : "", status_text(store).c_str());
     std::fflush(stdout);
     if (done) return kExitDone;
-    if (!is_in_use(store)) {
+    if (!holder_of(store)) {
       std::printf("  no run is working on this job\n");
       return kExitDone;
     }

@@ -424,13 +424,15 @@ class BadInput(CopyOfTheBlock):
         first = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stdout=subprocess.DEVNULL,
                                  stderr=subprocess.DEVNULL)
         lock = self.job / "lock"
-        while not (lock.exists() and lock.read_text()):  # it says who holds it once it does
+        while not (lock.exists() and lock.read_text() and (self.job / "job.json").exists()):  # it says who holds it
             self.assertIsNone(first.poll())
             time.sleep(0.01)
         first.send_signal(signal.SIGSTOP)  # it holds the lock for as long as we like
         try:
             line = one_line(self.run_job(BAD_INPUT))
-            self.assertIn(str(first.pid), line)
+            self.assertIn(f"stop it (kill -USR1 {first.pid})", line)
+            shown = subprocess.run([MEGABLOCK, "status", self.job], capture_output=True, text=True, check=True).stdout
+            self.assertIn(f"is at work on it; 'kill -USR1 {first.pid}' stops it", shown)
         finally:
             first.send_signal(signal.SIGCONT)
         self.assertEqual(first.wait(), DONE)

@@ -1,11 +1,15 @@
 #include "cluster/status.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "cluster/stage_record.h"
 #include "tests/unit/io/made_up_result.h"
 #include "tests/unit/io/scratch_directory.h"
 
@@ -74,6 +78,28 @@ TEST_F(StatusTest, TellsInterestPointsByCamera) {
   EXPECT_EQ(list[0]["mean"], 50);
   EXPECT_EQ(list[0]["total"], 150);
   EXPECT_THAT(status_text(store_), HasSubstr("10 to 100 interest points per image, mean 50, 150 in 3 images"));
+}
+
+TEST_F(StatusTest, SaysWhoIsAtWorkAndHowToStopIt) {
+  EXPECT_THAT(status_text(store_), HasSubstr("no result yet: run the same command again to resume"));
+  EXPECT_TRUE(json()["in_use_by"].is_null());
+  const std::string process = std::to_string(getpid());
+  std::optional<JobLock> lock(store_);
+  EXPECT_THAT(status_text(store_),
+              testing::ContainsRegex("\n  process " + process + " on [^ ]+, started [^ ]+Z, is at " +
+                                     "work on it; 'kill -USR1 " + process + "' stops it"));
+  EXPECT_THAT(status_text(store_), Not(HasSubstr("run the same")));
+  EXPECT_THAT(json()["in_use_by"].get<std::string>(), testing::StartsWith("process " + process + " on "));
+  StageRecord record{"features", 0, {{"features/000000.h5", 1}}, {}};
+  write_record(store_, record);
+  EXPECT_THAT(unfinished_stages(store_).front(), testing::EndsWith(", is at work on it"));
+  lock.reset();
+  EXPECT_THAT(unfinished_stages(store_).front(), testing::EndsWith("; run the job again to complete it"));
+  std::ofstream(store_.path("lock")) << "process 12 on elsewhere, started 2026-11-21T07:00:00Z\n";
+  const int other = open(store_.path("lock").c_str(), O_RDONLY);
+  ASSERT_EQ(flock(other, LOCK_EX), 0);
+  EXPECT_THAT(status_text(store_), HasSubstr("'kill -USR1 12 on elsewhere' stops it"));
+  close(other);
 }
 
 TEST_F(StatusTest, KeysAreThereBeforeAResult) {
