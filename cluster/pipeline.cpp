@@ -18,6 +18,7 @@
 #include "cluster/version.h"
 #include "io/error.h"
 #include "io/hash.h"
+#include "io/measurement_index.h"
 #include "io/measurements.h"
 #include "io/project.h"
 #include "io/track_rows.h"
@@ -55,15 +56,23 @@ void refuse_another_block(const JobStore& store, const Block& previous, const Pr
                    " images; name another folder with -j, or delete this one to begin anew");
 }
 
+// Of the job's last run; empty: there is none, or it is damaged.
+std::optional<Block> previous_block(const JobStore& store) {
+  if (!std::filesystem::exists(store.path("block.h5"))) return std::nullopt;
+  const std::string damage = store.problem("block.h5");
+  if (damage.empty()) return read_block(store.path("block.h5"));
+  tell_of_damage(store, "block.h5", damage);
+  return std::nullopt;
+}
+
 // The images of an earlier run keep their indices; new ones follow. Records when the block grew.
 std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job,
                                               Project& project) {
   Block& block = project.block;
   std::vector<std::int64_t> generations;
-  if (job && store.seal("block.h5")) {
-    const Block previous = read_block(store.verified_path("block.h5"));
-    refuse_another_block(store, previous, project);
-    Block merged = append_to(previous, block);
+  if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
+    refuse_another_block(store, *previous, project);
+    Block merged = append_to(*previous, block);
     // Images taken away or changed start a new block; growing keeps what is there.
     const bool grown = merged.images.size() == block.images.size();
     if (grown) {
@@ -143,10 +152,9 @@ void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
 }
 
 void update_measurement_index(Job& job, const std::vector<std::string>& tracks) {
-  on_first_rank(job.ranks, [&] {
-    update_measurement_index(job.store, tracks);
-    return std::string();
-  });
+  const std::string damage =
+      on_first_rank(job.ranks, [&] { return megablock::update_measurement_index(job.store, tracks); });
+  if (!damage.empty() && job.is_first_rank()) tell_of_damage(job.store, kMeasurementIndex, damage);
 }
 
 void run_stages(Job& job, const std::string& tie_points) {

@@ -1,6 +1,7 @@
 #include "cluster/work_queue.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
@@ -15,16 +16,6 @@ namespace megablock {
 namespace {
 
 using Json = nlohmann::json;
-
-bool is_current(const JobStore& store, const Unit& unit) {
-  if (!store.up_to_date(unit.name, unit.fingerprint)) return false;
-  try {
-    store.verify(unit.name);
-  } catch (const StoreError&) {
-    return false;  // altered or truncated: computed again
-  }
-  return true;
-}
 
 std::vector<std::size_t> claim_order(const std::vector<Unit>& units) {
   std::vector<std::size_t> order(units.size());
@@ -84,6 +75,18 @@ void write_own_record(const Job& job) {
 
 }  // namespace
 
+void tell_of_damage(const JobStore& store, const std::string& unit, const std::string& problem) {
+  end_progress_line();
+  std::fprintf(stderr, "megablock: warning: %s: %s; it is computed again\n", store.path(unit).c_str(), problem.c_str());
+}
+
+bool is_current(const JobStore& store, const std::string& unit, std::uint64_t fingerprint) {
+  std::string damage;
+  const bool current = store.is_current(unit, fingerprint, damage);
+  if (!damage.empty()) tell_of_damage(store, unit, damage);
+  return current;
+}
+
 void begin_stage(Job& job, const std::string& stage, const std::vector<Unit>& units) {
   if (job.records.empty() || job.records.back().stage != stage)
     job.records.push_back({stage, job.records.empty() ? 0 : job.records.back().hash(), {}, {}});
@@ -129,7 +132,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       const Unit& unit = units[index];
       job.parts_done = 0;
       try {
-        if (!is_current(job.store, unit)) {
+        if (!is_current(job.store, unit.name, unit.fingerprint)) {
           compute_unit(job, stage, unit, claim_s);
           ++mine.computed;
         }

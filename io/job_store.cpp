@@ -213,19 +213,36 @@ bool JobStore::up_to_date(const std::string& unit, std::uint64_t fingerprint) co
   return found && found->fingerprint == fingerprint;
 }
 
-void JobStore::verify(const std::string& unit) const {
+std::string JobStore::problem(const std::string& unit) const {
   const std::string name = path(unit);
-  const std::string remedy = "; delete it and run again, it will be computed anew";
   const Descriptor file(name, O_RDONLY);
   if (file.id() < 0) {
-    if (errno == ENOENT) throw StoreError(name + ": is missing; run the stage that makes it");
+    if (errno == ENOENT) return "is missing";
     throw_file_error(name, "opened", errno);
   }
   std::string problem;
   const std::optional<Trailer> trailer = read_trailer(file.id(), problem);
-  if (!trailer) throw StoreError(name + ": " + problem + remedy);
-  if (hash_payload(file.id(), name, trailer->seal.length) != trailer->seal.content_hash)
-    throw StoreError(name + ": is damaged (its contents do not have the hash of its seal)" + remedy);
+  if (!trailer) return problem;
+  try {
+    if (hash_payload(file.id(), name, trailer->seal.length) == trailer->seal.content_hash) return "";
+  } catch (const StoreError&) {
+    return "cannot be read to its end; check the disk";
+  }
+  return "is damaged (its contents do not have the hash of its seal)";
+}
+
+bool JobStore::is_current(const std::string& unit, std::uint64_t fingerprint, std::string& damage) const {
+  damage.clear();
+  if (!fs::exists(path(unit))) return false;
+  const std::optional<UnitSeal> found = seal(unit);
+  if (found && found->fingerprint != fingerprint) return false;
+  damage = problem(unit);
+  return damage.empty();
+}
+
+void JobStore::verify(const std::string& unit) const {
+  if (const std::string found = problem(unit); !found.empty())
+    throw StoreError(path(unit) + ": " + found + "; run the job again, which computes it anew");
 }
 
 std::string JobStore::verified_path(const std::string& unit) const {

@@ -39,7 +39,11 @@ class JobStore {
   std::optional<UnitSeal> seal(const std::string& unit) const;
   // There, sealed with this fingerprint, and its payload's length right. Does not read the payload.
   bool up_to_date(const std::string& unit, std::uint64_t fingerprint) const;
-  // Reads the payload and compares its hash; throws StoreError naming the file and what is wrong with it.
+  // Reads the payload and compares its hash; says what is wrong with the unit, empty: nothing.
+  std::string problem(const std::string& unit) const;
+  // There, whole and with this fingerprint. `damage` gets the problem() of one that is there and not whole.
+  bool is_current(const std::string& unit, std::uint64_t fingerprint, std::string& damage) const;
+  // Throws StoreError naming the file, its problem() and the remedy.
   void verify(const std::string& unit) const;
   // Path of a unit after verify(); verified once per process and file version.
   std::string verified_path(const std::string& unit) const;

@@ -71,16 +71,14 @@ std::uint64_t measurement_index_fingerprint(const UnitSeal& tracks) {
   return hasher.add(kAlgorithm).add(tracks.content_hash).value();
 }
 
-void update_measurement_index(const JobStore& store, const std::vector<std::string>& tiles) {
+std::string update_measurement_index(const JobStore& store, const std::vector<std::string>& tiles) {
   const auto tracks = store.seal(kTrackList);
   if (!tracks) throw StoreError(store.path(kTrackList) + ": is missing or damaged; run the job again");
   const std::uint64_t fingerprint = measurement_index_fingerprint(*tracks);
-  try {
-    if (store.up_to_date(kMeasurementIndex, fingerprint)) return store.verify(kMeasurementIndex);
-  } catch (const StoreError&) {
-    // made again
-  }
-  store.write(kMeasurementIndex, fingerprint, [&](const std::string& path) { write_index(path, store, tiles); });
+  std::string damage;
+  if (!store.is_current(kMeasurementIndex, fingerprint, damage))
+    store.write(kMeasurementIndex, fingerprint, [&](const std::string& path) { write_index(path, store, tiles); });
+  return damage;
 }
 
 void check_measurement_index(const JobStore& store) {

@@ -64,7 +64,8 @@ class MeasurementStore {
 };
 
 // Brings the index by image up to date with the files of the tiles, in tile order, that tracks/index.txt lists.
-void update_measurement_index(const JobStore& store, const std::vector<std::string>& tiles);
+// Returns what was wrong with the index that was there, if it was damaged.
+std::string update_measurement_index(const JobStore& store, const std::vector<std::string>& tiles);
 
 // Throws StoreError when the index by image is not that of the files of tracks as they are.
 void check_measurement_index(const JobStore& store);

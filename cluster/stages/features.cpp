@@ -58,12 +58,8 @@ std::vector<ImageFeatures> features_to_keep(const JobStore& store, const std::st
                                             const std::vector<std::uint64_t>& fingerprints) {
   for (std::size_t count = fingerprints.size() - 1; count > 0; --count) {
     const std::uint64_t fingerprint = shard_fingerprint({fingerprints.begin(), fingerprints.begin() + count});
-    if (!store.up_to_date(name, fingerprint)) continue;
-    try {
-      return read_features(store.verified_path(name));
-    } catch (const StoreError&) {
-      return {};  // damaged: computed again
-    }
+    if (store.up_to_date(name, fingerprint))
+      return is_current(store, name, fingerprint) ? read_features(store.path(name)) : std::vector<ImageFeatures>();
   }
   return {};
 }

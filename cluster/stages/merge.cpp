@@ -228,12 +228,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
-    if (!job.store.up_to_date(kResult, fingerprint)) return "";
-    try {
-      job.store.verify(kResult);
-    } catch (const StoreError&) {
-      return "";
-    }
+    if (!is_current(job.store, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path("result/report.html")) ? "current" : "";
   });
   if (!current.empty()) {  // a run that was killed behind its result may have left what led to it

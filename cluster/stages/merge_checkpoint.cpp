@@ -115,13 +115,12 @@ std::optional<MergePosition> MergeCheckpoint::find() {
     for (const std::string& name : folders) {
       const auto seal = job_.store.seal(name + kMarker);
       bool valid = seal && seal->fingerprint == fingerprint(name);
-      try {
-        if (valid)
-          for (const auto& file : std::filesystem::directory_iterator(job_.store.path(name)))
-            job_.store.verify(name + "/" + file.path().filename().string());
-      } catch (const StoreError&) {
-        valid = false;
-      }
+      if (valid)
+        for (const auto& file : std::filesystem::directory_iterator(job_.store.path(name))) {
+          const std::string unit = name + "/" + file.path().filename().string(), problem = job_.store.problem(unit);
+          if (!problem.empty()) tell_of_damage(job_.store, unit, problem);
+          valid = valid && problem.empty();
+        }
       if (valid)
         last = name;
       else

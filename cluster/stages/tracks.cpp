@@ -39,30 +39,15 @@ std::uint64_t content_fingerprint(const TrackSet& tracks) {
   return hasher.value();
 }
 
-bool holds(const Job& job, const std::string& name, std::uint64_t fingerprint) {
-  try {
-    if (!job.store.up_to_date(name, fingerprint)) return false;
-    job.store.verify(name);
-  } catch (const StoreError&) {
-    return false;
-  }
-  return true;
-}
-
 // The files named in the index are there and whole.
 bool index_holds(const Job& job, const std::string& index, const std::vector<std::string>& names) {
   if (!job.store.seal(index)) return false;
   std::ifstream in(job.store.path(index));
-  try {
-    for (const std::string& name : names) {
-      std::string listed, fingerprint;
-      if (!(in >> listed >> fingerprint) || listed != name) return false;
-      const auto seal = job.store.seal(name);
-      if (!seal || hex(seal->fingerprint) != fingerprint) return false;
-      job.store.verify(name);
-    }
-  } catch (const StoreError&) {
-    return false;
+  for (const std::string& name : names) {
+    std::string listed, fingerprint;
+    if (!(in >> listed >> fingerprint) || listed != name) return false;
+    const auto seal = job.store.seal(name);
+    if (!seal || hex(seal->fingerprint) != fingerprint || !job.store.problem(name).empty()) return false;
   }
   return true;
 }
@@ -81,7 +66,7 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
     std::size_t t = 0;
     tracks_by_tile([&](const TrackSet& tracks) {
       const std::uint64_t fingerprint = content_fingerprint(tracks);
-      if (!holds(job, names[t], fingerprint))
+      if (!is_current(job.store, names[t], fingerprint))
         job.store.write(names[t], fingerprint, [&](const std::string& p) { write_tracks(p, tracks); });
       out << names[t++] << ' ' << hex(fingerprint) << '\n';
     });

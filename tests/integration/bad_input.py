@@ -338,7 +338,8 @@ class BadInput(CopyOfTheBlock):
         megablock("run", self.project, "-j", self.job, "-q")
         digest = status(self.job)["digest"]
         for unit, damage in (("features/000000.h5", "flip"), ("tracks/000000.h5", "cut"), ("adjust/000000.h5", "flip"),
-                             ("matches/000000.h5", "gone")):
+                             ("matches/000000.h5", "gone"), ("block.h5", "flip"), ("measurements.h5", "cut"),
+                             ("result/block.h5", "flip")):
             file = self.job / unit
             data = bytearray(file.read_bytes())
             if damage == "flip":
@@ -349,9 +350,14 @@ class BadInput(CopyOfTheBlock):
             else:
                 file.unlink()
             before = len(events(self.job))
-            self.run_job()
-            self.assertIn(unit if unit[:6] != "tracks" else "tracks/index.txt",
-                          [e["unit"] for e in events(self.job)[before:]])
+            said = self.run_job()
+            if damage == "gone":
+                self.assertNotIn("warning: ", said)
+            else:
+                self.assertRegex(one_line(said), f"warning: {file}: (is damaged|has no valid seal).*; it is computed again")
+            if unit not in ("block.h5", "measurements.h5"):  # these are no stage's
+                self.assertIn(unit if unit[:6] != "tracks" else "tracks/index.txt",
+                              [e["unit"] for e in events(self.job)[before:]])
             self.assertEqual(status(self.job)["digest"], digest)
 
     def test_check_names_the_damaged_file(self):
@@ -363,7 +369,7 @@ class BadInput(CopyOfTheBlock):
         file.write_bytes(data)
         done = subprocess.run([MEGABLOCK, "check", self.job], capture_output=True, text=True)
         self.assertEqual(done.returncode, FAILED_UNITS)
-        self.assertIn("matches/000000.h5", done.stdout)
+        self.assertRegex(done.stdout, "matches/000000.h5: is damaged .*; run the job again, which computes it anew")
 
     def test_questions_for_measurements(self):
         shutil.copytree(work / "clean_job", self.job)
