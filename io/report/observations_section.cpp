@@ -19,6 +19,22 @@ bool misstated(const ObservationStatistics& statistics) {
   return std::isfinite(factor) && std::abs(factor - 1) > tolerance;
 }
 
+// What more large residuals than expected mean, if there are more than chance explains (five standard deviations).
+std::string verdict(const Reliability& r) {
+  const double expected = kFalseAlarmProbability * static_cast<double>(r.tested);
+  const auto found = static_cast<double>(r.beyond_normal);
+  if (found <= expected + 5 * std::sqrt(std::max(1.0, expected)))
+    return "No more measurements are beyond the limit than normally distributed errors leave there.";
+  return fmt::format(
+      "{} times as many measurements are beyond the limit as normally distributed errors of one sigma would leave "
+      "there. "
+      "By itself that is no fault: matched points are not all measured equally well, so that large errors are more "
+      "frequent than normal ones, about ten times so on rendered pictures without any fault. The sigma of the tie "
+      "points, which is estimated, includes them. It matters where they lie together: see whether the largest, below, "
+      "are of one image or one object.",
+      significant(found / expected, 2));
+}
+
 // Baarda's and Pope's tests of the tie point measurements, and how large an error must be to be found.
 std::string reliability_part(const BlockResult& result, const Reliability& r) {
   if (r.tested == 0) return "";
@@ -45,7 +61,7 @@ std::string reliability_part(const BlockResult& result, const Reliability& r) {
       100 * kDetectionProbability, 1 / kFalseAlarmProbability, significant(r.detectable_px.median, 2),
       significant(r.detectable_px.p95, 2), count(r.poorly_checked), count(r.tested),
       fixed(Reliability::kPoorRedundancy, 1), count(r.unchecked), significant(r.worst_external, 2));
-  return tests.html("compact") + paragraph(reliability) + largest.html("compact");
+  return tests.html("compact") + paragraph(verdict(r)) + paragraph(reliability) + largest.html("compact");
 }
 
 }  // namespace

@@ -67,6 +67,31 @@ TEST(ReportReliability, CountsEveryMeasurement) {
   for (std::size_t i = 0; i < 10; ++i) EXPECT_NEAR(found.largest[i].normalised, all[i], 1e-12 * all[i]);
 }
 
+// Normal errors as they are simulated, and errors of two kinds of points, one measured three times as badly.
+TEST(ReportReliability, SaysWhetherItMattersThatMoreThanExpectedAreBeyondTheLimit) {
+  BlockResult result = result_with_redundancy();
+  result.redundancy_x.assign(result.kept.size(), 204);  // 0.8
+  result.redundancy_y = result.redundancy_x;
+  const auto page_with_errors = [&](double share_of_bad) {
+    std::mt19937 random(7);
+    std::normal_distribution<float> normal(0, static_cast<float>(0.5 * std::sqrt(0.8)));
+    for (std::size_t i = 0; i < result.kept.size(); ++i) {
+      const float factor = static_cast<double>(random() % 1000) < 1000 * share_of_bad ? 3.0F : 1.0F;
+      result.residual_x[i] = factor * normal(random);
+      result.residual_y[i] = factor * normal(random);
+    }
+    result.observation_table.kinds[0] = {100, 95, 60, 1};
+    return report_html(result);
+  };
+  const std::string normal = page_with_errors(0), mixed = page_with_errors(0.2);
+  constexpr const char* kNoMore = "No more measurements are beyond the limit than normally distributed errors";
+  constexpr const char* kMore = " times as many measurements are beyond the limit";
+  EXPECT_THAT(normal, testing::HasSubstr(kNoMore));
+  EXPECT_THAT(normal, testing::Not(testing::HasSubstr(kMore)));
+  EXPECT_THAT(mixed, testing::HasSubstr(kMore));
+  EXPECT_THAT(mixed, testing::HasSubstr("By itself that is no fault"));
+}
+
 TEST(ReportReliability, IsOnThePage) {
   using testing::HasSubstr;
   using testing::Not;
