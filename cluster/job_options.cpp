@@ -3,6 +3,8 @@
 
 #include "cluster/job_options.h"
 
+#include <cctype>
+
 #include "cluster/job_json.h"
 #include "io/error.h"
 #include "io/settings_reader.h"
@@ -178,6 +180,17 @@ class TextVisitor {
   std::vector<OptionValue>& values_;
 };
 
+// The message names the key: the word as a whole, not as a part of another key.
+bool names_key(const std::string& message, const std::string& key) {
+  const auto part_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  for (std::size_t at = message.find(key); at != std::string::npos; at = message.find(key, at + 1)) {
+    const std::size_t end = at + key.size();
+    if ((at == 0 || !part_of_word(message[at - 1])) && (end == message.size() || !part_of_word(message[end])))
+      return true;
+  }
+  return false;
+}
+
 // A value that is wrong for itself, with the place where the project file sets it.
 template <typename Options>
 void check_section(const StageSettings& settings, const std::string& section, const Options& options) {
@@ -186,8 +199,9 @@ void check_section(const StageSettings& settings, const std::string& section, co
   } catch (const InputError& error) {
     const std::string message = error.what();
     for (const auto& entry : settings.entries)
-      if (entry.section == section && message.find(entry.key) != std::string::npos)
-        throw InputError(entry.where + ": " + section + ": " + message);
+      if (entry.section == section && names_key(message, entry.key))
+        throw InputError(entry.where + ": " + section + ": " + message +
+                         (message.find(", not ") == std::string::npos ? ", not " + entry.value : ""));
     throw;
   }
 }

@@ -25,7 +25,8 @@ struct GpsOptions {
 std::optional<double> read_sigma(YamlReader& reader, const std::string& key, double held) {
   const auto sigma = reader.number(key);
   if (sigma && !(*sigma >= 0))
-    throw InputError(reader.where(key) + ": " + key + " must be greater than 0, or 0 for what is held");
+    throw InputError(reader.where(key) + ": " + key + " must be greater than 0, or 0 for what is held, not " +
+                     *reader.text(key));
   return sigma && *sigma < held ? held : sigma;
 }
 

@@ -77,7 +77,8 @@ std::optional<double> YamlReader::number(const std::string& key) {
 
 std::optional<double> YamlReader::positive_number(const std::string& key) {
   const auto value = number(key);
-  if (value && !(*value > 0)) throw InputError(where(key) + ": " + full(key) + " must be greater than 0");
+  if (value && !(*value > 0))
+    throw InputError(where(key) + ": " + full(key) + " must be greater than 0, not " + *text(key));
   return value;
 }
 

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -316,13 +317,40 @@ int exit_code_of(const std::exception& error) {
   return dynamic_cast<const InputError*>(&error) ? kExitBadInput : kExitFailedUnits;
 }
 
+// " min frames " of "--min-frames", "min_frames".
+std::string as_words(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return !std::isalnum(c); }, ' ');
+  return " " + text + " ";
+}
+
+// What must be otherwise is named as it was given: "--min-frames 9: min_frames must be 3 or 4".
+std::string with_given_value(const CLI::App& app, const std::string& message) {
+  const std::size_t end = message.find(" must ");
+  if (end == std::string::npos) return message;
+  const std::string subject = as_words(message.substr(0, end));
+  std::string given;
+  std::size_t longest = 0;
+  for (const CLI::App* command : app.get_subcommands())
+    for (const CLI::Option* option : command->get_options([](const CLI::Option* o) { return o->nonpositional(); }))
+      for (const std::string& name : option->get_lnames()) {
+        const bool wanted = option->count() > 0 && option->get_type_size() > 0 && name.size() > longest;
+        if (!wanted || subject.find(as_words(name)) == std::string::npos) continue;
+        given = "--" + name + " " + option->results().back() + ": ";
+        longest = name.size();
+      }
+  return given + message;
+}
+
 // An error all ranks agree on is said once; one that a single rank has ends the others, which would wait for it.
-int run_action(const Action& action, Communicator& ranks) {
+int run_action(const CLI::App& app, const Action& action, Communicator& ranks) {
   try {
     return action();
   } catch (const std::exception& error) {
     const bool agreed = dynamic_cast<const Agreed*>(&error) != nullptr;
-    if (!agreed || ranks.rank() == 0) std::fprintf(stderr, "megablock: %s\n", error.what());
+    const bool input = dynamic_cast<const InputError*>(&error) != nullptr;
+    if (!agreed || ranks.rank() == 0)
+      std::fprintf(stderr, "megablock: %s\n", input ? with_given_value(app, error.what()).c_str() : error.what());
     if (!agreed && ranks.size() > 1) ranks.abort(exit_code_of(error));
     return exit_code_of(error);
   }
@@ -390,7 +418,7 @@ int command_line(int argc, char** argv) {
       return code == 0 ? kExitDone : kExitBadInput;
     }
     if (by_one) action = [&] { return exit_code_on_first_rank(ranks, by_one); };
-    return run_action(action, ranks);
+    return run_action(app, action, ranks);
   } catch (const std::exception& error) {  // before there are ranks
     std::fprintf(stderr, "megablock: %s\n", error.what());
     return exit_code_of(error);

@@ -97,11 +97,12 @@ void SimulationOptions::check() const {
   require_option(held_out_zone == -1 || (held_out_zone >= 0 && held_out_zone < control_zones),
                  "held_out_zone must be -1 or one of the control zones, counted from 0");
   require_option(scene != Scene::kStereopolis || outlier_share <= 0.4,
-                 "outlier_share of this scene must lie in [0, 0.4]");
+                 "the share of outliers in this scene must lie in [0, 0.4]");
   require_option(control_zones == 0 || scene == Scene::kStereopolis,
                  "control_zones are those of the stereopolis scene");
-  require_option(mount_position_error_m >= 0 && mount_rotation_error_deg >= 0 && mount_rotation_error_deg < 10,
-                 "mount errors must not be negative, mount_rotation_error_deg below 10");
+  require_option(mount_position_error_m >= 0, "mount_position_error_m must not be negative");
+  require_option(mount_rotation_error_deg >= 0 && mount_rotation_error_deg < 10,
+                 "mount_rotation_error_deg must lie in [0, 10)");
   require_option(panorama_radius_m > 0, "panorama_radius_m must be positive");
   require_option(depth_spread >= 0 && depth_spread < 0.9, "depth_spread must lie in [0, 0.9)");
   require_option(std::abs(off_centre_m) < 0.05 * panorama_radius_m,
@@ -114,7 +115,7 @@ void SimulationOptions::check() const {
   require_option(points_per_frame >= 10, "points_per_frame must be at least 10");
   require_option(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");
   require_option(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");
-  require_option(outlier_share >= 0 && outlier_share < 1, "outlier_share must lie in [0, 1)");
+  require_option(outlier_share >= 0 && outlier_share < 1, "the share of outliers must lie in [0, 1)");
   require_option(gps_share >= 0 && gps_share <= 1, "gps_share must lie in [0, 1]");
   require_option(std::isfinite(gps_sigma_m) && std::isfinite(attitude_sigma_deg), "sigmas of priors must be finite");
   require_option(relative_position_sigma_m <= 0 || relative_rotation_sigma_deg > 0,
@@ -126,9 +127,11 @@ void SimulationOptions::check() const {
       "start_offset_m (--start-offset) needs relative poses to integrate (--relative-position-sigma) and another scene "
       "than stereopolis");
   require_option(start_chain_frames >= 2, "start_chain_frames (--start-chain) must be at least 2");
-  require_option(control_points >= 0 && check_points >= 0, "control_points and check_points must not be negative");
+  require_option(control_points >= 0, "control_points must not be negative");
+  require_option(check_points >= 0, "check_points must not be negative");
   require_option(control_sigma_m > 0, "control_sigma_m must be positive");
-  require_option(image_width >= 64 && image_height >= 64, "images must have at least 64 x 64 pixels");
+  require_option(image_width >= 64, "image_width must be at least 64 px");
+  require_option(image_height >= 64, "image_height must be at least 64 px");
   const auto model = find_model(camera_model);
   require_option(model.has_value(), "camera_model '" + camera_model + "' is none of: " + model_list());
   require_option(focal_px >= 0.3 * std::max(image_width, image_height),

@@ -78,6 +78,20 @@ class BadInput(CopyOfTheBlock):
         said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
         self.assertIn("argument '--thread' was not expected; see 'megablock run --help'", said)
 
+    def test_refused_values_are_named(self):
+        for option, value, words in (("--frames", 1, "frames must be at least 2"),
+                                     ("--outliers", 1.5, "the share of outliers must lie in"),
+                                     ("--image-height", 8, "image_height must be at least 64"),
+                                     ("--drift-per-frame", -1, "drift_per_frame_m must be positive")):
+            said = one_line(megablock("simulate", "--drift", 3, option, value, "-o", self.folder / "x", expect=BAD_INPUT))
+            self.assertRegex(said, f"^megablock: {option} {value}: .*{words}")
+        said = one_line(megablock("register", self.project, "-j", self.job, "--min-frames", 9, expect=BAD_INPUT))
+        self.assertIn("--min-frames 9: ", said)
+        self.assertFalse(self.job.exists())
+        with self.project.open("a") as f:
+            f.write("tiles: {min_tiles: 0}\n")
+        self.assertRegex(one_line(self.run_job(BAD_INPUT)), "block.yaml:[0-9]+: tiles: min_tiles must be at least 1, not 0")
+
     def test_help_is_as_wide_as_the_terminal(self):
         def help_of(columns, *command):
             text = megablock(*command, "--help", env=dict(os.environ, COLUMNS=str(columns)))

@@ -51,6 +51,11 @@ TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("ratio"));
   EXPECT_THAT(message(setting("adjustment", "image_sigma_px", "0.5 mm")), testing::HasSubstr("block.yaml:7"));
   EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::StartsWith("block.yaml:7: merge: decrement"));
+  EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::EndsWith(", not -1"));
+  EXPECT_EQ(message(setting("matching", "k_best", "9")), "block.yaml:7: matching: k_best must be 1 to 7, not 9");
+  StageSettings two = setting("tiles", "min_tiles", "2");  // the name of the second begins with that of the first
+  two.entries.push_back({"tiles", "min_tiles_from", "1", "block.yaml:8"});
+  EXPECT_EQ(message(two), "block.yaml:8: tiles: min_tiles_from must be at least 2, not 1");
 }
 
 TEST(JobOptions, ValuesInForceAreWrittenDownWithTheirDefaults) {

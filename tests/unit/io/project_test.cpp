@@ -278,7 +278,8 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, "images: nothing\n"), HasSubstr("block.yaml:1: images: no readable image"));
   EXPECT_THAT(refusal(folder, images + "gps:\n  sigma_horizontal_m: 3 m\n"),
               HasSubstr("block.yaml:3: gps.sigma_horizontal_m: '3 m' has something behind the number"));
-  EXPECT_THAT(refusal(folder, images + "gps: {sigma_vertical_m: -1}\n"), HasSubstr("must be greater than 0"));
+  EXPECT_THAT(refusal(folder, images + "gps: {sigma_vertical_m: -1}\n"),
+              HasSubstr("must be greater than 0, or 0 for what is held, not -1"));
   EXPECT_THAT(refusal(folder, images + "gps: {sigma_horizontal_cm: 3}\n"),
               HasSubstr("unknown key 'sigma_horizontal_cm' in 'gps'; did you mean 'sigma_horizontal_m'?"));
   EXPECT_THAT(refusal(folder, images + "gps: 3\n"), HasSubstr("block.yaml:2: 'gps' must be a mapping"));
