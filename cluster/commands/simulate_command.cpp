@@ -56,7 +56,7 @@ class SimulateOptions {
   }
 
   std::string scene = "aerial", path = "s", output;
-  bool rendered = false;
+  bool rendered = false, overwrite = false;
 
  private:
   CLI::App* command_;
@@ -157,14 +157,16 @@ void add_simulate(CLI::App& app, Action& action) {
   add_observation_options(*options);
   add_prior_options(*options);
   command->add_option("-o,--output", options->output, "Folder to write")->required();
+  command->add_flag("--overwrite", options->overwrite, "Overwrite a block.yaml that was edited since");
   command->callback([=, &action] {
     action = [options] {
       const SimulationOptions simulation = options->settled();
       simulation.check();
+      const EditedProject edited = options->overwrite ? EditedProject::kOverwrite : EditedProject::kRefuse;
       if (options->rendered)
-        write_rendered_block(simulation, options->output);
+        write_rendered_block(simulation, options->output, edited);
       else
-        write_simulated_block(simulation, options->output);
+        write_simulated_block(simulation, options->output, edited);
       std::printf("%s/block.yaml\n", options->output.c_str());
       return kExitDone;
     };

@@ -1,10 +1,10 @@
 // The project files of a simulated block at the level of tie points.
 #include <filesystem>
-#include <fstream>
 
 #include "io/error.h"
 #include "io/hdf5_tables.h"
 #include "io/pose_csv.h"
+#include "io/simulate/project_text.h"
 #include "io/simulate/simulate.h"
 #include "io/track_writer.h"
 #include "io/unit_files.h"
@@ -15,6 +15,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr const char* kProject =
+    "# A simulated block: cameras, frames and priors in given.h5, tie points in tie_points.h5.\n"
+    "# The truth is in truth.csv (poses), truth.h5 (poses and cameras) and truth_tracks.h5 (points, wrong "
+    "observations).\n"
+    "block: given.h5\n"
+    "tie_points: tie_points.h5\n";
 constexpr const char *kTruth = "simulated_tracks", *kPosition = "points/position", *kOutlier = "observations/outlier";
 
 std::vector<double> positions(const std::vector<Eigen::Vector3d>& points) {
@@ -23,9 +29,10 @@ std::vector<double> positions(const std::vector<Eigen::Vector3d>& points) {
 
 }  // namespace
 
-void write_simulated_block(const SimulationOptions& options, const std::string& folder,
+void write_simulated_block(const SimulationOptions& options, const std::string& folder, EditedProject edited,
                            std::int64_t batch_observations) {
   options.check();
+  refuse_edited_project(folder, kProject, edited);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw InputError(folder + ": cannot be created: " + error.message());
@@ -51,14 +58,7 @@ void write_simulated_block(const SimulationOptions& options, const std::string& 
   write_block((root / "given.h5").string(), simulated.block);
   write_state((root / "truth.h5").string(), simulated.truth);
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
-  std::ofstream yaml(root / "block.yaml");
-  yaml << "# A simulated block: cameras, frames and priors in given.h5, tie points in tie_points.h5.\n"
-       << "# The truth is in truth.csv (poses), truth.h5 (poses and cameras) and truth_tracks.h5 (points, wrong "
-          "observations).\n"
-       << "block: given.h5\n"
-       << "tie_points: tie_points.h5\n";
-  yaml.close();
-  if (!yaml) throw InputError((root / "block.yaml").string() + ": cannot be written");
+  write_text((root / "block.yaml").string(), kProject);
 }
 
 SimulatedTracks read_truth_tracks(const std::string& path) {

@@ -14,6 +14,7 @@
 #include "io/pose_csv.h"
 #include "io/project.h"
 #include "io/simulate/image_file.h"
+#include "io/simulate/project_text.h"
 #include "io/simulate/render.h"
 #include "io/unit_files.h"
 
@@ -94,13 +95,6 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
 
 bool has_rig(const Block& block) { return block.rigs.front().mounts.size() > 1; }
 
-void write_text(const fs::path& path, const std::string& text) {
-  std::ofstream stream(path);
-  stream << text << '\n';
-  stream.close();
-  if (!stream) throw InputError(path.string() + ": cannot be written");
-}
-
 // OpenSfM's description of a rig: X_camera = R X_rig + t, and which images were exposed together.
 void write_rig(const Block& block, const fs::path& root) {
   nlohmann::ordered_json cameras, assignments;
@@ -115,17 +109,14 @@ void write_rig(const Block& block, const fs::path& root) {
     assignments[block.frames[block.images[image].frame].name].push_back(
         {block.images[image].name, block.cameras[block.camera_of(image)].name});
   }
-  write_text(root / "rig_cameras.json", cameras.dump(2));
-  write_text(root / "rig_assignments.json", assignments.dump(2));
+  write_text((root / "rig_cameras.json").string(), cameras.dump(2) + "\n");
+  write_text((root / "rig_assignments.json").string(), assignments.dump(2) + "\n");
 }
 
 // The given poses, for those who want to start from them.
-bool write_poses(const Block& block, const fs::path& path) {
+PoseTable given_poses(const Block& block) {
   const BlockState start = initial_state(block);
-  const PoseTable table = pose_table(block, start);
-  if (table.names.empty()) return false;
-  write_pose_csv(path.string(), table);
-  return true;
+  return pose_table(block, start);
 }
 
 // The control points (without the check points) in the form that other programs read: longitude, latitude, ellipsoidal
@@ -180,12 +171,7 @@ void write_cameras(const SimulationOptions& options, const Block& block, std::os
   }
 }
 
-// Which of the optional files there are.
-struct Written {
-  bool control, poses;
-};
-
-void write_project(const SimulationOptions& options, const Block& block, const Written& written, const fs::path& path) {
+std::string project_text(const SimulationOptions& options, const Block& block, bool has_poses) {
   const GroundFrame& ground = block.ground;
   std::ostringstream yaml;
   yaml << std::setprecision(12) << "# A rendered block; the truth is in truth.csv (poses) and truth.h5.\n"
@@ -207,18 +193,19 @@ void write_project(const SimulationOptions& options, const Block& block, const W
          << "  sigma_position_m: " << mount.position_sigma_m << (mount.held() ? "  # held" : "")
          << "\n  sigma_rotation_deg: " << mount.rotation_sigma_rad * 180 / std::numbers::pi << '\n';
   }
-  if (written.control) yaml << "control: control.csv\n";
-  if (written.poses && is_stereopolis(options))
+  if (!block.control_points.empty()) yaml << "control: control.csv\n";
+  if (has_poses && is_stereopolis(options))
     yaml << "poses: poses.csv  # the trajectory\n";
-  else if (written.poses)
+  else if (has_poses)
     yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
   write_cameras(options, block, yaml);
-  write_text(path, yaml.str());
+  yaml << '\n';
+  return yaml.str();
 }
 
 }  // namespace
 
-void write_rendered_block(const SimulationOptions& asked, const std::string& folder) {
+void write_rendered_block(const SimulationOptions& asked, const std::string& folder, EditedProject edited) {
   asked.check();
   if (asked.scene == SimulationOptions::Scene::kTargetField)
     throw InputError("simulation: the target field is made of tie points only; leave out --rendered");
@@ -238,18 +225,19 @@ void write_rendered_block(const SimulationOptions& asked, const std::string& fol
   simulated.block = layout.block;
   simulated.truth = layout.truth;
   simulate_given(options, simulated);
+  const PoseTable poses = given_poses(simulated.block);
+  const std::string project = project_text(options, simulated.block, !poses.names.empty());
+  refuse_edited_project(folder, project, edited);
   write_images(options, layout, simulated.block, root / "images");
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
   write_state((root / "truth.h5").string(), simulated.truth);
   if (has_rig(simulated.block)) write_rig(simulated.block, root);
-  Written written{};
-  written.poses = write_poses(simulated.block, root / "poses.csv");
-  written.control = !simulated.block.control_points.empty();
-  if (written.control) {
+  if (!poses.names.empty()) write_pose_csv((root / "poses.csv").string(), poses);
+  if (!simulated.block.control_points.empty()) {
     write_control_csv((root / "control.csv").string(), simulated.block);
     write_gcp_list(simulated.block, root / "gcp_list.txt");
   }
-  write_project(options, simulated.block, written, root / "block.yaml");
+  write_text((root / "block.yaml").string(), project);
 }
 
 }  // namespace megablock

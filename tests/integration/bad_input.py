@@ -78,6 +78,17 @@ class BadInput(CopyOfTheBlock):
         said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
         self.assertIn("argument '--thread' was not expected; see 'megablock run --help'", said)
 
+    def test_edited_project_of_a_simulation(self):
+        simulation = ("simulate", "--frames", 6, "-o", self.folder / "simulated")
+        megablock(*simulation)
+        megablock(*simulation)
+        with (self.folder / "simulated/block.yaml").open("a") as f:
+            f.write("tiles: {tile_max_frames: 6}\n")
+        self.assertRegex(one_line(megablock(*simulation, expect=BAD_INPUT)),
+                         "simulated/block.yaml: is there and differs .*; name another folder with -o, or give --overwrite")
+        megablock(*simulation, "--overwrite")
+        self.assertNotIn("tiles", (self.folder / "simulated/block.yaml").read_text())
+
     def test_refused_values_are_named(self):
         for option, value, words in (("--frames", 1, "frames must be at least 2"),
                                      ("--outliers", 1.5, "the share of outliers must lie in"),

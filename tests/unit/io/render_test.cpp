@@ -205,7 +205,7 @@ TEST_P(RenderTest, FilesAreAProject) {
   }
   const std::string image = folder.path("images/" + project.block.images[ImageIndex(3)].name);
   const std::uint64_t before = hash_file(image);
-  write_rendered_block(options_, folder.path());
+  write_rendered_block(options_, folder.path(), EditedProject::kOverwrite);
   EXPECT_EQ(hash_file(image), before);
 }
 

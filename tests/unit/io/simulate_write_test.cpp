@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 
 #include "io/error.h"
@@ -33,6 +34,26 @@ class SimulateWriteTest : public testing::Test {
 
   ScratchDirectory scratch_;
 };
+
+TEST_F(SimulateWriteTest, AnEditedProjectIsNotOverwritten) {
+  SimulationOptions options;
+  options.frames = 4;
+  options.image_width = options.image_height = 96;
+  options.focal_px = 80;
+  const auto check = [](const std::string& folder, const std::function<void(EditedProject)>& write) {
+    write(EditedProject::kRefuse);
+    write(EditedProject::kRefuse);  // as it was written
+    std::ofstream(folder + "/block.yaml", std::ios::app) << "tiles: {tile_max_frames: 6}\n";
+    fs::remove(folder + "/truth.csv");
+    EXPECT_THROW(write(EditedProject::kRefuse), InputError);
+    EXPECT_FALSE(fs::exists(folder + "/truth.csv"));  // nothing was written
+    write(EditedProject::kOverwrite);
+    write(EditedProject::kRefuse);
+  };
+  const std::string points = file("points"), pictures = file("pictures");
+  check(points, [&](EditedProject edited) { write_simulated_block(options, points, edited); });
+  check(pictures, [&](EditedProject edited) { write_rendered_block(options, pictures, edited); });
+}
 
 TEST_F(SimulateWriteTest, FilesHoldTheBlock) {
   SimulationOptions options;
@@ -79,7 +100,7 @@ TEST_F(SimulateWriteTest, BatchesLeaveNoTrace) {
     options.scene = scene;
     const SimulatedBlock s = simulate_block(options);
     for (const std::int64_t batch : {std::int64_t{1}, std::int64_t{37}, kTrackBatch}) {
-      write_simulated_block(options, scratch_.path(), batch);
+      write_simulated_block(options, scratch_.path(), EditedProject::kRefuse, batch);
       const TrackSet tracks = read_tracks(file("tie_points.h5"));
       EXPECT_EQ(tracks.id, s.tracks.id);
       EXPECT_EQ(tracks.begin, s.tracks.begin);

@@ -1,0 +1,28 @@
+#include "io/simulate/project_text.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "io/error.h"
+
+namespace megablock {
+
+void refuse_edited_project(const std::string& folder, const std::string& text, EditedProject edited) {
+  const std::filesystem::path path = std::filesystem::path(folder) / "block.yaml";
+  if (edited == EditedProject::kOverwrite || !std::filesystem::exists(path)) return;
+  std::ifstream file(path);
+  if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return;
+  throw InputError(path.string() +
+                   ": is there and differs from what would be written: it was edited, or is of another simulation; "
+                   "name another folder with -o, or give --overwrite");
+}
+
+void write_text(const std::string& path, const std::string& text) {
+  std::ofstream stream(path);
+  stream << text;
+  stream.close();
+  if (!stream) throw InputError(path + ": cannot be written");
+}
+
+}  // namespace megablock
