@@ -5,6 +5,7 @@ usage: bad_input.py MEGABLOCK [BadInput | Signals] [unittest arguments]
 Works on a small rendered block; needs nothing but the program and the standard library. Cases that need a file system
 of their own (full disk, read-only job) mount a tmpfs and are skipped, saying so, where that is not allowed.
 """
+import contextlib
 import json
 import os
 import pathlib
@@ -519,12 +520,15 @@ class Signals(CopyOfTheBlock):
         terminal, its_end = pty.openpty()
         run = subprocess.Popen([*command, "-j", job], stdout=subprocess.DEVNULL, stderr=its_end)
         os.close(its_end)
-        while not (job / "features/000000.h5").exists():
+        said = ""
+        while not (job / "features/000000.h5").exists() or not re.search("[1-7]/8 images, ", said):
             self.assertIsNone(run.poll())
-            time.sleep(0.01)
+            said += os.read(terminal, 1 << 16).decode()  # until the line is drawn again
         run.send_signal(signal.SIGINT)
         self.assertEqual(run.wait(), INTERRUPTED)
-        said = os.read(terminal, 1 << 16).decode()
+        with contextlib.suppress(OSError):  # at its end
+            while more := os.read(terminal, 1 << 16):
+                said += more.decode()
         os.close(terminal)
         self.assertRegex(said, r"features +\[#+\.+\] [1-7]/8 images, ")
         self.assertRegex(said, "[0-9a-z] *\r\nmegablock: stopped; ")  # on a line of its own
