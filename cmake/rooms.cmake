@@ -28,7 +28,8 @@ if(MEGABLOCK_SANITIZE)
                          -Wno-maybe-uninitialized)
   # Debian's static libceres holds Eigen code compiled without sanitizers, which takes memory from malloc as it is.
   target_compile_definitions(megablock_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
-  target_link_options(megablock_options INTERFACE -fsanitize=address,undefined)
+  # dlopen is called by the sanitizer then, which only looks where the program's RPATH says, not its RUNPATH.
+  target_link_options(megablock_options INTERFACE -fsanitize=address,undefined LINKER:--disable-new-dtags)
 endif()
 
 # Tests only call the rooms, which keep the full optimisation: at -O1 they compile in half the time.
