@@ -23,7 +23,7 @@ namespace megablock {
 
 namespace {
 
-constexpr int kAlgorithm = 4;  // of the registration's stages, part of their fingerprints
+constexpr int kAlgorithm = 5;  // of the registration's stages, part of their fingerprints
 constexpr const char* kRig = "register/rig.h5";
 constexpr const char* kPlaces = "register/places.h5";
 constexpr const char* kTrajectory = "register/trajectory.h5";

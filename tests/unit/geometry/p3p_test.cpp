@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -35,6 +36,22 @@ TEST(P3p, FindsTheTruthAmongConsistentSolutions) {
     missed += !(nearest < 1e-5);
   }
   EXPECT_LE(missed, kTrials / 200) << "near-degenerate triangles only";
+}
+
+// From the axis of an equilateral triangle two of the conics fall apart by themselves.
+TEST(P3p, FromTheAxisOfAnEquilateralTriangle) {
+  for (const double height : {0.5, 2.0, 30.0, 1000.0}) {
+    std::array<Eigen::Vector3d, 3> rays, points;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double angle = 2 * std::numbers::pi / 3 * static_cast<double>(k);
+      points[k] = {std::cos(angle), std::sin(angle), height};
+      rays[k] = points[k].normalized();
+    }
+    double nearest = 1e9;
+    for (const Pose& pose : solve_p3p(rays, points))
+      nearest = std::min(nearest, pose.centre.norm() / height + rotation_angle(pose.rotation, {1, 0, 0, 0}));
+    EXPECT_LT(nearest, 1e-7) << height;
+  }
 }
 
 TEST(P3p, NothingForBadPoints) {
@@ -87,7 +104,7 @@ TEST(P3p, OnTheDangerCylinder) {
   EXPECT_LT(median(beside), 1e-12);
   EXPECT_GT(median(on), 1e-11);
   EXPECT_LT(median(on), 1e-6);
-  EXPECT_LE(missed, kTrials / 20) << "by rounding, or thin triangles";
+  EXPECT_LE(missed, kTrials / 100) << "by rounding, or thin triangles";
 }
 
 TEST(P3p, RefusesPointsOnOneLine) {
