@@ -187,11 +187,11 @@ class PlaceEquations {
     result_.redundancy = 0;
     for (std::int32_t m = 0; m < std::ssize(linked_.models); ++m)
       result_.redundancy -= linked_.reference[nth(m)] == m ? 0 : 7;
-    struct Rows {
+    struct WeightedRows {
       std::int32_t model;
       Eigen::Matrix<double, 7, 3> by_place, by_attitude;  // J' W B
     };
-    std::vector<Rows> rows;
+    std::vector<WeightedRows> rows;
     for (const SharedPlace& place : linked_.places) {
       if (!any_kept(place)) continue;
       const Mean m = mean(place);
@@ -205,7 +205,7 @@ class PlaceEquations {
         const double w = 1 / (e.sigma * e.sigma);
         Block7 own = w * by_step.transpose() * by_step;
         SimilarityStep right = -w * by_step.transpose() * r;
-        Rows row{e.model, w / s.scale * by_step.transpose() * back, Eigen::Matrix<double, 7, 3>::Zero()};
+        WeightedRows row{e.model, w / s.scale * by_step.transpose() * back, Eigen::Matrix<double, 7, 3>::Zero()};
         result_.weighted_squares += w * r.squaredNorm();
         if (place.image) {
           const double v = rotation_weight(e);
@@ -220,8 +220,8 @@ class PlaceEquations {
         rows.push_back(row);
       }
       result_.redundancy += (place.image ? 6 : 3) * (std::ssize(rows) - 1);
-      for (const Rows& i : rows)
-        for (const Rows& j : rows) {
+      for (const WeightedRows& i : rows)
+        for (const WeightedRows& j : rows) {
           Block7 block = -i.by_place * j.by_place.transpose() / m.weight;
           if (place.image) block -= i.by_attitude * j.by_attitude.transpose() / m.rotation_weight;
           equations.add(i.model, j.model, block);

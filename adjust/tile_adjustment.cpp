@@ -10,6 +10,7 @@
 #include "adjust/image_sigma.h"
 #include "adjust/linearise.h"
 #include "adjust/lost_frames.h"
+#include "adjust/lost_parts.h"
 #include "io/error.h"
 
 namespace megablock {
@@ -113,12 +114,13 @@ class TileAdjuster {
 
  private:
   enum class Stage { kFocal, kAll };
+  static constexpr double kApart = 3;  // times the widest limit: of passes that start apart
 
   // From rough start values to residuals of a few pixels: gross errors are left out, only focal length and k1 are
   // estimated, and of dense tiles only the longest tracks take part, until they are of one mind.
   void approach() {
     constexpr int kMaxRounds = 6;
-    constexpr double kWide = 4, kApart = 3;
+    constexpr double kWide = 4;
     constexpr int kFew = 6;  // iterations: to test again which rays belong together helps more than others
     const std::vector<std::uint8_t> all = problem_.kept;
     const bool dense = select_long_tracks();
@@ -149,17 +151,28 @@ class TileAdjuster {
     triangulate_points(problem_, state_, options_, others);
   }
 
-  // Frames that none of it has brought to their points; a few rounds, as they may hang on one another.
+  // What none of it has brought to the rest: parts of the tile as a whole, then single frames; a few rounds, as they
+  // may hang on one another.
   void recover() {
     constexpr int kMaxRounds = 3;
+    const double limit = 8 * options_.max_residual_sigmas, apart = kApart * limit;
     for (int round = 0; round < kMaxRounds; ++round) {
-      screen(8 * options_.max_residual_sigmas);
-      const std::vector<LocalFrame> found = recover_lost_frames(problem_, state_, 8 * options_.max_residual_sigmas);
-      if (found.empty()) return;
-      screen(8 * options_.max_residual_sigmas);
-      choose_points_of(found);
-      solve_rough(Stage::kFocal);
+      screen(limit);
+      if (!take_up(recover_lost_parts(problem_, state_, apart), apart)) break;
     }
+    for (int round = 0; round < kMaxRounds; ++round) {
+      if (round > 0) screen(limit);
+      if (!take_up(recover_lost_frames(problem_, state_, limit), limit)) break;
+    }
+  }
+
+  // Adjusts frames that were found with what they see now; false: there are none.
+  bool take_up(const std::vector<LocalFrame>& found, double limit) {
+    if (found.empty()) return false;
+    screen(limit);
+    choose_points_of(found);
+    solve_rough(Stage::kFocal);
+    return true;
   }
 
   void choose_points_of(const std::vector<LocalFrame>& frames) {
