@@ -35,7 +35,7 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
   for (ImageIndex i(0); block.images.contains(i); ++i.value)
     if (rows.frame[block.images[i].frame] == 0) images.push_back(i);
   std::sort(images.begin(), images.end(),
-            [&](ImageIndex a, ImageIndex b) { return block.images[a].name < block.images[b].name; });
+            [&](ImageIndex a, ImageIndex b) { return block.image_names[a] < block.image_names[b]; });
 
   std::fill(rows.frame.begin(), rows.frame.end(), -1);
   std::vector<std::pair<std::string, std::int32_t>> camera_of;

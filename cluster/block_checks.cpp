@@ -100,7 +100,7 @@ std::vector<std::vector<ImageIndex>> indices_of(const Block& block,
   std::vector<std::vector<ImageIndex>> found;
   if (subsets.empty()) return found;
   std::map<std::string, ImageIndex> index;
-  for (ImageIndex i(0); block.images.contains(i); ++i.value) index[block.images[i].name] = i;
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) index[block.name_of(i)] = i;
   for (const std::vector<std::string>& names : subsets) {
     found.emplace_back();
     for (const std::string& name : names) {
@@ -141,7 +141,7 @@ class SubsetTracks {
 
 std::vector<std::string> names_of(const ImageSubset& subset, const Block& block) {
   std::vector<std::string> names;
-  for (const ImageIndex image : subset.images) names.push_back(block.images[image].name);
+  for (const ImageIndex image : subset.images) names.push_back(block.name_of(image));
   return names;
 }
 

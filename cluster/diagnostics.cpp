@@ -39,7 +39,7 @@ class TrackEvidence {
     }
   }
 
-  FrameGraph graph() const { return links_.graph(static_cast<std::int64_t>(block_.frames.size())); }
+  const LinkWeights& links() const { return links_; }
   IndexedVector<ImageIndex, double> ground_height() const {
     IndexedVector<ImageIndex, double> height;
     for (ImageIndex i(0); count_.contains(i); ++i.value)
@@ -58,7 +58,7 @@ class TrackEvidence {
 
 BlockDiagnostics diagnose_with(const TrackEvidence& evidence, const Block& block, const BlockState& state,
                                const DiagnosticsOptions& options) {
-  return diagnose(block, state, evidence.ground_height(), evidence.graph(), options);
+  return diagnose(block, state, evidence.ground_height(), evidence.links(), options);
 }
 
 }  // namespace

@@ -40,17 +40,24 @@ void check_job_json(const JobStore& store, const JobJson& job) {
 }
 
 // An image is the same when its file is, or its name where there is no file.
-std::uint64_t identity(const Image& image) {
-  return image.file_hash != 0 ? image.file_hash : Hasher().add(image.name).value();
+std::uint64_t identity(const Block& block, ImageIndex image) {
+  const std::uint64_t hash = block.images[image].file_hash;
+  return hash != 0 ? hash : Hasher().add(block.image_names[image]).value();
+}
+
+std::vector<std::uint64_t> identities(const Block& block) {
+  std::vector<std::uint64_t> all;
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) all.push_back(identity(block, i));
+  return all;
 }
 
 // A job is not replaced by that of quite another block, which mostly is a slip of -j.
 void refuse_another_block(const JobStore& store, const Block& previous, const Project& project) {
-  std::vector<std::uint64_t> own;
-  for (const Image& image : previous.images) own.push_back(identity(image));
+  std::vector<std::uint64_t> own = identities(previous);
   std::sort(own.begin(), own.end());
-  const auto is_own = [&](const Image& image) { return std::binary_search(own.begin(), own.end(), identity(image)); };
-  if (std::any_of(project.block.images.begin(), project.block.images.end(), is_own)) return;
+  const auto is_own = [&](std::uint64_t image) { return std::binary_search(own.begin(), own.end(), image); };
+  const std::vector<std::uint64_t> given = identities(project.block);
+  if (std::any_of(given.begin(), given.end(), is_own)) return;
   throw InputError(store.directory() + ": is the job of another block: " + project.file + " has none of its " +
                    std::to_string(previous.images.size()) +
                    " images; name another folder with -j, or delete this one to begin anew");
@@ -157,6 +164,14 @@ void update_measurement_index(Job& job, const std::vector<std::string>& tracks) 
   if (!damage.empty() && job.is_first_rank()) tell_of_damage(job.store, kMeasurementIndex, damage);
 }
 
+// Tiles, tracks and adjustments do without the names of images, of which every rank has a table.
+void release_names(Job& job) {
+  job.block.image_names = {};
+  return_freed_memory();
+}
+
+void restore_names(Job& job) { job.block.image_names = read_image_names(job.store.verified_path("block.h5")); }
+
 void run_stages(Job& job, const std::string& tie_points) {
   const std::string& last = job.options.last_stage;
   std::vector<std::string> matches;
@@ -167,10 +182,12 @@ void run_stages(Job& job, const std::string& tie_points) {
     const CandidateGraph graph = run_candidates(job, features);
     if (last == "partition") return;
     matches = run_matching(job, features, graph);
+    release_names(job);
     use_memory_sparingly();
     tiles = run_tiles(job, matches);
     tracks = run_tracks(job, matches, tiles);
   } else {
+    release_names(job);
     use_memory_sparingly();
     tiles = run_tiles_of_tracks(job, tie_points);
     if (last == "partition") return;
@@ -181,7 +198,9 @@ void run_stages(Job& job, const std::string& tie_points) {
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   update_measurement_index(job, tracks);
   if (last == "match") return;
+  restore_names(job);
   BlockState oriented = run_orientation(job, matches);
+  release_names(job);
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
     throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
   if (last == "orient") return;

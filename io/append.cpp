@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <unordered_map>
 
 #include "io/ground_change.h"
 #include "io/project.h"
@@ -22,6 +23,19 @@ IndexedVector<Index, Index> places_by_name(const IndexedVector<Index, Item>& pre
   for (const Item& item : now) {
     const auto [found, inserted] = place.emplace(item.name, merged.next_index());
     if (inserted) merged.push_back(item);
+    places.push_back(found->second);
+  }
+  return places;
+}
+
+IndexedVector<ImageIndex, ImageIndex> places_of_images(const Block& previous, const Block& now, Block& merged) {
+  std::unordered_map<std::string, ImageIndex> place;
+  for (ImageIndex i(0); previous.images.contains(i); ++i.value)
+    place.emplace(previous.name_of(i), merged.add_image(previous.image_names[i], previous.images[i]));
+  IndexedVector<ImageIndex, ImageIndex> places;
+  for (ImageIndex i(0); now.images.contains(i); ++i.value) {
+    const auto [found, inserted] = place.emplace(now.name_of(i), merged.images.next_index());
+    if (inserted) merged.add_image(now.image_names[i], now.images[i]);
     places.push_back(found->second);
   }
   return places;
@@ -83,7 +97,7 @@ Block append_to(const Block& previous, const Block& now) {
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
   const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
   const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);
-  const auto images = places_by_name(previous.images, moved.images, merged.images);
+  const auto images = places_of_images(previous, moved, merged);
   for (std::size_t i = 0; i < cameras.size(); ++i)
     merged.cameras[cameras.Base::operator[](i)] = moved.cameras.Base::operator[](i);
   for (std::size_t i = 0; i < rigs.size(); ++i) {
@@ -99,7 +113,7 @@ Block append_to(const Block& previous, const Block& now) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     Image image = moved.images.Base::operator[](i);
     image.frame = frames[image.frame];
-    merged.images[images.Base::operator[](i)] = std::move(image);
+    merged.images[images.Base::operator[](i)] = image;
   }
   merged.relative_poses = moved.relative_poses;
   for (RelativePose& relative : merged.relative_poses) {

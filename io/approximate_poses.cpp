@@ -158,8 +158,7 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
     frames.emplace(block.frames[FrameIndex(static_cast<std::int64_t>(f))].name,
                    FrameIndex(static_cast<std::int64_t>(f)));
   for (std::size_t i = 0; i < block.images.size(); ++i)
-    images.emplace(block.images[ImageIndex(static_cast<std::int64_t>(i))].name,
-                   ImageIndex(static_cast<std::int64_t>(i)));
+    images.emplace(block.name_of(ImageIndex(static_cast<std::int64_t>(i))), ImageIndex(static_cast<std::int64_t>(i)));
   for (const ApproximatePoses::Row& row : poses.rows) {
     const auto image = images.find(row.name);
     const auto frame = frames.find(row.name);

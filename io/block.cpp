@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <string_view>
 #include <unordered_set>
 
 #include "geometry/camera.h"
@@ -46,13 +48,21 @@ void check_names(const auto& items, const std::string& kind) {
     require(seen.insert(item.name).second, kind + " '" + item.name + "' appears twice; names must differ");
 }
 
+void check_image_names(const Block& block) {
+  require(block.image_names.size() == block.images.size(), "the block has not a name per image");
+  std::unordered_set<std::string_view> seen;
+  for (ImageIndex i(0); block.images.contains(i); ++i.value)
+    require(seen.insert(block.image_names[i]).second,
+            "image '" + block.name_of(i) + "' appears twice; names must differ");
+}
+
 bool positive(const Eigen::Vector3d& sigma) { return (sigma.array() > 0).all(); }
 
 void check_verticals(const Block& block) {
   ImageIndex before;
   for (const SeenVertical& vertical : block.verticals) {
     require(block.images.contains(vertical.image), "a vertical names no image of the block");
-    const std::string what = "vertical of image '" + block.images[vertical.image].name + "'";
+    const std::string what = "vertical of image '" + block.name_of(vertical.image) + "'";
     require(before < vertical.image, what + ": appears twice, or out of the order of images");
     before = vertical.image;
     require(std::abs(vertical.down.norm() - 1) < 1e-6, what + ": is no unit vector");
@@ -75,9 +85,15 @@ bool same_origin(const GroundFrame& a, const GroundFrame& b) {
   return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
 }
 
+bool has_pictures(const Block& block) {
+  for (ImageIndex i(0); block.images.contains(i); ++i.value)
+    if (const std::string path = block.path_of(i); !path.empty() && std::filesystem::exists(path)) return true;
+  return false;
+}
+
 void check(const Block& block) {
   check_names(block.cameras, "camera");
-  check_names(block.images, "image");
+  check_image_names(block);
   check_names(block.control_points, "control point");
   check_names(block.lines, "line");
   for (const Camera& camera : block.cameras) {
@@ -110,10 +126,11 @@ void check(const Block& block) {
           "frame '" + frame.name + "': attitude prior must be a unit quaternion with positive sigmas");
     if (frame.given_pose) check_unit(*frame.given_pose, "frame '" + frame.name + "'");
   }
-  for (const Image& image : block.images) {
-    require(block.frames.contains(image.frame), "image '" + image.name + "': names no frame of the block");
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    const Image& image = block.images[i];
+    require(block.frames.contains(image.frame), "image '" + block.name_of(i) + "': names no frame of the block");
     require(image.mount >= 0 && image.mount < static_cast<int>(block.rig_of(image.frame).mounts.size()),
-            "image '" + image.name + "': its rig has no such mount");
+            "image '" + block.name_of(i) + "': its rig has no such mount");
   }
   for (const RelativePose& relative : block.relative_poses) {
     require(block.frames.contains(relative.from) && block.frames.contains(relative.to),

@@ -13,6 +13,7 @@
 #include "geometry/camera.h"
 #include "geometry/pose.h"
 #include "io/index.h"
+#include "io/name_table.h"
 
 namespace megablock {
 
@@ -75,7 +76,6 @@ struct Frame {
 };
 
 struct Image {
-  std::string name;  // unique; relative path in the image folder
   FrameIndex frame;
   int mount = 0;                // in the frame's rig
   std::uint64_t file_hash = 0;  // XXH3 of the file (0: none)
@@ -135,6 +135,7 @@ struct Block {
   IndexedVector<RigIndex, Rig> rigs;
   IndexedVector<FrameIndex, Frame> frames;
   IndexedVector<ImageIndex, Image> images;
+  NameTable<ImageIndex> image_names;  // [images] unique; relative paths in the image folder
   std::vector<RelativePose> relative_poses;
   std::vector<ControlPoint> control_points;
   std::vector<KnownLine> lines;
@@ -145,7 +146,15 @@ struct Block {
     return rig_of(images[image].frame).mounts[static_cast<std::size_t>(images[image].mount)];
   }
   CameraIndex camera_of(ImageIndex image) const { return mount_of(image).camera; }
-  std::string path_of(const Image& image) const { return image_folder.empty() ? "" : image_folder + image.name; }
+  // Throw std::out_of_range where image_names is away.
+  std::string name_of(ImageIndex image) const { return std::string(image_names[image]); }
+  std::string path_of(ImageIndex image) const { return image_folder.empty() ? "" : image_folder + name_of(image); }
+
+  ImageIndex add_image(std::string_view name, const Image& image) {
+    image_names.push_back(name);
+    images.push_back(image);
+    return ImageIndex(std::ssize(images) - 1);
+  }
 };
 
 // Current values of everything but points. Mounts are indexed [rig][mount].
@@ -158,6 +167,9 @@ struct BlockState {
 
 // State with the block's start values: cameras and mounts as given, frames with given_pose oriented.
 BlockState initial_state(const Block& block);
+
+// Any image file that is there.
+bool has_pictures(const Block& block);
 
 // Throws InputError when indices dangle, sigmas are negative or not finite, names repeat, quaternions are not unit.
 void check(const Block& block);

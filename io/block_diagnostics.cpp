@@ -108,7 +108,7 @@ class JsonWriter {
   OrderedJson of(const BlockDiagnostics::Footprint& footprint) const {
     OrderedJson corners = OrderedJson::array();
     for (const Eigen::Vector2d& corner : footprint.corners) corners.push_back({corner.x(), corner.y()});
-    return {{"image", block_.images[footprint.image].name}, {"corners_m", corners}};
+    return {{"image", block_.name_of(footprint.image)}, {"corners_m", corners}};
   }
   // The frames of all parts but the largest.
   OrderedJson smaller_parts() const {

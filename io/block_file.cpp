@@ -1,4 +1,7 @@
 // The block as read from project file and image headers: docs/job-format.md, "Block".
+#include <algorithm>
+#include <functional>
+
 #include "io/hdf5_block.h"
 #include "io/hdf5_cameras.h"
 #include "io/hdf5_tables.h"
@@ -202,8 +205,8 @@ IndexedVector<FrameIndex, Frame> get_frames(const Hdf5Reader& file) {
 void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images, const Block& block) {
   file.group("images", "one row per exposure");
   const std::int64_t count = std::ssize(images);
-  file.texts("images/name", count, [&](std::int64_t i) { return images[ImageIndex(i)].name; });
-  file.texts("images/path", count, [&](std::int64_t i) { return block.path_of(images[ImageIndex(i)]); },
+  file.texts("images/name", count, [&](std::int64_t i) { return block.name_of(ImageIndex(i)); });
+  file.texts("images/path", count, [&](std::int64_t i) { return block.path_of(ImageIndex(i)); },
              {"", "image file; empty for simulated tie points"});
   file.vector("images/frame", column(images, [](const Image& i) { return i.frame.value; }), {"", "row in frames"});
   file.vector("images/mount", column(images, [](const Image& i) { return static_cast<std::int32_t>(i.mount); }),
@@ -231,23 +234,34 @@ std::string get_image_folder(const Hdf5Reader& file) {
   return path.ends_with(name) ? path.substr(0, path.size() - name.size()) : "";
 }
 
-IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
+// Calls visit(rows) for the rows of the table of images, a batch at a time.
+void visit_image_rows(const Hdf5Reader& file, const std::function<void(const std::vector<RowRange>&)>& visit) {
   constexpr std::int64_t kBatch = 1 << 16;
   const std::vector<std::int64_t> shape = file.shape("images/name");
   for (const char* name : {"images/frame", "images/mount", "images/file_hash"})
     if (shape.size() != 1 || file.shape(name) != shape) file.fail(name, "has not a row per image");
+  for (std::int64_t first = 0; first < shape[0]; first += kBatch) visit({{first, std::min(kBatch, shape[0] - first)}});
+}
+
+IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
   IndexedVector<ImageIndex, Image> images;
-  images.reserve(static_cast<std::size_t>(shape[0]));
-  for (std::int64_t first = 0; first < shape[0]; first += kBatch) {
-    const std::vector<RowRange> rows = {{first, std::min(kBatch, shape[0] - first)}};
-    std::vector<std::string> names = file.text_rows("images/name", rows);
+  images.reserve(static_cast<std::size_t>(file.shape("images/frame").at(0)));
+  visit_image_rows(file, [&](const std::vector<RowRange>& rows) {
     const auto frames = file.rows<std::int64_t>("images/frame", rows);
     const auto mounts = file.rows<std::int32_t>("images/mount", rows);
     const auto hashes = file.rows<std::uint64_t>("images/file_hash", rows);
-    for (std::size_t i = 0; i < names.size(); ++i)
-      images.push_back({std::move(names[i]), FrameIndex(frames[i]), mounts[i], hashes[i]});
-  }
+    for (std::size_t i = 0; i < frames.size(); ++i) images.push_back({FrameIndex(frames[i]), mounts[i], hashes[i]});
+  });
   return images;
+}
+
+NameTable<ImageIndex> get_image_names(const Hdf5Reader& file) {
+  NameTable<ImageIndex> names;
+  names.reserve(static_cast<std::size_t>(file.shape("images/name").at(0)));
+  visit_image_rows(file, [&](const std::vector<RowRange>& rows) {
+    for (const std::string& name : file.text_rows("images/name", rows)) names.push_back(name);
+  });
+  return names;
 }
 
 void put_relative_poses(Hdf5Writer& file, const std::vector<RelativePose>& relatives) {
@@ -449,6 +463,7 @@ Block get_block(const Hdf5Reader& file) {
   block.frames = get_frames(file);
   block.image_folder = get_image_folder(file);
   block.images = get_images(file);
+  block.image_names = get_image_names(file);
   block.relative_poses = get_relative_poses(file);
   block.control_points = get_control(file);
   block.lines = get_lines(file);
@@ -463,5 +478,7 @@ void write_block(const std::string& path, const Block& block) {
 }
 
 Block read_block(const std::string& path) { return get_block(Hdf5Reader(path, "block")); }
+
+NameTable<ImageIndex> read_image_names(const std::string& path) { return get_image_names(Hdf5Reader(path, "block")); }
 
 }  // namespace megablock

@@ -251,7 +251,7 @@ void write_control_csv(const std::string& path, const Block& block) {
         fmt::format("{},{},{},{},{},{},{}", point.name, point.role == PointRole::kCheck ? "check" : "control", p.x(),
                     p.y(), std::isnan(p.z()) ? "" : fmt::format("{}", p.z()), point.sigma.x(), point.sigma.z());
     for (const ImageMeasurement& m : point.measurements)
-      writer.print("{},{},{},{},{}\n", head, block.images[m.image].name, m.pixel.x(), m.pixel.y(), m.sigma_px);
+      writer.print("{},{},{},{},{}\n", head, block.name_of(m.image), m.pixel.x(), m.pixel.y(), m.sigma_px);
     if (point.measurements.empty()) writer.print("{},,,,\n", head);
   }
   writer.close();

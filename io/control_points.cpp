@@ -17,7 +17,7 @@ std::map<std::string, ImageIndex> images_by_name(const Block& block) {
   std::map<std::string, ImageIndex> by_name, by_last;
   for (std::size_t i = 0; i < block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
-    const std::string& name = block.images[image].name;
+    const std::string& name = block.name_of(image);
     by_name.emplace(name, image);
     const auto [found, inserted] = by_last.emplace(name.substr(name.find_last_of('/') + 1), image);
     if (!inserted) found->second = ImageIndex();

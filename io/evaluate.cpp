@@ -62,9 +62,9 @@ std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& tru
   for (std::size_t i = 0; i < truth.names.size(); ++i) row.emplace(truth.names[i], i);
   const Block& block = result.block;
   std::vector<std::string> first_image(block.frames.size());
-  for (const Image& image : block.images) {
-    std::string& name = first_image[static_cast<std::size_t>(image.frame.value)];
-    if (name.empty()) name = image.name;
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    std::string& name = first_image[static_cast<std::size_t>(block.images[i].frame.value)];
+    if (name.empty()) name = block.name_of(i);
   }
   std::vector<Match> matches;
   for (std::size_t f = 0; f < block.frames.size(); ++f) {

@@ -77,7 +77,7 @@ void export_bundler(const BlockResult& result, const std::string& path) {
     for (int r = 0; r < 3; ++r)
       writer.print("{} {} {}\n", camera.rotation(r, 0), camera.rotation(r, 1), camera.rotation(r, 2));
     writer.print("{} {} {}\n", camera.translation.x(), camera.translation.y(), camera.translation.z());
-    list.print("{} 0 {}\n", view.image(i).name, camera.focal);
+    list.print("{} 0 {}\n", view.image_name(i), camera.focal);
   }
   for (std::size_t t = 0; t < all.tracks.size(); ++t) {
     const Eigen::Vector3d& p = view.point(all.tracks[t]);

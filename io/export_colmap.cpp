@@ -83,7 +83,7 @@ void write_model(const BlockResult& result, Writer& writer) {
     const Eigen::Vector3d translation = -(pose.rotation * pose.centre);
     const std::int64_t begin = by_image.begin[static_cast<std::size_t>(i)];
     const std::int64_t end = by_image.begin[static_cast<std::size_t>(i) + 1];
-    writer.image(image_id(view, i), pose.rotation, translation, view.camera_index(i).value + 1, view.image(i).name,
+    writer.image(image_id(view, i), pose.rotation, translation, view.camera_index(i).value + 1, view.image_name(i),
                  end - begin);
     for (std::int64_t k = begin; k < end; ++k) {
       const auto position = static_cast<std::size_t>(by_image.observation[static_cast<std::size_t>(k)]);

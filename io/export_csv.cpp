@@ -51,7 +51,7 @@ void write_local(const ExportView& view, const std::string& path) {
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Image& image = view.image(i);
     const Pose pose = view.pose(i);
-    writer.print("{},{},{},{},{},{}", image.name, view.result.block.frames[image.frame].name,
+    writer.print("{},{},{},{},{},{}", view.image_name(i), view.result.block.frames[image.frame].name,
                  view.result.block.cameras[view.camera_index(i)].name, pose.centre.x(), pose.centre.y(),
                  pose.centre.z());
     print_angles(writer, pose.rotation);
@@ -71,7 +71,7 @@ void write_wgs84(const ExportView& view, const std::string& path) {
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Pose pose = view.pose(i);
     const Geodetic position = georeference.to_geodetic(pose.centre);
-    writer.print("{},{:.11f},{:.11f},{:.5f}", view.image(i).name, position.latitude_deg, position.longitude_deg,
+    writer.print("{},{:.11f},{:.11f},{:.5f}", view.image_name(i), position.latitude_deg, position.longitude_deg,
                  position.height_m);
     const Eigen::Quaterniond own = georeference.own_from_block(position);
     print_angles(writer, pose.rotation * own.conjugate());

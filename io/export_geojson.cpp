@@ -79,7 +79,7 @@ void export_geojson(const BlockResult& result, const std::string& path) {
       ring.push_back(ring.front());
       geometry = {{"type", "Polygon"}, {"coordinates", Json::array({ring})}};
     }
-    Json properties = {{"image", image.name},
+    Json properties = {{"image", view.image_name(i)},
                        {"frame", result.block.frames[image.frame].name},
                        {"centre", coordinates(georeference, pose.centre, true)}};
     if (result.tiles.tile_of_frame.contains(image.frame))

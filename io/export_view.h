@@ -19,6 +19,7 @@ struct ExportView {
   std::vector<std::int64_t> observations;  // rows of result.tracks' observations, kept, of oriented images
 
   const Image& image(std::int64_t i) const { return result.block.images[images[static_cast<std::size_t>(i)]]; }
+  std::string image_name(std::int64_t i) const { return result.block.name_of(images[static_cast<std::size_t>(i)]); }
   CameraIndex camera_index(std::int64_t i) const { return result.block.camera_of(images[static_cast<std::size_t>(i)]); }
   const Intrinsics& intrinsics(std::int64_t i) const { return result.state.cameras[camera_index(i)]; }
   Pose pose(std::int64_t i) const;  // of the camera in the ground frame

@@ -133,13 +133,12 @@ void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping groupin
       block.cameras.push_back(make_camera(name, image.header));
       block.rigs.push_back(std::move(rig));
     }
-    Image entry{image.name, block.frames.next_index(), 0, image.hash};
+    block.add_image(image.name, {block.frames.next_index(), 0, image.hash});
     Frame frame;
     frame.name = image.name;
     frame.rig = found->second;
     frame.time_s = image.header.time_s;
     block.frames.push_back(std::move(frame));
-    block.images.push_back(std::move(entry));
   }
 }
 

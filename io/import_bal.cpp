@@ -47,7 +47,7 @@ ImportedBlock block_from_bal(const BalProblem& problem, const std::vector<std::s
     frame.name = name;
     frame.rig = RigIndex(static_cast<std::int64_t>(c));
     frame.given_pose = pose_from_bal(problem.cameras[c]);
-    block.images.push_back({name, block.frames.next_index(), 0, 0});
+    block.add_image(name, {block.frames.next_index(), 0, 0});
     block.frames.push_back(std::move(frame));
   }
   check(block);

@@ -84,7 +84,7 @@ void ColmapBuilder::add_image(std::int64_t id, const std::array<double, 4>& q, c
   frame.name = name;
   frame.rig = RigIndex(found->second.value);
   frame.given_pose = Pose{rotation.normalized(), -(rotation.normalized().conjugate() * translation)};
-  block.images.push_back({name, block.frames.next_index(), 0, 0});
+  block.add_image(name, {block.frames.next_index(), 0, 0});
   block.frames.push_back(std::move(frame));
 }
 

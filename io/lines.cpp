@@ -51,7 +51,7 @@ void read_lines(const std::string& path, const std::vector<std::string>& left_ou
   std::map<std::string, ImageIndex> images;
   for (std::size_t i = 0; i < block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
-    images.emplace(block.images[image].name, image);
+    images.emplace(block.name_of(image), image);
   }
   std::map<std::string, std::size_t> line_of_name;
   std::map<std::string, std::string> first_place;

@@ -94,7 +94,7 @@ class RigBuilder {
         old_(project.block) {
     for (std::size_t i = 0; i < old_.images.size(); ++i) {
       const ImageIndex image(static_cast<std::int64_t>(i));
-      images_.emplace(old_.images[image].name, image);
+      images_.emplace(old_.name_of(image), image);
     }
     for (const auto& [name, reason] : project.unreadable) left_out_.push_back(name);
     left_out_.insert(left_out_.end(), project.copies.begin(), project.copies.end());

@@ -114,11 +114,10 @@ std::string unused_points_text(const BlockResult& result, PointRole role) {
                   one ? "point" : "points", one ? "s" : "");
   for (std::size_t i = 0; i < std::min(kNamed, unused.size()); ++i) {
     const UnusedPoint& point = unused[i];
-    text +=
-        (i > 0 ? ", " : "") + result.block.control_points[point.point].name + " (" +
-        (point.image.valid() ? pixels(point.worst_px) + " px in " + result.block.images[point.image].name + ", rejected"
-                             : "not seen by an oriented image") +
-        ")";
+    text += (i > 0 ? ", " : "") + result.block.control_points[point.point].name + " (" +
+            (point.image.valid() ? pixels(point.worst_px) + " px in " + result.block.name_of(point.image) + ", rejected"
+                                 : "not seen by an oriented image") +
+            ")";
   }
   if (unused.size() > kNamed) text += fmt::format(" and {} more", unused.size() - kNamed);
   return text;

@@ -15,6 +15,7 @@ namespace megablock {
 
 void write_block(const std::string& path, const Block& block);
 Block read_block(const std::string& path);
+NameTable<ImageIndex> read_image_names(const std::string& path);  // Block::image_names of such a file
 
 void write_features(const std::string& path, const std::vector<ImageFeatures>& images);
 std::vector<ImageFeatures> read_features(const std::string& path);
@@ -50,21 +51,21 @@ InitialOrientation read_orientation(const std::string& path);
 // with the rows of the tile's track file (then its control points in block order).
 struct TileAdjustment {
   std::vector<FrameIndex> frames;
-  std::vector<Pose> poses;                       // [frames]
-  std::vector<std::int64_t> observations;        // [frames], kept ones: the boundary frame starts from the richest tile
+  std::vector<Pose> poses;                 // [frames]
+  std::vector<std::int64_t> observations;  // [frames], kept ones: the boundary frame starts from the richest tile
   std::vector<CameraIndex> cameras;
-  std::vector<Intrinsics> intrinsics;            // [cameras]
-  std::vector<std::int64_t> camera_observations; // [cameras]
+  std::vector<Intrinsics> intrinsics;             // [cameras]
+  std::vector<std::int64_t> camera_observations;  // [cameras]
   std::vector<RigIndex> mount_rigs;
   std::vector<std::int32_t> mount_numbers;       // [mount_rigs] of the mount in its rig
   std::vector<Pose> mounts;                      // [mount_rigs]
   std::vector<std::int64_t> mount_observations;  // [mount_rigs]
   std::vector<std::uint8_t> parts;               // [rows of the track file] part of its track (adjust/track_parts.h)
   // Of the tracks split into these parts:
-  std::vector<Eigen::Vector3d> points;           // [tracks + control points]; NaN = not triangulated
-  std::vector<std::uint8_t> kept;                // [observations of tracks, then of control points] 1 = kept
-  double image_sigma_px = 0;                     // of tie point measurements, with which the tile was adjusted
-  std::string summary;                           // one line for the log and the report
+  std::vector<Eigen::Vector3d> points;  // [tracks + control points]; NaN = not triangulated
+  std::vector<std::uint8_t> kept;       // [observations of tracks, then of control points] 1 = kept
+  double image_sigma_px = 0;            // of tie point measurements, with which the tile was adjusted
+  std::string summary;                  // one line for the log and the report
 };
 void write_adjustment(const std::string& path, const TileAdjustment& adjustment);
 TileAdjustment read_adjustment(const std::string& path);

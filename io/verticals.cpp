@@ -82,7 +82,7 @@ void read_verticals(const std::string& path, const std::vector<std::string>& lef
   csv.require({"image", "down_x", "down_y", "down_z"});
   if (!csv.has("sigma_deg")) csv.require({"sigma_roll_deg", "sigma_pitch_deg"});
   std::map<std::string, ImageIndex> images;
-  for (ImageIndex i(0); block.images.contains(i); ++i.value) images.emplace(block.images[i].name, i);
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) images.emplace(block.name_of(i), i);
   std::map<ImageIndex, SeenVertical> verticals;
   for (std::size_t row = 0; row < csv.row_count(); ++row) {
     const std::string name = csv.text(row, "image");
@@ -155,7 +155,7 @@ std::string set_aside_text(const Block& block, std::span<const SetAsideVertical>
     std::size_t count = 0;
     for (const SetAsideVertical& vertical : aside) {
       if (vertical.verdict != verdict || ++count > kNamed) continue;
-      names += (names.empty() ? "" : ", ") + block.images[vertical.image].name;
+      names += (names.empty() ? "" : ", ") + block.name_of(vertical.image);
     }
     if (count > kNamed) names += fmt::format(" and {} more", count - kNamed);
     if (count > 0) reasons += fmt::format("{}{} {} ({})", reasons.empty() ? "" : ", ", count, reason, names);

@@ -81,6 +81,11 @@ Adjacency subgraph(const Adjacency& graph, const std::vector<idx_t>& side, idx_t
   Adjacency part;
   part.begin.reserve(static_cast<std::size_t>(count) + 1);
   part.begin.push_back(0);
+  idx_t links = 0;  // those to the other half included
+  for (std::size_t v = 0; v < side.size(); ++v)
+    if (side[v] == which) links += graph.begin[v + 1] - graph.begin[v];
+  part.neighbour.reserve(static_cast<std::size_t>(links));
+  part.weight.reserve(static_cast<std::size_t>(links));
   for (std::size_t v = 0; v < side.size(); ++v) {
     if (side[v] != which) continue;
     for (idx_t e = graph.begin[v]; e < graph.begin[v + 1]; ++e) {

@@ -39,11 +39,11 @@ std::int64_t missing_in(double usual_distances) {
 class Diagnosis {
  public:
   Diagnosis(const Block& block, const BlockState& state, const IndexedVector<ImageIndex, double>& ground_height,
-            const FrameGraph& links, const DiagnosticsOptions& options)
-      : block_(block), state_(state), ground_(ground_height), graph_(links) {
+            const LinkWeights& links, const DiagnosticsOptions& options)
+      : block_(block), state_(state), ground_(ground_height), links_(links) {
     options.check();
     found_.requested = options;
-    found_.links_known = !links.edges.empty();
+    found_.links_known = !links.empty();
   }
 
   BlockDiagnostics find() {
@@ -58,7 +58,7 @@ class Diagnosis {
       find_missing_lines();
       find_pairs();
     }
-    find_link_parts(block_, state_, graph_, found_);
+    find_link_parts(block_, state_, links_, found_);
     if (found_.aerial) {
       GroundCover cover(found_.footprints, found_.requested.min_images);
       place_exposures();
@@ -312,9 +312,10 @@ class Diagnosis {
       for (const FlightLine& line : lines_)
         for (std::size_t i = 0; i + 1 < line.size(); ++i) add_pair(line[i], line[i + 1]);
     } else {
-      for (const FrameEdge& edge : graph_.edges)
+      links_.visit([this](const FrameEdge& edge) {
         if (edge.weight >= found_.requested.min_link_points && state_.oriented[edge.a] && state_.oriented[edge.b])
           add_pair(edge.a, edge.b);
+      });
     }
   }
 
@@ -406,7 +407,7 @@ class Diagnosis {
   const Block& block_;
   const BlockState& state_;
   const IndexedVector<ImageIndex, double>& ground_;
-  const FrameGraph& graph_;
+  const LinkWeights& links_;
   BlockDiagnostics found_;
   std::vector<FlightLine> lines_;
   IndexedVector<FrameIndex, ImageIndex> down_image_;       // invalid: none looks down
@@ -421,7 +422,7 @@ class Diagnosis {
 }  // namespace
 
 BlockDiagnostics diagnose(const Block& block, const BlockState& state,
-                          const IndexedVector<ImageIndex, double>& ground_height, const FrameGraph& links,
+                          const IndexedVector<ImageIndex, double>& ground_height, const LinkWeights& links,
                           const DiagnosticsOptions& options) {
   return Diagnosis(block, state, ground_height, links, options).find();
 }

@@ -20,14 +20,14 @@
 #pragma once
 
 #include "io/block_diagnostics.h"
-#include "io/image_graph.h"
+#include "partition/link_weights.h"
 
 namespace megablock {
 
 // Frames with a pose are looked at: those of `state` that are oriented. `ground_height`: of what each image sees, z in
-// the block's frame; NaN: not known. `links`: common tie points of frames; without edges: not known.
+// the block's frame; NaN: not known. `links`: common tie points of frames; empty: not known.
 BlockDiagnostics diagnose(const Block& block, const BlockState& state,
-                          const IndexedVector<ImageIndex, double>& ground_height, const FrameGraph& links,
+                          const IndexedVector<ImageIndex, double>& ground_height, const LinkWeights& links,
                           const DiagnosticsOptions& options);
 
 // Before anything is oriented: frames with a given pose, or position and attitude prior.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tuple>
 
 #include "io/disjoint_sets.h"
 
@@ -15,17 +16,24 @@ struct GoodLink {
 };
 
 // Links of enough points and relative poses, ascending; two that join the same frames are one.
-std::vector<GoodLink> good_links(const Block& block, const BlockState& state, const FrameGraph& links,
+std::vector<GoodLink> good_links(const Block& block, const BlockState& state, const LinkWeights& links,
                                  std::int64_t enough) {
   std::vector<GoodLink> good;
-  for (const FrameEdge& edge : links.edges)
-    if (edge.weight >= enough && state.oriented[edge.a] && state.oriented[edge.b])
-      good.push_back({edge.a, edge.b, edge.weight});
+  const auto is_good = [&](const FrameEdge& edge) {
+    return edge.weight >= enough && state.oriented[edge.a] && state.oriented[edge.b];
+  };
+  std::size_t count = block.relative_poses.size();
+  links.visit([&](const FrameEdge& edge) { count += is_good(edge); });
+  good.reserve(count);
+  links.visit([&](const FrameEdge& edge) {
+    if (is_good(edge)) good.push_back({edge.a, edge.b, edge.weight});
+  });
   for (const RelativePose& pose : block.relative_poses)
     if (pose.from != pose.to && state.oriented[pose.from] && state.oriented[pose.to])
       good.push_back({std::min(pose.from, pose.to), std::max(pose.from, pose.to), 0});
-  std::stable_sort(good.begin(), good.end(),
-                   [](const GoodLink& x, const GoodLink& y) { return std::pair(x.a, x.b) < std::pair(y.a, y.b); });
+  std::sort(good.begin(), good.end(), [](const GoodLink& x, const GoodLink& y) {  // tie points before a relative pose
+    return std::tuple(x.a, x.b, -x.points) < std::tuple(y.a, y.b, -y.points);
+  });
   const auto same = [](const GoodLink& x, const GoodLink& y) { return x.a == y.a && x.b == y.b; };
   good.erase(std::unique(good.begin(), good.end(), same), good.end());
   return good;
@@ -121,7 +129,7 @@ void number_parts(const BlockState& state, DisjointSets& sets, BlockDiagnostics&
 
 }  // namespace
 
-void find_link_parts(const Block& block, const BlockState& state, const FrameGraph& links, BlockDiagnostics& d) {
+void find_link_parts(const Block& block, const BlockState& state, const LinkWeights& links, BlockDiagnostics& d) {
   if (!d.links_known) {
     d.part_of_frame.assign(state.oriented.size(), -1);
     return;
@@ -130,10 +138,10 @@ void find_link_parts(const Block& block, const BlockState& state, const FrameGra
   DisjointSets sets(static_cast<std::int64_t>(state.oriented.size()));
   for (const GoodLink& link : good) sets.unite(link.a.value, link.b.value);
   number_parts(state, sets, d);
-  for (const FrameEdge& edge : links.edges) {
+  links.visit([&](const FrameEdge& edge) {
     const std::int32_t a = d.part_of_frame[edge.a], b = d.part_of_frame[edge.b];
     if (a >= 0 && b >= 0 && a != b) d.weak_links.push_back({edge.a, edge.b, edge.weight, 0});
-  }
+  });
   Bridges(static_cast<std::int64_t>(state.oriented.size()), good).find([&](std::size_t l, std::int64_t below) {
     const GoodLink& link = good[l];
     const std::int64_t whole = d.part_frames[static_cast<std::size_t>(d.part_of_frame[link.a])];

@@ -2,12 +2,12 @@
 #pragma once
 
 #include "io/block_diagnostics.h"
-#include "io/image_graph.h"
+#include "partition/link_weights.h"
 
 namespace megablock {
 
 // Fills in part_of_frame, part_frames, weak_links and single_links, of frames with a pose. Linear in the links.
-void find_link_parts(const Block& block, const BlockState& state, const FrameGraph& links,
+void find_link_parts(const Block& block, const BlockState& state, const LinkWeights& links,
                      BlockDiagnostics& diagnostics);
 
 }  // namespace megablock

@@ -36,18 +36,14 @@ void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
 }
 
 FrameGraph LinkWeights::graph(std::int64_t frames) const {
-  const auto visit = [&](auto&& visit_edge) {
-    for (std::size_t first = 0; first < links_.size(); ++first)
-      for (const Link& link : links_[first]) {
-        const auto a = static_cast<std::int64_t>(first), b = a + link.further;
-        if (b < frames) visit_edge(FrameEdge{FrameIndex(a), FrameIndex(b), link.tracks});
-      }
-  };
+  const auto within = [&](const FrameEdge& edge) { return edge.b.value < frames; };
   std::size_t count = 0;
-  visit([&](const FrameEdge&) { ++count; });
+  visit([&](const FrameEdge& edge) { count += within(edge); });
   FrameGraph graph{frames, {}};
   graph.edges.reserve(count);
-  visit([&](const FrameEdge& edge) { graph.edges.push_back(edge); });
+  visit([&](const FrameEdge& edge) {
+    if (within(edge)) graph.edges.push_back(edge);
+  });
   return graph;
 }
 

@@ -16,6 +16,16 @@ class LinkWeights {
   void add(FrameIndex a, FrameIndex b, std::int64_t tracks);
   // The links among the first `frames` frames. Does not depend on the order of add().
   FrameGraph graph(std::int64_t frames) const;
+  bool empty() const { return links_.empty(); }
+  // Calls visit(FrameEdge) for every link, ascending.
+  template <typename Visit>
+  void visit(Visit&& visit_edge) const {
+    for (std::size_t first = 0; first < links_.size(); ++first)
+      for (const Link& link : links_[first]) {
+        const auto a = static_cast<std::int64_t>(first);
+        visit_edge(FrameEdge{FrameIndex(a), FrameIndex(a + link.further), link.tracks});
+      }
+  }
 
  private:
   struct Link {

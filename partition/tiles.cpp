@@ -82,7 +82,9 @@ class TileMaker {
     std::vector<Component> result;
     for (std::size_t i = 0; i < work.size(); ++i) {  // work grows while components fall apart
       Frames frames = std::move(work[i]);
-      FrameGraph part = part_of(frames);
+      const bool whole = static_cast<std::int64_t>(frames.size()) == graph_.frame_count;
+      const FrameGraph links = whole ? FrameGraph() : part_of(frames);
+      const FrameGraph& part = whole ? graph_ : links;  // without a copy
       BisectionTree cut = bisect(part, options_.tile_max_frames, least_tiles(frames.size(), linked));
       std::vector<Frames> pieces = pieces_without_weak_links(part, cut, frames);
       if (pieces.size() == 1 && pieces.front().size() == frames.size())
@@ -103,9 +105,8 @@ class TileMaker {
     const auto count = static_cast<std::int64_t>(frames);
     return (options_.min_tiles * count + linked - 1) / linked;
   }
-  // The links among `frames`; the whole graph needs no copying of numbers.
+  // The links among `frames`.
   FrameGraph part_of(const Frames& frames) {
-    if (static_cast<std::int64_t>(frames.size()) == graph_.frame_count) return graph_;
     if (static_cast<std::int64_t>(frames.size()) > kScanLimit) return graph_of(graph_, frames, position_);
     return small_part_of(frames);
   }

@@ -57,7 +57,7 @@ IndexedVector<ImageIndex, std::int64_t> name_ranks(const Block& block) {
   order.reserve(block.images.size());
   for (std::size_t i = 0; i < block.images.size(); ++i) order.emplace_back(static_cast<std::int64_t>(i));
   std::sort(order.begin(), order.end(),
-            [&](ImageIndex a, ImageIndex b) { return natural_less(block.images[a].name, block.images[b].name); });
+            [&](ImageIndex a, ImageIndex b) { return natural_less(block.image_names[a], block.image_names[b]); });
   IndexedVector<ImageIndex, std::int64_t> ranks(block.images.size(), 0);
   for (std::size_t r = 0; r < order.size(); ++r) ranks[order[r]] = static_cast<std::int64_t>(r);
   return ranks;

@@ -107,7 +107,7 @@ std::vector<std::int64_t> add_images(const Block& whole, Part& part) {
     row[i] = part.block.images.next_index().value;
     Image image = whole.images[index];
     image.frame = FrameIndex(frame);
-    part.block.images.push_back(std::move(image));
+    part.block.add_image(whole.image_names[index], image);
   }
   return row;
 }

@@ -49,7 +49,7 @@ PanoramicTracks tracks_of(const CalibrationInput& input, CameraIndex camera) {
     for (const std::int64_t row : rows) {
       const ImageIndex image = input.tracks.image[row];
       const auto [entry, added] = number.try_emplace(image, static_cast<int>(number.size()));
-      if (added) result.images.push_back(input.block.images[image].name);
+      if (added) result.images.push_back(input.block.name_of(image));
       result.image.push_back(entry->second);
       result.pixel.emplace_back(from_fixed_pixel(input.tracks.x[row]), from_fixed_pixel(input.tracks.y[row]));
     }

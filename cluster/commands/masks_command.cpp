@@ -94,7 +94,7 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::int64_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    const GreyImage image = read_grey_image(block.path_of(block.images[images[at]]));
+    const GreyImage image = read_grey_image(block.path_of(images[at]));
     if (!image.failure.empty()) continue;
     gradients[at] = finder.gradients(image.pixels);
     sizes[at] = image.pixels.size();
@@ -108,8 +108,8 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
     return judged;
   }
   judged.mask = finder.mask();
-  judged.sample = read_picture(block.path_of(block.images[images[images.size() / 2]]),
-                               cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  judged.sample =
+      read_picture(block.path_of(images[images.size() / 2]), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   return judged;
 }
 
@@ -201,8 +201,7 @@ int propose_masks(MasksOptions options) {
   options.regions.check();
   const Project project = read_project(options.project);
   const Block& block = project.block;
-  if (std::none_of(block.images.begin(), block.images.end(),
-                   [&](const Image& i) { return fs::exists(block.path_of(i)); }))
+  if (!has_pictures(block))
     throw InputError(options.project + ": the project has no pictures; masks are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "mask_proposals").string();
   std::error_code error;

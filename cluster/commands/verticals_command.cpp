@@ -35,11 +35,7 @@ constexpr double kLeastSensorSigma = 2 * kDegree;
 
 constexpr double kGivenPoseSigma = 5 * kDegree;  // approximate poses
 
-std::uint64_t seed_of(const Image& image) {
-  Hasher hasher;
-  hasher.add(std::string_view(image.name));
-  return hasher.value();
-}
+std::uint64_t seed_of(std::string_view image) { return Hasher().add(image).value(); }
 
 }  // namespace
 
@@ -58,7 +54,7 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
     return prior;
   }
   try {
-    prior.down = down_of_exif_orientation(read_image_header(block.path_of(image)).orientation);
+    prior.down = down_of_exif_orientation(read_image_header(block.path_of(i)).orientation);
   } catch (const InputError&) {
   }  // reading the picture says what is wrong with it
   return prior;
@@ -85,7 +81,7 @@ std::string edgeless_text(const Block& block, const std::vector<ImageVertical>& 
   std::string names;
   for (std::size_t k = 0; k < verticals.size(); ++k) {
     if (verticals[k].segments > 0 || !verticals[k].failure.empty() || ++count > kNamed) continue;
-    names += (count > 1 ? ", " : "") + block.images[ImageIndex(static_cast<std::int64_t>(k))].name;
+    names += (count > 1 ? ", " : "") + block.name_of(ImageIndex(static_cast<std::int64_t>(k)));
   }
   if (count == 0) return "";
   if (count > kNamed) names += fmt::format(" and {} more", count - kNamed);
@@ -99,7 +95,7 @@ SeenVertical seen_vertical(ImageIndex image, const ImageVertical& found, const I
 
 // With the sigmas that the camera's own add, for the reader of the table.
 std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
-  const std::string& name = block.images[i].name;
+  const std::string& name = block.name_of(i);
   const std::string found_in = fmt::format("{},{},{}", v.segments, v.vanishing_points, v.lines);
   if (!v.found) return name + ",,,,,,,,,,," + found_in + ",,,\n";
   const Camera& camera = block.cameras[block.camera_of(i)];
@@ -115,8 +111,7 @@ int write_verticals(VerticalsOptions options) {
   const Project project = read_project(options.project);
   const Block& block = project.block;
   namespace fs = std::filesystem;
-  if (std::none_of(block.images.begin(), block.images.end(),
-                   [&](const Image& i) { return fs::exists(block.path_of(i)); }))
+  if (!has_pictures(block))
     throw InputError(options.project + ": the project has no pictures; verticals are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "verticals.csv").string();
   const fs::path output = fs::absolute(options.output);
@@ -129,8 +124,8 @@ int write_verticals(VerticalsOptions options) {
   for (std::int64_t k = 0; k < count; ++k) {
     const ImageIndex i(k);
     verticals[static_cast<std::size_t>(k)] =
-        find_image_vertical(block.path_of(block.images[i]), block.cameras[block.camera_of(i)],
-                            expected_vertical(block, i), seed_of(block.images[i]), options.segments);
+        find_image_vertical(block.path_of(i), block.cameras[block.camera_of(i)], expected_vertical(block, i),
+                            seed_of(block.image_names[i]), options.segments);
   }
 
   std::string table = verticals_header() +
@@ -138,11 +133,11 @@ int write_verticals(VerticalsOptions options) {
   int found = 0, failed = 0;
   for (std::int64_t k = 0; k < count; ++k) {
     const ImageVertical& v = verticals[static_cast<std::size_t>(k)];
-    const Image& image = block.images[ImageIndex(k)];
     table += row_of(block, ImageIndex(k), v);
     found += v.found;
     failed += !v.failure.empty();
-    if (!v.failure.empty()) std::fprintf(stderr, "megablock: %s: %s\n", image.name.c_str(), v.failure.c_str());
+    if (!v.failure.empty())
+      std::fprintf(stderr, "megablock: %s: %s\n", block.name_of(ImageIndex(k)).c_str(), v.failure.c_str());
   }
   JobStore(output.parent_path().string()).write_text(output.filename().string(), table);
   std::printf("%d of %zu images show the vertical: %s\n", found, verticals.size(), options.output.c_str());

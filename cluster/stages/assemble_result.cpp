@@ -48,12 +48,12 @@ void list_failures(const Job& job, BlockResult& result) {
     const FrameIndex frame = result.block.images[image].frame;
     if (result.state.oriented[frame]) continue;
     const auto known = std::find_if(job.failures.begin(), job.failures.end(), [&](const FailedUnit& failure) {
-      return failure.unit == result.block.images[image].name;
+      return failure.unit == result.block.name_of(image);
     });
     if (known != job.failures.end()) continue;
     const auto reason = job.not_oriented.find(frame);
     const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
-    result.failures.push_back({linked ? "orientation" : "matching", result.block.images[image].name,
+    result.failures.push_back({linked ? "orientation" : "matching", result.block.name_of(image),
                                linked && reason != job.not_oriented.end() ? reason->second
                                : linked ? "oriented at first, but too few of its observations hold in the adjustment"
                                         : "no other image shares enough verified matches with it"});
@@ -69,8 +69,7 @@ void scale_covariances(BlockResult& result, double factor) {
 
 }  // namespace
 
-BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome,
-                            const std::vector<TilePart>& parts) {
+BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, const std::vector<TilePart>& parts) {
   BlockResult result;
   result.image_records = image_records(job);
   result.provenance = provenance_of(job);

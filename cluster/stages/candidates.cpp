@@ -23,7 +23,8 @@ std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& feature
   hasher.add(algorithm::kCandidates);
   add_to_hash(hasher, job.settings.candidates);
   hasher.add(features.image_fingerprint).add(job.generations);
-  for (const Image& image : job.block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
+  for (ImageIndex i(0); job.block.images.contains(i); ++i.value)
+    hasher.add(job.block.image_names[i]).add(job.block.images[i].frame.value).add(job.block.images[i].mount);
   for (const Camera& camera : job.block.cameras)
     hasher.add(camera.width).add(camera.height).add(camera.intrinsics[kFocal]).add(camera.intrinsics.model().kind);
   for (const Rig& rig : job.block.rigs)

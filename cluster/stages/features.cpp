@@ -127,8 +127,7 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
   for (std::int64_t i = kept; i < count; ++i) {
     const ImageIndex image(shard.first + i);
     const std::string& mask = job.block.cameras[job.block.camera_of(image)].mask_path;
-    ImageFeatures features =
-        detect_features(job.block.path_of(job.block.images[image]), mask, image, job.settings.features);
+    ImageFeatures features = detect_features(job.block.path_of(image), mask, image, job.settings.features);
 #pragma omp critical(features_of_a_shard)
     {
       growing.add(i, std::move(features));
@@ -145,7 +144,7 @@ void list_unreadable(Job& job, const FeatureStage& stage) {
     nlohmann::json failed = nlohmann::json::array();
     for (const std::string& shard : stage.shards)
       for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard)))
-        if (!image.failure.empty()) failed.push_back({job.block.images[image.image].name, image.failure});
+        if (!image.failure.empty()) failed.push_back({job.block.name_of(image.image), image.failure});
     return failed.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   });
   std::vector<FailedUnit> failures;

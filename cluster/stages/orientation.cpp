@@ -40,7 +40,8 @@ void add_vertical_values(Hasher& hasher, const Block& block) {
 }
 
 void add_block_values(Hasher& hasher, const Block& block) {
-  for (const Image& image : block.images) hasher.add(image.name).add(image.frame.value).add(image.mount);
+  for (ImageIndex i(0); block.images.contains(i); ++i.value)
+    hasher.add(block.image_names[i]).add(block.images[i].frame.value).add(block.images[i].mount);
   for (const Frame& frame : block.frames) {
     hasher.add(frame.name).add(frame.rig.value);
     add_priors_to_hash(hasher, frame);

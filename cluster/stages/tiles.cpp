@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cluster/collective.h"
+#include "cluster/process_memory.h"
 #include "cluster/stages/given_tracks.h"
 #include "cluster/stages/growth.h"
 #include "cluster/stages/stages.h"
@@ -17,11 +18,15 @@ namespace megablock {
 namespace {
 
 // Grown as the block grew, so that earlier frames keep their tiles.
-Tiles grow_tiles(const Job& job, const LinkWeights& links) {
+Tiles grow_tiles(const Job& job, LinkWeights links) {
   Tiles tiles;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const std::int64_t frames = frames_of_first_images(job.block, job.generations[g]);
     const FrameGraph graph = links.graph(frames);
+    if (g + 1 == job.generations.size()) {  // makes room for what METIS needs
+      links = {};
+      return_freed_memory();
+    }
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);
   }
   return tiles;

@@ -62,7 +62,7 @@ std::string measurements_table(const BlockResult& result, const Figures& f) {
     const MeasurementResidual& r = f.measurements[i];
     const ControlPoint& point = result.block.control_points[r.point];
     const ImageMeasurement& measurement = point.measurements[r.measurement];
-    table.add({escape(point.name), name_of(point.role), escape(result.block.images[measurement.image].name),
+    table.add({escape(point.name), name_of(point.role), escape(result.block.name_of(measurement.image)),
                with_sign(r.residual.x(), 2), with_sign(r.residual.y(), 2), fixed(r.residual.norm(), 2),
                fixed(measurement.sigma_px, 2), fixed(r.ratio, 1)},
               r.ratio > kGrossRatio ? "bad" : "");

@@ -61,7 +61,7 @@ void add_sigmas(const BlockResult& result, FrameIndex frame, const LengthUnit& u
 
 void add_image(const BlockResult& result, const Figures& f, const Columns& columns, ImageIndex image, Table& table) {
   const Image& i = result.block.images[image];
-  std::vector<std::string> cells = {escape(i.name)};
+  std::vector<std::string> cells = {escape(result.block.name_of(image))};
   if (columns.camera) cells.push_back(escape(result.block.cameras[result.block.camera_of(image)].name));
   if (columns.tile) {
     const auto& tiles = result.tiles.tile_of_frame;

@@ -46,7 +46,7 @@ std::string reliability_part(const BlockResult& result, const Reliability& r) {
     tests.add({"Pope: |τ| = |w| ÷ sigma0", fixed(r.tau_limit, 2), count(r.beyond_tau), count(expected)});
   Table largest({"largest |w|", "image", "axis", "residual [px]", "redundancy", "|w|"});
   for (const TestedMeasurement& test : r.largest)
-    largest.add({"track " + std::to_string(test.track.value), escape(result.block.images[test.image].name),
+    largest.add({"track " + std::to_string(test.track.value), escape(result.block.name_of(test.image)),
                  test.vertical ? "y" : "x", fixed(test.residual, 2), fixed(test.redundancy, 2),
                  fixed(test.normalised, 2)});
   const std::string reliability = fmt::format(

@@ -42,7 +42,7 @@ std::string failures_section(const BlockResult& result, const Figures& f) {
   if (result.failures.empty() && f.not_oriented.empty()) return "";
   std::map<std::string, ImageIndex> by_name;
   for (ImageIndex image(0); result.block.images.contains(image); ++image.value)
-    by_name.emplace(result.block.images[image].name, image);
+    by_name.emplace(result.block.name_of(image), image);
   Table table(
       {"image or unit", "stage", "reason", "size [px]", "features", "images matched", "matches", "observations"}, 3);
   std::size_t all = 0;
@@ -55,7 +55,7 @@ std::string failures_section(const BlockResult& result, const Figures& f) {
                   image == by_name.end() ? std::vector<std::string>{} : image_cells(result, f, image->second));
   }
   for (const ImageIndex image : f.not_oriented) {
-    const std::string& name = result.block.images[image].name;
+    const std::string& name = result.block.name_of(image);
     if (told.contains(name)) continue;
     if (++all <= kListedFailures) add_failure(table, {"", name, "not oriented"}, image_cells(result, f, image));
   }

@@ -36,7 +36,7 @@ std::string tie_points_section(const BlockResult& result, const Figures& f) {
       [&](ImageIndex a, ImageIndex b) { return std::pair(f.observations[a], a) < std::pair(f.observations[b], b); });
   Table table({"image with fewest", "observations"});
   for (std::size_t i = 0; i < listed; ++i)
-    table.add({escape(result.block.images[weakest[i]].name), count(f.observations[weakest[i]])});
+    table.add({escape(result.block.name_of(weakest[i])), count(f.observations[weakest[i]])});
   return section("tie-points", "Tie points",
                  "<div class=row>" + charts + "<div class=aside>" + table.html() + "</div></div>");
 }

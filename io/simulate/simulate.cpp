@@ -204,16 +204,12 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   frame.pass = pass;
   frame.time_s = 1.6e9 + time_s;
   for (std::size_t m = 0; m < cameras; ++m) {
-    Image image;
-    image.name = frame.name;
+    std::string name = frame.name;
     if (!layout.image_suffixes.empty())
-      image.name.append(layout.image_suffixes[m]);
+      name.append(layout.image_suffixes[m]);
     else if (cameras > 1)
-      image.name.append("_c").append(std::to_string(m));
-    image.name.append(".jpg");
-    image.frame = index;
-    image.mount = static_cast<int>(m);
-    layout.block.images.push_back(std::move(image));
+      name.append("_c").append(std::to_string(m));
+    layout.block.add_image(name.append(".jpg"), {index, static_cast<int>(m), 0});
   }
   if (cameras == 1) frame.name += ".jpg";  // a single photo's frame carries the name of its image
   layout.block.frames.push_back(std::move(frame));

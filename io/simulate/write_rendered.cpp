@@ -88,7 +88,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
       const auto& prior = with_priors.frames[with_priors.images[image].frame].position_prior;
       if (prior) exif.position = georeference.to_geodetic(prior->position);  // of the antenna
       exif.position_sigma_m = options.gps_sigma_m;
-      write_jpeg((folder / layout.block.images[image].name).string(), picture, exif);
+      write_jpeg((folder / layout.block.name_of(image)).string(), picture, exif);
     }
   }
 }
@@ -107,7 +107,7 @@ void write_rig(const Block& block, const fs::path& root) {
   for (std::size_t i = 0; i < block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
     assignments[block.frames[block.images[image].frame].name].push_back(
-        {block.images[image].name, block.cameras[block.camera_of(image)].name});
+        {block.name_of(image), block.cameras[block.camera_of(image)].name});
   }
   write_text((root / "rig_cameras.json").string(), cameras.dump(2) + "\n");
   write_text((root / "rig_assignments.json").string(), assignments.dump(2) + "\n");
@@ -131,7 +131,7 @@ void write_gcp_list(const Block& block, const fs::path& path) {
     for (const ImageMeasurement& m : point.measurements)
       stream << std::setprecision(10) << place.longitude_deg << ' ' << place.latitude_deg << ' ' << std::setprecision(5)
              << place.height_m << ' ' << std::setprecision(4) << m.pixel.x() - 0.5 << ' ' << m.pixel.y() - 0.5 << ' '
-             << block.images[m.image].name << ' ' << point.name << '\n';
+             << block.name_of(m.image) << ' ' << point.name << '\n';
   }
   stream.close();
   if (!stream) throw InputError(path.string() + ": cannot be written");

@@ -214,7 +214,7 @@ void write_names(const Store& store, const JobStore& job) {
     block.frames.back().name = name;
     block.frames.back().rig = RigIndex(0);
     for (int c = 0; c < kCameras; ++c)
-      block.images.push_back({std::string(name) + "/" + std::to_string(c), FrameIndex(f), c, 0});
+      block.add_image(std::string(name) + "/" + std::to_string(c), {FrameIndex(f), c, 0});
   }
   for (int c = 0; c < kCameras; ++c) {
     block.cameras.emplace_back();

@@ -188,11 +188,10 @@ TEST_F(BlockInput, TwoCities) {
       if (copy.given_pose) copy.given_pose->centre += away;
       s.block.frames.push_back(copy);
     }
-    for (const Image& image : one.block.images) {
-      Image copy = image;
-      copy.name += "_b";
+    for (ImageIndex i(0); one.block.images.contains(i); ++i.value) {
+      Image copy = one.block.images[i];
       copy.frame.value += frames;
-      s.block.images.push_back(copy);
+      s.block.add_image(one.block.name_of(i) + "_b", copy);
     }
     for (const Pose& pose : one.truth.frames) {
       s.truth.frames.push_back(pose);

@@ -12,6 +12,7 @@
 #include "io/pose_csv.h"
 #include "io/simulate/simulate.h"
 #include "tests/integration/block_folder.h"
+#include "tests/unit/io/image_names.h"
 
 namespace megablock {
 namespace {
@@ -45,18 +46,20 @@ void keep_frames(
   std::vector<std::int64_t> frame_row(old.frames.size(), -1), image_row(old.images.size(), -1);
   Block block = old;
   BlockState truth = s.truth;
-  block.frames.clear(), block.images.clear(), block.relative_poses.clear(), truth.frames.clear();
+  block.frames.clear(), block.images.clear(), block.image_names = {}, block.relative_poses.clear(),
+                                              truth.frames.clear();
   truth.oriented.assign(order.size(), 1);
   for (const std::int64_t f : order) {
     frame_row[static_cast<std::size_t>(f)] = block.frames.next_index().value;
     block.frames.push_back(old.frames[FrameIndex(f)]);
     truth.frames.push_back(s.truth.frames[FrameIndex(f)]);
     for (std::size_t i = 0; i < old.images.size(); ++i) {
-      Image image = old.images[ImageIndex(static_cast<std::int64_t>(i))];
+      const ImageIndex index(static_cast<std::int64_t>(i));
+      Image image = old.images[index];
       if (image.frame.value != f || !keep_image(image)) continue;
       image_row[i] = block.images.next_index().value;
       image.frame = FrameIndex(frame_row[static_cast<std::size_t>(f)]);
-      block.images.push_back(image);
+      block.add_image(old.image_names[index], image);
     }
   }
   const auto frame = [&](FrameIndex f) { return FrameIndex(frame_row[static_cast<std::size_t>(f.value)]); };
@@ -186,10 +189,8 @@ TEST_F(RegistrationInput, FramesListedTwice) {
   keep_frames(s, order);
   // Measurements and relative poses have gone to the copy.
   s.block.frames[FrameIndex(41)].name += "_copy";
-  for (std::size_t i = 0; i < s.block.images.size(); ++i) {
-    Image& image = s.block.images[ImageIndex(static_cast<std::int64_t>(i))];
-    if (image.frame.value == 41) image.name += "_copy";
-  }
+  rename_images(
+      s.block, [&](ImageIndex i) { return s.block.name_of(i) + (s.block.images[i].frame.value == 41 ? "_copy" : ""); });
   const std::string said = register_block(s);
   EXPECT_THAT(said,
               HasSubstr("look: frames 'f000040' and 'f000040_copy' have the same time and place: is one of them a "

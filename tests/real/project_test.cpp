@@ -91,7 +91,7 @@ TEST(RealProject, BerlinReadsControlAndRigFiles) {
   ASSERT_EQ(block.control_points.size(), located);
   // The first point's first measurement: 02.jpg at (-0.015689, -0.0625362).
   const ImageMeasurement& m = block.control_points[0].measurements[0];
-  EXPECT_EQ(block.images[m.image].name, "02.jpg");
+  EXPECT_EQ(block.name_of(m.image), "02.jpg");
   EXPECT_NEAR(m.pixel.x(), 1632 - 0.015689 * 3264, 1e-9);
   EXPECT_NEAR(m.pixel.y(), 1224 - 0.0625362 * 3264, 1e-9);
   const Georeference reference(block.ground);

@@ -56,8 +56,7 @@ class AT36 : public testing::Test {
           weights.add(a, b, 1);
           ++points_[std::minmax(a, b)];
         }
-    return diagnose(simulated_.block, state, ground, weights.graph(static_cast<std::int64_t>(state.frames.size())),
-                    options);
+    return diagnose(simulated_.block, state, ground, weights, options);
   }
   double base_to_height(FrameIndex a, FrameIndex b) const {
     const Eigen::Vector3d &p = simulated_.truth.frames[a].centre, &q = simulated_.truth.frames[b].centre;

@@ -118,7 +118,7 @@ struct KnownPositionsScene {
       frame.attitude_prior = AttitudePrior{rotation, attitude_sigmas(angles[i])};
       frame.given_pose = Pose{rotation, centres[i]};
       b.frames.push_back(frame);
-      b.images.push_back({name, FrameIndex(static_cast<std::int64_t>(i)), 0, 0});
+      b.add_image(name, {FrameIndex(static_cast<std::int64_t>(i)), 0, 0});
     }
     for (std::size_t k = 0; k < control_points.size(); ++k) {
       ControlPoint point;

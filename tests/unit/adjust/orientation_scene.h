@@ -66,7 +66,7 @@ inline SimulatedBlock make_scene(const std::vector<Pose>& poses, const std::vect
       frame.position_prior->position = poses[i].centre + options.gps_sigma_m * normal_vector(random);
     }
     scene.block.frames.push_back(frame);
-    scene.block.images.push_back({"image" + std::to_string(1000 + i), FrameIndex(static_cast<std::int64_t>(i)), 0, 0});
+    scene.block.add_image("image" + std::to_string(1000 + i), {FrameIndex(static_cast<std::int64_t>(i)), 0, 0});
   }
   scene.truth = initial_state(scene.block);
   scene.truth.frames = IndexedVector<FrameIndex, Pose>(poses);

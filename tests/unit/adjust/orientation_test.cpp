@@ -373,7 +373,7 @@ TEST(Orientation, ApproximateGivenPosesOrientTheOthersToTheirAccuracy) {
 
 TEST(Orientation, ReportsImagesThatNothingLinks) {
   SimulatedBlock scene = aerial(2, 6, {});
-  scene.block.images.push_back({"alone", FrameIndex(12), 0, 0});
+  scene.block.add_image("alone", {FrameIndex(12), 0, 0});
   Frame alone;
   alone.name = "alone";
   alone.rig = RigIndex(0);

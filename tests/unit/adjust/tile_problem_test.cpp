@@ -38,10 +38,7 @@ class TwoTiles : public testing::Test {
       frame.given_pose.emplace();
       frame.given_pose->centre = {10.0 * f, 0, 0};
       block_.frames.push_back(frame);
-      Image image;
-      image.name = "i" + std::to_string(f);
-      image.frame = FrameIndex(f);
-      block_.images.push_back(image);
+      block_.add_image("i" + std::to_string(f), {FrameIndex(f), 0, 0});
       tiles_.tile_of_frame.push_back(TileIndex(f / 3));
     }
     tiles_.tile_count = 2;

@@ -33,7 +33,7 @@ TEST(Growth, FirstImagesAreABlockOfTheirOwn) {
   later.name = "later";
   block.rigs.push_back({"later", {Mount{block.cameras.next_index(), {}}}});
   block.cameras.push_back(later);
-  block.images.push_back({"later.jpg", block.frames.next_index(), 0, 0});
+  block.add_image("later.jpg", {block.frames.next_index(), 0, 0});
   Frame frame;
   frame.name = "later";
   frame.rig = RigIndex(1);

@@ -2,6 +2,7 @@
 
 #include "io/crs.h"
 #include "io/project.h"
+#include "tests/unit/io/image_names.h"
 
 namespace megablock {
 namespace {
@@ -30,7 +31,7 @@ Block block_of(const std::vector<std::string>& names, const GroundFrame& ground)
     frame.position_prior = PositionPrior{{static_cast<double>(name.back()), 2, 3}};
     frame.attitude_prior = AttitudePrior{};
     frame.given_pose = Pose{Eigen::Quaterniond::Identity(), {1, 2, static_cast<double>(name.back())}};
-    block.images.push_back({name, block.frames.next_index(), 0, 0});
+    block.add_image(name, {block.frames.next_index(), 0, 0});
     block.frames.push_back(frame);
   }
   ControlPoint point;
@@ -50,12 +51,6 @@ Block block_of(const std::vector<std::string>& names, const GroundFrame& ground)
 const GroundFrame kHere{true, 46.84, -91.99, 200, "EPSG:4979"};
 const GroundFrame kThere{true, 46.93, -91.9, 250, "EPSG:4979"};
 
-std::vector<std::string> image_names(const Block& block) {
-  std::vector<std::string> names;
-  for (const Image& image : block.images) names.push_back(image.name);
-  return names;
-}
-
 TEST(AppendTo, OldIndicesStayNewImagesFollow) {
   const Block previous = block_of({"b1", "b2", "c1"}, kHere);
   const Block merged = append_to(previous, block_of({"a1", "b1", "b15", "b2", "c1"}, kHere));
@@ -63,21 +58,21 @@ TEST(AppendTo, OldIndicesStayNewImagesFollow) {
   EXPECT_NO_THROW(check(merged));
   for (std::size_t i = 0; i < merged.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
-    EXPECT_EQ(merged.frames[merged.images[image].frame].name, merged.images[image].name);
-    EXPECT_EQ(merged.cameras[merged.camera_of(image)].name, merged.images[image].name.substr(0, 1));
+    EXPECT_EQ(merged.frames[merged.images[image].frame].name, merged.name_of(image));
+    EXPECT_EQ(merged.cameras[merged.camera_of(image)].name, merged.name_of(image).substr(0, 1));
   }
   EXPECT_EQ(merged.cameras[CameraIndex(2)].name, "a");
-  EXPECT_EQ(merged.images[merged.control_points[0].measurements[0].image].name, "c1");
+  EXPECT_EQ(merged.name_of(merged.control_points[0].measurements[0].image), "c1");
 }
 
 TEST(AppendTo, MeasurementsFollowTheirImages) {
   const Block now = block_of({"a1", "b1", "b15", "b2"}, kHere);
   const Block merged = append_to(block_of({"b1", "b2", "c1"}, kHere), now);
   ASSERT_EQ(merged.verticals.size(), 1u);
-  EXPECT_EQ(merged.images[merged.verticals.front().image].name, "b2");
+  EXPECT_EQ(merged.name_of(merged.verticals.front().image), "b2");
   ASSERT_EQ(merged.lines.size(), 1u);
-  EXPECT_EQ(merged.images[merged.lines.front().measurements.front().image].name, "b2");
-  EXPECT_EQ(merged.images[merged.control_points.front().measurements.front().image].name, "b2");
+  EXPECT_EQ(merged.name_of(merged.lines.front().measurements.front().image), "b2");
+  EXPECT_EQ(merged.name_of(merged.control_points.front().measurements.front().image), "b2");
 }
 
 TEST(AppendTo, ContentsAreTheNewOnes) {

@@ -60,7 +60,7 @@ TEST_F(ControlFile, GcpListInWgs84WithTabsAndBlanks) {
   EXPECT_LT((points[0].position - reference_.to_local({52.5201, 13.4001, 45.5})).norm(), 1e-6);
   ASSERT_THAT(points[0].measurements, SizeIs(2));
   EXPECT_EQ(points[0].measurements[0].pixel, Eigen::Vector2d(100, 50)) << "pixels count from the first pixel's centre";
-  EXPECT_EQ(project.block.images[points[0].measurements[1].image].name, "sub/1.jpg") << "also without its folder";
+  EXPECT_EQ(project.block.name_of(points[0].measurements[1].image), "sub/1.jpg") << "also without its folder";
   EXPECT_EQ(points[1].name, "gcp2");
   EXPECT_THAT(points[1].measurements, SizeIs(2));
   EXPECT_EQ(points[1].sigma.z(), 1000) << "height unknown";

@@ -190,7 +190,7 @@ void expect_equals(const WrittenModel& model, const BlockResult& result) {
       const ImageIndex index = result.tracks.image[o];
       const auto& image = model.images.at(index.value + 1);
       EXPECT_EQ(found->second.track[k].first, index.value + 1);
-      EXPECT_EQ(image.name, result.block.images[index].name);
+      EXPECT_EQ(image.name, result.block.name_of(index));
       const auto& [pixel, point] = image.observations.at(static_cast<std::size_t>(found->second.track[k].second));
       EXPECT_EQ(point, found->first);
       EXPECT_EQ(pixel, Eigen::Vector2d(from_fixed_pixel(result.tracks.x[o]), from_fixed_pixel(result.tracks.y[o])));

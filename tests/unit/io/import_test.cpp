@@ -50,7 +50,7 @@ TEST(Import, ColmapTextReturnsTheModel) {
   export_result(result, "colmap-text", folder.path("model"));
   const ImportedBlock imported = import_block("colmap-text", folder.path("model"));
   expect_same_residuals(imported, result, 1e-9);
-  EXPECT_EQ(imported.block.images[ImageIndex(1)].name, "frame0/1.jpg");
+  EXPECT_EQ(imported.block.name_of(ImageIndex(1)), "frame0/1.jpg");
   EXPECT_EQ(imported.block.cameras.size(), 2u);
   EXPECT_EQ(imported.state.cameras[CameraIndex(1)], result.state.cameras[CameraIndex(1)]);
 }
@@ -62,7 +62,7 @@ TEST(Import, BalAndBundlerReturnTheResiduals) {
     export_result(result, format, folder.path(format));
     const ImportedBlock imported = import_block(format, folder.path(format));
     expect_same_residuals(imported, result, 1.5e-3);  // observations are rounded to 2^-10 px again
-    EXPECT_EQ(imported.block.images[ImageIndex(1)].name, format == "bal" ? "image000001" : "frame0/1.jpg");
+    EXPECT_EQ(imported.block.name_of(ImageIndex(1)), format == "bal" ? "image000001" : "frame0/1.jpg");
   }
 }
 
@@ -98,7 +98,7 @@ BlockResult as_result(const ImportedBlock& imported) {
 void expect_same_model(const ImportedBlock& a, const ImportedBlock& b) {
   ASSERT_EQ(a.block.images.size(), b.block.images.size());
   for (ImageIndex i(0); a.block.images.contains(i); ++i.value) {
-    EXPECT_EQ(a.block.images[i].name, b.block.images[i].name);
+    EXPECT_EQ(a.block.name_of(i), b.block.name_of(i));
     EXPECT_EQ(a.block.camera_of(i), b.block.camera_of(i));
     const Pose &p = a.state.frames[FrameIndex(i.value)], &q = b.state.frames[FrameIndex(i.value)];
     EXPECT_LT((p.centre - q.centre).norm(), 1e-12);
@@ -168,7 +168,7 @@ TEST(Import, ASmallBundlerFileByHand) {
              "1000 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -10\n1 2 0\n9 9 9\n2 1 7 100 200 0 3 5 5\n");
   const ImportedBlock imported = import_block("bundler", folder.path("b.out"));
   ASSERT_EQ(imported.block.images.size(), 1u);
-  EXPECT_EQ(imported.block.images[ImageIndex(0)].name, "image000001");
+  EXPECT_EQ(imported.block.name_of(ImageIndex(0)), "image000001");
   const Camera& camera = imported.block.cameras[CameraIndex(0)];
   EXPECT_EQ(camera.width, 200);
   EXPECT_EQ(camera.height, 400);

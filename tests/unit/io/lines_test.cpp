@@ -31,7 +31,7 @@ class LinesFile : public ::testing::Test {
     read_lines(scratch_.path("lines.csv"), {"gone.jpg"}, block, warnings_);
     return block;
   }
-  std::string image(std::size_t i) const { return block_.images[ImageIndex(static_cast<std::int64_t>(i))].name; }
+  std::string image(std::size_t i) const { return block_.name_of(ImageIndex(static_cast<std::int64_t>(i))); }
 
   ScratchDirectory scratch_;
   Block block_ = example_block();

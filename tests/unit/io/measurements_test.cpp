@@ -70,7 +70,7 @@ Block block_of_street() {
     frame.name = "frame " + std::to_string(f);
     frame.rig = RigIndex(0);
     block.frames.push_back(frame);
-    for (int m = 0; m < 2; ++m) block.images.push_back({frame.name + "/" + std::to_string(m), FrameIndex(f), m, 0});
+    for (int m = 0; m < 2; ++m) block.add_image(frame.name + "/" + std::to_string(m), {FrameIndex(f), m, 0});
   }
   return block;
 }

@@ -55,7 +55,7 @@ TEST_F(ProjectRigs, JoinImagesOfAnExposure) {
   ASSERT_EQ(block.frames.size(), 4u) << "two exposures and two single images";
   const auto image = [&](const std::string& name) {
     for (std::size_t i = 0; i < block.images.size(); ++i)
-      if (block.images[ImageIndex(static_cast<std::int64_t>(i))].name == name)
+      if (block.name_of(ImageIndex(static_cast<std::int64_t>(i))) == name)
         return ImageIndex(static_cast<std::int64_t>(i));
     return ImageIndex();
   };

@@ -8,6 +8,7 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/held_priors.h"
+#include "tests/unit/io/image_names.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
@@ -58,10 +59,8 @@ TEST(Project, ScansImagesInByteOrderAndGroupsThem) {
   write_picture(folder.path("images/b/10.jpg"), 32, 48, 4, kDji);
   write_file(folder.path("images/readme.txt"), "no image");
   const Project project = read_text(folder, "images: images\n");
-  std::vector<std::string> names;
-  for (const Image& image : project.block.images) names.push_back(image.name);
-  EXPECT_THAT(names, ElementsAre("B.jpeg", "a.png", "b/10.jpg", "b/2.JPG"));
-  EXPECT_EQ(project.block.path_of(project.block.images[ImageIndex(3)]), folder.path("images/b/2.JPG"));
+  EXPECT_THAT(image_names(project.block), ElementsAre("B.jpeg", "a.png", "b/10.jpg", "b/2.JPG"));
+  EXPECT_EQ(project.block.path_of(ImageIndex(3)), folder.path("images/b/2.JPG"));
   EXPECT_EQ(project.block.images[ImageIndex(3)].file_hash, hash_file(folder.path("images/b/2.JPG")));
   ASSERT_THAT(project.block.cameras, SizeIs(3));
   const Camera& dji = project.block.cameras[CameraIndex(0)];

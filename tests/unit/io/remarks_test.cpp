@@ -68,7 +68,7 @@ TEST(Remarks, PointsThatAreNotSeenAndTheWorstFirst) {
   ASSERT_EQ(last.role, PointRole::kCheck);
   EXPECT_THAT(unused_points_text(result, PointRole::kCheck),
               testing::StartsWith("5 check points take no part: " + last.name + " (4810 px in " +
-                                  result.block.images[last.measurements[0].image].name + ", rejected), "));
+                                  result.block.name_of(last.measurements[0].image) + ", rejected), "));
   EXPECT_THAT(unused_points_text(result, PointRole::kCheck), HasSubstr(" (not seen by an oriented image), "));
   EXPECT_EQ(unused_points_text(result, PointRole::kControl), "");
 }

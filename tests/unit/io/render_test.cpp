@@ -203,7 +203,7 @@ TEST_P(RenderTest, FilesAreAProject) {
     ASSERT_TRUE(frame.given_pose);
     EXPECT_LT((frame.given_pose->centre - truth.poses[f].centre).norm(), 5 * options_.start_position_error_m);
   }
-  const std::string image = folder.path("images/" + project.block.images[ImageIndex(3)].name);
+  const std::string image = folder.path("images/" + project.block.name_of(ImageIndex(3)));
   const std::uint64_t before = hash_file(image);
   write_rendered_block(options_, folder.path(), EditedProject::kOverwrite);
   EXPECT_EQ(hash_file(image), before);

@@ -10,6 +10,7 @@
 
 #include "io/report/figures.h"
 #include "io/report/html.h"
+#include "tests/unit/io/image_names.h"
 #include "tests/unit/io/made_up_result.h"
 
 namespace megablock {
@@ -106,7 +107,7 @@ TEST(Report, WholeBlockWithFailures) {
   EXPECT_THAT(page, HasSubstr("truncated JPEG"));
   EXPECT_THAT(page, HasSubstr("tile 2 disagrees"));
   EXPECT_THAT(page, HasSubstr("9f3b6c1d20a87e55"));
-  EXPECT_THAT(page, HasSubstr(result.block.images[ImageIndex(3)].name));
+  EXPECT_THAT(page, HasSubstr(result.block.name_of(ImageIndex(3))));
   const auto json = figures_in(page);
   const ReprojectionStatistics statistics = reprojection_statistics(result);
   EXPECT_EQ(json["oriented"], 59);
@@ -158,7 +159,7 @@ TEST(Report, PointsThatNoMeasurementHoldsRaiseAnAlarm) {
   result.control[control].residual_px[1] = {1.4e6, 0};
   const std::string page = report_html(result);
   expect_sound(page);
-  const std::string image = result.block.images[given.measurements[1].image].name;
+  const std::string image = result.block.name_of(given.measurements[1].image);
   EXPECT_THAT(page, HasSubstr("<li class=bad>1 control point takes no part: pillar (1.4e6 px in " + image));
   EXPECT_THAT(page, HasSubstr("<tr class=\"bad\"><td class=t>pillar</td><td class=t>control</td><td>–</td>"
                               "<td>–</td><td>–</td>"));
@@ -237,7 +238,7 @@ TEST(Report, ImagesAreListedUpToALimit) {
 
 TEST(Report, FailedImagesWithWhatIsKnownOfThem) {
   BlockResult result = made_up_result(small_block());
-  const std::string name = result.block.images[ImageIndex(3)].name;
+  const std::string name = result.block.name_of(ImageIndex(3));
   result.failures = {{"init", "gone.jpg", "is empty"}, {"orientation", name, "too few points"}};
   const std::string page = report_html(result);
   expect_sound(page);
@@ -266,7 +267,7 @@ TEST(Report, NamesAreEscaped) {
   result.block.cameras[CameraIndex(0)].name = evil;
   result.block.frames[FrameIndex(0)].name = evil;
   result.block.control_points[0].name = evil;
-  result.block.images[ImageIndex(3)].name = evil;
+  rename_images(result.block, [&](ImageIndex i) { return i.value == 3 ? evil : result.block.name_of(i); });
   result.block.ground.crs = evil;
   result.failures.push_back({evil, evil, evil});
   result.notes.push_back(evil);
@@ -331,7 +332,7 @@ TEST(ReportFigures, IntersectionAnglesAndTrackLengths) {
   for (int i = 0; i < 2; ++i) {
     result.block.frames.push_back({});
     result.block.frames.back().rig = RigIndex(0);
-    result.block.images.push_back({std::to_string(i), FrameIndex(i), 0, 0});
+    result.block.add_image(std::to_string(i), {FrameIndex(i), 0, 0});
     result.state.frames.push_back({Eigen::Quaterniond::Identity(), Eigen::Vector3d(2.0 * i, 0, 0)});
     result.state.oriented.push_back(1);
   }

@@ -29,8 +29,7 @@ inline BlockResult small_result(bool full_distortion = true) {
     frame.name = "frame" + std::to_string(f);
     frame.rig = RigIndex(0);
     frame.pass = f / 2;
-    for (int m = 0; m < 2; ++m)
-      block.images.push_back({frame.name + "/" + std::to_string(m) + ".jpg", FrameIndex(f), m, 0});
+    for (int m = 0; m < 2; ++m) block.add_image(frame.name + "/" + std::to_string(m) + ".jpg", {FrameIndex(f), m, 0});
     block.frames.push_back(frame);
   }
   result.state = initial_state(block);

@@ -295,7 +295,7 @@ TEST(Stereopolis, CamerasCarryTheirNumbers) {
   };
   const std::vector<std::string> ten = {"c21", "c22", "c23", "c31", "c32", "c33", "c34", "c41", "c42", "c43"};
   EXPECT_EQ(names(), ten);
-  EXPECT_EQ(simulate_block(options).block.images[ImageIndex(19)].name, "f000001_c43.jpg");
+  EXPECT_EQ(simulate_block(options).block.name_of(ImageIndex(19)), "f000001_c43.jpg");
   options.rig_cameras = 14;
   EXPECT_EQ(names().front(), "c11");
   EXPECT_EQ(names().back(), "c52");
@@ -382,7 +382,7 @@ TEST(StereopolisRendered, FilesAreAProject) {
   const Block block = read_project(folder.path("block.yaml")).block;
   const BlockState truth = read_state(folder.path("truth.h5"));
   ASSERT_EQ(block.images.size(), 12u);
-  EXPECT_EQ(block.images.front().name, "f000000_c22.jpg");
+  EXPECT_EQ(block.name_of(ImageIndex(0)), "f000000_c22.jpg");
   ASSERT_EQ(block.frames.size(), 4u);
   for (std::size_t f = 0; f < 4; ++f) {
     const FrameIndex index(static_cast<std::int64_t>(f));

@@ -87,7 +87,7 @@ void expect_equal(const Block& a, const Block& b) {
   EXPECT_EQ(a.image_folder, b.image_folder);
   ASSERT_EQ(a.images.size(), b.images.size());
   for (ImageIndex i(0); a.images.contains(i); ++i.value) {
-    EXPECT_EQ(a.images[i].name, b.images[i].name);
+    EXPECT_EQ(a.name_of(i), b.name_of(i));
     EXPECT_EQ(a.images[i].frame, b.images[i].frame);
     EXPECT_EQ(a.images[i].mount, b.images[i].mount);
     EXPECT_EQ(a.images[i].file_hash, b.images[i].file_hash);
@@ -143,9 +143,8 @@ TEST_F(UnitFiles, ManyImagesComeBack) {
   const auto some = static_cast<std::int64_t>(block.images.size());
   for (std::int64_t i = some; i < 150000; ++i) {
     Image image = block.images[ImageIndex(i % some)];
-    image.name = std::to_string(i) + std::string(static_cast<std::size_t>(i * 7919 % 23), 'x') + ".jpg";
     image.file_hash = static_cast<std::uint64_t>(i);
-    block.images.push_back(image);
+    block.add_image(std::to_string(i) + std::string(static_cast<std::size_t>(i * 7919 % 23), 'x') + ".jpg", image);
   }
   write_block(path_, block);
   expect_equal(read_block(path_), block);

@@ -62,7 +62,7 @@ TEST_F(VerticalsFile, ComesBack) {
     const Intrinsics& camera = block_.cameras[block_.camera_of(seen.image)].intrinsics;
     seen.camera = Eigen::Map<const Eigen::VectorXd>(camera.data(), camera.size());
     seen.by_camera = Eigen::Matrix3Xd::Random(3, camera.size());
-    const std::string name = block_.images[seen.image].name;
+    const std::string name = block_.name_of(seen.image);
     const Block block = read(verticals_header() + ",segments\n" + verticals_row(seen, name) + ",12\n");
     ASSERT_EQ(block.verticals.size(), 1u);
     const SeenVertical& again = block.verticals[0];
@@ -117,8 +117,8 @@ TEST_F(VerticalsFile, WholeErrorHasTheCameras) {
 TEST_F(VerticalsFile, WhatIsSetAsideIsSaidByReason) {
   using enum VerticalVerdict;
   EXPECT_EQ(set_aside_text(block_, {}, 3), "");
-  const std::string& first = block_.images[ImageIndex(0)].name;
-  const std::string& second = block_.images[ImageIndex(1)].name;
+  const std::string& first = block_.name_of(ImageIndex(0));
+  const std::string& second = block_.name_of(ImageIndex(1));
   EXPECT_EQ(set_aside_text(block_, std::vector<SetAsideVertical>{{ImageIndex(1), kContradicted}}, 9),
             "1 of 9 verticals takes no part: 1 contradicted by most others (" + second + ")");
   const std::vector<SetAsideVertical> seven(7, {ImageIndex(0), kAgainstGround});

@@ -89,12 +89,7 @@ Block drive(std::int64_t frames) {
     frame.given_pose = Pose{rotation_exp<double>(Eigen::Vector3d(0.01, 0.02 * static_cast<double>(f.value), 0)),
                             {3 + 4 * static_cast<double>(f.value), 2, 1}};
     block.frames.push_back(frame);
-    for (int m = 0; m < 2; ++m) {
-      Image image;
-      image.frame = f;
-      image.mount = m;
-      block.images.push_back(image);
-    }
+    for (int m = 0; m < 2; ++m) block.add_image("", {f, m, 0});
   }
   return block;
 }

@@ -105,7 +105,7 @@ WholeBlock apart() {
     pose.centre = {0, static_cast<double>(f), 2};
     frame.given_pose = pose;
     block.frames.push_back(frame);
-    for (int m = 0; m < 2; ++m) block.images.push_back({frame.name + "_" + std::to_string(m), FrameIndex(f), m, 0});
+    for (int m = 0; m < 2; ++m) block.add_image(frame.name + "_" + std::to_string(m), {FrameIndex(f), m, 0});
   }
   state = initial_state(block);
   TrackSet tracks;

@@ -55,10 +55,7 @@ struct Survey {
     pose.rotation = Eigen::Quaterniond(r);
     frame.given_pose = pose;
     block.frames.push_back(frame);
-    Image image;
-    image.name = frame.name + ".jpg";
-    image.frame = index;
-    block.images.push_back(image);
+    block.add_image(frame.name + ".jpg", {index, 0, 0});
     return index;
   }
 
@@ -66,9 +63,9 @@ struct Survey {
 
   BlockDiagnostics found(const DiagnosticsOptions& options = {}) {
     state = initial_state(block);
-    FrameGraph graph{static_cast<std::int64_t>(block.frames.size()), links};
-    std::sort(graph.edges.begin(), graph.edges.end());
-    return diagnose(block, state, IndexedVector<ImageIndex, double>(block.images.size(), 0.0), graph, options);
+    LinkWeights weights;
+    for (const FrameEdge& link : links) weights.add(link.a, link.b, link.weight);
+    return diagnose(block, state, IndexedVector<ImageIndex, double>(block.images.size(), 0.0), weights, options);
   }
 };
 

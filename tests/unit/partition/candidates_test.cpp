@@ -41,7 +41,7 @@ ImageIndex add_photo(Block& block, const std::string& name, std::optional<Eigen:
   if (position) frame.position_prior = PositionPrior{*position, Eigen::Vector3d(3, 3, 6), Eigen::Vector3d::Zero()};
   const FrameIndex index = block.frames.next_index();
   block.frames.push_back(frame);
-  block.images.push_back(Image{name, index, 0, 0});
+  block.add_image(name, {index, 0, 0});
   return ImageIndex(block.images.next_index().value - 1);
 }
 
@@ -192,7 +192,7 @@ TEST(Candidates, DoNotDependOnTheOrderOfImages) {
   GlobalDescriptors shuffled_descriptors;
   for (std::size_t i : order) {
     const ImageIndex image(static_cast<std::int64_t>(i));
-    const ImageIndex added = add_photo(shuffled, block.images[image].name, std::nullopt);
+    const ImageIndex added = add_photo(shuffled, block.name_of(image), std::nullopt);
     shuffled.frames[shuffled.images[added].frame] = block.frames[block.images[image].frame];
     shuffled_descriptors.push_back(descriptors[image]);
   }
@@ -202,7 +202,7 @@ TEST(Candidates, DoNotDependOnTheOrderOfImages) {
       std::set<std::set<std::string>> cell;
       for (std::int64_t row = graph.cell_begin[c]; row < graph.cell_begin[c + 1]; ++row) {
         const ImagePair& pair = graph.pairs[static_cast<std::size_t>(graph.cell_pairs[static_cast<std::size_t>(row)])];
-        cell.insert({b.images[pair.a].name, b.images[pair.b].name});
+        cell.insert({b.name_of(pair.a), b.name_of(pair.b)});
       }
       cells.insert(cell);
     }
@@ -324,8 +324,7 @@ TEST(Candidates, RigImagesByConesAndViewingDirections) {
     frame.rig = RigIndex(0);
     frame.given_pose = Pose{looking(0, 0), Eigen::Vector3d(0, 4.0 * f, 2)};
     block.frames.push_back(frame);
-    for (int m = 0; m < 5; ++m)
-      block.images.push_back(Image{frame.name + "/" + std::to_string(m), FrameIndex(f), m, 0});
+    for (int m = 0; m < 5; ++m) block.add_image(frame.name + "/" + std::to_string(m), {FrameIndex(f), m, 0});
   }
   const CandidateOptions options;
   const CandidateGraph graph = candidate_pairs(block, {}, options);
