@@ -30,19 +30,22 @@ std::int32_t frame_of(const TileProblem& problem, std::int64_t row) {
   return problem.images[problem.image[row].value].frame.value;
 }
 
-// Of every n-th track, which are enough.
+// Of every n-th track, which are enough, and of each between neighbouring frames and from its first to its last: a long
+// track is not worth more than a short one. Tracks of which nothing is kept, too narrow ones say, tell nothing.
 Agreements agreements_of_frames(const TileProblem& problem) {
-  constexpr std::int64_t kEnough = 20'000;
-  const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / kEnough);
+  const std::int64_t enough = std::max<std::int64_t>(20'000, 40 * std::ssize(problem.frames));
+  const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / enough);
   std::vector<std::pair<FramePair, bool>> pairs;
   std::map<std::int64_t, bool> frames;  // of a track: whether one of its observations there is kept
   for (std::int64_t p = 0; p < problem.point_count(); p += stride) {
     frames.clear();
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row)
       if (problem.image[row].valid()) frames[frame_of(problem, row)] |= problem.kept[row] != 0;
-    for (auto a = frames.begin(); a != frames.end(); ++a)
-      for (auto b = std::next(a); b != frames.end(); ++b)
-        pairs.push_back({{a->first, b->first}, a->second && b->second});
+    const auto is_kept = [](const auto& frame) { return frame.second; };
+    if (frames.size() < 2 || std::none_of(frames.begin(), frames.end(), is_kept)) continue;
+    const auto add = [&](const auto& a, const auto& b) { pairs.push_back({{a.first, b.first}, a.second && b.second}); };
+    for (auto a = frames.begin(), b = std::next(a); b != frames.end(); ++a, ++b) add(*a, *b);
+    if (frames.size() > 2) add(*frames.begin(), *frames.rbegin());
   }
   std::sort(pairs.begin(), pairs.end());
   Agreements sums;
@@ -109,12 +112,13 @@ class PartFinder {
   }
   bool of_part(std::int64_t row) const { return in_part_[static_cast<std::size_t>(frame_of(problem_, row))] != 0; }
 
-  // Whether frames that stand keep the point, two or more of them, and nobody else does.
+  // Whether frames that stand keep the point, two or more of them, and nobody else does but the part itself.
   bool stands(std::int64_t p) const {
     std::int32_t first = -1;
     bool several = false;
     for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
       if (!problem_.kept[row]) continue;
+      if (of_part(row)) continue;
       const std::int32_t frame = frame_of(problem_, row);
       if (!stands_[static_cast<std::size_t>(frame)]) return false;
       several = several || (first >= 0 && frame != first);
@@ -148,11 +152,15 @@ class PartFinder {
     }));
   }
 
-  // From ground axes as they should be to those in which the part stands now; empty where too few agree, or no more
-  // than do now.
+  // From ground axes as they should be to those in which the part stands now; empty where enough agree now, or too few
+  // anywhere.
   std::optional<Pose> place(const std::vector<RigSight>& sights, std::uint64_t seed) const {
     constexpr std::size_t kMostSights = 500;
-    if (sights.size() < kFewestAgreeing) return std::nullopt;
+    const auto enough = [&](std::size_t agree) {
+      return agree >= kFewestAgreeing &&
+             static_cast<double>(agree) >= kAgreeingShare * static_cast<double>(sights.size());
+    };
+    if (sights.size() < kFewestAgreeing || enough(agreeing(sights, Pose{}))) return std::nullopt;
     std::vector<RigSight> some;
     for (std::size_t i = 0; i < sights.size(); i += 1 + (sights.size() - 1) / kMostSights) some.push_back(sights[i]);
     RansacOptions sampling;
@@ -161,11 +169,7 @@ class PartFinder {
     sampling.max_draws = 500;
     sampling.seed = seed;
     const auto found = ransac(RigSightEstimator(some), sampling);
-    if (!found) return std::nullopt;
-    const std::size_t agree = agreeing(sights, found->model);
-    const bool enough =
-        agree >= kFewestAgreeing && static_cast<double>(agree) >= kAgreeingShare * static_cast<double>(sights.size());
-    if (!enough || agree <= agreeing(sights, Pose{})) return std::nullopt;
+    if (!found || !enough(agreeing(sights, found->model))) return std::nullopt;
     return found->model;
   }
 
@@ -179,6 +183,7 @@ class PartFinder {
       frame = {(frame.rotation * pose.rotation).normalized(), moved(frame.centre)};
     }
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
+      if (problem_.points[static_cast<std::size_t>(p)].role != PointRole::kTie) continue;  // control has its place
       bool own = false, others = false;
       for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row)
         if (problem_.kept[row]) (of_part(row) ? own : others) = true;

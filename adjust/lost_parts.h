@@ -11,10 +11,11 @@
 namespace megablock {
 
 // Frames hang together where half or more of the tracks that both observe are kept by both, and so do sets of frames
-// by the sums over their pairs. Of the sets the largest stays; each other one of three frames or more is moved, with
-// the points that it alone keeps, to where at least thirty and three tenths of its observations agree with points kept
-// by frames that stand (RANSAC; residuals up to `threshold_sigmas` agree), and then stands, too. Observations are not
-// touched: screen again afterwards. Returns the frames moved. Deterministic: seeded by a part's lowest global frame.
+// by the sums over their pairs. Of the sets the largest stands. Another one of three frames or more is lost when fewer
+// than thirty, or three tenths, of its observations agree with points that standing frames keep, and nobody else but
+// the set itself (residuals up to `threshold_sigmas`). It is moved, with the tie points that it alone keeps, to where
+// enough of them agree (RANSAC), and then stands, too; larger sets come first. Observations are not touched: screen
+// again afterwards. Returns the frames moved. Deterministic: seeded by a set's lowest global frame.
 std::vector<LocalFrame> recover_lost_parts(const TileProblem& problem, TileState& state, double threshold_sigmas);
 
 }  // namespace megablock

@@ -156,13 +156,14 @@ class TileAdjuster {
   void recover() {
     constexpr int kMaxRounds = 3;
     const double limit = 8 * options_.max_residual_sigmas, apart = kApart * limit;
+    screen(limit);
     for (int round = 0; round < kMaxRounds; ++round) {
-      screen(limit);
       if (!take_up(recover_lost_parts(problem_, state_, apart), apart)) break;
+      screen(limit);
     }
     for (int round = 0; round < kMaxRounds; ++round) {
-      if (round > 0) screen(limit);
       if (!take_up(recover_lost_frames(problem_, state_, limit), limit)) break;
+      if (round + 1 < kMaxRounds) screen(limit);
     }
   }
 

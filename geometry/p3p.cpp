@@ -1,5 +1,6 @@
 #include "geometry/p3p.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -23,7 +24,8 @@ std::array<double, 4> determinant(const Eigen::Matrix3d& a, const Eigen::Matrix3
 double outer_root(double b, double c, double d) {
   const double inflection = -b / 3, p = c - b * b / 3;
   const double value = ((inflection + b) * inflection + c) * inflection + d;
-  double x = inflection - std::copysign(p < 0 ? 2 * std::sqrt(-p / 3) : std::cbrt(std::abs(value)), value);
+  double x =
+      inflection - std::copysign(std::max(2 * std::sqrt(std::max(0.0, -p / 3)), std::cbrt(std::abs(value))), value);
   for (int iteration = 0; iteration < 50; ++iteration) {
     const double step = (((x + b) * x + c) * x + d) / ((3 * x + 2 * b) * x + c);
     if (!std::isfinite(step)) break;
@@ -41,8 +43,8 @@ Eigen::Matrix3d degenerate_conic(const Eigen::Matrix3d& a, const Eigen::Matrix3d
   return b + outer_root(k1 / k0, k2 / k0, k3 / k0) * a;
 }
 
-// A symmetric matrix C of rank two is l m' + m l', and l m' = C + [p]x with p = l x m, -adj C = p p'. Empty where the
-// lines are not real.
+// A symmetric matrix C of rank two is l m' + m l'. With p = l x m, -adj C = p p', and C + [p]x is a multiple of l m'.
+// Empty where the lines are not real.
 std::optional<Lines> lines_of(const Eigen::Matrix3d& conic) {
   Eigen::Matrix3d square;
   square << -conic.col(1).cross(conic.col(2)), -conic.col(2).cross(conic.col(0)), -conic.col(0).cross(conic.col(1));
@@ -102,10 +104,8 @@ struct CosineLaws {
   bool polish(Eigen::Vector3d& s) const {
     constexpr double kSettled = 1e-9;  // relative; the step after it is the square
     constexpr int kIterations = 20;    // two or three, but where two solutions coincide, to which steps only halve
-    double error = 0;
     for (int iteration = 0; iteration < kIterations; ++iteration) {
       const Eigen::Vector3d f = sides_squared(s) - side_squared;
-      error = f.norm();
       // The Jacobian's rows are (0, a, b), (c, 0, d), (e, g, 0).
       const double a = 2 * (s[1] - s[2]) + s[2] * chord_squared[0], b = 2 * (s[2] - s[1]) + s[1] * chord_squared[0];
       const double c = 2 * (s[0] - s[2]) + s[2] * chord_squared[1], d = 2 * (s[2] - s[0]) + s[0] * chord_squared[1];
@@ -118,7 +118,7 @@ struct CosineLaws {
       s -= step;
       if (step.squaredNorm() < kSettled * kSettled * s.squaredNorm()) break;
     }
-    return (s.array() > 0).all() && error < 1e-6 * side_squared.norm();
+    return (s.array() > 0).all() && (sides_squared(s) - side_squared).norm() < 1e-6 * side_squared.norm();
   }
 };
 

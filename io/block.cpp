@@ -49,7 +49,9 @@ void check_names(const auto& items, const std::string& kind) {
 }
 
 void check_image_names(const Block& block) {
-  require(block.image_names.size() == block.images.size(), "the block has not a name per image");
+  require(block.image_names.size() == block.images.size(), std::to_string(block.images.size()) + " images have " +
+                                                               std::to_string(block.image_names.size()) +
+                                                               " names; the file of the block is damaged");
   std::unordered_set<std::string_view> seen;
   for (ImageIndex i(0); block.images.contains(i); ++i.value)
     require(seen.insert(block.image_names[i]).second,

@@ -234,19 +234,24 @@ std::string get_image_folder(const Hdf5Reader& file) {
   return path.ends_with(name) ? path.substr(0, path.size() - name.size()) : "";
 }
 
-// Calls visit(rows) for the rows of the table of images, a batch at a time.
-void visit_image_rows(const Hdf5Reader& file, const std::function<void(const std::vector<RowRange>&)>& visit) {
-  constexpr std::int64_t kBatch = 1 << 16;
+std::int64_t image_count(const Hdf5Reader& file) {
   const std::vector<std::int64_t> shape = file.shape("images/name");
   for (const char* name : {"images/frame", "images/mount", "images/file_hash"})
     if (shape.size() != 1 || file.shape(name) != shape) file.fail(name, "has not a row per image");
-  for (std::int64_t first = 0; first < shape[0]; first += kBatch) visit({{first, std::min(kBatch, shape[0] - first)}});
+  return shape[0];
+}
+
+// Calls visit(rows) for so many rows, a batch at a time.
+void visit_rows(std::int64_t count, const std::function<void(const std::vector<RowRange>&)>& visit) {
+  constexpr std::int64_t kBatch = 1 << 16;
+  for (std::int64_t first = 0; first < count; first += kBatch) visit({{first, std::min(kBatch, count - first)}});
 }
 
 IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
   IndexedVector<ImageIndex, Image> images;
-  images.reserve(static_cast<std::size_t>(file.shape("images/frame").at(0)));
-  visit_image_rows(file, [&](const std::vector<RowRange>& rows) {
+  const std::int64_t count = image_count(file);
+  images.reserve(static_cast<std::size_t>(count));
+  visit_rows(count, [&](const std::vector<RowRange>& rows) {
     const auto frames = file.rows<std::int64_t>("images/frame", rows);
     const auto mounts = file.rows<std::int32_t>("images/mount", rows);
     const auto hashes = file.rows<std::uint64_t>("images/file_hash", rows);
@@ -257,8 +262,9 @@ IndexedVector<ImageIndex, Image> get_images(const Hdf5Reader& file) {
 
 NameTable<ImageIndex> get_image_names(const Hdf5Reader& file) {
   NameTable<ImageIndex> names;
-  names.reserve(static_cast<std::size_t>(file.shape("images/name").at(0)));
-  visit_image_rows(file, [&](const std::vector<RowRange>& rows) {
+  const std::int64_t count = image_count(file);
+  names.reserve(static_cast<std::size_t>(count));
+  visit_rows(count, [&](const std::vector<RowRange>& rows) {
     for (const std::string& name : file.text_rows("images/name", rows)) names.push_back(name);
   });
   return names;

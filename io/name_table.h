@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <iterator>
 #include <string_view>
 #include <vector>
 
@@ -17,20 +17,20 @@ class NameTable {
   void reserve(std::size_t rows) { end_.reserve(rows); }
 
   void push_back(std::string_view name) {
-    text_.append(name);
-    end_.push_back(static_cast<std::int64_t>(text_.size()));
+    text_.insert(text_.end(), name.begin(), name.end());
+    end_.push_back(std::ssize(text_));
   }
 
   // Valid until the table changes. Throws std::out_of_range where there is no such row, so of a table that is away.
   std::string_view operator[](Index row) const {
     const auto i = static_cast<std::size_t>(row.value);
     const auto end = static_cast<std::size_t>(end_.at(i)), begin = i == 0 ? 0 : static_cast<std::size_t>(end_[i - 1]);
-    return std::string_view(text_).substr(begin, end - begin);
+    return {text_.data() + begin, end - begin};
   }
 
  private:
   std::vector<std::int64_t> end_;  // [rows] in text_
-  std::string text_;
+  std::vector<char> text_;         // no string, which would keep its memory where an empty one is assigned
 };
 
 }  // namespace megablock

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <unordered_set>
 #include <utility>
 
 #include "cluster/stages/provenance.h"
@@ -43,17 +44,17 @@ void find_boundary(BlockResult& result, const std::vector<TilePart>& parts) {
 // Images without pose, each with its reason.
 void list_failures(const Job& job, BlockResult& result) {
   result.failures = job.failures;
+  std::unordered_set<std::string> told;
+  for (const FailedUnit& failure : job.failures) told.insert(failure.unit);
   for (std::size_t i = 0; i < result.block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
     const FrameIndex frame = result.block.images[image].frame;
     if (result.state.oriented[frame]) continue;
-    const auto known = std::find_if(job.failures.begin(), job.failures.end(), [&](const FailedUnit& failure) {
-      return failure.unit == result.block.name_of(image);
-    });
-    if (known != job.failures.end()) continue;
+    const std::string name = result.block.name_of(image);
+    if (told.contains(name)) continue;
     const auto reason = job.not_oriented.find(frame);
     const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
-    result.failures.push_back({linked ? "orientation" : "matching", result.block.name_of(image),
+    result.failures.push_back({linked ? "orientation" : "matching", name,
                                linked && reason != job.not_oriented.end() ? reason->second
                                : linked ? "oriented at first, but too few of its observations hold in the adjustment"
                                         : "no other image shares enough verified matches with it"});

@@ -13,6 +13,8 @@ std::int64_t frames_of_first_images(const Block& block, std::int64_t n) {
 Block first_images(const Block& block, std::int64_t n) {
   Block part = block;
   part.images.resize(static_cast<std::size_t>(n));
+  part.image_names = {};
+  for (ImageIndex i(0); i.value < n; ++i.value) part.image_names.push_back(block.image_names[i]);
   std::int64_t rigs = 0, cameras = 0;
   part.frames.resize(static_cast<std::size_t>(frames_of_first_images(block, n)));
   for (const Frame& frame : part.frames) rigs = std::max(rigs, frame.rig.value + 1);

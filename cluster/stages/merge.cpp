@@ -85,7 +85,7 @@ void say_iteration(const Job& job, const GlobalState& state) {
   std::fprintf(stderr, "merge        %s\n", describe(state).c_str());
 }
 
-// What tables of images and frames say is in the tiles now. Of a million images they take 110 MiB on every rank, beside
+// What tables of images and frames say is in the tiles now. Of a million images they take 60 MiB on every rank, beside
 // which tiles and fronts are at work.
 void release_tables(Job& job, MergeInputs& inputs) {
   job.block.images = {};

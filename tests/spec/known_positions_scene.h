@@ -150,11 +150,11 @@ struct KnownPositionsScene {
   }
 
   void place_cameras(double lowest, double highest) {
-    const double line_y = uniform(-extent_.y(), extent_.y()), line_z = uniform(lowest, highest);
+    const double slope = extent_.y() / extent_.x(), line_z = uniform(lowest, highest);  // from corner to corner
     for (int i = 0; i < options.cameras; ++i) {
       const double x = uniform(-extent_.x(), extent_.x()), y = uniform(-extent_.y(), extent_.y()),
                    z = uniform(lowest, highest);
-      centres.push_back(options.collinear ? Eigen::Vector3d(x, line_y, line_z) : Eigen::Vector3d(x, y, z));
+      centres.push_back(options.collinear ? Eigen::Vector3d(x, slope * x, line_z) : Eigen::Vector3d(x, y, z));
       true_angles.push_back(aimed_at_origin(centres.back()));
     }
   }

@@ -46,6 +46,7 @@ TEST(Growth, FirstImagesAreABlockOfTheirOwn) {
   const Block part = first_images(block, 6);
   EXPECT_NO_THROW(check(part));
   EXPECT_EQ(part.images.size(), 6u);
+  EXPECT_EQ(part.image_names.size(), 6u);
   EXPECT_EQ(part.verticals.size(), 1u);
   EXPECT_EQ(part.frames.size(), 2u);
   EXPECT_EQ(part.rigs.size(), 1u);
