@@ -172,25 +172,24 @@ double expected_squared_error(const KnownPositionsScene& scene) {
   return sum / static_cast<double>(scene.points.size());
 }
 
-// Published: means of twenty scenes, which do not say how their cameras lie on a line. Limits are these means, and what
-// is asked for where that is less (spread satellites; their angles, and those of collinear ones with two control
-// points, reach 2.4 and 4.6 for 2.5 and 4.8). Satellite scenes of ours allow no such mean error of points in five
-// cases, whatever the method: there it must be as good as the best one that they do allow. The verdict is of what the
-// attitude priors alone tell: the rotation about the line, a common rotation.
+// Published: means of twenty scenes, which do not say how their cameras lie on a line; ours lie from corner to corner
+// of the space of the cameras. Limits are these means, of satellites with what such a mean scatters by, and what is
+// asked for where that is less (spread satellites; their angles, and those of collinear ones with two control points,
+// reach 2.4 and 4.6 for 2.5 and 4.8). The errors of points must be those that the covariances expect, scene by scene.
+// The verdict is of what the attitude priors alone tell: the rotation about the line, a common rotation.
 TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
   struct Case {
     bool drone, collinear;
     int control;
     double least_gain, largest_rms;
     bool line_flagged, common_flagged;
-    bool out_of_reach = false;  // that mean error, in scenes of ours
   };
-  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},       {true, true, 1, 121, 0.011, false, false},
-                        {true, true, 2, 175, 0.008, false, false},     {true, true, 4, 228, 0.006, false, false},
-                        {true, false, 0, 3000, 0.001, false, false},   {false, false, 0, 2, 7, false, true, true},
-                        {false, false, 1, 3.8, 2.5, false, true},      {false, true, 0, 2.1, 160, true, true, true},
-                        {false, true, 1, 3.8, 2.5, false, true, true}, {false, true, 2, 4.5, 2, false, true, true},
-                        {false, true, 4, 4.8, 1.9, false, true, true}};
+  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},     {true, true, 1, 121, 0.011, false, false},
+                        {true, true, 2, 175, 0.008, false, false},   {true, true, 4, 228, 0.006, false, false},
+                        {true, false, 0, 3000, 0.001, false, false}, {false, false, 0, 2, 7, false, true},
+                        {false, false, 1, 3.8, 2.5, false, true},    {false, true, 0, 2.1, 160, true, true},
+                        {false, true, 1, 3.8, 2.5, false, true},     {false, true, 2, 4.5, 2, false, true},
+                        {false, true, 4, 4.8, 1.9, false, true}};
   for (const Case& c : cases) {
     const auto scene_of = [&](std::uint64_t seed) {
       KnownPositionsOptions options =
@@ -200,25 +199,27 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
       options.control_points = c.control;
       return options;
     };
-    constexpr int kRuns = 200;
+    constexpr int kRuns = 200, kPublishedRuns = 20;
     const Runs runs = adjusted(kRuns, scene_of);
     const std::string what = std::string(c.drone ? "drone" : "satellite") +
                              (c.collinear ? ", collinear, " : ", spread, ") + std::to_string(c.control) +
                              " control points: ";
     const double mean = runs.mean(runs.point_rms), middle = median(runs.point_rms_of_runs);
     expect_at_least(runs.angle_gain(), c.least_gain, what + "angle error divided by");
-    double reached = 0, expected = 0, best_mean = 0;
+    double squares = 0, ratio = 0, best_mean = 0;
     for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
-      const double squared = expected_squared_error(KnownPositionsScene(scene_of(seed)));
-      reached += std::pow(runs.point_rms_of_runs[seed - 1], 2) / kRuns;
-      expected += squared / kRuns;
-      best_mean += std::sqrt(squared) / kRuns;
+      const double expected = expected_squared_error(KnownPositionsScene(scene_of(seed)));
+      const double reached = runs.point_rms_of_runs[seed - 1];
+      squares += std::pow(reached - mean, 2) / (kRuns - 1);
+      ratio += reached * reached / expected / kRuns;
+      best_mean += std::sqrt(expected) / kRuns;
     }
-    std::printf("[ reached  ] %smean %.4g m, median %.4g; rms of all %.4g, expected %.4g; mean of the expected %.4g\n",
-                what.c_str(), mean, middle, std::sqrt(reached), std::sqrt(expected), best_mean);
-    expect_at_most(mean, c.out_of_reach ? best_mean : c.largest_rms, what + "mean rms of the points, m");
+    const double scatter = std::sqrt(squares / kPublishedRuns);  // of a mean of so many scenes
+    std::printf("[ reached  ] %smean %.4g m, median %.4g; mean of the expected %.4g; scatter of a mean of %d %.3g\n",
+                what.c_str(), mean, middle, best_mean, kPublishedRuns, scatter);
+    expect_at_most(mean, c.largest_rms + (c.drone ? 0 : scatter), what + "mean rms of the points, m");
     if (!c.drone && !c.collinear) expect_at_most(middle, c.largest_rms, what + "median rms of the points, m");
-    expect_at_most(std::abs(std::sqrt(reached / expected) - 1), 0.1, what + "off the expected rms by");
+    expect_at_most(std::abs(std::sqrt(ratio) - 1), 0.1, what + "off the expected rms by");
     EXPECT_EQ(runs.collinear, c.line_flagged ? kRuns : 0) << what;
     EXPECT_EQ(runs.weak_common, c.common_flagged ? kRuns : 0) << what;
   }

@@ -44,13 +44,12 @@ inline Block example_block() {
   first.attitude_prior = AttitudePrior{Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {0.01, 0.02, 0.03}};
   block.frames[FrameIndex(2)].given_pose = Pose{Eigen::Quaterniond(0, 1, 0, 0), {7, 8, 9}};
   block.image_folder = "/data/";
-  block.images =
-      IndexedVector<ImageIndex, Image>(std::vector<Image>{{"a/0.jpg", FrameIndex(0), 0, 0x123456789abcdef0u},
-                                                          {"b/0.jpg", FrameIndex(0), 1, 1},
-                                                          {"a/1.jpg", FrameIndex(1), 0, 2},
-                                                          {"b/1.jpg", FrameIndex(1), 1, 3},
-                                                          {"2.jpg", FrameIndex(2), 0, 0},
-                                                          {"gr\xc3\xbcn.jpg", FrameIndex(3), 0, 0xffffffffffffffffu}});
+  block.add_image("a/0.jpg", {FrameIndex(0), 0, 0x123456789abcdef0u});
+  block.add_image("b/0.jpg", {FrameIndex(0), 1, 1});
+  block.add_image("a/1.jpg", {FrameIndex(1), 0, 2});
+  block.add_image("b/1.jpg", {FrameIndex(1), 1, 3});
+  block.add_image("2.jpg", {FrameIndex(2), 0, 0});
+  block.add_image("gr\xc3\xbcn.jpg", {FrameIndex(3), 0, 0xffffffffffffffffu});
   block.relative_poses.push_back(
       {FrameIndex(0), FrameIndex(1), {Eigen::Quaterniond(0.6, 0, 0.8, 0), {4, 0.001, -0.002}}, 1e-3, 0.05});
   ControlPoint control{"GCP 1", PointRole::kControl, {10, 20, std::nan("")}, {0.01, 0.01, 0.02}, {}};
