@@ -8,7 +8,7 @@
 namespace megablock {
 namespace {
 
-constexpr double kScreening = 32, kThreshold = 3 * kScreening;  // sigmas, as the adjustment asks for
+constexpr double kFrameLimit = 32, kPartLimit = 3 * kFrameLimit;  // sigmas, as the adjustment asks for
 
 // Vehicles with four cameras on streets that are driven twice. The second passes stand metres beside and above the
 // first, turned a little, each in agreement with itself.
@@ -18,7 +18,7 @@ struct PassesApart : SingleTile {
     state = model;
     for (const std::size_t f : second_passes()) state.frames[f] = shifted(model.frames[f]);
     triangulate_points(problem, state, options);
-    screen_observations(problem, state, kScreening, options);
+    screen_observations(problem, state, kFrameLimit, options);
   }
   static SimulationOptions driven_twice(std::uint64_t seed) {
     SimulationOptions simulation;
@@ -61,14 +61,14 @@ TEST(LostParts, PassesAreBroughtTogether) {
     PassesApart tile(seed);
     const std::vector<std::size_t> second = tile.second_passes();
     ASSERT_GT(second.size(), 50u);
-    const std::vector<LocalFrame> found = recover_lost_parts(tile.problem, tile.state, kThreshold);
+    const std::vector<LocalFrame> found = recover_lost_parts(tile.problem, tile.state, kPartLimit);
     EXPECT_EQ(found.size(), second.size()) << seed;
     const auto [place, turn] = tile.errors(found);
     EXPECT_LT(place, 0.05) << seed;
     EXPECT_LT(turn, 0.05) << seed;
-    const std::int64_t back = screen_observations(tile.problem, tile.state, kScreening, tile.options);
+    const std::int64_t back = screen_observations(tile.problem, tile.state, kFrameLimit, tile.options);
     EXPECT_GT(back, tile.problem.observation_count() / 50) << "what one pass sees of the other's points";
-    EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kThreshold).empty()) << "they are one now";
+    EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty()) << "they are one now";
   }
 }
 
@@ -76,8 +76,8 @@ TEST(LostParts, NothingIsMovedWhereAllAgree) {
   PassesApart tile(4);
   tile.state = tile.model;
   std::fill(tile.problem.kept.begin(), tile.problem.kept.end(), 1);
-  screen_observations(tile.problem, tile.state, kScreening, tile.options);
-  EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kThreshold).empty());
+  screen_observations(tile.problem, tile.state, kFrameLimit, tile.options);
+  EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty());
 }
 
 // Without common tracks nothing says where a part belongs.
@@ -96,7 +96,7 @@ TEST(LostParts, PartsWithoutCommonTracksStay) {
         tile.problem.kept[row] = 0;
       }
   }
-  EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kThreshold).empty());
+  EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty());
 }
 
 // The whole adjustment from there: as good as from the truth.

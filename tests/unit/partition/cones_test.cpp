@@ -57,7 +57,7 @@ TEST(ViewingCones, PairsOfARigAreNearAndSeeTheSame) {
     if (a.frame == b.frame) continue;
     EXPECT_LE(distance(block, pair.a, pair.b), 30.0);
     if (checked++ % 7 == 0) {
-      EXPECT_TRUE(cones_meet(block, pair.a, pair.b, 30)) << a.name << ' ' << b.name;
+      EXPECT_TRUE(cones_meet(block, pair.a, pair.b, 30)) << block.name_of(pair.a) << ' ' << block.name_of(pair.b);
     }
     across += block.frames[a.frame].pass != block.frames[b.frame].pass;
     for (const ImageIndex image : {pair.a, pair.b}) ++partners[static_cast<std::size_t>(image.value)];
