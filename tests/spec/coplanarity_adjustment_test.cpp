@@ -248,20 +248,27 @@ TEST(CoplanarityAdjustment, TKP07TableOfNineConfigurations) {
 }
 
 TEST(CoplanarityAdjustment, TKP08aAnglesAloneFromExactImages) {
+  constexpr int kRuns = 20;  // averaged, as the protocol says: one step of a single scene may reach 22
   double floor = 1e9, first = 1e9, third = 1e9;
-  for (const int points : {50, 250, 1000})
-    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+  for (const int points : {50, 250, 1000}) {
+    double left[3] = {};  // of the angle error, mean of the runs
+    for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
       const KnownPositionsScene scene(KnownPositionsOptions::satellite(points, 0.1, seed));
       CoplanarityNetwork start = network_of(scene, {false, true});
       hold_images(start);
-      const auto gain = [&](Solver solver, int steps) {
-        return errors_of(scene, start, adjust_by_coplanarity(start, determinants_of(scene, solver, 0, steps)).network)
-            .angle_gain();
+      const auto share = [&](Solver solver, int steps) {
+        return 1 / (kRuns * errors_of(scene, start,
+                                      adjust_by_coplanarity(start, determinants_of(scene, solver, 0, steps)).network)
+                                .angle_gain());
       };
-      keep_smallest(floor, gain(Solver::kLsqr, 1));
-      keep_smallest(first, gain(Solver::kDirect, 1));
-      keep_smallest(third, gain(Solver::kDirect, 3));
+      left[0] += share(Solver::kLsqr, 1);
+      left[1] += share(Solver::kDirect, 1);
+      left[2] += share(Solver::kDirect, 3);
     }
+    keep_smallest(floor, 1 / left[0]);
+    keep_smallest(first, 1 / left[1]);
+    keep_smallest(third, 1 / left[2]);
+  }
   expect_at_least(floor, 3, "angle error divided by, LSQR as published");
   expect_at_least(first, 50, "angle error divided by, one step");
   expect_at_least(third, 1e6, "angle error divided by, three steps");

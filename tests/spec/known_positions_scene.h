@@ -150,7 +150,8 @@ struct KnownPositionsScene {
   }
 
   void place_cameras(double lowest, double highest) {
-    const double slope = extent_.y() / extent_.x(), line_z = uniform(lowest, highest);  // from corner to corner
+    const double slope = std::copysign(extent_.y() / extent_.x(), uniform(-1, 1));  // from corner to corner
+    const double line_z = uniform(lowest, highest);
     for (int i = 0; i < options.cameras; ++i) {
       const double x = uniform(-extent_.x(), extent_.x()), y = uniform(-extent_.y(), extent_.y()),
                    z = uniform(lowest, highest);

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <numeric>
 #include <set>
+#include <string>
 
 #include "io/error.h"
 #include "tests/unit/adjust/orientation_scene.h"
 #include "tests/unit/adjust/seen_verticals.h"
+#include "tests/unit/io/image_names.h"
 
 namespace megablock {
 namespace {
@@ -175,6 +177,10 @@ Permuted permuted(const SimulatedBlock& scene, std::vector<VerifiedPair> pairs) 
     result.scene.block.images[ImageIndex(to)].frame = FrameIndex(to);
     result.scene.truth.frames[FrameIndex(to)] = scene.truth.frames[FrameIndex(from)];
   }
+  std::vector<std::string> names(count);
+  for (std::size_t i = 0; i < count; ++i)
+    names[static_cast<std::size_t>(result.place[i])] = scene.block.name_of(ImageIndex(static_cast<std::int64_t>(i)));
+  rename_images(result.scene.block, [&](ImageIndex image) { return names[static_cast<std::size_t>(image.value)]; });
   std::vector<std::size_t> order(scene.tracks.id.size());
   std::iota(order.begin(), order.end(), 0u);
   std::shuffle(order.begin(), order.end(), random);

@@ -145,7 +145,9 @@ void expect_harmless(const Estimator& estimator, bool may_find) {
     int inliers = 0;
     for (std::size_t i = 0; i < estimator.size(); ++i) {
       inliers += found->consensus.inlier[i] != 0;
-      if (found->consensus.inlier[i]) EXPECT_LE(squared_residual(i), limit * limit * (1 + 1e-12)) << i;
+      if (found->consensus.inlier[i]) {
+        EXPECT_LE(squared_residual(i), limit * limit * (1 + 1e-12)) << i;
+      }
     }
     EXPECT_EQ(inliers, found->consensus.count);
   }
