@@ -80,6 +80,32 @@ TEST(LostParts, NothingIsMovedWhereAllAgree) {
   EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty());
 }
 
+// Wrong matches that agree with one another, of a facade seen one period off, say, do not move what stands well.
+TEST(LostParts, APartStaysWhereItsOwnObservationsAgree) {
+  PassesApart tile(7);
+  const std::vector<std::size_t> second = tile.second_passes();
+  TileState elsewhere = tile.model;
+  for (const std::size_t f : second) elsewhere.frames[f] = tile.shifted(tile.model.frames[f]);
+  std::int64_t count = 0;
+  for (std::int64_t p = 0; p < tile.problem.point_count(); ++p)
+    for (std::int64_t row = tile.problem.begin[p]; row < tile.problem.begin[p + 1]; ++row) {
+      const TileImage& image = tile.problem.images[tile.problem.image[row].value];
+      const auto frame = static_cast<std::size_t>(image.frame.value);
+      if (!std::binary_search(second.begin(), second.end(), frame) || ++count % 5 < 2) continue;
+      // Three of five observations are those of a pass that stands elsewhere.
+      const Eigen::Vector3d inside =
+          to_camera(elsewhere.frames[frame], elsewhere.mounts[image.mount], tile.model.points[p]);
+      if (inside.z() < 1) continue;
+      const Eigen::Vector2d pixel = project(elsewhere.cameras[image.camera.value], inside);
+      tile.problem.x[row] = pixel.x();
+      tile.problem.y[row] = pixel.y();
+    }
+  tile.state = tile.model;
+  std::fill(tile.problem.kept.begin(), tile.problem.kept.end(), 1);
+  screen_observations(tile.problem, tile.state, kFrameLimit, tile.options);
+  EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty());
+}
+
 // Without common tracks nothing says where a part belongs.
 TEST(LostParts, PartsWithoutCommonTracksStay) {
   PassesApart tile(5);
