@@ -79,11 +79,9 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::
   std::vector<std::int64_t> generations;
   if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
     refuse_another_block(store, *previous, project);
-    Block merged = append_to(*previous, block);
     // Images taken away or changed start a new block; growing keeps what is there.
-    const bool grown = merged.images.size() == block.images.size();
-    if (grown) {
-      block = std::move(merged);
+    if (has_all_images_of(*previous, block)) {
+      block = append_to(*previous, std::move(block));
       generations = job->at<std::vector<std::int64_t>>("generations");
     }
   }

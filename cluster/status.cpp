@@ -128,11 +128,13 @@ Json status(const JobStore& store) {
                           "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
                           "control_points_unused", "check_points_unused", "interest_points", "remarks"})
     json[key] = nullptr;
-  json["images"] = store.seal("block.h5") ? read_block(store.verified_path("block.h5")).images.size() : 0;
+  const bool only_block = !result && store.seal("block.h5");
+  json["images"] = only_block ? read_block(store.verified_path("block.h5")).images.size() : 0;
   const bool current = stages.back().state == StageState::kDone;
   json["result"] = !result ? "none" : current ? "current" : "stale";
   if (result) add_figures(json, *result, StoredTracks(store.path(kResult)));
-  json["failures"] = failures_json(job, stages, current ? result : std::nullopt);
+  if (!current) result.reset();
+  json["failures"] = failures_json(job, stages, result);
   json["failed"] = json["failures"].size();
   return json;
 }

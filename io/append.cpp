@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <string_view>
 #include <unordered_map>
 
 #include "io/ground_change.h"
@@ -83,17 +84,56 @@ void keep_former_bits(const Block& previous, Block& moved) {
   }
 }
 
+template <typename Index, typename Item>
+bool same_names(const IndexedVector<Index, Item>& a, const IndexedVector<Index, Item>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Item& x, const Item& y) { return x.name == y.name; });
+}
+
+bool same_image_names(const Block& a, const Block& b) {
+  if (a.images.size() != b.images.size()) return false;
+  for (ImageIndex i(0); a.images.contains(i); ++i.value)
+    if (a.image_names[i] != b.image_names[i]) return false;
+  return true;
+}
+
+// Every item has its place already, which is what a job that is resumed finds.
+bool same_places(const Block& a, const Block& b) {
+  return same_names(a.cameras, b.cameras) && same_names(a.rigs, b.rigs) && same_names(a.frames, b.frames) &&
+         same_image_names(a, b);
+}
+
+void sort_verticals(Block& block) {
+  std::sort(block.verticals.begin(), block.verticals.end(),
+            [](const SeenVertical& a, const SeenVertical& b) { return a.image < b.image; });
+}
+
 }  // namespace
 
-Block append_to(const Block& previous, const Block& now) {
-  Block moved = now;
-  if (previous.ground.georeferenced && now.ground.georeferenced && !same_origin(previous.ground, now.ground)) {
-    move(GroundChange(now.ground, previous.ground), moved);
+bool has_all_images_of(const Block& previous, const Block& now) {
+  if (same_image_names(previous, now)) return true;
+  std::vector<std::string_view> names;
+  names.reserve(now.images.size());
+  for (ImageIndex i(0); now.images.contains(i); ++i.value) names.push_back(now.image_names[i]);
+  std::sort(names.begin(), names.end());
+  for (ImageIndex i(0); previous.images.contains(i); ++i.value)
+    if (!std::binary_search(names.begin(), names.end(), previous.image_names[i])) return false;
+  return true;
+}
+
+Block append_to(const Block& previous, Block moved) {
+  if (previous.ground.georeferenced && moved.ground.georeferenced && !same_origin(previous.ground, moved.ground)) {
+    move(GroundChange(moved.ground, previous.ground), moved);
     keep_former_bits(previous, moved);
   }
+  if (previous.ground.georeferenced) moved.ground = previous.ground;
+  if (same_places(previous, moved)) {
+    sort_verticals(moved);
+    return moved;
+  }
   Block merged;
-  merged.ground = previous.ground.georeferenced ? previous.ground : now.ground;
-  merged.image_folder = now.image_folder;  // the job's may have been moved
+  merged.ground = moved.ground;
+  merged.image_folder = moved.image_folder;  // the job's may have been moved
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
   const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
   const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);
@@ -128,8 +168,7 @@ Block append_to(const Block& previous, const Block& now) {
     for (KnownLine::Measurement& measurement : line.measurements) measurement.image = images[measurement.image];
   merged.verticals = moved.verticals;
   for (SeenVertical& vertical : merged.verticals) vertical.image = images[vertical.image];
-  std::sort(merged.verticals.begin(), merged.verticals.end(),
-            [](const SeenVertical& a, const SeenVertical& b) { return a.image < b.image; });
+  sort_verticals(merged);
   return merged;
 }
 

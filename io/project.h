@@ -27,7 +27,7 @@ struct Project {
   std::vector<std::pair<std::string, std::string>> unreadable;  // image file and reason, reported and skipped
   std::vector<std::string> copies;    // image files left out because an earlier one has the same bytes
   std::vector<std::string> missing;   // images and exposures that the rigs' assignments name and that are not there
-  std::vector<std::string> warnings;                            // one line each: GPS at 0,0, duplicates, outliers ...
+  std::vector<std::string> warnings;  // one line each: GPS at 0,0, duplicates, outliers ...
 };
 
 // Reads and validates; InputError with file:line for unknown keys, wrong types or units, missing files.
@@ -40,9 +40,11 @@ std::string mask_file_name(const std::string& camera);
 
 // The block of a job that has grown: cameras, rigs, frames and images of `previous` keep their indices (matched by
 // name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
-// `previous` that are gone stay, so the caller sees that by the count. The ground frame stays the previous one:
-// positions, attitudes and control of `now` are turned into it when it has another origin.
-Block append_to(const Block& previous, const Block& now);
+// `previous` that are gone stay. The ground frame stays the previous one: positions, attitudes and control of `now` are
+// turned into it when it has another origin.
+Block append_to(const Block& previous, Block now);
+// By name.
+bool has_all_images_of(const Block& previous, const Block& now);
 
 struct InitOptions {
   std::string images;  // folder, searched recursively, names sorted

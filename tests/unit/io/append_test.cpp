@@ -86,9 +86,30 @@ TEST(AppendTo, ContentsAreTheNewOnes) {
   EXPECT_FALSE(merged.frames[FrameIndex(1)].position_prior);
 }
 
-TEST(AppendTo, RemovedImagesStaySoThatTheyAreNoticed) {
-  const Block merged = append_to(block_of({"b1", "b2"}, kHere), block_of({"b2"}, kHere));
+TEST(AppendTo, RemovedImagesStayAndAreNoticed) {
+  const Block previous = block_of({"b1", "b2"}, kHere), now = block_of({"b2"}, kHere);
+  EXPECT_THAT(image_names(append_to(previous, now)), ::testing::ElementsAre("b1", "b2"));
+  EXPECT_FALSE(has_all_images_of(previous, now));
+  EXPECT_TRUE(has_all_images_of(now, previous));
+  EXPECT_TRUE(has_all_images_of(previous, previous));
+  EXPECT_TRUE(has_all_images_of(previous, block_of({"b2", "c1", "b1"}, kHere)));
+}
+
+TEST(AppendTo, ABlockThatHasNotGrownIsTheOneGivenNow) {
+  const Block previous = block_of({"b1", "b2"}, kHere);
+  Block now = previous;
+  now.image_folder = "/moved/";
+  now.frames[FrameIndex(1)].position_prior.reset();
+  now.ground.crs = "EPSG:4326";
+  SeenVertical second = now.verticals.front(), first = second;
+  first.image = ImageIndex(0);
+  now.verticals = {second, first};
+  const Block merged = append_to(previous, now);
   EXPECT_THAT(image_names(merged), ::testing::ElementsAre("b1", "b2"));
+  EXPECT_EQ(merged.image_folder, "/moved/");
+  EXPECT_FALSE(merged.frames[FrameIndex(1)].position_prior);
+  EXPECT_EQ(merged.ground.crs, previous.ground.crs);
+  EXPECT_EQ(merged.verticals[0].image, ImageIndex(0));
 }
 
 TEST(AppendTo, TheGroundFrameStaysThePreviousOne) {
