@@ -148,7 +148,7 @@ std::string headline(const BlockResult& result, const Figures& f) {
     seconds += stage.seconds;
     peak = std::max(peak, stage.peak_rss_mib);
   }
-  std::string cards = card(count(r.oriented_images) + "<i> of " + count(images) + "</i>", "images oriented",
+  std::string cards = card(count(r.oriented_images) + "<i> of\u00a0" + count(images) + "</i>", "images oriented",
                            images == r.oriented_images ? "" : count(images - r.oriented_images) + " not oriented");
   cards += card(count(r.points), "tie points",
                 measured ? "seen in " + fixed(r.mean_track_length, 2) + " images on average" : "");

@@ -22,7 +22,7 @@ code{font:13px ui-monospace,Menlo,Consolas,monospace}
 .muted,figcaption{color:var(--muted);font-size:13px}
 .cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(205px,1fr));gap:10px;margin:16px 0}
 .card{background:var(--paper);border:1px solid var(--line);border-radius:8px;padding:10px 14px;display:flex;flex-direction:column}
-.card b{font-size:23px;font-weight:600;line-height:1.25;white-space:nowrap}
+.card b{font-size:23px;font-weight:600;line-height:1.25}
 .card i{font-style:normal;font-size:14px;font-weight:400;color:var(--muted)}
 .card span{font-size:13px}
 .card small{color:var(--muted);font-size:12px}

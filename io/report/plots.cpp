@@ -57,6 +57,13 @@ std::string horizontal_grid(const Axes& a, double factor = 1) {
   return svg;
 }
 
+// Left of the axis: the title, and counts of up to `most` with their spaces between thousands.
+double room_for_labels(std::int64_t most) {
+  constexpr double kTitle = 26, kDigit = 6.8, kSpace = 3;
+  const auto digits = static_cast<double>(std::to_string(most).size());
+  return kTitle + kDigit * digits + kSpace * std::floor((digits - 1) / 3);
+}
+
 std::string vertical_grid(const Axes& a, double factor) {
   const double step = round_step((a.x_high - a.x_low) * factor, 7) / factor;
   const int decimals = decimals_of(step * factor);
@@ -132,6 +139,7 @@ std::string draw(const BarChart& chart) {
   const std::int64_t most = h.bins.empty() ? 0 : *std::max_element(h.bins.begin(), h.bins.end());
   if (most == 0) return paragraph("Nothing to show.", "muted");
   Axes axes{h.low, h.low + h.width * static_cast<double>(h.bins.size()), 0, 1.06 * static_cast<double>(most)};
+  axes.left = std::max(axes.left, room_for_labels(most));
   std::string svg = open(axes, escape(chart.x_title)) + horizontal_grid(axes);
   for (std::size_t b = 0; b < h.bins.size(); ++b) {
     if (h.bins[b] == 0) continue;
