@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "cluster/gather_by_tile.h"
 #include "cluster/progress.h"
 #include "io/error.h"
 #include "merge/point_refinement.h"
@@ -11,49 +12,6 @@
 namespace megablock {
 
 namespace {
-
-template <typename Value>
-concept MakesBytes = requires(const Value& value) {
-  value.to_bytes();
-};
-
-template <typename Value>
-void write(ByteWriter& writer, const Value& value) {
-  if constexpr (MakesBytes<Value>)
-    writer.bytes(value.to_bytes());
-  else
-    writer.value(value);
-}
-void write(ByteWriter& writer, const UnknownList& unknowns) { writer.values(unknowns); }
-
-template <typename Value>
-void read(ByteReader& reader, Value& value) {
-  if constexpr (MakesBytes<Value>)
-    value = Value::from_bytes(reader.bytes());
-  else
-    value = reader.value<Value>();
-}
-void read(ByteReader& reader, UnknownList& unknowns) { unknowns = reader.values<Unknown>(); }
-
-// One value per tile from the ranks that hold them, in tile order, on every rank.
-template <typename Value>
-std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const TileStore& own,
-                                  const std::vector<Value>& values) {
-  ByteWriter writer;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    writer.value(own.number(i));
-    write(writer, values[i]);
-  }
-  std::vector<Value> all(tiles);
-  for (const Bytes& bytes : ranks.gather_all(writer.take())) {
-    ByteReader reader(bytes);
-    while (!reader.at_end()) {
-      const auto tile = reader.value<std::int64_t>();
-      read(reader, all[static_cast<std::size_t>(tile)]);
-    }
-  }
-  return all;
-}
 
 // Adds the time of its life to a sum.
 class Stopwatch {

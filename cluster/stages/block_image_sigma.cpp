@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "adjust/image_sigma.h"
+#include "cluster/gather_by_tile.h"
 #include "io/unit_files.h"
 #include "merge/bytes.h"
 
@@ -23,20 +24,12 @@ std::int64_t orientation_unknowns(const Block& block, const BlockState& state) {
 
 // Sums in tile order, whatever the ranks.
 ImageResiduals block_image_residuals(Job& job, TileStore& own, std::size_t tile_count) {
-  ByteWriter writer;
+  std::vector<ImageResiduals> residuals;  // [own]
   for (std::size_t row = 0; row < own.size(); ++row) {
     const RankTile& tile = own.whole(row);
-    writer.value(tile.tile);
-    writer.value(image_residuals(tile.problem, tile.state, job.settings.adjustment));
+    residuals.push_back(image_residuals(tile.problem, tile.state, job.settings.adjustment));
   }
-  std::vector<ImageResiduals> by_tile(tile_count);
-  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
-    ByteReader reader(bytes);
-    while (!reader.at_end()) {
-      const auto tile = reader.value<std::int64_t>();
-      by_tile[static_cast<std::size_t>(tile)] = reader.value<ImageResiduals>();
-    }
-  }
+  const std::vector<ImageResiduals> by_tile = gather_by_tile(job.ranks, tile_count, own, residuals);
   ImageResiduals sum;
   for (const ImageResiduals& tile : by_tile) sum.add(tile);
   return sum;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "cluster/gather_by_tile.h"
 #include "cluster/matrix_bytes.h"
 #include "cluster/stages/merge_start.h"
 #include "cluster/stages/provenance.h"
@@ -89,18 +90,7 @@ void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<Motio
 }
 
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count) {
-  ByteWriter writer;
-  for (const TilePart& part : adjusted.parts) writer.bytes(part.to_bytes());
-  std::vector<TilePart> parts(tile_count);
-  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
-    ByteReader reader(bytes);
-    while (!reader.at_end()) {
-      TilePart part = TilePart::from_bytes(reader.bytes());
-      const auto tile = static_cast<std::size_t>(part.tile);
-      parts[tile] = std::move(part);
-    }
-  }
-  return parts;
+  return gather_by_tile(job.ranks, tile_count, adjusted.parts, [&](std::size_t i) { return adjusted.parts[i].tile; });
 }
 
 void gather_covariances(Job& job, Adjusted& adjusted) {
