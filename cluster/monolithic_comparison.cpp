@@ -31,6 +31,7 @@ double cost_after_ceres(const ResultTile& tile) {
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_tile.problem(), &summary);
+  if (!summary.IsSolutionUsable()) throw ComputeError("Ceres fails: " + summary.message);
   return summary.final_cost;
 }
 

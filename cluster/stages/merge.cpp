@@ -188,8 +188,10 @@ std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
 
 void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
                  MergeOutcome outcome, const std::vector<TilePart>& parts, const UnitEvent& event) {
-  if (!adjusted.converged)
+  if (!adjusted.converged) {
     job.notes.push_back("the global adjustment did not converge: " + describe(adjusted.position.global));
+    std::fprintf(stderr, "merge        warning: %s\n", job.notes.back().c_str());  // --quiet or not
+  }
   for (const SeamCheck& seam : outcome.seams)
     if (!seam.note.empty()) job.notes.push_back(seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))

@@ -1,18 +1,21 @@
 // One job on a simulated block of any size, from given tie points to the evaluated result:
 //
 //   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 16] [--folder F]
-//                [--seed 1] [--calibration held|shared]
+//                [--seed 1] [--calibration held|shared] [--plain]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
 // its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of the
 // stages, writing of result and report included, starting and the summary that is printed at the end not;
 // stage_peak_rss_mib: that of each, of the merge without its result. What --folder holds is not simulated again.
+// image_sigma_px: that of the tie points, which the job estimates, so that chi2_per_dof
+// says nothing of it but with --plain.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "io/error.h"
 #include "io/evaluate.h"
@@ -31,13 +34,27 @@ struct ScaleOptions {
   int ranks = 1, threads = 1;
   double memory_mib = 16;  // per rank, for tiles, fronts and factors of the merge
   std::string arithmetic = "avx2";
+  bool plain = false;
 };
 
-// Median over the steps of the global adjustment, of which each leaves one event on the first rank.
+// Nothing is estimated from residuals, nothing is cut from the tails of their distribution.
+constexpr const char* kPlain =
+    "adjustment: {image_sigma_px: 0.5, estimate_image_sigma: false, image_loss: none, position_loss: none, "
+    "max_residual_sigmas: 8}\n";
+
+// Median over the accepted steps of the global adjustment, refused ones before them included. Each leaves an event on
+// the first rank, "merge/<round>-<accepted>"; so does the end of a round, with as many accepted as before.
 double seconds_per_iteration(const fs::path& job) {
+  std::vector<UnitEvent> events = read_events(JobStore(job.string()));
+  std::stable_sort(events.begin(), events.end(),
+                   [](const UnitEvent& a, const UnitEvent& b) { return a.time_s < b.time_s; });
   std::vector<double> seconds;
-  for (const UnitEvent& event : read_events(JobStore(job.string())))
-    if (event.rank == 0 && event.unit.starts_with("merge/")) seconds.push_back(event.seconds);
+  std::string accepted;
+  for (const UnitEvent& event : events) {
+    if (event.rank != 0 || !event.unit.starts_with("merge/")) continue;
+    const std::string now = event.unit.substr(event.unit.rfind('-'));
+    if (std::exchange(accepted, now) != now) seconds.push_back(event.seconds);
+  }
   if (seconds.empty()) throw ComputeError("the job has left no events of its merge");
   std::nth_element(seconds.begin(), seconds.begin() + std::ssize(seconds) / 2, seconds.end());
   return seconds[seconds.size() / 2];
@@ -85,7 +102,7 @@ std::int64_t points_across_tiles(const BlockResult& result, const TrackBatches& 
 
 nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
   const fs::path job = folder / ("job-" + std::to_string(options.ranks) + "x" + std::to_string(options.threads));
-  simulate_scene(options.scene, folder);
+  simulate_scene(options.scene, folder, options.plain ? kPlain : "");
   const auto start = std::chrono::steady_clock::now();
   const double start_s = seconds_since_1970();
   run_scene(folder, job, options.ranks, options.threads,
@@ -112,6 +129,8 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
           {"seconds_per_iteration", per_iteration},
           {"global_iterations", result.global_iterations},
           {"chi2_per_dof", result.variance_factor},
+          {"image_sigma_px", result.image_sigma_px},
+          {"plain", options.plain},
           {"peak_rss_mib_per_rank", peak_rss_mib(job)},
           {"stage_peak_rss_mib", by_stage(result, &StageStatistics::peak_rss_mib)},
           {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), std::uint8_t{1})},
@@ -136,6 +155,8 @@ int main(int argc, char** argv) {
   app.add_option("--memory", options.memory_mib, "Memory per rank for tiles, fronts and factors, MiB")
       ->check(CLI::PositiveNumber);
   app.add_option("--arithmetic", options.arithmetic, "Of the job")->check(CLI::IsMember({"avx2", "avx512"}));
+  app.add_flag("--plain", options.plain,
+               "Sigma of tie points as simulated, no loss, next to nothing rejected: chi2_per_dof tests the noise");
   CLI11_PARSE(app, argc, argv);
   try {
     const ScratchDirectory scratch;

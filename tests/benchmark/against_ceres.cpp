@@ -91,7 +91,7 @@ struct Options {
   std::string role;  // of a process that this program starts: "exactness", "ours" or the name of Ceres' linear solver
   bool analytic = false;
   bool exactness = true, speed = true;  // what is asked for
-  int tile_frames = 0;                  // 0: as the program chooses
+  int tile_frames = 120;                // so that ranks have several; 0: as the program chooses
   std::string loss = "huber";
   Options() { scene.frames = 2000; }
 };
@@ -370,15 +370,11 @@ double pose_difference_sigmas(const Start& start, const BlockResult& result, con
 }
 
 void run_job(const Options& options, const Start& start) {
-  const bool made = !fs::exists(start.folder / "block.yaml");
-  simulate_scene(options.scene, start.folder);
-  if (made) {
-    std::ofstream project(start.folder / "block.yaml", std::ios::app);
-    project << "adjustment: {image_loss: " << options.loss << ", position_loss: " << options.loss << "}\n"
-            << "merge: {decrement: 1e-7}\n";
-    if (options.tile_frames > 0) project << "tiles: {tile_max_frames: " << options.tile_frames << "}\n";
-  }
-  if (!fs::exists(start.job() / "result/block.h5")) run_scene(start.folder, start.job(), kRanks, 1);
+  std::string project =
+      "adjustment: {image_loss: " + options.loss + ", position_loss: " + options.loss + "}\nmerge: {decrement: 1e-7}\n";
+  if (options.tile_frames > 0) project += "tiles: {tile_max_frames: " + std::to_string(options.tile_frames) + "}\n";
+  simulate_scene(options.scene, start.folder, project);
+  run_scene(start.folder, start.job(), kRanks, 1);
 }
 
 Json exactness(const Start& start, const std::string& self) {
@@ -429,7 +425,10 @@ Json compare(const Options& options, const fs::path& folder) {
   fs::create_directories(folder / "start");
   const std::string self =
       "'" + fs::canonical("/proc/self/exe").string() + "' --folder '" + folder.string() + "' --role ";
-  Json figures{{"scene", options.scene.scene}, {"frames", options.scene.frames}};
+  Json figures{{"scene", options.scene.scene},      {"frames", options.scene.frames},
+               {"seed", options.scene.seed},        {"calibration", options.scene.calibration},
+               {"free", options.scene.free},        {"loss", options.loss},
+               {"tile_frames", options.tile_frames}};
   if (options.exactness) figures.update(exactness(start, self));
   if (options.speed) figures.update(speed(options, start, self));
   return figures;
@@ -441,7 +440,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app("The merge against Ceres on one simulated block; prints one JSON object");
   add_scene_options(app, options.scene);
-  app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most, of a block that is not there yet");
+  app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most; 0: as the program chooses");
   app.add_option("--calibration", options.scene.calibration, "Calibration held, or shared by all frames and adjusted")
       ->check(CLI::IsMember({"held", "shared"}));
   app.add_option("--loss", options.loss, "Robust loss of image measurements and positions")

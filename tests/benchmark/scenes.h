@@ -16,6 +16,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
 
@@ -70,9 +72,24 @@ inline void free_mounts(const std::filesystem::path& given) {
   write_block(given.string(), block);
 }
 
-// Unless the folder holds a block.
-inline void simulate_scene(const SceneOptions& options, const std::filesystem::path& folder) {
-  if (std::filesystem::exists(folder / "block.yaml")) return;
+// What a folder's block was made of.
+inline nlohmann::json description_of(const SceneOptions& options, const std::string& project_lines) {
+  return {{"scene", options.scene}, {"frames", options.frames},
+          {"seed", options.seed},   {"calibration", options.calibration},
+          {"free", options.free},   {"project_lines", project_lines}};
+}
+
+// Unless the folder holds this very block. `project_lines` are added to its project file.
+inline void simulate_scene(const SceneOptions& options, const std::filesystem::path& folder,
+                           const std::string& project_lines = {}) {
+  const std::string description = description_of(options, project_lines).dump();
+  if (std::filesystem::exists(folder / "block.yaml")) {
+    std::string there;
+    std::getline(std::ifstream(folder / "scene.json"), there);
+    if (there == description) return;
+    throw InputError(folder.string() + ": holds another block (" + (there.empty() ? "no scene.json" : there) +
+                     ", not " + description + "); name another folder, or delete this one");
+  }
   const bool street = options.scene == "street";
   std::string scene = street ? "--scene street --rig-cameras 10 --points-per-frame 1000 --relative-position-sigma 0.01 "
                                "--relative-rotation-sigma 0.01 --start-offset 2"
@@ -86,6 +103,8 @@ inline void simulate_scene(const SceneOptions& options, const std::filesystem::p
   run_command(program() + "simulate " + scene + " --frames " + std::to_string(options.frames) + " --seed " +
               std::to_string(options.seed) + " -o '" + folder.string() + "'");
   if (street && !held) free_mounts(folder / "given.h5");
+  std::ofstream(folder / "block.yaml", std::ios::app) << project_lines;
+  std::ofstream(folder / "scene.json") << description << "\n";
 }
 
 // Its job, from the beginning.

@@ -24,7 +24,8 @@ parser.add_argument("megablock")
 parser.add_argument("--kills", type=int, default=10)
 parser.add_argument("--seed", type=int, default=4711)
 options = parser.parse_args()
-LONGEST_S = 120  # of a run, and of the others' end when a rank is gone
+LONGEST_S = 120  # of a run
+LEFT_S = 30  # until the others end when a rank is gone
 
 
 def digest(job):
@@ -100,10 +101,10 @@ with tempfile.TemporaryDirectory() as folder:
                 os.kill(moments.choice(sorted(own)), signal.SIGKILL)
                 begun = time.monotonic()
                 try:
-                    code = run.wait(timeout=LONGEST_S)
+                    code = run.wait(timeout=LEFT_S)
                 except subprocess.TimeoutExpired:
                     kill_all(run.pid)
-                    sys.exit(f"the others still waited {LONGEST_S} s after one rank was killed")
+                    sys.exit(f"the others still waited {LEFT_S} s after one rank was killed")
                 left_s.append(time.monotonic() - begun)
                 if code == 0 and not (job / "result/block.h5").exists():
                     sys.exit("a run without one of its ranks ended with 0")
@@ -119,5 +120,5 @@ with tempfile.TemporaryDirectory() as folder:
           f"without a rank the others ended in at most {max(left_s, default=0):.1f} s")
     if last != found[1]:
         sys.exit("digest differs after kills")
-    if resumed == 0:
-        sys.exit("no run went on from a checkpoint")
+    if resumed < max(1, kills // 3):
+        sys.exit(f"only {resumed} of {kills} runs went on from a checkpoint")

@@ -63,7 +63,8 @@ void expect_same(const Matrix& ours, const Matrix& reference) {
   ASSERT_EQ(ours.cols(), reference.cols());
   for (Eigen::Index row = 0; row < ours.rows(); ++row) {
     const double scale = reference.row(row).cwiseAbs().maxCoeff();
-    EXPECT_LE((ours.row(row) - reference.row(row)).cwiseAbs().maxCoeff(), 1e-9 * scale + 1e-300) << "row " << row;
+    EXPECT_LE((ours.row(row) - reference.row(row)).cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), 1e-9 * scale + 1e-300)
+        << "row " << row;
   }
 }
 void expect_residual(const Eigen::VectorXd& ours, const Eigen::VectorXd& reference) {

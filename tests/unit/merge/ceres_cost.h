@@ -3,11 +3,13 @@
 
 #include <ceres/ceres.h>
 
+#include <limits>
+
 #include "adjust/ceres_problem.h"
 
 namespace megablock {
 
-// Cost after so many steps from a state, until no tolerance of double precision is left.
+// Cost after so many steps from a state, until no tolerance of double precision is left; NaN where Ceres fails.
 inline double cost_after_ceres(const TileProblem& problem, const TileState& state, int max_iterations) {
   CeresTile tile(problem, state);
   ceres::Solver::Options options;
@@ -16,7 +18,7 @@ inline double cost_after_ceres(const TileProblem& problem, const TileState& stat
   options.max_num_iterations = max_iterations;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &tile.problem(), &summary);
-  return summary.final_cost;
+  return summary.IsSolutionUsable() ? summary.final_cost : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace megablock

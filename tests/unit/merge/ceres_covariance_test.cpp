@@ -27,7 +27,7 @@ class CeresCovariance : public testing::TestWithParam<CovarianceCase> {
   void expect(const Eigen::MatrixXd& ours, double* a, double* b, const std::string& what) {
     const Eigen::VectorXd row = of(a, a).diagonal().cwiseSqrt(), column = of(b, b).diagonal().cwiseSqrt();
     const Eigen::MatrixXd error = (ours - of(a, b)).cwiseQuotient(row * column.transpose());
-    EXPECT_LE(error.cwiseAbs().maxCoeff(), 1e-6) << what;
+    EXPECT_LE(error.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), 1e-6) << what;
     largest_ = std::max(largest_, error.cwiseAbs().maxCoeff());
     ++compared_;
   }

@@ -42,7 +42,7 @@ void expect_covariances(const TiledBlock& block, const std::vector<TileCovarianc
     const Eigen::VectorXd sigma = block_expected.diagonal().cwiseSqrt();
     const Eigen::MatrixXd error =
         sigma.cwiseInverse().asDiagonal() * (ours - block_expected) * sigma.cwiseInverse().asDiagonal();
-    EXPECT_LE(error.cwiseAbs().maxCoeff(), tolerance) << what << " at column " << column;
+    EXPECT_LE(error.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), tolerance) << what << " at column " << column;
   };
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     const TileProblem& problem = block.problems[t];
@@ -208,7 +208,7 @@ TEST(Gauge, FreeBlockReachesTheOptimum) {
   const MonolithicSystem system = monolithic_system(block.whole, solution);
   const Eigen::VectorXd scaled_gradient =
       system.gradient().cwiseQuotient(system.diagonal().cwiseSqrt());  // in units of the conditional sigmas
-  EXPECT_LE(scaled_gradient.cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LE(scaled_gradient.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), 1e-6);
 }
 
 }  // namespace

@@ -98,6 +98,7 @@ TEST(MakeTiles, TilesOfAStreetGridAreBalanced) {
   const std::vector<std::int64_t> sizes = tile_sizes(tiles);
   const double mean = static_cast<double>(2 * kStreets * kLength) / static_cast<double>(tiles.tile_count);
   EXPECT_LE(static_cast<double>(*std::max_element(sizes.begin(), sizes.end())), 1.1 * mean);
+  EXPECT_GE(static_cast<double>(*std::min_element(sizes.begin(), sizes.end())), 0.9 * mean);
   EXPECT_LE(*std::max_element(sizes.begin(), sizes.end()), TileOptions().tile_max_frames);
 }
 
