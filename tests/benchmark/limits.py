@@ -3,11 +3,15 @@
 
 usage: limits.py tracks COMPARE_TRACKS      T-KP11: 10^8 matches, in one cell and in 64
        limits.py solvers BENCH_SOLVERS      microseconds of minimal solvers, medians of five
+       limits.py partition COMPARE_PARTITION         image graph and tree of a million frames, aerial and street
+       limits.py ordering COMPARE_ORDERING MEGABLOCK   CN-20: 267 798 unknowns ordered and solved
 """
 import json
 import re
 import subprocess
 import sys
+import tempfile
+import time
 
 # Processor time for five times as many matches: five times, sorted on disk; a quadratic step would take 25 times.
 LARGEST_GROWTH = 8
@@ -57,4 +61,32 @@ def solvers(program):
     return good
 
 
-sys.exit(0 if {"tracks": tracks, "solvers": solvers}[sys.argv[1]](sys.argv[2]) else 1)
+def partition(program):
+    good = True
+    for scene in ("aerial", "street"):
+        begun = time.monotonic()
+        line = subprocess.check_output([program, "--scene", scene, "--frames", "1000000"], text=True)
+        seconds = time.monotonic() - begun  # making the graph included
+        print(line, end="")
+        least, mean, above = map(float, re.search(r"tiles of (\d+) to \d+ frames \((\d+) in the mean, the largest ([\d.]+) %",
+                                                  line).groups())
+        good &= check(seconds, 60, f"{scene}, seconds")
+        good &= check(float(re.search(r"time, (\d+) MiB", line)[1]), 2048, f"{scene}, MiB")
+        good &= check(above, 10, f"{scene}, largest tile above the mean, %")
+        good &= check(100 * (1 - least / mean), 10, f"{scene}, smallest tile below the mean, %")
+    return good
+
+
+def ordering(program, megablock):
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([megablock, "simulate", "--scene", "stereopolis", "--frames", "44633", "--drives", "4",
+                        "--points-per-frame", "10", "-o", folder + "/town"], check=True, stdout=subprocess.DEVNULL)
+        text = subprocess.check_output([program, folder + "/town/block.yaml", "3"], text=True)
+    print(text, end="")
+    unknowns = int(re.search(r"(\d+) unknowns", text)[1])
+    assert unknowns == 267_798, f"{unknowns} unknowns"
+    return check(min(float(s) for s in re.findall(r"together ([\d.]+) s", text)), 0.5, "ordered and solved, s")
+
+
+CHECKS = {"tracks": tracks, "solvers": solvers, "partition": partition, "ordering": ordering}
+sys.exit(0 if CHECKS[sys.argv[1]](*sys.argv[2:]) else 1)
