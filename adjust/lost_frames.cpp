@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "adjust/rig_sights.h"
-#include "geometry/ransac.h"
 
 namespace megablock {
 
@@ -51,16 +50,11 @@ class Resection {
     const std::size_t stride = 1 + (rows.size() - 1) / kMaxSights;
     for (std::size_t i = 0; i < rows.size(); i += stride)
       if (const auto sight = sight_of(rows[i])) sights.push_back(*sight);
-    RansacOptions sampling;
-    sampling.threshold = threshold_;
-    sampling.confidence = 0.999;
-    sampling.max_draws = 500;
-    sampling.seed = seed;
-    const auto found = ransac(RigSightEstimator(sights), sampling);
+    const std::optional<Pose> found = find_lost_pose(sights, threshold_, seed);
     if (!found) return std::nullopt;
-    const std::size_t agree = agreeing(found->model, rows);
+    const std::size_t agree = agreeing(*found, rows);
     const bool enough = agree >= kMinAgreeing && static_cast<double>(agree) >= kMinShare * std::ssize(rows);
-    return enough ? std::optional(found->model) : std::nullopt;
+    return enough ? found : std::nullopt;
   }
 
   std::size_t agreeing(const Pose& frame, const std::vector<std::int64_t>& rows) const {

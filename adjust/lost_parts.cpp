@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "adjust/rig_sights.h"
-#include "geometry/ransac.h"
 #include "io/disjoint_sets.h"
 
 namespace megablock {
@@ -163,14 +162,8 @@ class PartFinder {
     if (sights.size() < kFewestAgreeing || enough(agreeing(sights, Pose{}))) return std::nullopt;
     std::vector<RigSight> some;
     for (std::size_t i = 0; i < sights.size(); i += 1 + (sights.size() - 1) / kMostSights) some.push_back(sights[i]);
-    RansacOptions sampling;
-    sampling.threshold = threshold_;
-    sampling.confidence = 0.999;
-    sampling.max_draws = 500;
-    sampling.seed = seed;
-    const auto found = ransac(RigSightEstimator(some), sampling);
-    if (!found || !enough(agreeing(sights, found->model))) return std::nullopt;
-    return found->model;
+    const std::optional<Pose> found = find_lost_pose(some, threshold_, seed);
+    return found && enough(agreeing(sights, *found)) ? found : std::nullopt;
   }
 
   // X_now = R (X - C) of the ground; the part's frames and what it alone keeps go to their X.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "geometry/gp3p.h"
+#include "geometry/ransac.h"
 
 namespace megablock {
 
@@ -56,6 +57,16 @@ std::optional<Pose> RigSightEstimator::refine(Pose pose, double threshold) const
     pose = pose_update(pose, increment);
   }
   return pose;
+}
+
+std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed) {
+  RansacOptions sampling;
+  sampling.threshold = threshold_sigmas;
+  sampling.confidence = 0.999;
+  sampling.max_draws = 500;
+  sampling.seed = seed;
+  const auto found = ransac(RigSightEstimator(sights), sampling);
+  return found ? std::optional(found->model) : std::nullopt;
 }
 
 }  // namespace megablock

@@ -60,4 +60,8 @@ class RigSightEstimator {
   std::span<const RigSight> sights_;
 };
 
+// The pose that most of the sights agree on, of a frame or a part of a tile that is lost: up to 500 samples, residuals
+// up to the threshold in sigmas. Empty where none is found; whether enough agree is the caller's to judge.
+std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed);
+
 }  // namespace megablock

@@ -45,19 +45,14 @@ std::uint64_t identity(const Block& block, ImageIndex image) {
   return hash != 0 ? hash : Hasher().add(block.image_names[image]).value();
 }
 
-std::vector<std::uint64_t> identities(const Block& block) {
-  std::vector<std::uint64_t> all;
-  for (ImageIndex i(0); block.images.contains(i); ++i.value) all.push_back(identity(block, i));
-  return all;
-}
-
 // A job is not replaced by that of quite another block, which mostly is a slip of -j.
 void refuse_another_block(const JobStore& store, const Block& previous, const Project& project) {
-  std::vector<std::uint64_t> own = identities(previous);
+  std::vector<std::uint64_t> own;
+  own.reserve(previous.images.size());
+  for (ImageIndex i(0); previous.images.contains(i); ++i.value) own.push_back(identity(previous, i));
   std::sort(own.begin(), own.end());
-  const auto is_own = [&](std::uint64_t image) { return std::binary_search(own.begin(), own.end(), image); };
-  const std::vector<std::uint64_t> given = identities(project.block);
-  if (std::any_of(given.begin(), given.end(), is_own)) return;
+  for (ImageIndex i(0); project.block.images.contains(i); ++i.value)
+    if (std::binary_search(own.begin(), own.end(), identity(project.block, i))) return;
   throw InputError(store.directory() + ": is the job of another block: " + project.file + " has none of its " +
                    std::to_string(previous.images.size()) +
                    " images; name another folder with -j, or delete this one to begin anew");

@@ -20,6 +20,12 @@ struct PassesApart : SingleTile {
     triangulate_points(problem, state, options);
     screen_observations(problem, state, kFrameLimit, options);
   }
+  // As if nothing had ever stood apart.
+  void stand_right() {
+    state = model;
+    std::fill(problem.kept.begin(), problem.kept.end(), 1);
+    screen_observations(problem, state, kFrameLimit, options);
+  }
   static SimulationOptions driven_twice(std::uint64_t seed) {
     SimulationOptions simulation;
     simulation.scene = SimulationOptions::Scene::kStreet;
@@ -74,9 +80,7 @@ TEST(LostParts, PassesAreBroughtTogether) {
 
 TEST(LostParts, NothingIsMovedWhereAllAgree) {
   PassesApart tile(4);
-  tile.state = tile.model;
-  std::fill(tile.problem.kept.begin(), tile.problem.kept.end(), 1);
-  screen_observations(tile.problem, tile.state, kFrameLimit, tile.options);
+  tile.stand_right();
   EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty());
 }
 
@@ -100,9 +104,7 @@ TEST(LostParts, APartStaysWhereItsOwnObservationsAgree) {
       tile.problem.x[row] = pixel.x();
       tile.problem.y[row] = pixel.y();
     }
-  tile.state = tile.model;
-  std::fill(tile.problem.kept.begin(), tile.problem.kept.end(), 1);
-  screen_observations(tile.problem, tile.state, kFrameLimit, tile.options);
+  tile.stand_right();
   EXPECT_TRUE(recover_lost_parts(tile.problem, tile.state, kPartLimit).empty());
 }
 
