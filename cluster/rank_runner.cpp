@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <set>
 #include <utility>
 
 #include "cluster/gather_by_tile.h"
@@ -203,21 +205,75 @@ UpReport RankRunner::up(const Pass& pass) {
   return report;
 }
 
+std::vector<bool> RankRunner::nodes_of(const std::vector<std::int64_t>& subtrees) const {
+  std::vector<bool> nodes(plan_.nodes.size(), false);
+  for (const std::int64_t top : subtrees) nodes[static_cast<std::size_t>(top)] = true;
+  for (std::int64_t n = plan_.root(); n >= 0; --n) {
+    const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(n)].parent;
+    if (parent >= 0 && nodes[static_cast<std::size_t>(parent)]) nodes[static_cast<std::size_t>(n)] = true;
+  }
+  return nodes;
+}
+
+bool RankRunner::leaves(std::int64_t node) const {
+  const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(node)].parent;
+  return parent < 0 || !on_one_rank_[static_cast<std::size_t>(parent)];
+}
+
+std::vector<bool> RankRunner::go_on(const PassRecord& record) {
+  factors_.adopt(record.factors);
+  seams_ = record.seams;
+  std::ranges::copy_if(record.subtrees, std::back_inserter(left_), [&](std::int64_t n) { return leaves(n); });
+  return nodes_of(record.subtrees);
+}
+
+void RankRunner::record(std::int64_t node, const UpdateMatrix& update) {
+  if (recorder_ == nullptr || !on_one_rank_[static_cast<std::size_t>(node)]) return;
+  const std::int64_t bytes = update.byte_count() + waiting_bytes() + factors_.bytes_without_copy();
+  if (!recorder_->due(bytes, leaves(node))) return;
+  std::map<std::int64_t, const UpdateMatrix*> updates{{node, &update}};
+  for (const auto& [n, waiting] : updates_)
+    if (on_one_rank_[static_cast<std::size_t>(n)]) updates[n] = &waiting;
+  if (!factors_.copy_to_scratch() || !recorder_->write_updates(updates)) return recorder_->give_up();
+  if (leaves(node)) left_.push_back(node);
+
+  PassRecord record;
+  std::set<std::int64_t> subtrees(left_.begin(), left_.end());
+  for (const auto& [n, waiting] : updates) subtrees.insert(n);
+  record.subtrees.assign(subtrees.begin(), subtrees.end());
+  const std::vector<bool> done = nodes_of(record.subtrees);
+  for (std::size_t n = 0; n < done.size(); ++n) record.tiles += done[n] && plan_.nodes[n].leaf >= 0;
+  const auto is_done = [&](std::int64_t n) { return done[static_cast<std::size_t>(n)]; };
+  std::ranges::copy_if(factors_.nodes_in_scratch(), std::back_inserter(record.factors), is_done);
+  std::ranges::copy_if(seams_, std::back_inserter(record.seams), is_done, &SeamReport::node);
+  recorder_->write(std::move(record));
+}
+
 UpReport RankRunner::condense_all(const Pass& pass) {
   updates_.clear();
   factors_.clear();
   seams_.clear();
+  left_.clear();
+  const PassRecord before = recorder_ ? recorder_->begin({pass, check_seams_, with_columns_}) : PassRecord();
+  const std::vector<bool> done = go_on(before);
   for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
     if (!mine(n)) continue;
-    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
-    if (node.leaf >= 0) {
-      factors_.leave_room(waiting_bytes());
-      pass_up(n, condense_leaf(n, pass));
+    if (done[static_cast<std::size_t>(n)]) {
+      if (std::ranges::binary_search(before.subtrees, n)) pass_up(n, recorder_->read_update(n));
       continue;
     }
-    UpdateMatrix left = child_update(node.left), right = child_update(node.right);
-    factors_.leave_room(waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n));
-    pass_up(n, eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_));
+    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    UpdateMatrix update;
+    if (node.leaf >= 0) {
+      factors_.leave_room(waiting_bytes());
+      update = condense_leaf(n, pass);
+    } else {
+      UpdateMatrix left = child_update(node.left), right = child_update(node.right);
+      factors_.leave_room(waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n));
+      update = eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
+    }
+    record(n, update);
+    pass_up(n, std::move(update));
   }
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();

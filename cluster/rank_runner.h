@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "cluster/communicator.h"
+#include "cluster/pass_recorder.h"
 #include "merge/block_motion.h"
 #include "merge/condense.h"
 #include "merge/global_adjustment.h"
@@ -47,6 +48,10 @@ class RankRunner : public TreeRunner {
   DownReport down(const Pass& pass) override;
   void accept() override;
   void reject() override;
+
+  // Upward passes are recorded from now on, and the first one goes on where the record that was found ends. Of subtrees
+  // on this rank alone: what joins several ranks is computed again. `recorder` outlives the runner.
+  void record_passes(PassRecorder& recorder) { recorder_ = &recorder; }
 
   // The next pass with lambda = 0 may be the last one: what the posterior needs of it is kept, so that it has not to be
   // gone again. Not of free blocks.
@@ -88,6 +93,14 @@ class RankRunner : public TreeRunner {
   // The subtree of a node that lies on this rank alone, once more.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
+  // Nodes of these subtrees. [nodes]
+  std::vector<bool> nodes_of(const std::vector<std::int64_t>& subtrees) const;
+  // Takes over what a killed run did of the pass; the nodes that are done.
+  std::vector<bool> go_on(const PassRecord& record);
+  // Records the pass, if it is time to, once a node's front is eliminated.
+  void record(std::int64_t node, const UpdateMatrix& update);
+  // The node's update goes where no other subtree of this rank alone holds it.
+  bool leaves(std::int64_t node) const;
   // One upward pass with the datum in gauge_.
   UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
@@ -110,6 +123,8 @@ class RankRunner : public TreeRunner {
   std::vector<bool> on_one_rank_;                 // [nodes]: the whole subtree is this rank's
   FactorStore factors_;                           // of this rank's nodes
   std::map<std::int64_t, UpdateMatrix> updates_;  // waiting for their parent on this rank
+  PassRecorder* recorder_ = nullptr;
+  std::vector<std::int64_t> left_;  // recorded subtrees of this pass that leaves() is true of
   BlockGauge gauge_;
   bool with_columns_ = false;  // the pass carries the further right-hand sides of a free datum
   bool check_seams_ = false;

@@ -39,8 +39,8 @@ FactorStore::~FactorStore() {
   for (const std::string& path : files_) remove_scratch_file(path);
 }
 
-std::string FactorStore::scratch_path(std::int64_t node) const {
-  return options_.scratch_directory + "/factor-" + std::to_string(node) + ".bin";
+std::string factor_path(const std::string& scratch_directory, std::int64_t node) {
+  return scratch_directory + "/factor-" + std::to_string(node) + ".bin";
 }
 
 void FactorStore::put(std::int64_t node, NodeFactors factors, Loss loss) {
@@ -80,7 +80,7 @@ bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
   if (options_.scratch_directory.empty() || scratch_full_ ||
       scratch_bytes_ + factors.byte_count() > options_.scratch_bytes)
     return false;
-  const std::string path = scratch_path(node);
+  const std::string path = factor_path(options_.scratch_directory, node);
   files_.insert(path);
   const bool whole = write_scratch_file(path, [&](std::ofstream& file) {
     ByteWriter writer(file);
@@ -134,6 +134,32 @@ void FactorStore::clear() {
   bytes_ = others_ = scratch_bytes_ = 0;
   scratch_full_ = false;
   loaded_ = NodeFactors();
+}
+
+std::int64_t FactorStore::bytes_without_copy() const {
+  std::int64_t bytes = 0;
+  for (const auto& [node, factors] : kept_)
+    if (!spilled_.contains(node)) bytes += factors.byte_count();
+  return bytes;
+}
+
+bool FactorStore::copy_to_scratch() {
+  return std::ranges::all_of(kept_, [&](const auto& entry) { return spill(entry.first, entry.second); });
+}
+
+std::vector<std::int64_t> FactorStore::nodes_in_scratch() const {
+  std::vector<std::int64_t> nodes;
+  for (const auto& [node, path] : spilled_) nodes.push_back(node);
+  return nodes;
+}
+
+void FactorStore::adopt(const std::vector<std::int64_t>& nodes) {
+  for (const std::int64_t node : nodes) {
+    const std::string path = factor_path(options_.scratch_directory, node);
+    files_.insert(path);
+    spilled_[node] = path;
+    scratch_bytes_ += static_cast<std::int64_t>(std::filesystem::file_size(path));
+  }
 }
 
 }  // namespace megablock

@@ -13,6 +13,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "merge/condense.h"
 
@@ -27,6 +28,8 @@ struct MemoryOptions {
 };
 // Makes it, where there is one. Throws InputError.
 void make_scratch_directory(const MemoryOptions& options);
+// Of a node's factors in a scratch directory.
+std::string factor_path(const std::string& scratch_directory, std::int64_t node);
 
 struct MemoryStatistics {
   std::int64_t put = 0, spilled = 0;  // factors put, moved to scratch
@@ -61,11 +64,19 @@ class FactorStore {
   // From now on so much of the budget is taken by others: fronts at work, what waits for a parent or a child.
   void leave_room(std::int64_t bytes);
   void clear();
+
+  // For records of a pass (pass_record.h). Bytes in memory that are not in scratch; copies them there: false where they
+  // have no room; the nodes whose factors are in scratch; after clear(): takes over those that an earlier run left
+  // there.
+  std::int64_t bytes_without_copy() const;
+  bool copy_to_scratch();
+  std::vector<std::int64_t> nodes_in_scratch() const;
+  void adopt(const std::vector<std::int64_t>& nodes);
+
   void note_recomputed() { ++statistics_.recomputed; }
   const MemoryStatistics& statistics() const { return statistics_; }
 
  private:
-  std::string scratch_path(std::int64_t node) const;
   bool spill(std::int64_t node, const NodeFactors& factors);  // false: no room
   void make_room();
 

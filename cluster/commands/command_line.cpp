@@ -100,6 +100,12 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
           "--scratch", options->scratch_mib,
           "Scratch per rank for these, MiB; beyond it (0: at once) tiles stay in memory, factors are computed again")
       ->check(not_negative());
+  command
+      ->add_option(
+          "--record", options->record_s,
+          "Seconds of a pass of the merge after which what is done of it is kept in the job's scratch, so that a "
+          "killed run goes on in its middle; 0: after every tile")
+      ->check(not_negative());
   auto level = std::make_shared<std::string>();  // taken before there is a parser
   command
       ->add_option(kArithmeticOption, *level,

@@ -54,14 +54,17 @@ int most_rounds(const MergeSettings& settings) {
   return settings.estimate_sigmas ? std::max(settings.screening_rounds, kSigmaRounds) : settings.screening_rounds;
 }
 
-// Before a run (a killed one may have left files) and after it. The folder itself stays where another disk is mounted.
-void clear_scratch(Job& job) {
-  job.ranks.barrier();  // ranks remove their own files first
+// Before a run (a killed one may have left files) and after it. The folder itself stays where another disk is mounted,
+// and so do the folders of ranks that `keep` theirs.
+void clear_scratch(Job& job, bool keep = false) {
+  const std::vector<std::string> kept =  // ranks have removed their own files before they say so
+      job.ranks.gather_all(keep ? scratch_folder_of_rank(job) : std::string());
   on_first_rank(job.ranks, [&] {
     const std::filesystem::path folder(job.store.path("scratch"));
     std::error_code ignored;
     for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
-      std::filesystem::remove_all(entry.path(), ignored);
+      if (std::ranges::find(kept, entry.path().filename().string()) == kept.end())
+        std::filesystem::remove_all(entry.path(), ignored);
     std::filesystem::remove(folder, ignored);
     return std::string();
   });
@@ -130,6 +133,11 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   const std::vector<int> rank_of_tile =
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
+  const MergePosition start =
+      found ? *found : MergePosition{0, start_global(options_of(job.settings.merge, frames, false)), {}};
+  PassRecorder recorder(memory_of_tiles(job).scratch_directory, job.options.record_s);
+  const std::optional<MergePosition> within = checkpoint.find_pass(start, recorder);
+  clear_scratch(job, recorder.found().has_value());
   TileStore tiles(memory_of_tiles(job));
   Adjusted adjusted;
   BlockState& block = adjusted.state;
@@ -137,12 +145,14 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   release_tables(job, inputs);
 
   MergePosition& position = adjusted.position;
-  position = found ? *found : MergePosition{0, start_global(options_of(job.settings.merge, frames, false)), {}};
+  position = within ? *within : start;
+  recorder.set_position([&] { return checkpoint.of_pass(position); });
   std::int32_t saved = position.global.accepted;
   for (;;) {
     const bool last = position.round >= most_rounds(job.settings.merge);
     const GlobalOptions options = options_of(job.settings.merge, frames, last);
     RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(job, tiles));
+    runner.record_passes(recorder);
     if (last) runner.expect_posterior();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       say_iteration(job, state);
@@ -239,7 +249,6 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   }
 
   MergeCheckpoint checkpoint(job, fingerprint);
-  clear_scratch(job);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
   clear_scratch(job);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <tuple>
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
@@ -141,6 +142,36 @@ void MergeCheckpoint::load_tile(RankTile& tile) const {
   tile.state.frames = snapshot.poses;
   tile.state.cameras = snapshot.intrinsics;
   tile.state.points = snapshot.points;
+}
+
+PassRecorder::Position MergeCheckpoint::of_pass(const MergePosition& position) const {
+  Hasher hasher;
+  hasher.add(fingerprint(folder(position))).add(job_.ranks.size());
+  return {hasher.value(), Bytes(reinterpret_cast<const char*>(&position), sizeof position)};
+}
+
+std::optional<MergePosition> MergeCheckpoint::find_pass(const MergePosition& start, PassRecorder& recorder) {
+  if (recorder.found() && recorder.found()->state != of_pass(start).state) recorder.forget_found();
+  ByteWriter writer;
+  writer.bytes(recorder.found() ? recorder.found()->position : Bytes());
+  writer.value(recorder.found() ? recorder.found()->tiles : 0);
+  std::optional<MergePosition> furthest;
+  std::int64_t tiles = 0;
+  const auto order = [](const GlobalState& state) {
+    return std::tuple(state.iterations, state.pass_lambda == 0, state.next == GlobalAction::kStop);
+  };
+  for (const Bytes& bytes : job_.ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    const Bytes there = reader.bytes();
+    tiles += reader.value<std::int64_t>();
+    if (there.size() != sizeof(MergePosition)) continue;
+    MergePosition position;
+    std::memcpy(&position, there.data(), sizeof position);
+    if (!furthest || order(furthest->global) < order(position.global)) furthest = position;
+  }
+  if (furthest && job_.is_first_rank() && !job_.options.quiet)
+    std::fprintf(stderr, "merge        goes on within a pass: %lld tiles are done\n", static_cast<long long>(tiles));
+  return furthest;
 }
 
 void MergeCheckpoint::clear() {

@@ -7,6 +7,7 @@
 
 #include "adjust/sigma_scales.h"
 #include "cluster/job.h"
+#include "cluster/pass_recorder.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
 #include "merge/global_adjustment.h"
@@ -33,6 +34,12 @@ class MergeCheckpoint {
   void load_tile(RankTile& tile) const;
   // Deletes all checkpoints (the result is written). Rank 0.
   void clear();
+
+  // Records of passes (pass_recorder.h): what they say of the position; and the furthest position from which a rank has
+  // a record of a pass that begins at the state of `start`, the last checkpoint or the beginning. Forgets others.
+  // Collective.
+  PassRecorder::Position of_pass(const MergePosition& position) const;
+  std::optional<MergePosition> find_pass(const MergePosition& start, PassRecorder& recorder);
 
  private:
   std::string folder(const MergePosition& position) const;

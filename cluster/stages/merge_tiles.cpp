@@ -114,11 +114,13 @@ std::int64_t screen(Job& job, TileStore& tiles) {
   return total;
 }
 
+std::string scratch_folder_of_rank(const Job& job) { return "rank-" + std::to_string(job.ranks.rank()); }
+
 MemoryOptions memory_of_tiles(const Job& job) {
   MemoryOptions memory;
   memory.factor_bytes = static_cast<std::int64_t>(job.options.memory_mib * 1024 * 1024);
   memory.tile_bytes = memory.factor_bytes / 2;
-  memory.scratch_directory = job.store.path("scratch/rank-" + std::to_string(job.ranks.rank()));
+  memory.scratch_directory = job.store.path("scratch/" + scratch_folder_of_rank(job));
   if (job.options.scratch_mib >= 0)
     memory.scratch_bytes = static_cast<std::int64_t>(job.options.scratch_mib * 1024 * 1024);
   return memory;

@@ -40,6 +40,8 @@ bool adopt_sigma_scales(RankRunner& runner, TileStore& tiles, SigmaScales& scale
 // Re-tests every observation at the solution; how many verdicts changed in the whole block. Collective.
 std::int64_t screen(Job& job, TileStore& tiles);
 
+// Of this rank, in the job's scratch.
+std::string scratch_folder_of_rank(const Job& job);
 // The memory of a rank: half of it for tiles; factors get what these leave of it.
 MemoryOptions memory_of_tiles(const Job& job);
 MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles);

@@ -10,6 +10,7 @@ import argparse
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -60,11 +61,11 @@ with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(work / "adjusted", work / name)
         return work / name
 
-    def begin(job, ranks):
-        return start([options.megablock, "run", project, "-j", job, "--quiet", "--threads", "1"], ranks, log)
+    def begin(job, ranks, *more):
+        return start([options.megablock, "run", project, "-j", job, "--threads", "1", *more], ranks, log)
 
     def finish(job, ranks):
-        if begin(job, ranks).wait(timeout=LONGEST_S) != 0:
+        if begin(job, ranks, "--quiet").wait(timeout=LONGEST_S) != 0:
             sys.exit(f"a run on {ranks} ranks failed: {(work / 'log').read_text()[-2000:]}")
         return digest(job)
 
@@ -85,7 +86,7 @@ with tempfile.TemporaryDirectory() as folder:
     job, kills, resumed, finished, left_s = fresh("killed"), 0, 0, 0, []
     while kills < options.kills:
         there = checkpoints(job)
-        run = begin(job, 2)
+        run = begin(job, 2, "--record", "0")  # of every subtree that is done, so that runs go on within a pass
         try:
             if moments.random() < 0.5:  # behind the next checkpoint, however fast the machine
                 while run.poll() is None and checkpoints(job) <= there:
@@ -116,9 +117,13 @@ with tempfile.TemporaryDirectory() as folder:
             sys.exit("digest differs after kills")
         job = fresh("killed")
     last = finish(job, 2)
-    print(f"{kills} kills, {resumed} runs went on from a checkpoint, {finished + 1} came to their end, digest {last}; "
+    tiles = [int(n) for n in re.findall(r"goes on within a pass: (\d+) tiles", (work / "log").read_text())]
+    print(f"{kills} kills, {resumed} runs went on from a checkpoint, {len(tiles)} within a pass with {tiles} of its tiles "
+          f"done, {finished + 1} came to their end, digest {last}; "
           f"without a rank the others ended in at most {max(left_s, default=0):.1f} s")
     if last != found[1]:
         sys.exit("digest differs after kills")
     if resumed < max(1, kills // 3):
         sys.exit(f"only {resumed} of {kills} runs went on from a checkpoint")
+    if len(tiles) < max(1, kills // 5):
+        sys.exit(f"only {len(tiles)} of {kills} runs went on within a pass")

@@ -1,0 +1,55 @@
+// What a rank has done of an upward pass, so that a run that was killed goes on in its middle: the update matrices of
+// finished subtrees, and of all their nodes the factors, which lie in the rank's scratch directory anyway or are copied
+// there (memory.h). Going on changes no bits: what is read back is what was computed.
+//
+// Records outlive the process, not the machine: nothing is forced to the disk, and one that an earlier start of the
+// machine wrote, or another machine, does not count. Then the pass begins again.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "merge/front.h"
+#include "merge/seam_check.h"
+
+namespace megablock {
+
+struct PassRecord {
+  std::uint64_t state = 0;             // hash of what the pass starts from
+  std::uint64_t pass = 0;              // of this and of the kind of the pass
+  Bytes position;                      // of the global adjustment in that pass, as its owner writes it
+  std::int64_t tiles = 0;              // in the finished subtrees
+  std::vector<std::int64_t> subtrees;  // nodes whose subtree is finished, none within another's
+  std::vector<std::int64_t> factors;   // nodes of the subtrees whose factors are in scratch
+  std::vector<SeamReport> seams;       // of the nodes of the subtrees, where the pass checks seams
+};
+
+// The record of one rank in its scratch directory.
+class PassRecordFiles {
+ public:
+  explicit PassRecordFiles(std::string scratch_directory) : directory_(std::move(scratch_directory)) {}
+
+  // A subtree's update matrix; before the record that names it. False: the disk is full.
+  bool write_update(std::int64_t node, const UpdateMatrix& update) const;
+  // Throws StoreError.
+  UpdateMatrix read_update(std::int64_t node) const;
+  void remove_update(std::int64_t node) const;
+
+  // Replaces the record as a whole. False: the disk is full, or no start of a machine is to be told from another here.
+  bool write(const PassRecord& record) const;
+  // Nothing: there is none, it is of another start of the machine, or files that it names are gone or have another
+  // size.
+  std::optional<PassRecord> read() const;
+  void remove() const;  // the record alone
+
+ private:
+  std::string update_path(std::int64_t node) const;
+  std::string record_path() const { return directory_ + "/pass.bin"; }
+  std::vector<std::int64_t> sizes_of(const PassRecord& record) const;  // of its files; empty: one is not there
+
+  std::string directory_;
+};
+
+}  // namespace megablock
