@@ -186,6 +186,21 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   return adjusted;
 }
 
+std::string not_converged(const Adjusted& adjusted) {
+  return "the global adjustment did not converge: " + describe(adjusted.position.global);
+}
+
+// A result that is there is a failed unit all the same, now and in runs that find it, where it is not the optimum.
+void add_unconverged(Job& job, const std::string& reason) {
+  if (!reason.empty()) add_failures(job, {{"merge", kResult, reason}});
+}
+std::string unconverged_before(Job& job) {
+  return on_first_rank(job.ranks, [&] {
+    const auto record = read_record(job.store, "merge");
+    return record && !record->failures.empty() ? record->failures.front().reason : std::string();
+  });
+}
+
 // Of all stages, this one as far as `event`, which ends it, says.
 std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
   std::vector<UnitEvent> events = read_events(job.store);
@@ -199,7 +214,7 @@ std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
 void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
                  MergeOutcome outcome, const std::vector<TilePart>& parts, const UnitEvent& event) {
   if (!adjusted.converged) {
-    job.notes.push_back("the global adjustment did not converge: " + describe(adjusted.position.global));
+    job.notes.push_back(not_converged(adjusted));
     std::fprintf(stderr, "merge        warning: %s\n", job.notes.back().c_str());  // --quiet or not
   }
   for (const SeamCheck& seam : outcome.seams)
@@ -212,6 +227,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   }
   return_freed_memory();  // fronts, tiles
   BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
+  if (!adjusted.converged) result.failures.push_back({"merge", kResult, not_converged(adjusted)});
   result.stages = statistics_of(job, event);
   std::filesystem::create_directories(job.store.path("result"));
   std::vector<PartTracks::File> files;
@@ -238,6 +254,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   reset_peak_rss();
   MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units, verticals_of_tiles(job.block, tiles)};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
+  const std::string before = unconverged_before(job);
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
     if (!is_current(job.store, kResult, fingerprint)) return "";
@@ -245,7 +262,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   });
   if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
     if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();
-    return;
+    return add_unconverged(job, before);
   }
 
   MergeCheckpoint checkpoint(job, fingerprint);
@@ -269,6 +286,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
     checkpoint.clear();
     return std::string();
   });
+  add_unconverged(job, adjusted.converged ? "" : not_converged(adjusted));
 }
 
 }  // namespace megablock

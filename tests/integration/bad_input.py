@@ -419,6 +419,21 @@ class BadInput(CopyOfTheBlock):
         self.run_job()
         self.assertEqual(events(self.job)[before:], [])
 
+    def test_merge_without_an_optimum(self):
+        megablock("simulate", "--frames", 40, "-o", self.folder / "simulated")
+        project = self.folder / "simulated/block.yaml"
+        given = project.read_text()
+        project.write_text(given + "merge: {max_iterations: 1, screening_rounds: 0, decrement: 1e-7}\n")
+        for _ in range(2):  # a second run has nothing to do, and the same to say
+            megablock("run", project, "-j", self.job, "-q", expect=FAILED_UNITS)
+        self.assertTrue((self.job / "result/block.h5").exists())
+        failures = status(self.job)["failures"]
+        self.assertEqual([(f["stage"], f["unit"]) for f in failures], [("merge", "result/block.h5")])
+        self.assertRegex(failures[0]["reason"], "did not converge: .* 1 steps")
+        project.write_text(given)
+        megablock("run", project, "-j", self.job, "-q")
+        self.assertEqual(status(self.job)["failed"], 0)
+
     def test_two_runs_on_one_job(self):
         first = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stdout=subprocess.DEVNULL,
                                  stderr=subprocess.DEVNULL)
