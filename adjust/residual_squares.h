@@ -22,7 +22,6 @@ class ResidualSquares {
       if (problem_.active(p)) list.push_back(p);
     return list;
   }
-  const std::vector<ImageView>& views() const { return views_; }
 
   // Calls visit(point, row, |r|^2) for the kept observations of the points, in their order; not finite where the camera
   // cannot project the point.

@@ -11,6 +11,7 @@
 #include "adjust/consistent_rays.h"
 #include "adjust/tile_adjustment.h"
 #include "geometry/triangulation.h"
+#include "geometry/workers.h"
 #include "io/error.h"
 #include "io/held_priors.h"
 
@@ -162,6 +163,22 @@ double allowed_by_attitudes(const TileProblem& problem, const TileState& state) 
 
 }  // namespace
 
+namespace {
+
+// Points are settled each by itself. settle(PointSettler&, point)
+template <typename Settle>
+void settle_points(TileProblem& problem, TileState& state, const AdjustOptions& options, const Settle& settle) {
+  constexpr std::int64_t kAtOnce = 1024;
+  PerThread<PointSettler> settlers(
+      [&] { return std::make_unique<PointSettler>(problem, state, options.min_intersection_deg); });
+  visit_in_parallel((problem.point_count() + kAtOnce - 1) / kAtOnce, [&](std::int64_t part) {
+    const std::int64_t end = std::min((part + 1) * kAtOnce, problem.point_count());
+    for (std::int64_t p = part * kAtOnce; p < end; ++p) settle(settlers.mine(), p);
+  });
+}
+
+}  // namespace
+
 void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options) {
   triangulate_points(problem, state, options, std::vector<std::uint8_t>(problem.points.size(), 1));
 }
@@ -171,9 +188,9 @@ void triangulate_points(TileProblem& problem, TileState& state, const AdjustOpti
   state.points.resize(problem.points.size(), kNowhere);
   constexpr double kAnything = 1e3;  // sigmas: only rays that have nothing to do with the others are left out
   const double anything = std::max(kAnything, allowed_by_attitudes(problem, state));
-  PointSettler settler(problem, state, options.min_intersection_deg);
-  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+  settle_points(problem, state, options, [&](PointSettler& settler, std::int64_t p) {
     if (which[p] && problem.active(p)) settler.intersect(p, anything);
+  });
 }
 
 std::int64_t screen_observations(TileProblem& problem, TileState& state, double threshold_sigmas,
@@ -186,9 +203,9 @@ std::int64_t screen_observations(TileProblem& problem, TileState& state, double 
                                  const AdjustOptions& options, const std::vector<std::uint8_t>& which) {
   if (!(threshold_sigmas > 0)) throw InputError("the screening threshold must be positive (sigmas)");
   const std::vector<std::uint8_t> before = problem.kept;
-  PointSettler settler(problem, state, options.min_intersection_deg);
-  for (std::int64_t p = 0; p < problem.point_count(); ++p)
+  settle_points(problem, state, options, [&](PointSettler& settler, std::int64_t p) {
     if (which[p]) settler.screen(p, threshold_sigmas);
+  });
   std::int64_t changed = 0;
   for (std::size_t row = 0; row < before.size(); ++row) changed += before[row] != problem.kept[row];
   return changed;

@@ -1,5 +1,7 @@
 #include "cluster/pipeline.h"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -281,6 +283,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
           .not_oriented = {},
           .notes = written.at<std::vector<std::string>>("warnings")};
   if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
+  omp_set_num_threads(job.options.threads);  // where no other number is asked for: inside tiles
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
   for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
     job.failures.push_back({"init", file, reason});

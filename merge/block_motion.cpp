@@ -4,6 +4,7 @@
 
 #include "geometry/decompositions.h"
 #include "geometry/rotation.h"
+#include "geometry/workers.h"
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -148,11 +149,12 @@ TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& mo
       next.frames[f] = movers[at(plan.part_of_frame[f])].pose(
           state.frames[f],
           Eigen::Map<const PoseIncrement>(step.unknowns.find({UnknownKind::kFrame, 0, problem.frames[f].value})));
-  for (const RowList& cell : plan.points)
-    for (const std::int64_t p : cell.rows()) {
+  visit_in_parallel(std::ssize(plan.points), [&](std::int64_t cell) {
+    for (const std::int64_t p : plan.points[at(cell)].rows()) {
       const Mover& mover = movers[at(plan.part_of_frame[at(frame_of_point(problem, p))])];
       next.points[at(p)] = mover.position(state.points[at(p)], step.points[at(p)]);
     }
+  });
   move_shared_parameters(problem, plan, step, next);
   return next;
 }

@@ -6,6 +6,7 @@
 #include "geometry/decompositions.h"
 #include "merge/cell_assembler.h"
 #include "merge/point_equations.h"
+#include "merge/tree_workers.h"
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -71,34 +72,52 @@ TileFactor TileFactor::read(ByteReader& in) {
   return factor;
 }
 
+namespace {
+
+// What a thread works with.
+struct Workspace {
+  PointEquations equations;
+  PairBlocks pair_blocks;
+  FrontMemory memory;
+};
+
+}  // namespace
+
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                                const Pass& pass, const TileDatum& datum) {
   const std::int64_t right_hand_sides = 1 + datum.columns.columns;
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
-  PointEquations equations(problem, plan, state);
+  PerThread<Workspace> workspaces([&] {
+    return std::unique_ptr<Workspace>(new Workspace{{problem, plan, state}, {}, {}});
+  });
   std::vector<UpdateMatrix> updates(nodes.size());
-  FrontMemory memory;
-  PairBlocks pair_blocks;
+  std::vector<std::vector<double>> diagonals(plan.points.size());  // of J'J of each cell
   TileCondensation result;
   result.factor.nodes.resize(nodes.size());
-  result.factor.diagonal.assign(at(total_dimension(plan.unknowns)), 0);
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const PlanNode& node = nodes[i];
-    Front front(node.eliminated, node.passed, right_hand_sides, &memory);
-    if (node.leaf >= 0)
-      fill_cell(problem, plan, state, pass, node, equations, pair_blocks, result.factor.diagonal, front);
+  visit_children_first(nodes, [&](std::int64_t i) {
+    const PlanNode& node = nodes[at(i)];
+    Workspace& mine = workspaces.mine();
+    Front front(node.eliminated, node.passed, right_hand_sides, &mine.memory);
+    if (node.leaf >= 0) {
+      std::vector<double>& diagonal = diagonals[at(node.leaf)];
+      diagonal.assign(at(total_dimension(plan.unknowns)), 0);
+      fill_cell(problem, plan, state, pass, node, mine.equations, mine.pair_blocks, diagonal, front);
+    }
     for (std::int64_t child : {node.left, node.right}) {
       if (child < 0) continue;
       front.add(updates[at(child)]);
-      memory.give(std::move(updates[at(child)].matrix));
+      mine.memory.give(std::move(updates[at(child)].matrix));
       updates[at(child)] = UpdateMatrix();
     }
     add_datum(datum, node.eliminated, front);
-    if (i + 1 == nodes.size()) add_datum(datum, node.passed, front);
+    if (at(i) + 1 == nodes.size()) add_datum(datum, node.passed, front);
     Front::Result eliminated = std::move(front).eliminate(pass.lambda);
-    updates[i] = std::move(eliminated.update);
-    result.factor.nodes[i] = std::move(eliminated.factor);
-  }
+    updates[at(i)] = std::move(eliminated.update);
+    result.factor.nodes[at(i)] = std::move(eliminated.factor);
+  });
+  result.factor.diagonal.assign(at(total_dimension(plan.unknowns)), 0);
+  for (const std::vector<double>& diagonal : diagonals)
+    for (std::size_t k = 0; k < diagonal.size(); ++k) result.factor.diagonal[k] += diagonal[k];
   result.update = std::move(updates.back());
   result.update.matrix.shrink_to_fit();  // waits for its sibling
   return result;
@@ -137,16 +156,19 @@ void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const T
                        TileStep& step) {
   step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
   const UnknownMotions motions(plan, step.unknowns.values.data());
-  PointEquations equations(problem, plan, state);
-  for (const RowList& cell : plan.points) {
-    const std::vector<std::int32_t> points = cell.rows();
+  PerThread<PointEquations> all_equations([&] { return std::make_unique<PointEquations>(problem, plan, state); });
+  std::vector<double> damping_norms(plan.points.size(), 0);
+  visit_in_parallel(std::ssize(plan.points), [&](std::int64_t cell) {
+    PointEquations& equations = all_equations.mine();
+    const std::vector<std::int32_t> points = plan.points[at(cell)].rows();
     for (std::span<const std::int32_t> rest = points; !rest.empty();) {
       rest = rest.subspan(equations.linearise(rest, pass));
       equations.steps(motions, step.points);
       for (std::size_t i = 0; i < equations.points().size(); ++i)
-        step.damping_norm += equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
+        damping_norms[at(cell)] += equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
     }
-  }
+  });
+  for (const double norm : damping_norms) step.damping_norm += norm;
 }
 
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,

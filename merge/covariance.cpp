@@ -4,6 +4,7 @@
 
 #include "merge/condense.h"
 #include "merge/point_equations.h"
+#include "merge/tree_workers.h"
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -16,88 +17,25 @@ ObservationKind image_kind(PointRole role) {
                                      : ObservationKind::kTieImage;
 }
 
-class TileCovarianceBuilder {
+// What the cells add that a thread works on: each writes where no other does.
+class CellCovariances {
  public:
-  TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                        const TileFactor& factor, const Step& columns)
+  // `offsets`: of plan.unknowns in columns.
+  CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Step& columns,
+                  const std::vector<std::int64_t>& offsets, TileCovariance& result)
       : problem_(problem),
         plan_(plan),
         state_(state),
-        factor_(factor),
         columns_(columns),
+        offsets_(offsets),
+        result_(result),
         equations_(problem, plan, state),
-        frame_sums_(plan.unknowns.size()) {
-    offsets_ = row_offsets(plan.unknowns);
-    if (columns.columns > 1)
-      result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
-    result_.frames.assign(problem.frames.size(), Eigen::Matrix<double, 6, 6>::Zero());
-    for (const Intrinsics& camera : state.cameras)
-      result_.cameras.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
-    result_.mounts.assign(problem.mounts.size(), Eigen::Matrix<double, 6, 6>::Zero());
-    result_.points.assign(problem.points.size(), Eigen::Matrix3d::Zero());
-    result_.redundancy_x.assign(problem.kept.size(), std::numeric_limits<float>::quiet_NaN());
-    result_.redundancy_y = result_.redundancy_x;
-    row_of_unknown_.assign(plan.unknowns.size(), -1);
-    invert(plan.unknown_of_frame, frame_of_);
-    invert(plan.unknown_of_camera, camera_of_);
-    invert(plan.unknown_of_mount, mount_of_);
-  }
+        frame_sums_(plan.unknowns.size()),
+        row_of_unknown_(plan.unknowns.size(), -1) {}
 
-  TileCovariance build(CovarianceMatrix boundary) {
-    result_.boundary = std::move(boundary);
-    take(result_.boundary, plan_.boundary);
-    descend(plan_.cells.root(), result_.boundary);
-    return std::move(result_);
-  }
-
- private:
-  void invert(const std::vector<std::int64_t>& unknown_of_row, std::vector<std::int64_t>& row_of_unknown) {
-    row_of_unknown.assign(plan_.unknowns.size(), -1);
-    for (std::size_t row = 0; row < unknown_of_row.size(); ++row)
-      if (unknown_of_row[row] >= 0) row_of_unknown[at(unknown_of_row[row])] = static_cast<std::int64_t>(row);
-  }
-
-  void descend(std::int64_t number, const CovarianceMatrix& parent) {
-    const PlanNode& node = plan_.cells.nodes[at(number)];
-    const FrontFactor& factor = factor_.nodes[at(number)];
-    const CovarianceMatrix covariance = covariance_down(factor, parent.restricted_to(factor.passed)).whole();
-    take(covariance, node.eliminated);
-    if (node.leaf >= 0) add_points(at(node.leaf), covariance);
-    if (node.left >= 0) descend(node.left, covariance);
-    if (node.right >= 0) descend(node.right, covariance);
-  }
-
-  // Copies the diagonal blocks of the listed unknowns.
-  void take(const CovarianceMatrix& covariance, const UnknownList& list) {
-    for (const Unknown& u : list) {
-      const std::int64_t unknown = find_unknown(plan_.unknowns, u.id);
-      if (unknown < 0) continue;
-      std::vector<double> block(at(u.dimension * u.dimension));
-      covariance.block(u.id, u.id, block.data());
-      switch (u.id.kind) {
-        case UnknownKind::kFrame:
-          result_.frames[at(frame_of_[at(unknown)])] = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block.data());
-          break;
-        case UnknownKind::kMount:
-          result_.mounts[at(mount_of_[at(unknown)])] = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block.data());
-          break;
-        case UnknownKind::kCamera:
-          take_camera(at(camera_of_[at(unknown)]), u.dimension, block);
-          break;
-      }
-    }
-  }
-
-  void take_camera(std::size_t camera, std::int64_t dimension, const std::vector<double>& block) {
-    std::vector<int> parameters;
-    for (int k = 0; k < result_.cameras[camera].cols(); ++k)
-      if (contains(plan_.camera_free[camera], k)) parameters.push_back(k);
-    for (std::size_t i = 0; i < parameters.size(); ++i)
-      for (std::size_t j = 0; j < parameters.size(); ++j)
-        result_.cameras[camera](parameters[i], parameters[j]) = block[i + j * at(dimension)];
-  }
-
-  void add_points(std::size_t cell, const CovarianceMatrix& covariance) {
+  // Points and observations of a cell, from the covariance of its unknowns.
+  void add(std::size_t cell, const CovarianceMatrix& covariance, ObservationTable& observations) {
+    observations_ = &observations;
     cell_ = covariance.matrix.data();
     const std::vector<std::int64_t> offsets = row_offsets(covariance.unknowns);
     cell_rows_ = offsets.back();
@@ -116,6 +54,7 @@ class TileCovarianceBuilder {
     visit_terms(problem_, plan_, state_, 0, cell, [&](const TermResidual& term) { add_term(term); });
   }
 
+ private:
   using CovarianceBlock = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
   // Of two unknowns of the cell.
   CovarianceBlock covariance_of(std::int64_t a, std::int64_t rows, std::int64_t b, std::int64_t columns) const {
@@ -145,7 +84,7 @@ class TileCovarianceBuilder {
   }
 
   void add_image_redundancy(const PointEquations::Point& point, const Eigen::Matrix3d& covariance) {
-    ObservationStatistics& sums = result_.observations[image_kind(problem_.points[at(point.point)].role)];
+    ObservationStatistics& sums = (*observations_)[image_kind(problem_.points[at(point.point)].role)];
     std::int64_t row = problem_.begin[at(point.point)];  // the equations hold the kept ones in their order
     for (std::int64_t lane = point.first; lane < point.last; ++lane) {
       const Eigen::Matrix<double, 2, 3> by_point = equations_.by_point(lane);
@@ -186,7 +125,7 @@ class TileCovarianceBuilder {
     for (int axis = 0; axis < 3; ++axis) {
       if (std::isinf(term.sigma[axis])) continue;
       const double variance = covariance(axis, axis) / (term.sigma[axis] * term.sigma[axis]);
-      result_.observations[axis < 2 ? ObservationKind::kControlHorizontal : ObservationKind::kControlHeight].add(
+      (*observations_)[axis < 2 ? ObservationKind::kControlHorizontal : ObservationKind::kControlHeight].add(
           residual[axis] * residual[axis], 1 - variance);
     }
   }
@@ -203,7 +142,7 @@ class TileCovarianceBuilder {
       }
     }
     for (Eigen::Index k = 0; k < variance.size(); ++k)
-      result_.observations[term.kinds[at(k)]].add(term.residual[k] * term.residual[k], 1 - variance[k]);
+      (*observations_)[term.kinds[at(k)]].add(term.residual[k] * term.residual[k], 1 - variance[k]);
   }
 
   // Their own right-hand side is zero: x_p = -C^-T sum Y_i' x_i.
@@ -222,18 +161,101 @@ class TileCovarianceBuilder {
   const TileProblem& problem_;
   const TilePlan& plan_;
   const TileState& state_;
-  const TileFactor& factor_;
   const Step& columns_;
-  std::vector<std::int64_t> offsets_;
+  const std::vector<std::int64_t>& offsets_;
+  TileCovariance& result_;
   PointEquations equations_;
   std::vector<FrameSum> frame_sums_;           // reduce() makes them with Y
   std::vector<PointEquations::Block> blocks_;  // of the point at hand
-  std::vector<std::int64_t> frame_of_, camera_of_, mount_of_, row_of_unknown_;
-  // Of the cell at hand: covariance of its unknowns.
-  const double* cell_ = nullptr;
+  // Of the cell at hand.
+  ObservationTable* observations_ = nullptr;
+  std::vector<std::int64_t> row_of_unknown_;  // in the covariance of its unknowns
+  const double* cell_ = nullptr;              // this
   std::int64_t cell_rows_ = 0;
   std::vector<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMaxIntrinsics, 3>> with_point_;  // C_ap
   std::array<JacobianBlock<IntrinsicJacobian>, 3> jacobians_;  // of one observation
+};
+
+class TileCovarianceBuilder {
+ public:
+  TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
+                        const TileFactor& factor, const Step& columns)
+      : plan_(plan), factor_(factor), offsets_(row_offsets(plan.unknowns)), cells_([&, this] {
+          return std::make_unique<CellCovariances>(problem, plan, state, columns, offsets_, result_);
+        }) {
+    if (columns.columns > 1)
+      result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
+    result_.frames.assign(problem.frames.size(), Eigen::Matrix<double, 6, 6>::Zero());
+    for (const Intrinsics& camera : state.cameras)
+      result_.cameras.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
+    result_.mounts.assign(problem.mounts.size(), Eigen::Matrix<double, 6, 6>::Zero());
+    result_.points.assign(problem.points.size(), Eigen::Matrix3d::Zero());
+    result_.redundancy_x.assign(problem.kept.size(), std::numeric_limits<float>::quiet_NaN());
+    result_.redundancy_y = result_.redundancy_x;
+    invert(plan.unknown_of_frame, frame_of_);
+    invert(plan.unknown_of_camera, camera_of_);
+    invert(plan.unknown_of_mount, mount_of_);
+  }
+
+  TileCovariance build(CovarianceMatrix boundary) {
+    result_.boundary = std::move(boundary);
+    take(result_.boundary, plan_.boundary);
+    std::vector<ObservationTable> tables(plan_.points.size());  // of the cells
+    visit_parents_first<CovarianceMatrix>(plan_.cells.nodes, [&](std::int64_t n, const CovarianceMatrix* parent) {
+      const PlanNode& node = plan_.cells.nodes[at(n)];
+      const FrontFactor& factor = factor_.nodes[at(n)];
+      const CovarianceMatrix& outer = parent ? *parent : result_.boundary;
+      CovarianceMatrix covariance = covariance_down(factor, outer.restricted_to(factor.passed)).whole();
+      take(covariance, node.eliminated);
+      if (node.leaf >= 0) cells_.mine().add(at(node.leaf), covariance, tables[at(node.leaf)]);
+      return covariance;
+    });
+    for (const ObservationTable& table : tables) result_.observations.add(table);
+    return std::move(result_);
+  }
+
+ private:
+  void invert(const std::vector<std::int64_t>& unknown_of_row, std::vector<std::int64_t>& row_of_unknown) {
+    row_of_unknown.assign(plan_.unknowns.size(), -1);
+    for (std::size_t row = 0; row < unknown_of_row.size(); ++row)
+      if (unknown_of_row[row] >= 0) row_of_unknown[at(unknown_of_row[row])] = static_cast<std::int64_t>(row);
+  }
+
+  // Copies the diagonal blocks of the listed unknowns.
+  void take(const CovarianceMatrix& covariance, const UnknownList& list) {
+    for (const Unknown& u : list) {
+      const std::int64_t unknown = find_unknown(plan_.unknowns, u.id);
+      if (unknown < 0) continue;
+      std::vector<double> block(at(u.dimension * u.dimension));
+      covariance.block(u.id, u.id, block.data());
+      switch (u.id.kind) {
+        case UnknownKind::kFrame:
+          result_.frames[at(frame_of_[at(unknown)])] = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block.data());
+          break;
+        case UnknownKind::kMount:
+          result_.mounts[at(mount_of_[at(unknown)])] = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block.data());
+          break;
+        case UnknownKind::kCamera:
+          take_camera(at(camera_of_[at(unknown)]), u.dimension, block);
+          break;
+      }
+    }
+  }
+
+  void take_camera(std::size_t camera, std::int64_t dimension, const std::vector<double>& block) {
+    std::vector<int> parameters;
+    for (int k = 0; k < result_.cameras[camera].cols(); ++k)
+      if (contains(plan_.camera_free[camera], k)) parameters.push_back(k);
+    for (std::size_t i = 0; i < parameters.size(); ++i)
+      for (std::size_t j = 0; j < parameters.size(); ++j)
+        result_.cameras[camera](parameters[i], parameters[j]) = block[i + j * at(dimension)];
+  }
+
+  const TilePlan& plan_;
+  const TileFactor& factor_;
+  std::vector<std::int64_t> offsets_;
+  std::vector<std::int64_t> frame_of_, camera_of_, mount_of_;
+  PerThread<CellCovariances> cells_;
   TileCovariance result_;
 };
 

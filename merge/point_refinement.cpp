@@ -10,6 +10,7 @@
 #include "adjust/residual_squares.h"
 #include "geometry/decompositions.h"
 #include "geometry/triangulation.h"
+#include "geometry/workers.h"
 #include "merge/point_equations.h"
 
 namespace megablock {
@@ -279,20 +280,28 @@ class LossSums {
 
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
-  ResidualSquares residuals(problem, state);
-  LossSums sums(problem.image_loss);
-  for (const RowList& cell : plan.points)
-    residuals.visit(cell.rows(), [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
-  sums.finish();
-  double images = 0.5 * sums.settled();
-  if (!sums.tail().empty()) {
-    PointRefiner refiner(problem, state, residuals.views(), settled);
-    for (std::span<const std::int64_t> rest = sums.tail(); !rest.empty();) {
-      const auto some = rest.first(std::min(kAtOnce, rest.size()));
-      images += refiner.refine(some);
-      rest = rest.subspan(some.size());
-    }
+  PerThread<ResidualSquares> residuals([&] { return std::make_unique<ResidualSquares>(problem, state); });
+  std::vector<LossSums> of_cells(plan.points.size(), LossSums(problem.image_loss));
+  visit_in_parallel(std::ssize(plan.points), [&](std::int64_t cell) {
+    LossSums& sums = of_cells[static_cast<std::size_t>(cell)];
+    residuals.mine().visit(plan.points[static_cast<std::size_t>(cell)].rows(),
+                           [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
+    sums.finish();
+  });
+  double images = 0;
+  std::vector<std::int64_t> tail;
+  for (const LossSums& sums : of_cells) {
+    images += 0.5 * sums.settled();
+    tail.insert(tail.end(), sums.tail().begin(), sums.tail().end());
   }
+  const std::vector<ImageView> views = tail.empty() ? std::vector<ImageView>() : image_views(problem, state);
+  PerThread<PointRefiner> refiners([&] { return std::make_unique<PointRefiner>(problem, state, views, settled); });
+  std::vector<double> costs((tail.size() + kAtOnce - 1) / kAtOnce);
+  visit_in_parallel(std::ssize(costs), [&](std::int64_t chunk) {
+    const auto rest = std::span<const std::int64_t>(tail).subspan(static_cast<std::size_t>(chunk) * kAtOnce);
+    costs[static_cast<std::size_t>(chunk)] = refiners.mine().refine(rest.first(std::min(kAtOnce, rest.size())));
+  });
+  for (const double cost : costs) images += cost;
   return images + other_cost(problem, state);
 }
 

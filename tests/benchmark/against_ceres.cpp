@@ -22,6 +22,7 @@
 // median of the steps on the wall clock, without reading and ordering; processor_seconds_per_iteration: of all threads
 // or ranks; peak_rss_mib: largest resident memory of the process, ours the sum of both.
 #include <ceres/ceres.h>
+#include <omp.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -228,6 +229,7 @@ void run_ours(const Start& start, Communicator& ranks) {
       tiles.add(inputs.tile(inputs.tiles, TileIndex(t), read_tracks(start.tracks(t)), read_points(start.points(t))));
       own += kept_observations(tiles.outline(tiles.size() - 1).problem);
     }
+  omp_set_num_threads(kThreads / ranks.size());
   RankRunner runner(ranks, inputs.tiles.tree, rank_of_tile, tiles, MemoryOptions());
   GlobalOptions options;
   options.max_decrement = 1e-6;

@@ -8,6 +8,7 @@
 //
 //     bench_merge --benchmark_repetitions=5
 #include <benchmark/benchmark.h>
+#include <omp.h>
 
 #include <limits>
 #include <map>
@@ -64,6 +65,7 @@ struct WholeTile {
 
   explicit WholeTile(const SimulatedBlock& block) {
     openblas_set_num_threads(1);
+    omp_set_num_threads(1);
     const Tiles one = single_tile(block.block);
     problem = make_tile_problem(block.block, block.truth, one, TileIndex(0), block.tracks, {});
     state = make_tile_state(problem, block.truth, block.points);

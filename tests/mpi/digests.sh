@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Same bits for any number of ranks and threads: runs one simulated block on 1, 2, 3 and 4 ranks (aerial also on 8), and
-# on 1 rank with 1 and 3 threads, and compares the digests.
+# on 1 rank with 1 and 3 threads (as one tile with 1, 2, 3 and 5), and compares the digests.
 # usage: digests.sh MEGABLOCK aerial|street|rendered|registration FRAMES
 # `rendered` makes pictures, so that features, matches and the initial orientation are compared too. `registration`
 # registers a trajectory of that many frames.
@@ -42,7 +42,11 @@ compare ranks-1 "$megablock"
 for ranks in 2 3 4 $([ "$scene" = aerial ] && echo 8); do
   compare ranks-$ranks mpirun --bind-to none --oversubscribe --mca mpi_yield_when_idle 1 -n $ranks "$megablock"
 done
-for threads in 1 3; do
-  compare_threads() { "$megablock" "$@" --threads $threads; }
-  compare threads-$threads compare_threads
-done
+compare_threads() { "$megablock" "$@" --threads $threads; }
+for threads in 1 3; do compare threads-$threads compare_threads; done
+if [ "$scene" = aerial ] || [ "$scene" = street ]; then  # one tile, of several cells, on which threads work together
+  printf 'tiles:\n  tile_max_frames: %d\n  min_tiles_from: 1000\n' "$frames" > "$work/tile"
+  sed -i '/^tiles:$/,$d' "$work/block/block.yaml" && cat "$work/tile" >> "$work/block/block.yaml"
+  reference=
+  for threads in 1 2 3 5; do compare one-tile-$threads compare_threads; done
+fi
