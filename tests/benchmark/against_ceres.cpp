@@ -1,7 +1,7 @@
 // The merge of a block in tiles against Ceres, which holds it as one problem:
 //
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
-//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--exactness|--speed]
+//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--ranks 2] [--exactness|--speed]
 //
 // Scenes: tests/benchmark/scenes.h. A job of the block on two ranks, merged to a decrement of 1e-7, gives the tiles,
 // the observations it kept and its solution. How exact this is (cluster/monolithic_comparison.h):
@@ -12,8 +12,8 @@
 // How fast: from the same job's observations, points and sigmas, with every component of every pose moved off it by a
 // normal deviate of its sigma, run, each in processes of their own and with the arithmetic that the processor is best
 // at, Ceres on two threads, with SPARSE_SCHUR by automatic and by analytic derivatives and with ITERATIVE_SCHUR
-// (Schur-Jacobi, three steps) by analytic ones, and before each of them three times the merge on two ranks. Of Ceres'
-// runs the one with the fastest iterations counts, of ours the middle one.
+// (Schur-Jacobi, three steps) by analytic ones, and before each of them three times the merge on two ranks, or on
+// one with two threads. Of Ceres' runs the one with the fastest iterations counts, of ours the middle one.
 //
 // Prints one JSON object as its last line: the two figures above; of the second runs' ends
 // relative_cost_difference_of_runs ((ours - Ceres') / Ceres', of the best SPARSE_SCHUR) and
@@ -57,7 +57,7 @@ using namespace megablock;
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr int kRanks = 2, kThreads = 2;
+constexpr int kThreads = 2;  // in all, of either side
 
 double median(std::vector<double> values) {
   if (values.empty()) throw ComputeError("no iteration was made");
@@ -92,6 +92,7 @@ struct Options {
   std::string role;  // of a process that this program starts: "exactness", "ours" or the name of Ceres' linear solver
   bool analytic = false;
   bool exactness = true, speed = true;  // what is asked for
+  int ranks = 2;                        // of ours, with a thread each; 1: one with two threads
   int tile_frames = 120;                // so that ranks have several; 0: as the program chooses
   std::string loss = "huber";
   Options() { scene.frames = 2000; }
@@ -100,6 +101,7 @@ struct Options {
 // What both sides start from, as files in one folder.
 struct Start {
   fs::path folder;  // of the block
+  int ranks = 2;    // of ours
   fs::path job() const { return folder / "job"; }
   std::string file(const std::string& name) const { return (folder / "start" / name).string(); }
   std::string tracks(std::int64_t tile) const { return file("tracks-" + std::to_string(tile) + ".h5"); }
@@ -341,20 +343,20 @@ Json json_of(const std::string& path) {
 
 Json figures_of_ours(const Start& start) {
   Json ours = json_of(start.file("ours-0.json"));
-  for (int r = 1; r < kRanks; ++r) {
+  for (int r = 1; r < start.ranks; ++r) {
     const Json other = json_of(start.file("ours-" + std::to_string(r) + ".json"));
     ours["observations"] = ours["observations"].get<std::int64_t>() + other["observations"].get<std::int64_t>();
     for (const char* figure : {"peak_rss_mib", "processor_seconds_per_iteration"})
       ours[figure] = ours[figure].get<double>() + other[figure].get<double>();
   }
-  ours["solver"] = "megablock, " + std::to_string(kRanks) + " ranks";
+  ours["solver"] = "megablock, ranks: " + std::to_string(start.ranks);
   return ours;
 }
 
 double pose_difference_sigmas(const Start& start, const BlockResult& result, const std::string& ceres_end) {
   const BlockState ceres = read_state(ceres_end);
   double largest = 0;
-  for (int r = 0; r < kRanks; ++r) {
+  for (int r = 0; r < start.ranks; ++r) {
     const BlockState ours = read_state(start.file("end-" + std::to_string(r) + ".h5"));
     for (FrameIndex f(0); ours.frames.contains(f); ++f.value) {
       if (!ours.oriented[f]) continue;
@@ -376,7 +378,7 @@ void run_job(const Options& options, const Start& start) {
       "adjustment: {image_loss: " + options.loss + ", position_loss: " + options.loss + "}\nmerge: {decrement: 1e-7}\n";
   if (options.tile_frames > 0) project += "tiles: {tile_max_frames: " + std::to_string(options.tile_frames) + "}\n";
   simulate_scene(options.scene, start.folder, project);
-  run_scene(start.folder, start.job(), kRanks, 1);
+  run_scene(start.folder, start.job(), start.ranks, kThreads / start.ranks);
 }
 
 Json exactness(const Start& start, const std::string& self) {
@@ -387,7 +389,7 @@ Json exactness(const Start& start, const std::string& self) {
 Json speed(const Options& options, const Start& start, const std::string& self) {
   const BlockResult result = read_result((start.job() / "result/block.h5").string());
   write_start(start, result, options.scene.seed);
-  const std::string merge = on_ranks(kRanks) + self + "ours " + kArithmeticOption +
+  const std::string merge = on_ranks(start.ranks) + self + "ours " + kArithmeticOption +
                             (lane_kernels_of_width(8) != nullptr ? " avx512" : " avx2");
   std::vector<Json> own_runs, runs;
   for (const std::string run : {"SPARSE_SCHUR", "SPARSE_SCHUR --analytic", "ITERATIVE_SCHUR --analytic"}) {
@@ -422,7 +424,7 @@ Json speed(const Options& options, const Start& start, const std::string& self) 
 }
 
 Json compare(const Options& options, const fs::path& folder) {
-  const Start start{folder};
+  const Start start{folder, options.ranks};
   run_job(options, start);
   fs::create_directories(folder / "start");
   const std::string self =
@@ -443,6 +445,8 @@ int main(int argc, char** argv) {
   CLI::App app("The merge against Ceres on one simulated block; prints one JSON object");
   add_scene_options(app, options.scene);
   app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most; 0: as the program chooses");
+  app.add_option("--ranks", options.ranks, "Ranks of ours, with a thread each; 1: one with two threads")
+      ->check(CLI::Range(1, 2));
   app.add_option("--calibration", options.scene.calibration, "Calibration held, or shared by all frames and adjusted")
       ->check(CLI::IsMember({"held", "shared"}));
   app.add_option("--loss", options.loss, "Robust loss of image measurements and positions")
@@ -455,7 +459,7 @@ int main(int argc, char** argv) {
   app.add_option(kArithmeticOption)->group("");  // pin_arithmetic() reads it
   CLI11_PARSE(app, argc, argv);
   try {
-    const Start start{options.scene.folder};
+    const Start start{options.scene.folder, options.ranks};
     if (options.role == "ours") {
       pin_arithmetic(argc, argv);
       limit_libraries_to_one_thread();
