@@ -1,6 +1,7 @@
 #include "match/nearest.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "io/error.h"
 #include "match/nearest_kernel.h"
@@ -46,12 +47,14 @@ std::vector<std::int32_t> squared_norms(const std::vector<SiftDescriptor>& descr
   return norms;
 }
 
+// Components less `shift`, modulo 256 where the values are bytes.
 template <typename Value>
-std::vector<Value> pack_rows(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
-  std::vector<Value> packed(padded * kDimension, 0);
+std::vector<Value> pack_rows(const std::vector<SiftDescriptor>& descriptors, std::size_t padded, int shift = 0) {
+  std::vector<Value> packed(padded * kDimension, static_cast<Value>(-shift));
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    std::copy(descriptors[i].begin(), descriptors[i].end(),
-              packed.begin() + static_cast<std::ptrdiff_t>(i * kDimension));
+    std::transform(descriptors[i].begin(), descriptors[i].end(),
+                   packed.begin() + static_cast<std::ptrdiff_t>(i * kDimension),
+                   [shift](int value) { return static_cast<Value>(value - shift); });
   }
   return packed;
 }
@@ -91,6 +94,14 @@ bool are_short(const Size& a, const Size& b) {
   return a.largest_byte <= 127 && b.largest_byte <= 127 && a.largest_norm * b.largest_norm <= kLargestSum * kLargestSum;
 }
 
+// norms - 256 sum(b): what run_avx512 takes.
+std::vector<std::int32_t> shifted_norms(const std::vector<SiftDescriptor>& descriptors,
+                                        std::vector<std::int32_t> norms) {
+  for (std::size_t i = 0; i < descriptors.size(); ++i)
+    norms[i] -= 256 * std::accumulate(descriptors[i].begin(), descriptors[i].end(), 0);
+  return norms;
+}
+
 // [k][padded] to [count][k].
 std::vector<std::int32_t> transpose(const std::vector<std::int32_t>& lists, std::size_t k, std::size_t padded,
                                     std::size_t count) {
@@ -103,13 +114,24 @@ std::vector<std::int32_t> transpose(const std::vector<std::int32_t>& lists, std:
 
 }  // namespace
 
+NearestKernel fastest_nearest_kernel() {
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni"))
+    return NearestKernel::kAvx512;
+  return __builtin_cpu_supports("avx2") ? NearestKernel::kAvx2 : NearestKernel::kPortable;
+}
+
 MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
-                                    std::size_t k, bool portable) {
+                                    std::size_t k, NearestKernel wanted) {
   if (k < 1 || k > 8) throw InputError("nearest neighbours: k must be 1 to 8");
-  const std::size_t rows = round_up(a.size(), kRowTile), columns = round_up(b.size(), kColumnTile);
-  const std::vector<std::int32_t> norm_a = squared_norms(a, rows), norm_b = squared_norms(b, columns);
+  const NearestKernel kernel = std::min(wanted, fastest_nearest_kernel());
+  const std::size_t rows = round_up(a.size(), kRowMultiple), columns = round_up(b.size(), kColumnTile);
+  const std::vector<std::int32_t> norm_a = squared_norms(a, rows);
+  std::vector<std::int32_t> norm_b = squared_norms(b, columns);
   std::vector<std::int32_t> row_distance(rows * k, Neighbours::kFar), row_index(rows * k, -1);
   std::vector<std::int32_t> column_distance(columns * k, Neighbours::kFar), column_index(columns * k, -1);
+  const bool short_ones = kernel == NearestKernel::kAvx2 && are_short(size_of(a, norm_a), size_of(b, norm_b));
+  if (kernel == NearestKernel::kAvx512) norm_b = shifted_norms(b, std::move(norm_b));
   Problem problem{rows,
                   columns,
                   nullptr,
@@ -123,17 +145,17 @@ MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const 
                   row_index.data(),
                   column_distance.data(),
                   column_index.data()};
-  const bool avx2 = !portable && __builtin_cpu_supports("avx2");
-  if (avx2 && are_short(size_of(a, norm_a), size_of(b, norm_b))) {
-    const auto packed_a = pack_rows<std::uint8_t>(a, rows), packed_b = pack_panels<std::uint8_t>(b, columns);
+  if (short_ones || kernel == NearestKernel::kAvx512) {
+    const auto packed_a = pack_rows<std::uint8_t>(a, rows, short_ones ? 0 : 128),
+               packed_b = pack_panels<std::uint8_t>(b, columns);
     problem.a8 = packed_a.data();
     problem.b8 = packed_b.data();
-    run_avx2_short(problem);
+    short_ones ? run_avx2_short(problem) : run_avx512(problem);
   } else {
     const auto packed_a = pack_rows<std::int16_t>(a, rows), packed_b = pack_panels<std::int16_t>(b, columns);
     problem.a16 = packed_a.data();
     problem.b16 = packed_b.data();
-    avx2 ? run_avx2(problem) : run_portable(problem);
+    kernel == NearestKernel::kAvx2 ? run_avx2(problem) : run_portable(problem);
   }
   MutualNeighbours result;
   row_distance.resize(a.size() * k);

@@ -20,8 +20,13 @@ struct MutualNeighbours {
   Neighbours of_a, of_b;
 };
 
-// portable: without the AVX2 kernel; the result is the same, to the bit. k is 1 to 8.
+// For which processors; the result is the same, to the bit.
+enum class NearestKernel : std::uint8_t { kPortable, kAvx2, kAvx512 };
+// The fastest that this processor runs.
+NearestKernel fastest_nearest_kernel();
+
+// k is 1 to 8. Of a kernel that the processor does not run, the fastest that it does.
 MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
-                                    std::size_t k, bool portable = false);
+                                    std::size_t k, NearestKernel kernel = fastest_nearest_kernel());
 
 }  // namespace megablock

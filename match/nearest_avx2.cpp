@@ -8,6 +8,8 @@ namespace megablock::nearest_kernel {
 
 namespace {
 
+constexpr std::size_t kRowTile = 4;  // rows of a tile in registers
+
 __m256i load(const void* p) { return _mm256_loadu_si256(static_cast<const __m256i*>(p)); }
 
 // Four bytes of a row (two or four of its components), in every lane.
