@@ -81,9 +81,13 @@ NormalEquations normal_equations(const RelativeOrientation& o, const PointPairs&
     sum.cost += given * r * r / q;
     if (weight < 1e-3) continue;
     const Vector5 j = equations.derivative();
-    sum.normal.noalias() += weight * j * j.transpose();
-    sum.gradient += weight * r * j;
+    for (int column = 0; column < 5; ++column) {
+      const double weighted = weight * j[column];
+      for (int row = column; row < 5; ++row) sum.normal(row, column) += weighted * j[row];
+      sum.gradient[column] += weighted * r;
+    }
   }
+  sum.normal.triangularView<Eigen::StrictlyUpper>() = sum.normal.transpose();
   return sum;
 }
 

@@ -25,8 +25,9 @@ constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
 constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
 // Below this share of all matches what verticals give is checked by five points.
 constexpr double kDoubtfulVertical = 0.25;
-// Steps of an adjustment below it change nothing that matters: radians, of orientations good to some 1e-4.
-constexpr double kSettled = 1e-7;
+// Steps of an adjustment below it change nothing that matters: radians, of orientations good to some 1e-4. Those that
+// only tell candidates apart, and are adjusted once more, need less.
+constexpr double kSettled = 1e-7, kNear = 1e-5;
 // Of the right matches, within the limit of transfer residuals that follows from the matches' sigma.
 constexpr double kRightShare = 0.999;
 // Of the best orientation's support, for a plane's other one to be its twin.
@@ -37,20 +38,10 @@ constexpr double kSecondLook = 0.9;
 // Support of what they find, over that of what verticals gave, that leaves it the same.
 constexpr double kSameSupport = 1.05;
 
-RansacOptions sampling(const TwoViewOptions& options, double limit, int max_draws, double inlier_share = 0) {
-  RansacOptions sampling;
-  sampling.threshold = limit;
-  sampling.confidence = 0.999;
-  sampling.max_draws = max_draws;
-  sampling.inlier_share = inlier_share;
-  sampling.seed = options.seed;
-  return sampling;
-}
-
-RelativeAdjustment adjustment(double scale) {
+RelativeAdjustment adjustment(double scale, double tolerance = kSettled) {
   RelativeAdjustment by;
   by.scale = scale;
-  by.tolerance = kSettled;
+  by.tolerance = tolerance;
   return by;
 }
 
@@ -59,6 +50,15 @@ std::vector<std::size_t> rows_of(const std::vector<std::uint8_t>& inlier) {
   for (std::size_t i = 0; i < inlier.size(); ++i)
     if (inlier[i]) rows.push_back(i);
   return rows;
+}
+
+PointPairs selected_pairs(const PointPairs& points, const std::vector<std::uint8_t>& inlier) {
+  PointPairs pairs;
+  for (const std::size_t i : rows_of(inlier)) {
+    pairs.a.push_back(points.a[i]);
+    pairs.b.push_back(points.b[i]);
+  }
+  return pairs;
 }
 
 struct InlierRays {
@@ -94,19 +94,13 @@ class PairEstimation {
     none.inlier.assign(points_.size(), 0);
     // The general model first: what it explains tells how many draws a simpler one that is to be chosen needs.
     if (const auto general = orientation()) refine_all(std::array{*general});
-    const double share =
-        hypotheses_.empty() ? 0 : hypotheses_.front().support.count / static_cast<double>(points_.size());
     transfer_limit_ = transfer_limit();
-    const auto rotation =
-        ransac(RotationPairEstimator(points_), sampling(options_, transfer_limit_, 300, kRotationShare * share));
-    const auto plane =
-        ransac(HomographyEstimator(points_), sampling(options_, transfer_limit_, 1000, kPlaneShare * share));
+    const auto rotation = simpler<RotationPairEstimator>(300, kRotationShare);
+    const auto plane = simpler<HomographyEstimator>(1000, kPlaneShare);
     const int rotation_count = rotation ? rotation->consensus.count : 0,
               plane_count = plane ? plane->consensus.count : 0;
-    draws_ += (rotation ? rotation->draws : 0) + (plane ? plane->draws : 0);
-    if (plane && plane_count >= kPlaneShare * share * static_cast<double>(points_.size()))
-      refine_all(twins(plane->consensus.inlier));
-    const int best_count = hypotheses_.empty() ? 0 : hypotheses_.front().support.count;
+    if (plane && plane_count >= kPlaneShare * best_count()) refine_all(twins(plane->consensus.inlier));
+    const int best_count = this->best_count();
 
     if (rotation_count >= needed_ && rotation_count >= kRotationShare * best_count) return turned(*rotation);
     // A plane leaves the fundamental matrix undetermined.
@@ -120,6 +114,16 @@ class PairEstimation {
   }
 
  private:
+  RansacOptions sampling(double limit, int max_draws, double inlier_share = 0) const {
+    RansacOptions sampling;
+    sampling.threshold = limit;
+    sampling.confidence = 0.999;
+    sampling.max_draws = max_draws;
+    sampling.inlier_share = inlier_share;
+    sampling.seed = options_.seed;
+    return sampling;
+  }
+
   // Inliers that chance would give: random matches fall into the residual's band along the epipolar line with the share
   // of the image that the band covers, and the unknowns of the model adapt to them.
   int inliers_needed() const {
@@ -152,19 +156,17 @@ class PairEstimation {
     if (options_.vertical_a && options_.vertical_b) {
       const VerticalPairEstimator estimator(points_, options_.max_residual, options_.vertical_a->direction,
                                             options_.vertical_b->direction, options_.sample_spacing);
-      if (const auto found = ransac(estimator, sampling(options_, options_.max_residual, 1000))) {
-        draws_ += found->draws;
-        starts.push_back(adjust_orientation(found->model, points_, adjustment(0.5 * options_.max_residual)));
+      if (const auto found = counted(ransac(estimator, sampling(options_.max_residual, 1000)))) {
+        starts.push_back(adjust_orientation(found->model, points_, adjustment(0.5 * options_.max_residual, kNear)));
         by_vertical_ = found->consensus.count >= needed_ &&
                        found->consensus.count >= kDoubtfulVertical * static_cast<double>(points_.size()) &&
                        agrees_with_verticals(starts.front(), found->consensus);
       }
     }
-    RansacOptions five = sampling(options_, options_.max_residual, 3000);
+    RansacOptions five = sampling(options_.max_residual, 3000);
     if (by_vertical_) five.confidence = kSecondLook;
-    const auto found = ransac(five_points_, five, std::span<const RelativeOrientation>(starts));
+    const auto found = counted(ransac(five_points_, five, std::span<const RelativeOrientation>(starts)));
     if (!found) return std::nullopt;
-    draws_ += found->draws;
     if (by_vertical_) {
       const Consensus start = consensus_of(five_points_, starts.front(), options_.max_residual);
       by_vertical_ = found->consensus.score <= kSameSupport * start.score;
@@ -190,10 +192,37 @@ class PairEstimation {
     return turned.dot(b.direction) > 0 && difference.dot(covariance.inverse() * difference) < kSigmas * kSigmas;
   }
 
+  int best_count() const { return hypotheses_.empty() ? 0 : hypotheses_.front().support.count; }
+
+  // A rotation, or a plane. What it explains the general model explains too, so that samples come from what agrees with
+  // that one: there, most matches must agree for the simpler one to be chosen. Of all matches where there is none.
+  template <typename Estimator>
+  std::optional<RansacResult<typename Estimator::Model>> simpler(int max_draws, double share) {
+    if (best_count() < needed_) return counted(ransac(Estimator(points_), sampling(transfer_limit_, max_draws)));
+    return sampled_from<Estimator>(hypotheses_.front().support, sampling(transfer_limit_, max_draws, share));
+  }
+
+  // Of samples of the consensus alone, refined over all matches and held against them.
+  template <typename Estimator>
+  std::optional<RansacResult<typename Estimator::Model>> sampled_from(const Consensus& consensus,
+                                                                      const RansacOptions& options) {
+    const PointPairs agreeing = selected_pairs(points_, consensus.inlier);
+    const auto found = counted(ransac(Estimator(agreeing), options));
+    if (!found) return std::nullopt;
+    return ransac(Estimator(points_), sampling(options.threshold, 1), std::span(&found->model, 1));
+  }
+
+  template <typename Result>
+  Result counted(Result found) {
+    if (found) draws_ += found->draws;
+    return found;
+  }
+
   // Refines candidates over all points; the best by score comes first, one of each.
   void refine_all(std::span<const RelativeOrientation> candidates) {
     for (const RelativeOrientation& start : candidates) {
-      const RelativeOrientation refined = adjust_orientation(start, points_, adjustment(0.5 * options_.max_residual));
+      const RelativeOrientation refined =
+          adjust_orientation(start, points_, adjustment(0.5 * options_.max_residual, kNear));
       Hypothesis before{start, consensus_of(five_points_, start, options_.max_residual), 0.5 * options_.max_residual};
       Hypothesis after{refined, consensus_of(five_points_, refined, options_.max_residual),
                        0.5 * options_.max_residual};
@@ -332,13 +361,17 @@ class PairEstimation {
     return result;
   }
 
-  // Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate.
+  // Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate. What
+  // is right lies near the best essential one's epipolar lines even so, and most of the rest does not.
   std::optional<TwoView> uncalibrated() {
-    const auto found = ransac(FundamentalEstimator(points_), sampling(options_, options_.max_residual, 3000));
-    if (!found || found->consensus.count < needed_) return std::nullopt;
-    draws_ += found->draws;
     const double limit = 4 * options_.max_residual;
     const FivePointEstimator estimator(points_, limit);
+    const RansacOptions options = sampling(options_.max_residual, 3000);
+    const auto found = best_count() < needed_
+                           ? counted(ransac(FundamentalEstimator(points_), options))
+                           : sampled_from<FundamentalEstimator>(
+                                 consensus_of(estimator, hypotheses_.front().orientation, limit), options);
+    if (!found || found->consensus.count < needed_) return std::nullopt;
     std::optional<Hypothesis> best;
     for (const RelativeOrientation& start : orientations_of_essential(nearest_essential(found->model))) {
       const RelativeOrientation refined = adjust_orientation(start, points_, adjustment(0.5 * limit));
