@@ -34,7 +34,9 @@ struct SeenNormals {
 };
 
 constexpr int kRounds = 10;
-constexpr double kClearly = 1.5;  // times the agreement of what is chosen now
+// A twin is chosen that agrees better by this factor than what is chosen now, and by as many witnesses as agree wholly:
+// a single one may do so by chance, where hills leave few pairs a twin.
+constexpr double kClearly = 1.5, kWitnesses = 0.75;
 
 // From 0 to 1.
 double agreement(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -76,7 +78,7 @@ void choose_twins_by_planes(OrientationGraph& graph, std::size_t witnesses) {
     bool changed = false;
     for (std::size_t e = 0; e < graph.edges.size(); ++e) {
       const std::uint8_t now = by_twin[e];
-      if (!(votes[e][!now] > kClearly * votes[e][now])) continue;
+      if (!(votes[e][!now] > kClearly * votes[e][now] + kWitnesses)) continue;
       by_twin[e] = !now;
       changed = true;
     }

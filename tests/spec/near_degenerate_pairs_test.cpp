@@ -119,11 +119,10 @@ double averaging_error_deg(const SimulatedBlock& scene, const std::vector<Verifi
 
 // The averaged rotations' error is to be less than `gain` of what it is without covariance and twin. Returns the share
 // of the pairs that are ill-conditioned.
-double compare(double relief, double focal_px, double gain, const std::string& name) {
-  constexpr unsigned kBlocks = 4;
+double compare(double relief, double focal_px, double gain, const std::string& name, unsigned blocks) {
   double averaged = 0, averaged_alone = 0, adjusted = 0, adjusted_alone = 0, oriented = 0, oriented_alone = 0,
          planes = 0, ill = 0, twins = 0, pairs = 0;
-  for (unsigned seed = 1; seed <= kBlocks; ++seed) {
+  for (unsigned seed = 1; seed <= blocks; ++seed) {
     const SimulatedBlock scene = close_block(relief, focal_px, seed);
     const std::vector<VerifiedPair> all = verified(scene), alone = orientations_alone(all);
     for (const VerifiedPair& pair : all) {
@@ -132,12 +131,12 @@ double compare(double relief, double focal_px, double gain, const std::string& n
       ill += pair.ill_conditioned;
       twins += pair.twin.has_value();
     }
-    averaged += averaging_error_deg(scene, all) / kBlocks;
-    averaged_alone += averaging_error_deg(scene, alone) / kBlocks;
+    averaged += averaging_error_deg(scene, all) / blocks;
+    averaged_alone += averaging_error_deg(scene, alone) / blocks;
     const Errors with = errors_of(scene, orient(scene, all), true),
                  without = errors_of(scene, orient(scene, alone), true);
-    adjusted += with.position_m / kBlocks;
-    adjusted_alone += without.position_m / kBlocks;
+    adjusted += with.position_m / blocks;
+    adjusted_alone += without.position_m / blocks;
     oriented += static_cast<double>(with.oriented);
     oriented_alone += static_cast<double>(without.oriented);
   }
@@ -155,10 +154,11 @@ double compare(double relief, double focal_px, double gain, const std::string& n
 
 TEST(Spec, M43CovarianceAndTwinInABlockOverFlatGround) {
   // A plane is no reason to mark a pair.
-  expect_at_most(compare(0, 1200, 1, "flat"), 0.05, "flat: share of ill-conditioned pairs");
+  expect_at_most(compare(0, 1200, 1, "flat", 4), 0.05, "flat: share of ill-conditioned pairs");
 }
-TEST(Spec, M43CovarianceAndTwinInANarrowViewOfFlatGround) { compare(0, 4800, 0.3, "flat, narrow"); }
-TEST(Spec, M43CovarianceAndTwinInANarrowViewOfHills) { compare(1, 4800, 1, "hills of 1 m, narrow"); }
+TEST(Spec, M43CovarianceAndTwinInANarrowViewOfFlatGround) { compare(0, 4800, 0.3, "flat, narrow", 12); }
+// Over hills the matches themselves tell twins apart: there is next to nothing to be gained, and nothing to be lost.
+TEST(Spec, M43CovarianceAndTwinInANarrowViewOfHills) { compare(1, 4800, 1, "hills of 1 m, narrow", 12); }
 
 }  // namespace
 }  // namespace megablock
