@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "cluster/signals.h"
+
 namespace megablock {
 
 namespace {
@@ -98,6 +100,7 @@ Communicator::Communicator(int* argc, char*** argv) {
 Communicator::~Communicator() {
   if (!mpi_) return;
   barrier();
+  end_of_work();
   mpi_->stop = true;
   if (mpi_->progress.joinable()) mpi_->progress.join();
   MPI_Win_unlock_all(mpi_->window);

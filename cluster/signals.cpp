@@ -14,9 +14,13 @@ namespace megablock {
 
 namespace {
 
-std::atomic<bool>& stop_flag() {
-  static std::atomic<bool> flag{false};  // a signal belongs to the process: the one piece of state it can have
-  return flag;
+// A signal belongs to the process: the one piece of state it can have.
+struct Flags {
+  std::atomic<bool> stop{false}, end_of_work{false};
+};
+Flags& flags() {
+  static Flags flags;
+  return flags;
 }
 
 void write_line(const char* text, std::size_t size) {
@@ -37,17 +41,20 @@ void watch_signals() {
       int signal = 0;
       if (sigwait(&signals, &signal) != 0) continue;
       if (signal == SIGUSR1) {
-        stop_flag() = true;
+        flags().stop = true;
         continue;
       }
       constexpr char kText[] = "megablock: stopped; the units in hand are abandoned, run the same command to resume\n";
-      end_progress_line();
-      write_line(kText, sizeof kText - 1);
+      if (!flags().end_of_work) {
+        end_progress_line();
+        write_line(kText, sizeof kText - 1);
+      }
       std::_Exit(kExitInterrupted);
     }
   }).detach();
 }
 
-bool stop_requested() { return stop_flag(); }
+bool stop_requested() { return flags().stop; }
+void end_of_work() { flags().end_of_work = true; }
 
 }  // namespace megablock

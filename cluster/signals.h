@@ -13,4 +13,8 @@ void watch_signals();
 // True once a graceful stop was asked for.
 bool stop_requested();
 
+// The ranks have come to their end together and have nothing in hand: SIGTERM, which mpirun sends to those that leave
+// after one with an exit code, still ends the process, but says nothing.
+void end_of_work();
+
 }  // namespace megablock

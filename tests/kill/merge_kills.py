@@ -80,7 +80,10 @@ with tempfile.TemporaryDirectory() as folder:
         sys.exit("digest differs")
 
     def checkpoints(job):
-        return set((job / "merge").glob("*/iteration.bin"))
+        try:
+            return set((job / "merge").glob("*/iteration.bin"))
+        except FileNotFoundError:  # the run has ended, and the folder is gone while it is looked at
+            return set()
 
     moments = random.Random(options.seed)
     job, kills, resumed, finished, left_s = fresh("killed"), 0, 0, 0, []
