@@ -1,9 +1,12 @@
 #include "cluster/commands/simulate_command.h"
 
+#include <omp.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <map>
 
+#include "cluster/commands/option_checks.h"
 #include "cluster/exit_codes.h"
 #include "io/simulate/simulate.h"
 
@@ -57,6 +60,7 @@ class SimulateOptions {
 
   std::string scene = "aerial", path = "s", output;
   bool rendered = false, overwrite = false;
+  int threads = 0;
 
  private:
   CLI::App* command_;
@@ -158,10 +162,12 @@ void add_simulate(CLI::App& app, Action& action) {
   add_prior_options(*options);
   command->add_option("-o,--output", options->output, "Folder to write")->required();
   command->add_flag("--overwrite", options->overwrite, "Overwrite a block.yaml that was edited since");
+  command->add_option("--threads", options->threads, "Threads; 0 = cores of the host")->check(not_negative());
   command->callback([=, &action] {
     action = [options] {
       const SimulationOptions simulation = options->settled();
       simulation.check();
+      if (options->threads > 0) omp_set_num_threads(options->threads);
       const EditedProject edited = options->overwrite ? EditedProject::kOverwrite : EditedProject::kRefuse;
       if (options->rendered)
         write_rendered_block(simulation, options->output, edited);

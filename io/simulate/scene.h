@@ -110,6 +110,8 @@ class Observer {
 // Parts of simulate_block. Control goes to layout.block and layout.control_truth.
 void simulate_tracks(const SimulationOptions& options, const Layout& layout, const Observer& observer,
                      const TrackSink& sink, std::int64_t batch_observations);
+// The tracks [first, last) of `from`.
+void append_tracks(SimulatedTracks& to, const SimulatedTracks& from, std::size_t first, std::size_t last);
 void simulate_control(const SimulationOptions& options, const Observer& observer, Layout& layout);
 void simulate_control_zones(const SimulationOptions& options, const Observer& observer, Layout& layout);
 // Priors, given poses and relative poses: of the trajectory (Stereopolis), or with true sigmas (the others).

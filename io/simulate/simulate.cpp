@@ -267,19 +267,8 @@ SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink&
 SimulatedBlock simulate_block(const SimulationOptions& options) {
   SimulatedTracks all;
   all.tracks.begin = {0};
-  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-  SimulatedBlock simulated = simulate_block(options, [&](const SimulatedTracks& batch) {
-    const std::int64_t before = all.tracks.observation_count();
-    for (std::size_t t = 1; t < batch.tracks.begin.size(); ++t)
-      all.tracks.begin.push_back(before + batch.tracks.begin[t]);
-    append(all.tracks.id, batch.tracks.id);
-    append(all.tracks.image, batch.tracks.image);
-    append(all.tracks.x, batch.tracks.x);
-    append(all.tracks.y, batch.tracks.y);
-    append(all.tracks.feature, batch.tracks.feature);
-    append(all.points, batch.points);
-    append(all.outlier, batch.outlier);
-  });
+  SimulatedBlock simulated =
+      simulate_block(options, [&](const SimulatedTracks& batch) { append_tracks(all, batch, 0, batch.points.size()); });
   static_cast<SimulatedTracks&>(simulated) = std::move(all);
   return simulated;
 }

@@ -74,37 +74,59 @@ TEST_P(Lines, FollowThePlumbLineFarFromTheOrigin) {
   EXPECT_LT(squares, 0.03 * 0.03 * along_axis);
 }
 
-// Positions of metres leave a small block tilted; lines do not. Their residuals are those of their noise.
-TEST_P(Lines, LevelTheBlock) {
-  SimulationOptions options = scene(GetParam());
-  options.gps_sigma_m = 3;
-  options.start_position_error_m = 2;
-  SimulatedBlock with = simulate_block(options);
-  SingleTile without(with);
-  add_known_lines(with, 10, 0.1);
-  SingleTile lines(std::move(with));
-  for (SingleTile* tile : {&without, &lines})
-    EXPECT_TRUE(adjust_tile(tile->problem, tile->state, tile->options).usable);
-  const auto tilt = [](const SingleTile& tile) {
-    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-    double sum = 0;
-    for (std::size_t f = 0; f < tile.problem.frames.size(); ++f) {
-      const Eigen::Vector3d ours = tile.state.frames[f].rotation * up,
-                            truth = tile.simulated.truth.frames[tile.problem.frames[f]].rotation * up;
-      sum += (ours - truth).squaredNorm();
-    }
-    return std::sqrt(sum / static_cast<double>(tile.problem.frames.size())) * 180 / std::acos(-1.0);
-  };
-  EXPECT_GT(tilt(without), 0.1);  // degrees
-  EXPECT_LT(tilt(lines), 0.1 * tilt(without));
-  double squares = 0;
-  for (const auto& term : lines.problem.lines) {
-    const double r =
-        linearise_line(lines.state.frames[term.frame.value], lines.state.frames[term.seen_by().value], term).residual;
-    if (!term.other.valid()) squares += r * r;
+// Root mean square of the angles between our vertical and the true one in the frames' systems, degrees.
+double tilt_deg(const SingleTile& tile) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  double sum = 0;
+  for (std::size_t f = 0; f < tile.problem.frames.size(); ++f) {
+    const Eigen::Vector3d ours = tile.state.frames[f].rotation * up,
+                          truth = tile.simulated.truth.frames[tile.problem.frames[f]].rotation * up;
+    sum += (ours - truth).squaredNorm();
   }
-  const auto vertical = std::count_if(lines.problem.lines.begin(), lines.problem.lines.end(),
-                                      [](const auto& term) { return !term.other.valid(); });
+  return std::sqrt(sum / static_cast<double>(tile.problem.frames.size())) * 180 / std::acos(-1.0);
+}
+
+// Positions of metres leave a small block tilted; lines do not.
+TEST_P(Lines, LevelTheBlock) {
+  double squares_without = 0, squares_with = 0;
+  constexpr unsigned kBlocks = 6;
+  for (unsigned seed = 1; seed <= kBlocks; ++seed) {
+    SimulationOptions options = scene(GetParam());
+    options.seed = seed;
+    options.gps_sigma_m = 3;
+    options.start_position_error_m = 2;
+    SimulatedBlock with = simulate_block(options);
+    SingleTile without(with);
+    add_known_lines(with, 5, 0.1);
+    SingleTile lines(std::move(with));
+    for (SingleTile* tile : {&without, &lines})
+      EXPECT_TRUE(adjust_tile(tile->problem, tile->state, tile->options).usable);
+    squares_without += std::pow(tilt_deg(without), 2);
+    squares_with += std::pow(tilt_deg(lines), 2);
+  }
+  EXPECT_GT(std::sqrt(squares_without / kBlocks), 0.1);
+  EXPECT_LT(squares_with, 0.1 * 0.1 * squares_without);
+}
+
+TEST_P(Lines, LeaveResidualsOfTheirNoise) {
+  double squares = 0;
+  std::ptrdiff_t vertical = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SimulationOptions options = scene(GetParam());
+    options.seed = seed;
+    SimulatedBlock simulated = simulate_block(options);
+    add_known_lines(simulated, 10, 0.1);
+    SingleTile tile(std::move(simulated));
+    tile.state = tile.truth();
+    EXPECT_TRUE(adjust_tile(tile.problem, tile.state, tile.options).usable);
+    for (const auto& term : tile.problem.lines) {
+      if (term.other.valid()) continue;
+      const double r =
+          linearise_line(tile.state.frames[term.frame.value], tile.state.frames[term.seen_by().value], term).residual;
+      squares += r * r;
+      ++vertical;
+    }
+  }
   EXPECT_NEAR(std::sqrt(squares / static_cast<double>(vertical)), 1,
               4 / std::sqrt(2.0 * static_cast<double>(vertical)));
 }

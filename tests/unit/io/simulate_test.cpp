@@ -1,6 +1,7 @@
 #include "io/simulate/simulate.h"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -98,6 +99,24 @@ TEST_P(SimulateTest, SeedDecidesEverything) {
   const SimulatedBlock c = simulate_block(options);
   EXPECT_NE(a.tracks.x, c.tracks.x);
   EXPECT_NE(a.truth.frames.front().centre, c.truth.frames.front().centre);
+}
+
+TEST_P(SimulateTest, ThreadsDecideNothing) {
+  SimulationOptions options = GetParam();
+  options.frames = 150;  // groups of 64 frames, the last one smaller
+  options.outlier_share = 0.1;
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const SimulatedBlock alone = simulate_block(options);
+  omp_set_num_threads(3);
+  const SimulatedBlock together = simulate_block(options);
+  omp_set_num_threads(before);
+  EXPECT_EQ(alone.tracks.begin, together.tracks.begin);
+  EXPECT_EQ(alone.tracks.image, together.tracks.image);
+  EXPECT_EQ(alone.tracks.x, together.tracks.x);
+  EXPECT_EQ(alone.tracks.y, together.tracks.y);
+  EXPECT_EQ(alone.outlier, together.outlier);
+  EXPECT_EQ(alone.points, together.points);
 }
 
 // Root mean square of a list of normalised 3-vectors per axis; 1 when the stated sigmas are true.
