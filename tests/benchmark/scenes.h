@@ -5,9 +5,9 @@
 // calibration held; start = these integrated over stretches of 1 km, each off by up to 2 m. aerial: 80 % and 60 %
 // overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated.
 //
-// Of a street with shared calibration seven intrinsics of every camera are free, and of all mounts but the first six
-// unknowns with weak prior values (1 degree, 0.1 m). A free block has no positions and attitudes; the relative poses of
-// a street stay.
+// Of a street with shared calibration all eight intrinsics of every camera are free, and of all mounts but the first
+// six unknowns with weak prior values (1 degree, 0.1 m); of an aerial camera seven. A free block has no positions and
+// attitudes; the relative poses of a street stay.
 #pragma once
 
 #include <unistd.h>
@@ -17,6 +17,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -62,8 +63,10 @@ inline std::string block_of(const std::filesystem::path& folder) {
   return "'" + (folder / "block.yaml").string() + "' ";
 }
 
-inline void free_mounts(const std::filesystem::path& given) {
+// And what the simulator holds of cameras that are estimated, their third radial parameter.
+inline void free_cameras_and_mounts(const std::filesystem::path& given) {
   Block block = read_block(given.string());
+  for (Camera& camera : block.cameras) camera.prior_sigma[kRadial3] = std::numeric_limits<double>::infinity();
   for (Rig& rig : block.rigs)
     for (std::size_t m = 1; m < rig.mounts.size(); ++m) {
       rig.mounts[m].rotation_sigma_rad = std::numbers::pi / 180;
@@ -72,11 +75,17 @@ inline void free_mounts(const std::filesystem::path& given) {
   write_block(given.string(), block);
 }
 
-// What a folder's block was made of.
+inline bool calibration_held(const SceneOptions& options) {
+  return options.calibration.empty() ? options.scene == "street" : options.calibration == "held";
+}
+
+// What a folder's block was made of. Streets with shared calibration once had seven free intrinsics.
 inline nlohmann::json description_of(const SceneOptions& options, const std::string& project_lines) {
-  return {{"scene", options.scene}, {"frames", options.frames},
-          {"seed", options.seed},   {"calibration", options.calibration},
-          {"free", options.free},   {"project_lines", project_lines}};
+  nlohmann::json description{{"scene", options.scene}, {"frames", options.frames},
+                             {"seed", options.seed},   {"calibration", options.calibration},
+                             {"free", options.free},   {"project_lines", project_lines}};
+  if (options.scene == "street" && !calibration_held(options)) description["intrinsics"] = 8;
+  return description;
 }
 
 // Unless the folder holds this very block. `project_lines` are added to its project file.
@@ -98,11 +107,11 @@ inline void simulate_scene(const SceneOptions& options, const std::filesystem::p
     scene += " --gps-sigma 0";
   else
     scene += street ? " --gps-sigma 0.5 --gps-share 0.5" : " --gps-sigma 0.05 --attitude-sigma 0.02";
-  const bool held = options.calibration.empty() ? street : options.calibration == "held";
+  const bool held = calibration_held(options);
   if (held) scene += " --no-calibration";
   run_command(program() + "simulate " + scene + " --frames " + std::to_string(options.frames) + " --seed " +
               std::to_string(options.seed) + " -o '" + folder.string() + "'");
-  if (street && !held) free_mounts(folder / "given.h5");
+  if (street && !held) free_cameras_and_mounts(folder / "given.h5");
   std::ofstream(folder / "block.yaml", std::ios::app) << project_lines;
   std::ofstream(folder / "scene.json") << description << "\n";
 }
