@@ -12,7 +12,8 @@ namespace megablock {
 // bal:             one file                                            (io/export_bal.h)
 // bundler:         one file and its image list, <out>.list.txt         (io/export_bal.h)
 // ply, geojson:    one file                                            (io/export_tables.h)
-// csv:             folder with frames.csv, images_local.csv, images_wgs84.csv, cameras.csv   (io/export_tables.h)
+// csv:             folder with frames.csv, images_local.csv, images_wgs84.csv, cameras.csv, mounts.csv
+//                  (io/export_tables.h)
 // h5:              one self-contained file (write_result)
 const std::vector<std::string>& export_formats();
 

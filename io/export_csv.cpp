@@ -121,6 +121,37 @@ void write_cameras(const BlockResult& result, const std::string& path) {
   writer.close();
 }
 
+bool has_rig(const Block& block) {
+  return std::any_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.mounts.size() > 1; });
+}
+
+// Of the rigs of two cameras and more; sigmas along and about the axes of the rig.
+void write_mounts(const BlockResult& result, const std::string& path) {
+  TextWriter writer(path);
+  writer.print("rig,mount,camera,x_m,y_m,z_m,qw,qx,qy,qz");
+  if (!result.mount_covariance.empty())
+    writer.print(",sigma_x_m,sigma_y_m,sigma_z_m,sigma_rotation_x_deg,sigma_rotation_y_deg,sigma_rotation_z_deg");
+  writer.print("\n");
+  for (RigIndex r(0); result.block.rigs.contains(r); ++r.value) {
+    const Rig& rig = result.block.rigs[r];
+    if (rig.mounts.size() < 2) continue;
+    for (std::size_t m = 0; m < rig.mounts.size(); ++m) {
+      const Pose& pose = result.state.mounts[r][m];
+      const Eigen::Quaterniond& q = pose.rotation;
+      writer.print("{},{},{}", rig.name, m, result.block.cameras[rig.mounts[m].camera].name);
+      for (const double value : {pose.centre.x(), pose.centre.y(), pose.centre.z(), q.w(), q.x(), q.y(), q.z()})
+        writer.print(",{}", value);
+      if (!result.mount_covariance.empty()) {
+        const PoseIncrement sigma = result.mount_covariance[r][m].diagonal().cwiseSqrt();
+        for (const double position : sigma.tail<3>()) writer.print(",{:.6g}", position);
+        for (const double rotation : sigma.head<3>()) writer.print(",{:.6g}", rotation * kDegreesPerRadian);
+      }
+      writer.print("\n");
+    }
+  }
+  writer.close();
+}
+
 }  // namespace
 
 void export_csv(const BlockResult& result, const std::string& folder) {
@@ -130,6 +161,7 @@ void export_csv(const BlockResult& result, const std::string& folder) {
   write_local(view, (root / "images_local.csv").string());
   if (result.block.ground.georeferenced) write_wgs84(view, (root / "images_wgs84.csv").string());
   write_cameras(result, (root / "cameras.csv").string());
+  if (has_rig(result.block)) write_mounts(result, (root / "mounts.csv").string());
 }
 
 }  // namespace megablock

@@ -15,6 +15,8 @@ namespace megablock {
 //   images_wgs84.csv  image,latitude_deg,longitude_deg,height_m, the angles and the sigmas in the image's own vertical
 //                     (east, north, up at its position); only of georeferenced blocks
 //   cameras.csv       name,width,height,f,cx,cy,k1,k2,k3,p1,p2 and sigmas
+//   mounts.csv        rig,mount,camera,x_m,y_m,z_m,qw,qx,qy,qz (rig -> camera) and sigmas along and about the axes of
+//                     the rig; only of blocks with rigs of two cameras and more
 // omega, phi, kappa as in geometry/rotation.h; yaw, pitch, roll as in geometry/body_attitude.h.
 void export_csv(const BlockResult& result, const std::string& folder);
 

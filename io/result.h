@@ -90,6 +90,8 @@ struct BlockResult : TrackResults {
   IndexedVector<FrameIndex, Matrix6> frame_covariance;  // (rotation increment rad, centre m)
   // Of the model's parameters; held ones: zero.
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
+  // [rigs][mounts] of PoseIncrement (rotation increment about the rig's axes rad, centre m); held ones: zero.
+  IndexedVector<RigIndex, std::vector<Matrix6>> mount_covariance;
 
   struct ControlResult {
     Eigen::Vector3d adjusted;  // ground frame; NaN = not seen by two oriented images

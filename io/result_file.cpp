@@ -21,6 +21,8 @@ namespace {
 void check_sizes(const BlockResult& result) {
   require_size(result.state.frames.size(), result.block.frames.size(), "frame poses");
   require_size(result.boundary.size(), result.block.frames.size(), "boundary flags");
+  for (RigIndex rig(0); result.mount_covariance.contains(rig); ++rig.value)
+    require_size(result.mount_covariance[rig].size(), result.block.rigs[rig].mounts.size(), "covariances of mounts");
   if (!result.control.empty())
     require_size(result.control.size(), result.block.control_points.size(), "control point results");
   for (std::size_t p = 0; p < result.control.size(); ++p) {
@@ -35,11 +37,35 @@ void check_sizes(const BlockResult& result) {
 
 std::int64_t rows(const auto& items) { return static_cast<std::int64_t>(items.size()); }
 
+using MountCovariances = IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>>;
+
+// One row per mount, in the order of the group 'mounts'.
+void put_mount_covariances(Hdf5Writer& file, const MountCovariances& rigs) {
+  std::vector<BlockResult::Matrix6> mounts;
+  for (const auto& rig : rigs) mounts.insert(mounts.end(), rig.begin(), rig.end());
+  file.array("mounts/covariance", flattened<double>(mounts), {rows(mounts), 6, 6},
+             {"rad, m", "posterior, of (rotation increment about the rig's axes, centre); held: 0"});
+}
+
+MountCovariances get_mount_covariances(const Hdf5Reader& file, const IndexedVector<RigIndex, Rig>& rigs) {
+  std::int64_t count = 0;
+  for (const Rig& rig : rigs) count += rows(rig.mounts);
+  const auto mounts = square_matrices<BlockResult::Matrix6>(file.array<double>("mounts/covariance", {count, 6, 6}));
+  MountCovariances covariances;
+  auto next = mounts.begin();
+  for (const Rig& rig : rigs) {
+    const auto first = std::exchange(next, next + rows(rig.mounts));
+    covariances.push_back(std::vector<BlockResult::Matrix6>(first, next));
+  }
+  return covariances;
+}
+
 void put_precision(Hdf5Writer& file, const BlockResult& result) {
   if (!result.frame_covariance.empty())
     file.array("frames/covariance", flattened<double>(result.frame_covariance), {rows(result.frame_covariance), 6, 6},
                {"rad, m", "posterior, of (rotation increment about the ground axes, centre)"});
   if (!result.camera_covariance.empty()) put_covariances(file, result.camera_covariance);
+  if (!result.mount_covariance.empty()) put_mount_covariances(file, result.mount_covariance);
 }
 
 void get_precision(const Hdf5Reader& file, BlockResult& result) {
@@ -49,6 +75,7 @@ void get_precision(const Hdf5Reader& file, BlockResult& result) {
   if (file.has("cameras/covariance"))
     result.camera_covariance = IndexedVector<CameraIndex, Eigen::MatrixXd>(
         get_covariances(file, column(result.block.cameras, [](const Camera& c) { return c.intrinsics.model(); })));
+  if (file.has("mounts/covariance")) result.mount_covariance = get_mount_covariances(file, result.block.rigs);
 }
 
 void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::ControlResult>& control) {

@@ -64,6 +64,8 @@ void list_failures(const Job& job, BlockResult& result) {
 void scale_covariances(BlockResult& result, double factor) {
   for (auto& covariance : result.frame_covariance) covariance *= factor;
   for (auto& covariance : result.camera_covariance) covariance *= factor;
+  for (auto& rig : result.mount_covariance)
+    for (auto& covariance : rig) covariance *= factor;
   for (auto& control : result.control) control.covariance *= factor;
   result.sigma_scaled = true;
 }
@@ -79,6 +81,7 @@ BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, 
   result.tiles = tiles;
   result.frame_covariance = std::move(outcome.frame_covariance);
   result.camera_covariance = std::move(outcome.camera_covariance);
+  result.mount_covariance = std::move(outcome.mount_covariance);
   append_control(result, parts);
   find_boundary(result, parts);
   result.chi2 = outcome.chi2;

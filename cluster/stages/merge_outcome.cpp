@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <utility>
 
 #include "cluster/gather_by_tile.h"
@@ -30,36 +31,55 @@ constexpr int kCovarianceTag = 1 << 20;  // beyond those of the merge tree's nod
 
 // A message per tile, after their number and the cameras. Each tile's go as they are written: messages wait here.
 void send_covariances(Job& job, Adjusted& adjusted) {
-  std::vector<TileFrameCovariances> tiles = std::exchange(adjusted.covariances_of_tiles, {});
+  std::vector<PoseCovariances> tiles = std::exchange(adjusted.covariances_of_tiles, {});
   ByteWriter head;
   head.value(tiles.size());
   for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(head, covariance);
   job.ranks.send(0, kCovarianceTag, head.take());
-  for (TileFrameCovariances& tile : tiles) {
+  for (PoseCovariances& tile : tiles) {
     ByteWriter writer;
+    writer.value(tile.tile);
     writer.values(tile.frames);
-    write_matrices(writer, std::exchange(tile.covariances, {}));
+    write_matrices(writer, std::exchange(tile.of_frames, {}));
+    writer.values(tile.mounts);
+    write_matrices(writer, tile.of_mounts);
     job.ranks.send(0, kCovarianceTag, writer.take());
   }
 }
 
-void take_covariances(const TileFrameCovariances& tile, Adjusted& adjusted) {
-  for (std::size_t f = 0; f < tile.frames.size(); ++f)
-    if (!tile.covariances[f].isZero(0)) adjusted.frame_covariance[tile.frames[f]] = tile.covariances[f];
+PoseCovariances read_covariances(const Bytes& bytes) {
+  ByteReader reader(bytes);
+  PoseCovariances tile{reader.value<std::int64_t>(), reader.values<FrameIndex>(), {}, {}, {}};
+  tile.of_frames = read_matrices<BlockResult::Matrix6>(reader);
+  tile.mounts = reader.values<MountId>();
+  tile.of_mounts = read_matrices<BlockResult::Matrix6>(reader);
+  return tile;
 }
 
-void receive_covariances(Job& job, int from, Adjusted& adjusted) {
+using TileOfMount = std::map<MountId, std::int64_t>;  // that its covariance is from
+
+// Of a mount that of the lowest tile, in whatever order the tiles come.
+void take_covariances(const PoseCovariances& tile, TileOfMount& tile_of_mount, Adjusted& adjusted) {
+  for (std::size_t f = 0; f < tile.frames.size(); ++f)
+    if (!tile.of_frames[f].isZero(0)) adjusted.frame_covariance[tile.frames[f]] = tile.of_frames[f];
+  for (std::size_t m = 0; m < tile.mounts.size(); ++m) {
+    if (tile.of_mounts[m].isZero(0)) continue;
+    const MountId& mount = tile.mounts[m];
+    const auto found = tile_of_mount.emplace(mount, tile.tile).first;
+    if (found->second < tile.tile) continue;
+    found->second = tile.tile;
+    adjusted.mount_covariance[mount.rig][static_cast<std::size_t>(mount.mount)] = tile.of_mounts[m];
+  }
+}
+
+void receive_covariances(Job& job, int from, TileOfMount& tile_of_mount, Adjusted& adjusted) {
   const Bytes bytes = job.ranks.receive(from, kCovarianceTag);
   ByteReader reader(bytes);
   const auto tiles = reader.value<std::size_t>();
   for (Eigen::MatrixXd& covariance : adjusted.camera_covariance)
     if (Eigen::MatrixXd camera = read_matrix(reader); !camera.isZero(0)) covariance = std::move(camera);
-  for (std::size_t t = 0; t < tiles; ++t) {
-    const Bytes tile_bytes = job.ranks.receive(from, kCovarianceTag);
-    ByteReader tile_reader(tile_bytes);
-    const auto frames = tile_reader.values<FrameIndex>();
-    take_covariances({frames, read_matrices<BlockResult::Matrix6>(tile_reader)}, adjusted);
-  }
+  for (std::size_t t = 0; t < tiles; ++t)
+    take_covariances(read_covariances(job.ranks.receive(from, kCovarianceTag)), tile_of_mount, adjusted);
 }
 
 }  // namespace
@@ -74,7 +94,8 @@ void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<Motio
     adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
   std::filesystem::create_directories(job.store.path("merge/parts"));
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
-    adjusted.covariances_of_tiles.push_back({tile.problem.frames, covariance.frames});
+    adjusted.covariances_of_tiles.push_back(
+        {tile.tile, tile.problem.frames, covariance.frames, tile.problem.mounts, covariance.mounts});
     for (std::size_t c = 0; c < tile.problem.cameras.size(); ++c)
       if (!covariance.cameras[c].isZero(0)) adjusted.camera_covariance[tile.problem.cameras[c]] = covariance.cameras[c];
     const auto t = static_cast<std::size_t>(tile.tile);
@@ -96,9 +117,12 @@ std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size
 void gather_covariances(Job& job, Adjusted& adjusted) {
   if (job.is_first_rank()) {
     adjusted.frame_covariance.assign(adjusted.state.frames.size(), BlockResult::Matrix6::Zero());
-    for (const TileFrameCovariances& tile : std::exchange(adjusted.covariances_of_tiles, {}))
-      take_covariances(tile, adjusted);
-    for (int r = 1; r < job.ranks.size(); ++r) receive_covariances(job, r, adjusted);
+    for (const std::vector<Pose>& rig : adjusted.state.mounts)
+      adjusted.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
+    TileOfMount tile_of_mount;
+    for (const PoseCovariances& tile : std::exchange(adjusted.covariances_of_tiles, {}))
+      take_covariances(tile, tile_of_mount, adjusted);
+    for (int r = 1; r < job.ranks.size(); ++r) receive_covariances(job, r, tile_of_mount, adjusted);
   } else {
     send_covariances(job, adjusted);
   }
@@ -122,6 +146,7 @@ MergeOutcome make_outcome(Adjusted& adjusted, const Block& block) {
   outcome.state = std::move(adjusted.state);
   outcome.frame_covariance = std::move(adjusted.frame_covariance);
   outcome.camera_covariance = std::move(adjusted.camera_covariance);
+  outcome.mount_covariance = std::move(adjusted.mount_covariance);
   const SubtreeSums& sums = adjusted.posterior.sums;
   outcome.chi2 = sums.weighted_squares;
   outcome.degrees_of_freedom =

@@ -16,6 +16,7 @@ struct MergeOutcome {
   BlockState state;
   IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
+  IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>> mount_covariance;
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
   double variance_factor() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 1; }
@@ -28,20 +29,25 @@ struct MergeOutcome {
   ObservationTable observations;
 };
 
-// Of the frames of a tile; a frame of several tiles has the same bits in all of them, zero where one does not touch it.
-struct TileFrameCovariances {
+// Of the frames and mounts of a tile, zero where it does not touch one. A frame of several tiles has the same bits in
+// all of them; a mount, too, unless parts of the block with a datum of their own share it.
+struct PoseCovariances {
+  std::int64_t tile = -1;
   std::vector<FrameIndex> frames;
-  std::vector<BlockResult::Matrix6> covariances;  // [frames]
+  std::vector<BlockResult::Matrix6> of_frames;
+  std::vector<MountId> mounts;
+  std::vector<BlockResult::Matrix6> of_mounts;
 };
 
 // An adjusted block as a rank knows it.
 struct Adjusted {
   RankRunner::Posterior posterior;
   std::vector<TilePart> parts;                                       // of this rank's tiles
-  std::vector<TileFrameCovariances> covariances_of_tiles;            // of the same, until they are gathered
+  std::vector<PoseCovariances> covariances_of_tiles;                 // of the same, until they are gathered
   IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;  // of the block, when they are: on the first rank
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;     // of this rank's tiles; then of the block
-  double image_sigma_px = 0;                                         // of tie point measurements
+  IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>> mount_covariance;  // as frame_covariance
+  double image_sigma_px = 0;                                                    // of tie point measurements
   MergePosition position;
   BlockState state;
   bool converged = false;

@@ -98,17 +98,39 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
   return table.html();
 }
 
+// Along and about the axes of the rig; nothing of a held mount, kMissing of one that no image tells of.
+void add_mount_sigmas(const Mount& mount, const BlockResult::Matrix6& covariance, std::vector<std::string>& cells) {
+  const PoseIncrement sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const auto cell = [&](double value) {
+    cells.push_back(mount.held() ? "" : value > 0 ? sigma_text(value) : kMissing);
+  };
+  for (const double position : sigma.tail<3>()) cell(position * 1000);
+  for (const double rotation : sigma.head<3>()) cell(rotation * kDegreesPerRadian);
+}
+
 std::string mounts_table(const BlockResult& result, RigIndex index) {
   const Rig& rig = result.block.rigs[index];
   if (rig.mounts.size() < 2 || !result.state.mounts.contains(index)) return "";
-  Table table({"mount of " + escape(rig.name), "x [m]", "y [m]", "z [m]", "turned by [°]", "moved by [mm]"});
+  const bool sigmas = result.mount_covariance.contains(index) &&
+                      std::any_of(rig.mounts.begin(), rig.mounts.end(), [](const Mount& m) { return !m.held(); });
+  std::vector<std::string> headings = {
+      "mount of " + escape(rig.name), "x [m]", "y [m]", "z [m]", "turned by [°]", "moved by [mm]"};
+  if (sigmas)
+    headings.insert(headings.end(),
+                    {"σx [mm]", "σy [mm]", "σz [mm]", "σ about x [°]", "σ about y [°]", "σ about z [°]"});
+  Table table(std::move(headings));
   for (std::size_t m = 0; m < rig.mounts.size() && m < result.state.mounts[index].size(); ++m) {
     const Pose &start = rig.mounts[m].pose, &now = result.state.mounts[index][m];
     const bool held = rig.mounts[m].held();
-    table.add({count(static_cast<std::int64_t>(m)) + " " + escape(result.block.cameras[rig.mounts[m].camera].name),
-               fixed(now.centre.x(), 4), fixed(now.centre.y(), 4), fixed(now.centre.z(), 4),
-               held ? "held" : fixed(start.rotation.angularDistance(now.rotation) * kDegreesPerRadian, 4),
-               held ? "held" : fixed((now.centre - start.centre).norm() * 1000, 1)});
+    std::vector<std::string> cells = {
+        count(static_cast<std::int64_t>(m)) + " " + escape(result.block.cameras[rig.mounts[m].camera].name),
+        fixed(now.centre.x(), 4),
+        fixed(now.centre.y(), 4),
+        fixed(now.centre.z(), 4),
+        held ? "held" : fixed(start.rotation.angularDistance(now.rotation) * kDegreesPerRadian, 4),
+        held ? "held" : fixed((now.centre - start.centre).norm() * 1000, 1)};
+    if (sigmas) add_mount_sigmas(rig.mounts[m], result.mount_covariance[index][m], cells);
+    table.add(std::move(cells));
   }
   return table.html();
 }

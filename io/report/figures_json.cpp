@@ -70,6 +70,29 @@ OrderedJson cameras(const BlockResult& result) {
   return list;
 }
 
+// Of rigs of two cameras and more. Sigmas along and about the axes of the rig.
+OrderedJson mounts(const BlockResult& result) {
+  OrderedJson list = OrderedJson::array();
+  for (RigIndex r(0); result.block.rigs.contains(r) && result.state.mounts.contains(r); ++r.value) {
+    const Rig& rig = result.block.rigs[r];
+    if (rig.mounts.size() < 2) continue;
+    for (std::size_t m = 0; m < rig.mounts.size(); ++m) {
+      const Pose& pose = result.state.mounts[r][m];
+      const Eigen::Quaterniond& q = pose.rotation;
+      PoseIncrement sigma = PoseIncrement::Constant(kUnknown);
+      if (result.mount_covariance.contains(r)) sigma = result.mount_covariance[r][m].diagonal().cwiseMax(0).cwiseSqrt();
+      list.push_back({{"rig", rig.name},
+                      {"mount", m},
+                      {"camera", result.block.cameras[rig.mounts[m].camera].name},
+                      {"position_m", vector(pose.centre)},
+                      {"rotation_wxyz", {number(q.w()), number(q.x()), number(q.y()), number(q.z())}},
+                      {"sigma_position_m", vector(sigma.tail<3>())},
+                      {"sigma_rotation_rad", vector(sigma.head<3>())}});
+    }
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string figures_json(const BlockResult& result, const Figures& f) {
@@ -111,6 +134,7 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
       {"control_points_unused", unused_points(result, PointRole::kControl).size()},
       {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
       {"cameras", cameras(result)},
+      {"mounts", mounts(result)},
       {"failures", failures(result)},
       {"stages", stages(result)},
       {"notes", result.notes}};

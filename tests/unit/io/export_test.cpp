@@ -10,6 +10,7 @@
 #include <random>
 #include <sstream>
 
+#include "geometry/angles.h"
 #include "geometry/body_attitude.h"
 #include "image_files.h"
 #include "io/crs.h"
@@ -389,6 +390,32 @@ TEST(Export, CsvGivesPosesInBothFrames) {
   ASSERT_EQ(cameras.size(), 3u);
   EXPECT_EQ(cameras[2][3], "brown");
   EXPECT_EQ(std::stod(cameras[2][9]), 0.013);
+}
+
+TEST(Export, CsvOfMounts) {
+  const ScratchDirectory folder;
+  BlockResult result = small_result();
+  BlockResult::Matrix6 covariance = BlockResult::Matrix6::Zero();
+  covariance.diagonal() << 1e-6, 4e-6, 9e-6, 1e-4, 4e-4, 9e-4;
+  result.mount_covariance.push_back({BlockResult::Matrix6::Zero(), covariance});
+  export_result(result, "csv", folder.path("tables"));
+  const auto mounts = words_of(folder.path("tables/mounts.csv"), ',');
+  ASSERT_EQ(mounts.size(), 3u);
+  ASSERT_EQ(mounts[0].size(), 16u);
+  EXPECT_EQ(mounts[2][2], "camera 1");
+  std::vector<double> v;
+  for (std::size_t k = 3; k < 16; ++k) v.push_back(std::stod(mounts[2][k]));
+  const Pose& pose = result.state.mounts[RigIndex(0)][1];
+  EXPECT_EQ(Eigen::Vector3d(v[0], v[1], v[2]), pose.centre);
+  EXPECT_EQ(Eigen::Quaterniond(v[3], v[4], v[5], v[6]).coeffs(), pose.rotation.coeffs());
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(v[7 + k], 0.01 * (k + 1), 1e-7);
+    EXPECT_NEAR(v[10 + k], 1e-3 * (k + 1) * kDegreesPerRadian, 1e-6);
+    EXPECT_EQ(std::stod(mounts[1][10 + k]), 0);  // held
+  }
+  result.mount_covariance.clear();
+  export_result(result, "csv", folder.path("tables"));
+  EXPECT_EQ(words_of(folder.path("tables/mounts.csv"), ',')[0].size(), 10u);
 }
 
 TEST(Export, CsvOfALocalBlockHasNoGeodeticTable) {

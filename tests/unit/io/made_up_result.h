@@ -84,6 +84,13 @@ inline BlockResult made_up_result(const SimulationOptions& options, std::int64_t
     covariance(3, 4) = covariance(4, 3) = -0.9e-10;
     result.camera_covariance.push_back(covariance);
   }
+  for (const Rig& rig : result.block.rigs) {
+    std::vector<BlockResult::Matrix6> covariances(rig.mounts.size(), BlockResult::Matrix6::Zero());
+    for (std::size_t m = 0; m < rig.mounts.size(); ++m)
+      if (!rig.mounts[m].held())
+        covariances[m].diagonal() << 1e-8, 4e-8, 9e-8, 1e-6, 4e-6, 9e-6;  // 0.0057 to 0.017 degrees, 1 to 3 mm
+    result.mount_covariance.push_back(std::move(covariances));
+  }
   result.point_covariance.assign(result.points.size(), Eigen::Matrix3d::Identity() * 4e-4);
   std::normal_distribution<double> noise(0, 0.012);
   for (const ControlPoint& point : result.block.control_points) {

@@ -259,6 +259,36 @@ TEST(Report, StreetBlockWithRigs) {
   const std::string page = report_html(made_up_result(options));
   expect_sound(page);
   EXPECT_THAT(page, HasSubstr("Mounts"));
+  EXPECT_THAT(page, Not(HasSubstr("σx")));  // all are held
+}
+
+TEST(Report, SigmasOfFreeMounts) {
+  SimulationOptions options;
+  options.scene = SimulationOptions::Scene::kStereopolis;
+  options.frames = 40;
+  options.rig_cameras = 4;
+  BlockResult result = made_up_result(options);
+  auto& covariances = result.mount_covariance[RigIndex(0)];
+  covariances[3].setZero();  // no image tells of it
+  const auto cells = [](const std::string& page, const std::string& mount) {
+    const std::size_t row = page.find("<td class=t>" + mount, page.find("<h3>Mounts"));
+    return page.substr(row, page.find("</tr>", row) - row);
+  };
+  const std::string page = report_html(result);
+  expect_sound(page);
+  EXPECT_THAT(cells(page, "1 "), HasSubstr("<td>1.00</td><td>2.00</td><td>3.00</td>"
+                                           "<td>0.0057</td><td>0.011</td><td>0.017</td>"));
+  EXPECT_THAT(cells(page, "0 "), HasSubstr("<td>held</td><td>held</td><td></td>"));
+  EXPECT_THAT(cells(page, "3 "), HasSubstr("<td>–</td><td>–</td><td>–</td><td>–</td><td>–</td><td>–</td>"));
+  const auto mount = figures_in(page)["mounts"][1];
+  EXPECT_EQ(mount["camera"], result.block.cameras[result.block.rigs[RigIndex(0)].mounts[1].camera].name);
+  EXPECT_NEAR(mount["sigma_position_m"][2].get<double>(), 3e-3, 1e-12);
+  EXPECT_NEAR(mount["sigma_rotation_rad"][0].get<double>(), 1e-4, 1e-12);
+
+  for (auto& covariance : covariances) covariance.setConstant(std::nan(""));
+  expect_sound(report_html(result));
+  result.mount_covariance.clear();
+  EXPECT_THAT(report_html(result), Not(HasSubstr("σx")));
 }
 
 TEST(Report, NamesAreEscaped) {

@@ -37,6 +37,8 @@ BlockResult example_result() {
   result.tiles.tree.nodes = {{-1, -1, -1, TileIndex(0), 0}};
   for (int f = 0; f < 4; ++f) result.frame_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 1));
   for (int c = 0; c < 2; ++c) result.camera_covariance.push_back(symmetric<Eigen::Matrix<double, 8, 8>>(c + 0.5));
+  result.mount_covariance.push_back({BlockResult::Matrix6::Zero(), symmetric<BlockResult::Matrix6>(0.1)});
+  result.mount_covariance.push_back({BlockResult::Matrix6::Zero()});
   result.tracks = example_tracks();
   result.points = {{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}};
   result.point_covariance = {symmetric<Eigen::Matrix3d>(1), symmetric<Eigen::Matrix3d>(nan),
@@ -85,6 +87,7 @@ TEST(ResultFile, EverythingComesBack) {
     EXPECT_EQ(back.state.cameras[c], result.state.cameras[c]);
     EXPECT_EQ(back.camera_covariance[c], result.camera_covariance[c]);
   }
+  EXPECT_EQ(back.mount_covariance, result.mount_covariance);
   EXPECT_EQ(back.boundary, result.boundary);
   EXPECT_EQ(back.tiles.tile_of_frame, result.tiles.tile_of_frame);
   EXPECT_EQ(back.tracks.id, result.tracks.id);
@@ -151,6 +154,7 @@ TEST(ResultFile, EmptyResultComesBack) {
   const BlockResult back = read_result(scratch.path("block.h5"));
   EXPECT_TRUE(back.points.empty());
   EXPECT_TRUE(back.frame_covariance.empty());
+  EXPECT_TRUE(back.mount_covariance.empty());
   EXPECT_EQ(result_digest(back), result_digest(empty));
 }
 
@@ -159,6 +163,12 @@ TEST(ResultFile, ContradictingLengthsAreRefused) {
   BlockResult result = example_result();
   result.kept.pop_back();
   EXPECT_THROW(write_result(scratch.path("block.h5"), result), ComputeError);
+  result = example_result();
+  result.mount_covariance[RigIndex(0)].pop_back();
+  EXPECT_THROW(write_result(scratch.path("block.h5"), result), ComputeError);
+  result.mount_covariance.clear();
+  EXPECT_NO_THROW(write_result(scratch.path("block.h5"), result));
+  EXPECT_TRUE(read_result(scratch.path("block.h5")).mount_covariance.empty());
 }
 
 void flip_last_bit(double& value) {
