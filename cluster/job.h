@@ -8,6 +8,7 @@
 
 #include "cluster/communicator.h"
 #include "cluster/job_options.h"
+#include "cluster/process_memory.h"
 #include "cluster/stage_record.h"
 #include "io/block.h"
 #include "io/events.h"
@@ -41,6 +42,7 @@ struct Job {
   std::map<FrameIndex, std::string> not_oriented;  // by the initial orientation, and why
   std::vector<std::string> notes;                  // warnings for the report
   std::int64_t parts_done = 0;                     // of the unit in hand (work_queue.h)
+  PeakMemory peak_memory = {};                     // of this rank
 
   bool is_first_rank() const { return ranks.rank() == 0; }
 };

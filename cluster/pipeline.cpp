@@ -183,7 +183,6 @@ void run_stages(Job& job, const std::string& tie_points) {
     tracks = run_tracks(job, matches, tiles);
   } else {
     release_names(job);
-    use_memory_sparingly();
     tiles = run_tiles_of_tracks(job, tie_points);
     if (last == "partition") return;
     tracks = run_given_tracks(job, tie_points, tiles);
@@ -271,6 +270,10 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
     return prepare(run_options, store, std::move(project));
   });
   const JobJson written(store.path("job.json"), text);
+  const auto tie_points = written.at<std::string>("tie_points");
+  // No pictures, so that nothing speaks for keeping what is freed; the block's tables then lie where all of their memory
+  // can be given back (release_tables in stages/merge.cpp), not among what stays.
+  if (!tie_points.empty()) use_memory_sparingly();
   Job job{.options = run_options,
           .ranks = ranks,
           .store = store,
@@ -287,7 +290,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
   for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
     job.failures.push_back({"init", file, reason});
-  stages(job, written.at<std::string>("tie_points"));
+  stages(job, tie_points);
   ranks.barrier();  // the lock is held until everybody is done
   return job.failures.empty() ? kExitDone : kExitFailedUnits;
 }

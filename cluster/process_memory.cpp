@@ -2,8 +2,10 @@
 
 #include <malloc.h>
 #include <sched.h>
+#include <sys/mman.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <string>
@@ -25,13 +27,34 @@ double read_kib(const char* file, const std::string& name) {
 
 double peak_rss_mib() { return read_kib("/proc/self/status", "VmHWM:") / 1024; }
 
-void reset_peak_rss() { std::ofstream("/proc/self/clear_refs") << "5"; }
+void PeakMemory::begin_stage() {
+  before_mib_ = mib();
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+double PeakMemory::mib() const { return std::max(before_mib_, peak_rss_mib()); }
 
 void return_freed_memory() { malloc_trim(0); }
+
+namespace {
+
+// Of the heap as it is: where it has holes, a byte in use would hold a huge page (arithmetic.cpp) in memory.
+void divide_huge_pages_of_heap() {
+  std::ifstream maps("/proc/self/maps");
+  std::string line;
+  while (std::getline(maps, line)) {
+    unsigned long first = 0, last = 0;
+    if (line.ends_with("[heap]") && std::sscanf(line.c_str(), "%lx-%lx", &first, &last) == 2)
+      madvise(reinterpret_cast<void*>(first), last - first, MADV_NOHUGEPAGE);
+  }
+}
+
+}  // namespace
 
 void use_memory_sparingly() {
   constexpr int kLargeBlock = 1 << 20;
   mallopt(M_MMAP_THRESHOLD, kLargeBlock);
+  divide_huge_pages_of_heap();
   return_freed_memory();
 }
 

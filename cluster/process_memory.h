@@ -5,8 +5,16 @@
 
 namespace megablock {
 
-double peak_rss_mib();       // VmHWM since the last reset
-void reset_peak_rss();       // where the kernel allows it
+double peak_rss_mib();  // VmHWM of this process since the last reset
+// Of its whole life, where each stage is also asked for its own.
+class PeakMemory {
+ public:
+  void begin_stage();  // resets VmHWM, where the kernel allows it
+  double mib() const;
+
+ private:
+  double before_mib_ = 0;  // until the stage began
+};
 void return_freed_memory();  // to the system: what malloc keeps of it
 // What was freed goes back to the system, and from now on so does every block above 1 MiB as soon as it is freed. The
 // program's malloc keeps such pages for the next image's features (arithmetic.cpp); from the tiles on, among tracks,

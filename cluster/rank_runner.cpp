@@ -47,7 +47,7 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
 
 RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
                        const MemoryOptions& memory, const NodeSolver& solver)
-    : ranks_(ranks), tiles_(tiles), solver_(solver), factors_(memory) {
+    : ranks_(ranks), tiles_(tiles), solver_(solver), tile_plans_(memory.scratch_directory), factors_(memory) {
   rank_of_node_.assign(tree.nodes.size(), 0);
   own_tile_of_node_.assign(tree.nodes.size(), -1);
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
@@ -76,8 +76,12 @@ void RankRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
   }
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
     const std::int64_t node = plan_.node_of_leaf[static_cast<std::size_t>(tiles_.number(row))];
-    tile_plans_.push_back(make_tile_plan(tiles_.whole(row).problem, plan_.nodes[static_cast<std::size_t>(node)]));
+    tile_plans_.add(tiles_.number(row),
+                    make_tile_plan(tiles_.whole(row).problem, plan_.nodes[static_cast<std::size_t>(node)]),
+                    tiles_.in_scratch(row));
   }
+  for (PlanNode& node : plan_.nodes)
+    if (node.leaf >= 0) node.eliminated = node.owned = {};  // the tiles' own plans have it
 }
 
 double RankRunner::seam_probability() const {
@@ -171,7 +175,7 @@ UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
 }
 
 // The eliminated columns, and the rest once whole and once as a triangle; of the covariances as much. A seam's check
-// works on a copy of the rest.
+// works on a copy of the rest. What a tile eliminates never stands in one front: its cells' fronts are small.
 std::int64_t RankRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
@@ -195,6 +199,7 @@ const NodeFactors& RankRunner::factors_of(std::int64_t node, const Pass& pass) {
 
 UpReport RankRunner::up(const Pass& pass) {
   const Stopwatch watch(seconds_.all);
+  ++seconds_.passes;
   // Of the state at hand, not of the first one: a resumed run gets the same bits.
   gauge_ = gather_gauge();
   last_pass_.reset();
@@ -269,7 +274,9 @@ UpReport RankRunner::condense_all(const Pass& pass) {
       update = condense_leaf(n, pass);
     } else {
       UpdateMatrix left = child_update(node.left), right = child_update(node.right);
-      factors_.leave_room(waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n));
+      const std::int64_t at_work = waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n);
+      peak_front_bytes_ = std::max(peak_front_bytes_, at_work);
+      factors_.leave_room(at_work);
       update = eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
     }
     record(n, update);

@@ -22,6 +22,7 @@
 #include "merge/inner_constraints.h"
 #include "merge/memory.h"
 #include "merge/node.h"
+#include "merge/plan_store.h"
 #include "merge/seam_check.h"
 #include "merge/tile_store.h"
 
@@ -31,6 +32,7 @@ namespace megablock {
 // other ranks included.
 struct PassSeconds {
   double tiles = 0, fronts = 0, all = 0;
+  std::int64_t passes = 0;  // upwards
 };
 
 // Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
@@ -69,11 +71,13 @@ class RankRunner : public TreeRunner {
   using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
   Posterior posterior(const VisitCovariance& visit = {});
 
-  // The unknowns that a tile's kept residuals touch.
+  // The unknowns that a tile's kept residuals touch; until another tile is asked for.
   const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
   const EliminationPlan& plan() const { return plan_; }
   const PassSeconds& seconds() const { return seconds_; }
   const MemoryStatistics& memory() const { return factors_.statistics(); }
+  // The most that a front above the tiles, its children's updates and what waited for others took at a time.
+  std::int64_t peak_front_bytes() const { return peak_front_bytes_; }
 
  private:
   bool mine(std::int64_t node) const;
@@ -115,7 +119,7 @@ class RankRunner : public TreeRunner {
   Communicator& ranks_;
   TileStore& tiles_;
   const NodeSolver& solver_;
-  std::vector<TilePlan> tile_plans_;              // of tiles_
+  PlanStore tile_plans_;                          // of tiles_
   std::vector<TileGauge> gauges_, trial_gauges_;  // of tiles_, at their states and after a step
   std::vector<int> rank_of_node_;
   std::vector<std::int64_t> own_tile_of_node_;  // row of tiles_, -1
@@ -132,6 +136,7 @@ class RankRunner : public TreeRunner {
   std::optional<SubtreeSums> last_pass_;  // of a pass at the present state with what the posterior needs
   std::vector<SeamReport> seams_;
   PassSeconds seconds_;
+  std::int64_t peak_front_bytes_ = 0;
   std::map<std::int64_t, Bytes> downward_;  // what a parent on this rank left for its child
 };
 

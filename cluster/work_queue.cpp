@@ -113,7 +113,7 @@ void part_done(Job& job, std::int64_t parts) {
 StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units, const std::string& parts) {
   begin_stage(job, stage, units);
   return_freed_memory();
-  reset_peak_rss();
+  job.peak_memory.begin_stage();
   job.ranks.reset_counter();
   RankRecord mine;
   std::string fatal;  // concerns the run, not the unit: a full disk, a read-only job

@@ -50,6 +50,7 @@ Json to_json(const UnitEvent& event) {
                {"seconds", event.seconds}, {"claim_seconds", event.claim_seconds},
                {"bytes", event.bytes},     {"peak_rss_mib", event.peak_rss_mib}};
   if (!event.failure.empty()) json["failure"] = event.failure;
+  if (!event.figures.empty()) json["figures"] = event.figures;
   return json;
 }
 
@@ -64,6 +65,7 @@ UnitEvent from_json(const Json& json) {
   event.bytes = json.at("bytes");
   event.peak_rss_mib = json.at("peak_rss_mib");
   event.failure = json.value("failure", std::string());
+  event.figures = json.value("figures", event.figures);
   return event;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct UnitEvent {
   std::int64_t bytes = 0;    // of the unit's file
   double peak_rss_mib = 0;   // of the rank until now
   std::string failure;       // reason; empty when the unit was done
+  // Further figures of the unit by name: what the merge cost (cluster/stages/merge_tiles.h).
+  std::map<std::string, double> figures;
 };
 
 // Appends to this run's file of one rank. Each line goes out in one write, so that a killed run tears at most its last.

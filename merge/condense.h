@@ -40,6 +40,8 @@ struct TilePlan {
   // Position in `unknowns`, -1: held or untouched.
   std::vector<std::int64_t> unknown_of_frame, unknown_of_camera, unknown_of_mount;
   std::vector<ParameterMask> camera_free;  // [cameras] estimated intrinsics
+  void write(ByteWriter& out) const;
+  static TilePlan read(ByteReader& in);
 };
 // Frame row of an active point's first kept observation.
 std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);

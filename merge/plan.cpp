@@ -90,6 +90,26 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
   return plan;
 }
 
+void EliminationPlan::write(ByteWriter& out) const {
+  out.value<std::uint64_t>(nodes.size());
+  for (const PlanNode& node : nodes) {
+    for (const std::int64_t number : {node.left, node.right, node.parent, node.leaf}) out.value(number);
+    for (const UnknownList* list : {&node.eliminated, &node.passed, &node.owned}) out.values(*list);
+  }
+  out.values(node_of_leaf);
+}
+
+EliminationPlan EliminationPlan::read(ByteReader& in) {
+  EliminationPlan plan;
+  plan.nodes.resize(in.value<std::uint64_t>());
+  for (PlanNode& node : plan.nodes) {
+    for (std::int64_t* number : {&node.left, &node.right, &node.parent, &node.leaf}) *number = in.value<std::int64_t>();
+    for (UnknownList* list : {&node.eliminated, &node.passed, &node.owned}) *list = in.values<Unknown>();
+  }
+  plan.node_of_leaf = in.values<std::int64_t>();
+  return plan;
+}
+
 FrontCosts front_costs(const EliminationPlan& plan) {
   FrontCosts costs;
   for (const PlanNode& node : plan.nodes) {

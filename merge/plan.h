@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/image_graph.h"
+#include "merge/bytes.h"
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -24,6 +25,8 @@ struct EliminationPlan {
   std::vector<PlanNode> nodes;             // children before parents; the last node is the root
   std::vector<std::int64_t> node_of_leaf;  // [leaves]
   std::int64_t root() const { return static_cast<std::int64_t>(nodes.size()) - 1; }
+  void write(ByteWriter& out) const;
+  static EliminationPlan read(ByteReader& in);
 };
 
 // What the inner nodes cost; the leaves' share is in their own plans.

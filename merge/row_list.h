@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "merge/bytes.h"
+
 namespace megablock {
 
 class RowList {
@@ -22,6 +24,18 @@ class RowList {
   }
   void shrink_to_fit() { distances_.shrink_to_fit(); }
   std::int64_t size() const { return size_; }
+  void write(ByteWriter& out) const {
+    out.values(distances_);
+    out.value(last_);
+    out.value(size_);
+  }
+  static RowList read(ByteReader& in) {
+    RowList list;
+    list.distances_ = in.values<std::uint8_t>();
+    list.last_ = in.value<std::int32_t>();
+    list.size_ = in.value<std::int32_t>();
+    return list;
+  }
   std::vector<std::int32_t> rows() const {
     std::vector<std::int32_t> rows;
     rows.reserve(static_cast<std::size_t>(size_));

@@ -300,10 +300,38 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
     if (passed[row] || depth[row] >= 0) ++depth[row];
   const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();
   plan.cells = make_plan(cells.tree, lists, plan.boundary);
+  for (PlanNode& cell : plan.cells.nodes) cell.owned = {};  // of tiles alone somebody asks for it
   return plan;
 }
 
 }  // namespace
+
+void TilePlan::write(ByteWriter& out) const {
+  for (const UnknownList* list : {&unknowns, &boundary, &owned}) out.values(*list);
+  cells.write(out);
+  for (const RowList& rows : points) rows.write(out);
+  for (const auto* lists : {&positions, &attitudes, &relatives, &lines, &verticals, &intrinsic_priors, &mount_priors})
+    for (const std::vector<std::int64_t>& rows : *lists) out.values(rows);
+  for (const auto* rows : {&part_of_frame, &unknown_of_frame, &unknown_of_camera, &unknown_of_mount}) out.values(*rows);
+  out.value(part_count);
+  out.values(camera_free);
+}
+
+TilePlan TilePlan::read(ByteReader& in) {
+  TilePlan plan;
+  for (UnknownList* list : {&plan.unknowns, &plan.boundary, &plan.owned}) *list = in.values<Unknown>();
+  plan.cells = EliminationPlan::read(in);
+  const std::size_t cell_count = plan.cells.node_of_leaf.size();
+  for (std::size_t cell = 0; cell < cell_count; ++cell) plan.points.push_back(RowList::read(in));
+  for (auto* lists : {&plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
+                      &plan.intrinsic_priors, &plan.mount_priors})
+    for (std::size_t cell = 0; cell < cell_count; ++cell) lists->push_back(in.values<std::int64_t>());
+  for (auto* rows : {&plan.part_of_frame, &plan.unknown_of_frame, &plan.unknown_of_camera, &plan.unknown_of_mount})
+    *rows = in.values<std::int64_t>();
+  plan.part_count = in.value<std::int64_t>();
+  plan.camera_free = in.values<ParameterMask>();
+  return plan;
+}
 
 TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames) {
   return plan_of(problem, node, tile_unknowns(problem), problem.camera_free, cell_max_frames);

@@ -10,9 +10,13 @@ namespace megablock {
 
 namespace {
 
-// The tables of a tile that grow with its measurements, but for the points' positions.
+// The tables of a tile that wait in scratch, but for the points' positions.
 template <typename Visit, typename... Problems>
 void visit_tables(Visit&& visit, Problems&... problems) {
+  visit(problems.images...);
+  visit(problems.positions...);
+  visit(problems.attitudes...);
+  visit(problems.relatives...);
   visit(problems.points...);
   visit(problems.begin...);
   visit(problems.image...);

@@ -5,7 +5,8 @@
 // upwards, now downwards, and with a fixed choice each of them reads the others exactly once. A scratch disk that is
 // full keeps a tile in memory: it costs memory, never the tile. The choice never changes bits.
 //
-// Frames, cameras, mounts, images, priors and their values ("outline") are small and always there.
+// Frames, cameras, mounts and their values ("outline") are small and always there, and so are lines, verticals and the
+// priors of points, cameras and mounts; images, measurements and the other observations of a tile in scratch are not.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +38,9 @@ class TileStore {
   std::size_t size() const { return slots_.size(); }
   std::int64_t number(std::size_t row) const { return slots_[row].tile.tile; }
 
-  // Without points and measurements, if these are in scratch: their tables may be empty.
+  bool in_scratch(std::size_t row) const { return slots_[row].in_scratch; }
+
+  // Without what is in scratch: its tables may be empty.
   const RankTile& outline(std::size_t row) const { return slots_[row].tile; }
   // Whole. The reference holds until another row is asked for.
   const RankTile& whole(std::size_t row);

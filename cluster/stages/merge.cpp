@@ -134,7 +134,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
   const MergePosition start =
-      found ? *found : MergePosition{0, start_global(options_of(job.settings.merge, frames, false)), {}};
+      found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false)), {}};
   PassRecorder recorder(memory_of_tiles(job).scratch_directory, job.options.record_s);
   const std::optional<MergePosition> within = checkpoint.find_pass(start, recorder);
   clear_scratch(job, recorder.found().has_value());
@@ -153,8 +153,10 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
     const GlobalOptions options = options_of(job.settings.merge, frames, last);
     RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(job, tiles));
     runner.record_passes(recorder);
+    return_freed_memory();  // what the plans were made from
     if (last) runner.expect_posterior();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
+      return_freed_memory();
       say_iteration(job, state);
       if (state.accepted != saved) {
         saved = state.accepted;
@@ -170,13 +172,15 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
     follow(block, tiles);
     if (last) {
       find_posterior(job, inputs, references, runner, adjusted);
-      say_memory(job, tiles, runner);
+      adjusted.costs = gather_costs(job, tiles, runner);
+      say(job, adjusted.costs);
       break;
     }
     bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
     if (job.settings.merge.estimate_sigmas) changed = adopt_sigma_scales(runner, tiles, position.scales) || changed;
     changed = screen(job, tiles) > 0 || changed;
     position.round = changed ? position.round + 1 : most_rounds(job.settings.merge);
+    position.tried_steps += position.global.iterations;
     const std::int32_t accepted = position.global.accepted;
     position.global = start_global(options);
     position.global.accepted = accepted;
@@ -184,6 +188,13 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   }
   adjusted.image_sigma_px = common_image_sigma(job, tiles);
   return adjusted;
+}
+
+// Of what the ranks say.
+double largest(Job& job, double figure) {
+  for (const std::string& text : job.ranks.gather_all(std::to_string(figure)))
+    figure = std::max(figure, std::stod(text));
+  return figure;
 }
 
 std::string not_converged(const Adjusted& adjusted) {
@@ -212,15 +223,17 @@ std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
 }
 
 void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
-                 MergeOutcome outcome, const std::vector<TilePart>& parts, const UnitEvent& event) {
+                 MergeOutcome outcome, const std::vector<TilePart>& parts, UnitEvent& event) {
   if (!adjusted.converged) {
     job.notes.push_back(not_converged(adjusted));
     std::fprintf(stderr, "merge        warning: %s\n", job.notes.back().c_str());  // --quiet or not
   }
+  const std::size_t notes_before = job.notes.size();
   for (const SeamCheck& seam : outcome.seams)
     if (!seam.note.empty()) job.notes.push_back(seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
     job.notes.push_back(line);
+  event.figures["seam_alarms"] = static_cast<double>(job.notes.size() - notes_before);
   for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
     job.notes.push_back(line);
     if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());
@@ -251,7 +264,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
                const std::vector<std::string>& adjusted_units) {
   const double start = monotonic_seconds();
   return_freed_memory();
-  reset_peak_rss();
+  job.peak_memory.begin_stage();
   MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units, verticals_of_tiles(job.block, tiles)};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
   const std::string before = unconverged_before(job);
@@ -273,13 +286,18 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   UnitEvent event;
   event.stage = "merge";
   event.unit = kResult;
-  for (const std::string& text : job.ranks.gather_all(std::to_string(peak_rss_mib())))
-    event.peak_rss_mib = std::max(event.peak_rss_mib, std::stod(text));
+  event.peak_rss_mib = largest(job, peak_rss_mib());
+  event.figures = adjusted.costs.figures();
+  event.figures["tried_steps"] = adjusted.position.tried_steps + adjusted.position.global.iterations;
+  double process_peak_mib = largest(job, job.peak_memory.mib());
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
     restore_tables(job);
-    write_final(job, inputs, fingerprint, adjusted, make_outcome(adjusted, job.block), parts, event);
-    event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());  // what was written could not say it of itself
+    write_final(job, inputs, fingerprint, adjusted, make_outcome(adjusted, job.block, inputs.tiles.tree), parts, event);
+    // What was written could not say it of itself.
+    event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());
+    process_peak_mib = std::max(process_peak_mib, job.peak_memory.mib());
+    event.figures["process_peak_rss_mib"] = process_peak_mib;
     event.seconds = monotonic_seconds() - start;
     event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);
     job.events.append(event);

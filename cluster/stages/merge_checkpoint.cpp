@@ -39,10 +39,10 @@ TileAdjustment snapshot(const RankTile& tile) {
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
 // The layout that docs/job-format.md gives.
-static_assert(sizeof(MergePosition) == 224 && offsetof(MergePosition, global) == 8 &&
-              offsetof(MergePosition, scales) == 112 && offsetof(GlobalState, lambda) == 8 &&
-              offsetof(GlobalState, decrement_squared) == 48 && offsetof(GlobalState, accepted) == 84 &&
-              offsetof(GlobalState, curvature) == 88);
+static_assert(sizeof(MergePosition) == 224 && offsetof(MergePosition, tried_steps) == 4 &&
+              offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
+              offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
+              offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88);
 
 void write_marker(const std::string& path, const MergePosition& position) {
   std::ofstream out(path, std::ios::binary);

@@ -15,7 +15,8 @@
 namespace megablock {
 
 struct MergePosition {
-  std::int32_t round = 0;  // of screening
+  std::int32_t round = 0;        // of screening
+  std::int32_t tried_steps = 0;  // in the rounds before
   GlobalState global;
   SigmaScales scales;  // of the stated sigmas
 };

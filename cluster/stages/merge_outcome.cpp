@@ -15,8 +15,8 @@ namespace megablock {
 
 namespace {
 
-std::vector<SeamCheck> seam_checks(const RankRunner::Posterior& posterior) {
-  const std::vector<std::string> alarms = describe_seams(posterior.seams, posterior.tile_checks);
+std::vector<SeamCheck> seam_checks(const MergeTree& tree, const RankRunner::Posterior& posterior) {
+  const std::vector<std::string> alarms = describe_seams(tree, posterior.seams, posterior.tile_checks);
   std::vector<SeamCheck> checks;
   std::size_t alarm = 0;
   for (const SeamReport& seam : posterior.seams) {
@@ -141,7 +141,7 @@ std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, c
   return lines;
 }
 
-MergeOutcome make_outcome(Adjusted& adjusted, const Block& block) {
+MergeOutcome make_outcome(Adjusted& adjusted, const Block& block, const MergeTree& tree) {
   MergeOutcome outcome;
   outcome.state = std::move(adjusted.state);
   outcome.frame_covariance = std::move(adjusted.frame_covariance);
@@ -157,11 +157,11 @@ MergeOutcome make_outcome(Adjusted& adjusted, const Block& block) {
   const BlockGauge& gauge = adjusted.posterior.gauge;
   outcome.gauge = judge_gauge(sums, gauge, names_of(block)).text;
   for (const BlockComponent& part : gauge.components)
-    if (part.defect > 0) {
-      outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.defect)});
+    if (!part.columns.empty()) {
+      outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.columns.size())});
       outcome.degrees_of_freedom += part.defect;  // what only the datum fixes takes nothing of the observations
     }
-  outcome.seams = seam_checks(adjusted.posterior);
+  outcome.seams = seam_checks(tree, adjusted.posterior);
   outcome.observations = adjusted.posterior.observations;
   for (std::size_t k = 0; k < kObservationKinds; ++k)
     outcome.observations.kinds[k].scale = adjusted.position.scales.of[k];

@@ -49,6 +49,7 @@ struct Adjusted {
   IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>> mount_covariance;  // as frame_covariance
   double image_sigma_px = 0;                                                    // of tie point measurements
   MergePosition position;
+  MergeCosts costs;  // of the last round
   BlockState state;
   bool converged = false;
 };
@@ -69,6 +70,6 @@ void gather_covariances(Job& job, Adjusted& adjusted);
 std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts);
 
 // After gather_covariances(); takes the state and the covariances over.
-MergeOutcome make_outcome(Adjusted& adjusted, const Block& block);
+MergeOutcome make_outcome(Adjusted& adjusted, const Block& block, const MergeTree& tree);
 
 }  // namespace megablock

@@ -133,43 +133,66 @@ MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles) {
   return memory;
 }
 
-void say_memory(Job& job, const TileStore& tiles, const RankRunner& runner) {
+std::map<std::string, double> MergeCosts::figures() const {
+  const auto mib = [](std::int64_t bytes) { return static_cast<double>(bytes) / (1 << 20); };
+  return {{"tile_seconds", tile_seconds},
+          {"front_seconds", front_seconds},
+          {"pass_seconds", seconds},
+          {"passes", static_cast<double>(passes)},
+          {"tiles_in_scratch", static_cast<double>(tiles_in_scratch)},
+          {"factors_in_scratch", static_cast<double>(factors.spilled)},
+          {"subtrees_computed_again", static_cast<double>(factors.recomputed)},
+          {"peak_factor_mib", mib(factors.peak_bytes)},
+          {"peak_front_mib", mib(peak_front_bytes)},
+          {"root_unknowns", static_cast<double>(fronts.root)},
+          {"widest_front", static_cast<double>(fronts.widest)},
+          {"front_operations", fronts.operations}};
+}
+
+MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runner) {
   ByteWriter writer;
   writer.value(runner.memory());
   writer.value(runner.seconds());
+  writer.value(runner.peak_front_bytes());
   writer.value(static_cast<std::int64_t>(tiles.size()));
   writer.value(tiles.spilled());
-  MemoryStatistics all;
-  PassSeconds seconds;
-  std::int64_t tile_count = 0, spilled_tiles = 0;
+  MergeCosts all;
   for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
-    const auto some = reader.value<MemoryStatistics>();
-    const auto time = reader.value<PassSeconds>();
-    tile_count += reader.value<std::int64_t>();
-    spilled_tiles += reader.value<std::int64_t>();
-    all.put += some.put;
-    all.spilled += some.spilled;
-    all.recomputed += some.recomputed;
-    all.peak_bytes = std::max(all.peak_bytes, some.peak_bytes);
-    seconds.tiles += time.tiles / job.ranks.size();
-    seconds.fronts += time.fronts / job.ranks.size();
-    seconds.all = std::max(seconds.all, time.all);
+    const auto factors = reader.value<MemoryStatistics>();
+    const auto seconds = reader.value<PassSeconds>();
+    all.peak_front_bytes = std::max(all.peak_front_bytes, reader.value<std::int64_t>());
+    all.tiles += reader.value<std::int64_t>();
+    all.tiles_in_scratch += reader.value<std::int64_t>();
+    all.factors.put += factors.put;
+    all.factors.spilled += factors.spilled;
+    all.factors.recomputed += factors.recomputed;
+    all.factors.peak_bytes = std::max(all.factors.peak_bytes, factors.peak_bytes);
+    all.tile_seconds += seconds.tiles;
+    all.front_seconds += seconds.fronts;
+    all.seconds = std::max(all.seconds, seconds.all);
+    all.passes = std::max(all.passes, seconds.passes);
   }
+  all.fronts = front_costs(runner.plan());
+  return all;
+}
+
+void say(const Job& job, const MergeCosts& costs) {
   if (!job.is_first_rank() || job.options.quiet) return;
-  const FrontCosts fronts = front_costs(runner.plan());
   std::fprintf(stderr, "merge        fronts above the tiles: widest %lld unknowns, at the root %lld, %.3g operations\n",
-               static_cast<long long>(fronts.widest), static_cast<long long>(fronts.root), fronts.operations);
+               static_cast<long long>(costs.fronts.widest), static_cast<long long>(costs.fronts.root),
+               costs.fronts.operations);
   std::fprintf(
       stderr,
       "merge        last round: %.1f s, of them %.1f s on tiles and %.1f s on fronts above them (mean of the ranks)\n",
-      seconds.all, seconds.tiles, seconds.fronts);
+      costs.seconds, costs.tile_seconds / job.ranks.size(), costs.front_seconds / job.ranks.size());
   std::fprintf(stderr,
                "merge        %lld of %lld tiles in scratch; factors: %lld made, %lld spilled to scratch, %lld subtrees "
                "computed again, at most %.1f MiB on a rank\n",
-               static_cast<long long>(spilled_tiles), static_cast<long long>(tile_count),
-               static_cast<long long>(all.put), static_cast<long long>(all.spilled),
-               static_cast<long long>(all.recomputed), static_cast<double>(all.peak_bytes) / (1 << 20));
+               static_cast<long long>(costs.tiles_in_scratch), static_cast<long long>(costs.tiles),
+               static_cast<long long>(costs.factors.put), static_cast<long long>(costs.factors.spilled),
+               static_cast<long long>(costs.factors.recomputed),
+               static_cast<double>(costs.factors.peak_bytes) / (1 << 20));
 }
 
 }  // namespace megablock

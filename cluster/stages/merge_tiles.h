@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -45,8 +46,21 @@ std::string scratch_folder_of_rank(const Job& job);
 // The memory of a rank: half of it for tiles; factors get what these leave of it.
 MemoryOptions memory_of_tiles(const Job& job);
 MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles);
-// Says how large the fronts were, where the time of the last round went, and what `--memory` led to, over all ranks.
+
+// What a runner's passes cost, over all ranks: a round of the merge.
+struct MergeCosts {
+  double tile_seconds = 0, front_seconds = 0;  // work on tiles, on fronts above them: sums over the ranks
+  double seconds = 0;                          // of all passes, of the slowest rank
+  std::int64_t passes = 0;                     // upwards
+  std::int64_t tiles = 0, tiles_in_scratch = 0;
+  MemoryStatistics factors;           // peak_bytes: of the rank with most
+  std::int64_t peak_front_bytes = 0;  // of the rank with most: a front at work, and what waits for others
+  FrontCosts fronts;
+  std::map<std::string, double> figures() const;  // by name, for the event of the merge
+};
 // Collective.
-void say_memory(Job& job, const TileStore& tiles, const RankRunner& runner);
+MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runner);
+// How large the fronts were, where the time went, and what `--memory` led to.
+void say(const Job& job, const MergeCosts& costs);
 
 }  // namespace megablock

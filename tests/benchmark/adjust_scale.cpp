@@ -4,9 +4,12 @@
 //                [--seed 1] [--calibration held|shared] [--plain]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
-// its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of the
-// stages, writing of result and report included, starting and the summary that is printed at the end not;
-// stage_peak_rss_mib: that of each, of the merge without its result. What --folder holds is not simulated again.
+// its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of a rank,
+// but for the summary that is printed at the end; stage_peak_rss_mib: that of each stage, of the merge without its
+// result. Of the last round of the merge: leaf_seconds_per_image, work on tiles (leaves) of one pass up and down, of
+// both ranks; front_seconds_per_iteration, work on the fronts above them, in the mean of the ranks; peak_front_mib,
+// what fronts and updates at work took of a rank at most; steps_tried: accepted ones, refused ones and those that
+// confirm. seam_alarms: lines of the result that say that tiles disagree. What --folder holds is not simulated again.
 // image_sigma_px: that of the tie points, which the job estimates, so that chi2_per_dof
 // says nothing of it but with --plain.
 #include <CLI/CLI.hpp>
@@ -14,6 +17,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -68,11 +72,13 @@ double seconds_to_last_step(const fs::path& job, double start_s) {
   return last - start_s;
 }
 
-// Of all stages; the events know it of the writing of the result, too.
-double peak_rss_mib(const fs::path& job) {
-  double peak = 0;
-  for (const UnitEvent& event : read_events(JobStore(job.string()))) peak = std::max(peak, event.peak_rss_mib);
-  return peak;
+// What the event that ends the merge says of its cost.
+std::map<std::string, double> costs_of_merge(const fs::path& job) {
+  std::map<std::string, double> figures;
+  for (const UnitEvent& event : read_events(JobStore(job.string())))
+    if (!event.figures.empty()) figures = event.figures;
+  if (figures.empty()) throw ComputeError("the job has left no event of its result");
+  return figures;
 }
 
 nlohmann::json by_stage(const BlockResult& result, double StageStatistics::*figure) {
@@ -114,6 +120,9 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
   const Evaluation evaluation = evaluate(result, (folder / "truth.csv").string());
   const ReprojectionStatistics statistics = reprojection_statistics(result, tracks);
   const double per_iteration = seconds_per_iteration(job);
+  const std::map<std::string, double> costs = costs_of_merge(job);
+  const double leaf_seconds = costs.at("tile_seconds") / costs.at("passes"),
+               front_seconds = costs.at("front_seconds") / costs.at("passes");
   return {{"scene", options.scene.scene},
           {"frames", options.scene.frames},
           {"images", result.block.images.size()},
@@ -131,7 +140,16 @@ nlohmann::json measure(const ScaleOptions& options, const fs::path& folder) {
           {"chi2_per_dof", result.variance_factor},
           {"image_sigma_px", result.image_sigma_px},
           {"plain", options.plain},
-          {"peak_rss_mib_per_rank", peak_rss_mib(job)},
+          {"steps_tried", costs.at("tried_steps")},
+          {"leaf_seconds_per_image", leaf_seconds / static_cast<double>(result.block.images.size())},
+          {"front_seconds_per_iteration", front_seconds / options.ranks},
+          {"root_unknowns", costs.at("root_unknowns")},
+          {"widest_front", costs.at("widest_front")},
+          {"front_operations", costs.at("front_operations")},
+          {"peak_front_mib", costs.at("peak_front_mib")},
+          {"tiles_in_scratch", costs.at("tiles_in_scratch")},
+          {"seam_alarms", costs.at("seam_alarms")},
+          {"peak_rss_mib_per_rank", costs.at("process_peak_rss_mib")},
           {"stage_peak_rss_mib", by_stage(result, &StageStatistics::peak_rss_mib)},
           {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), std::uint8_t{1})},
           {"tiles", result.tiles.tile_count},

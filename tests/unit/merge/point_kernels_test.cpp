@@ -19,7 +19,7 @@ using namespace point_kernels;
 constexpr std::int64_t kCount = 16, kStride = 24;
 constexpr double kLambda = 0.01, kFloor = 1e-12;
 // Of four observations as if they were one point's: two of them in one frame.
-constexpr std::array<std::int64_t, 4> kFrames{1, 0, 2, 1};
+constexpr std::array<std::int64_t, 4> kFramesOfPairs{1, 0, 2, 1};
 
 const Kernels* kernels_of_width(int width) {
   if (lane_kernels_of_width(width) == nullptr) return nullptr;  // not on this processor
@@ -81,7 +81,7 @@ struct Worked {
     }
     kernels.reduce(linearised.data(), kStride, kCount, columns, step_of_lane.data(), y.data(), sums.data());
     kernels.move(linearised.data(), kStride, kCount, columns, of_lane.data(), moved.data(), kStride);
-    kernels.subtract_pairs(4, y.data(), kFrames.data(), {pairs.data(), used.data()});
+    kernels.subtract_pairs(4, y.data(), kFramesOfPairs.data(), {pairs.data(), used.data()});
   }
 
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const {
@@ -177,7 +177,8 @@ TEST_P(PointKernels, EqualPlainMatrices) {
   Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(18, 18);
   for (std::size_t a = 0; a < 4; ++a)
     for (std::size_t b = 0; b < 4; ++b)
-      if (a != b) expected.block<6, 6>(6 * kFrames[a], 6 * kFrames[b]) -= factors[a] * factors[b].transpose();
+      if (a != b)
+        expected.block<6, 6>(6 * kFramesOfPairs[a], 6 * kFramesOfPairs[b]) -= factors[a] * factors[b].transpose();
   for (std::int64_t column = 0; column < 18; ++column)
     for (std::int64_t row = column; row < 18; ++row)
       EXPECT_NEAR(Worked::element(w.pairs, row, column) - Worked::element(Worked::first_pairs(), row, column),

@@ -19,6 +19,9 @@ RankTile made_up_tile(std::int64_t number, std::int64_t points) {
   tile.problem.frames = {FrameIndex(number)};
   tile.state.frames.resize(1);
   tile.state.frames[0].centre = Eigen::Vector3d(static_cast<double>(number), 0, 0);
+  for (std::int64_t i = 0; i < 3; ++i)
+    tile.problem.images.push_back({ImageIndex(3 * number + i), LocalFrame(0), LocalCamera(0), 0});
+  tile.problem.positions.push_back({LocalFrame(0), {.position = tile.state.frames[0].centre}});
   tile.problem.begin.push_back(0);
   for (std::int64_t p = 0; p < points; ++p) {
     const auto value = static_cast<double>(1000 * number + p);
@@ -40,6 +43,11 @@ void expect_equal(const RankTile& found, const RankTile& expected) {
   EXPECT_EQ(found.tile, expected.tile);
   EXPECT_EQ(found.problem.frames, expected.problem.frames);
   EXPECT_EQ(found.state.frames[0].centre, expected.state.frames[0].centre);
+  ASSERT_EQ(found.problem.images.size(), expected.problem.images.size());
+  for (std::size_t i = 0; i < expected.problem.images.size(); ++i)
+    EXPECT_EQ(found.problem.images[i].image, expected.problem.images[i].image);
+  ASSERT_EQ(found.problem.positions.size(), 1u);
+  EXPECT_EQ(found.problem.positions[0].prior.position, expected.problem.positions[0].prior.position);
   ASSERT_EQ(found.problem.points.size(), expected.problem.points.size());
   for (std::size_t p = 0; p < expected.problem.points.size(); ++p)
     EXPECT_EQ(found.problem.points[p].index, expected.problem.points[p].index);
@@ -60,7 +68,7 @@ class TileStoreTest : public testing::Test {
   MemoryOptions options() const {
     MemoryOptions options;
     options.scratch_directory = scratch_.path("rank-0");
-    options.tile_bytes = 2 * 40 * (2 * 24 + 16 + 8 + 3 * 29) + 100;
+    options.tile_bytes = 2 * 40 * (2 * 24 + 16 + 8 + 3 * 29) + 600;
     return options;
   }
   static void fill(TileStore& store) {

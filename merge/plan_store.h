@@ -1,0 +1,41 @@
+// The plans of one rank's tiles: in memory, or in the rank's scratch directory beside the measurements of a tile that
+// is there (tile_store.h), read when they are asked for. A scratch disk that is full keeps them in memory; the choice
+// never changes bits.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "merge/condense.h"
+
+namespace megablock {
+
+class PlanStore {
+ public:
+  explicit PlanStore(std::string scratch_directory) : directory_(std::move(scratch_directory)) {}
+  ~PlanStore();  // removes its scratch files
+  PlanStore(const PlanStore&) = delete;
+  PlanStore& operator=(const PlanStore&) = delete;
+
+  // In the order of the tiles, `row` below counts them; `tile` is its number in the block.
+  void add(std::int64_t tile, TilePlan plan, bool to_scratch);
+  // The reference holds until another row is asked for.
+  const TilePlan& operator[](std::size_t row) const;
+
+ private:
+  struct Slot {
+    std::int64_t tile = -1;
+    bool in_scratch = false;
+    TilePlan plan;  // of a tile in memory
+  };
+  std::string path(const Slot& slot) const;
+
+  std::string directory_;
+  std::vector<Slot> slots_;
+  // What was read last.
+  mutable TilePlan loaded_;
+  mutable std::int64_t loaded_row_ = -1;
+};
+
+}  // namespace megablock

@@ -1,0 +1,66 @@
+// Plans out of core: what comes back is what was put.
+#include "merge/plan_store.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/unit/io/scratch_directory.h"
+#include "tests/unit/merge/tiled_block.h"
+
+namespace megablock {
+namespace {
+
+Bytes bytes_of(const TilePlan& plan) {
+  ByteWriter writer;
+  plan.write(writer);
+  return writer.take();
+}
+
+class PlanStoreTest : public testing::Test {
+ protected:
+  PlanStoreTest() {
+    SimulationOptions options;
+    options.frames = 90;
+    options.points_per_frame = 60;
+    const TiledBlock block(simulate_block(options), 30, ObservationOptions(), 0);
+    std::vector<UnknownList> unknowns;
+    for (const TileProblem& problem : block.problems) unknowns.push_back(tile_unknowns(problem));
+    const EliminationPlan tree = make_plan(block.tiles.tree, unknowns);
+    for (std::size_t t = 0; t < block.problems.size(); ++t)
+      plans.push_back(make_tile_plan(block.problems[t], tree.nodes[at(tree.node_of_leaf[t])], 8));
+  }
+
+  ScratchDirectory scratch;
+  std::vector<TilePlan> plans;
+};
+
+TEST_F(PlanStoreTest, EveryPlanComesBack) {
+  for (const bool to_scratch : {false, true}) {
+    PlanStore store(scratch.path());
+    for (std::size_t t = 0; t < plans.size(); ++t) store.add(static_cast<std::int64_t>(t), plans[t], to_scratch);
+    EXPECT_EQ(std::filesystem::is_empty(scratch.path()), !to_scratch);
+    ASSERT_GE(plans.size(), 3u);
+    for (const std::size_t t : {0u, 2u, 2u, 1u, 0u}) {
+      EXPECT_EQ(bytes_of(store[t]), bytes_of(plans[t])) << t;
+      EXPECT_EQ(store[t].points.size(), plans[t].cells.node_of_leaf.size());
+      for (std::size_t cell = 0; cell < plans[t].points.size(); ++cell) {
+        EXPECT_EQ(store[t].points[cell].rows(), plans[t].points[cell].rows());
+        EXPECT_EQ(store[t].positions[cell], plans[t].positions[cell]);
+      }
+      EXPECT_EQ(store[t].unknowns, plans[t].unknowns);
+      EXPECT_EQ(store[t].part_of_frame, plans[t].part_of_frame);
+      EXPECT_EQ(store[t].cells.nodes.back().eliminated, plans[t].cells.nodes.back().eliminated);
+    }
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
+}
+
+TEST_F(PlanStoreTest, KeepsWhatTheDiskDoesNotTake) {
+  PlanStore store(scratch.path() + "/not_there");
+  store.add(0, plans[0], true);
+  EXPECT_EQ(bytes_of(store[0]), bytes_of(plans[0]));
+}
+
+}  // namespace
+}  // namespace megablock
