@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <map>
 #include <numeric>
+#include <ranges>
 #include <set>
 
 #include "geometry/chi_square.h"
@@ -29,6 +30,9 @@ constexpr double kRankTolerance = 1e-10;  // pivot, of a matrix scaled to a unit
 constexpr double kShared = 1e-6;
 // Information about a frame's turn, of the most there is of any in the tile: below, its turn is not asked for.
 constexpr double kVisibleTurn = 0.25;
+// Variance factor of residuals without noise, of which a ratio means nothing.
+constexpr double kNoNoise = 0.01;
+constexpr std::size_t kLines = 3;  // of one kind; the rest is counted
 
 struct Quadratic {
   Eigen::MatrixXd s;  // full symmetric
@@ -143,6 +147,8 @@ class CovarianceRoot {
   SemidefiniteFactor factor_;
 };
 
+double normal_exceeds(double deviate) { return 0.5 * std::erfc(deviate / std::sqrt(2.0)); }
+
 // Quantiles of one alarm probability.
 class Limits {
  public:
@@ -239,6 +245,20 @@ std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::Mat
   return checks;
 }
 
+std::vector<std::string> describe_noise(const std::vector<TileCheck>& tiles) {
+  const std::vector<NoisyTile> noisy = noisy_tiles(tiles);
+  std::vector<std::string> lines;
+  for (const NoisyTile& tile : noisy | std::views::take(kLines)) {
+    char line[120];
+    std::snprintf(line, sizeof line, "tile %lld disagrees with itself: residuals %.1f times those of the other tiles",
+                  static_cast<long long>(tile.tile), std::sqrt(tile.ratio));
+    lines.emplace_back(line);
+  }
+  if (noisy.size() > kLines)
+    lines.push_back(std::to_string(noisy.size() - kLines) + " more tiles that disagree with themselves");
+  return lines;
+}
+
 // The worst by excess that have no unknown in common.
 std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
   std::stable_sort(checks.begin(), checks.end(),
@@ -326,6 +346,39 @@ bool UnknownCheck::shares_unknown(const UnknownCheck& check) const {
   return among(id) || among(other);
 }
 
+std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
+  std::vector<const TileCheck*> left;
+  double squares = 0, degrees = 0;  // of those
+  for (const TileCheck& tile : tiles) {
+    if (tile.own_degrees <= 0) continue;
+    left.push_back(&tile);
+    squares += tile.own_chi2;
+    degrees += static_cast<double>(tile.own_degrees);
+  }
+  const auto ratio = [&](const TileCheck* tile) {
+    const auto own = static_cast<double>(tile->own_degrees);
+    return tile->own_chi2 / own / std::max(kNoNoise, (squares - tile->own_chi2) / (degrees - own));
+  };
+  // Normal deviate of F (Paulson 1942): its third root is nearly normal.
+  const auto deviate = [&](const TileCheck* tile) {
+    const auto own = static_cast<double>(tile->own_degrees);
+    const double root = std::cbrt(ratio(tile) / kUsualVarianceRatio);
+    const double variance = 2 / (9 * own), others = 2 / (9 * (degrees - own));
+    return ((1 - others) * root - (1 - variance)) / std::sqrt(others * root * root + variance);
+  };
+  const double probability = kSeamAlarmProbability / static_cast<double>(tiles.size());
+  std::vector<NoisyTile> noisy;
+  while (left.size() > 1) {
+    const auto worst = std::ranges::max_element(left, {}, deviate);
+    if (!(normal_exceeds(deviate(*worst)) < probability)) break;
+    noisy.push_back({(*worst)->tile, ratio(*worst)});
+    squares -= (*worst)->own_chi2;
+    degrees -= static_cast<double>((*worst)->own_degrees);
+    left.erase(worst);
+  }
+  return noisy;
+}
+
 std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& tiles, const UnknownName& name) {
   std::vector<std::pair<std::int64_t, UnknownCheck>> all;  // tile, what it disagrees about
   for (const TileCheck& tile : tiles)
@@ -335,7 +388,6 @@ std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& ti
                    [](const auto& a, const auto& b) { return a.second.excess() > b.second.excess(); });
 
   const double decisive = -2 * std::log(kSeamAlarmProbability);
-  constexpr std::size_t kLines = 3;
   std::vector<std::string> lines;
   std::size_t more = 0;
   std::vector<UnknownCheck> said;
@@ -363,14 +415,54 @@ std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& ti
                     figures);
   }
   if (more > 0) lines.push_back(std::to_string(more) + " more unknowns that tiles see differently");
+  const std::vector<std::string> first = describe_noise(tiles);
+  lines.insert(lines.begin(), first.begin(), first.end());
   return lines;
 }
 
-std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles) {
-  const TileCheck* worst = nullptr;
-  const auto excess = [](const TileCheck& t) { return t.threshold > 0 ? t.statistic / t.threshold : 0; };
-  for (const TileCheck& tile : tiles)
-    if (worst == nullptr || excess(tile) > excess(*worst)) worst = &tile;
+namespace {
+
+// Which tile explains the alarm of which node of the tree; -1: no alarm.
+std::vector<std::int64_t> explain(const MergeTree& tree, const std::vector<SeamReport>& seams,
+                                  const std::vector<TileCheck>& tiles) {
+  std::vector<std::int64_t> explained(tree.nodes.size(), -1), leaf(tiles.size(), -1);
+  std::vector<bool> alarm(tree.nodes.size(), false);
+  for (const SeamReport& seam : seams) alarm[at(seam.node)] = seam.alarm();
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n)
+    if (tree.nodes[n].tile.valid()) leaf[at(tree.nodes[n].tile.value)] = static_cast<std::int64_t>(n);
+
+  const auto alarms_above = [&](std::int64_t tile) {
+    std::int64_t count = 0;
+    for (std::int64_t n = leaf[at(tile)]; n >= 0; n = tree.nodes[at(n)].parent) count += alarm[at(n)];
+    return count;
+  };
+  const auto take_out = [&](std::int64_t tile) {
+    for (std::int64_t n = leaf[at(tile)]; n >= 0; n = tree.nodes[at(n)].parent) {
+      if (alarm[at(n)]) explained[at(n)] = tile;
+      alarm[at(n)] = false;
+    }
+  };
+  for (const NoisyTile& noisy : noisy_tiles(tiles)) take_out(noisy.tile);
+  for (;;) {
+    const TileCheck* best = nullptr;
+    std::pair<std::int64_t, double> most;
+    for (const TileCheck& tile : tiles) {
+      const std::int64_t seams_cleared = alarms_above(tile.tile);
+      if (seams_cleared == 0) continue;
+      const std::pair cleared(seams_cleared + tile.alarm(), tile.degrees > 0 ? tile.statistic / tile.threshold : 0);
+      if (best == nullptr || cleared > most) best = &tile, most = cleared;
+    }
+    if (best == nullptr) return explained;
+    take_out(best->tile);
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> describe_seams(const MergeTree& tree, const std::vector<SeamReport>& seams,
+                                        const std::vector<TileCheck>& tiles) {
+  const std::vector<std::int64_t> explained = explain(tree, seams, tiles);
+  const std::vector<NoisyTile> noisy = noisy_tiles(tiles);
   std::vector<std::string> lines;
   for (const SeamReport& seam : seams) {
     if (!seam.alarm()) continue;
@@ -382,8 +474,11 @@ std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, co
         static_cast<long long>(seam.node), seam.statistic, static_cast<long long>(seam.degrees), seam.threshold,
         std::sqrt(seam.statistic / static_cast<double>(seam.degrees)));
     lines.emplace_back(line);
-    if (worst != nullptr)
-      lines.back() += "; tile " + std::to_string(worst->tile) + " disagrees most with the rest of the block";
+    const std::int64_t tile = explained[at(seam.node)];
+    if (tile < 0) continue;
+    const bool by_itself = std::ranges::find(noisy, tile, &NoisyTile::tile) != noisy.end();
+    lines.back() += "; tile " + std::to_string(tile) +
+                    (by_itself ? " does not even agree with itself" : " disagrees most with the rest of the block");
   }
   return lines;
 }

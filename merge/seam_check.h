@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "io/image_graph.h"
 #include "merge/front.h"
 #include "merge/gauge.h"
 
@@ -73,19 +74,36 @@ struct TileCheck {
   std::int64_t degrees = 0;
   double threshold = 0;
   std::array<UnknownCheck, 4> worst;  // by excess, the worst first; no two share an unknown
+  bool alarm() const { return degrees > 0 && statistic > threshold; }
 };
 // From the tile's condensed normal equations and the block's covariance of its boundary unknowns (lambda = 0, at the
 // optimum, where the rest's gradient is minus the tile's).
 TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
                      double probability, double variance_factor = 1);
 
-// One line per disagreement, the three worst: the unknowns, the figures, and the tile. Where other tiles explain it
+// A tile whose residuals do not fit together even by themselves is wrong whatever its neighbours say. The measure of
+// its own chi-square is the variance factor of the other tiles, not one: the sigma of the measurements is estimated
+// from all of them, to 2 %, and losses and limits take from the tails of what is right; with a million degrees of
+// freedom any of that would fail. The ratio of both factors has an F distribution; and photographs of one block are not
+// all equally sharp, so that only what exceeds kUsualVarianceRatio counts.
+inline constexpr double kUsualVarianceRatio = 1.5;
+struct NoisyTile {
+  std::int64_t tile = -1;
+  double ratio = 1;  // of its variance factor to that of the others, those left out that are worse
+};
+std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles);  // the worst first
+
+// One line per disagreement, the three worst of each kind. First of tiles with themselves (noisy_tiles). Then of tiles
+// with the rest: the unknowns, the figures, and the tile. Where other tiles explain it
 // about as well, they are named too: of a frame that two tiles alone see, either may be wrong. Since 2 ln of the ratio
 // of likelihoods is the difference of T, a tile is named alone at 1 : kSeamAlarmProbability.
 std::vector<std::string> describe_disagreements(
     const std::vector<TileCheck>& tiles, const UnknownName& name = [](const UnknownId& id) { return describe(id); });
 
-// One line per alarm: the seam, its figures, and the tile under it that disagrees most with the rest.
-std::vector<std::string> describe_seams(const std::vector<SeamReport>& seams, const std::vector<TileCheck>& tiles);
+// One line per alarm: the seam, its figures, and the tile under it that explains it: one of noisy_tiles, else the one
+// that clears most alarms when it is taken out, of seams above it and of its own against the rest, of equals the one
+// whose T is the largest part of its limit; then the same for the alarms that are left. All tiles, in tile order.
+std::vector<std::string> describe_seams(const MergeTree& tree, const std::vector<SeamReport>& seams,
+                                        const std::vector<TileCheck>& tiles);
 
 }  // namespace megablock

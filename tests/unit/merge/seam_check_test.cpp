@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
+#include <random>
 
 #include "adjust/image_sigma.h"
+#include "adjust/tile_adjustment.h"
 #include "tests/unit/merge/tiled_block.h"
 #include "tests/unit/merge/turned_frames.h"
 
@@ -35,6 +38,27 @@ void adjust(SerialRunner& runner) {
   runner.final_up();
 }
 
+// As a job does: robust losses, the sigma of the measurements estimated from all residuals, observations tested again.
+std::unique_ptr<SerialRunner> adjusted_as_a_job(const TiledBlock& block, std::vector<TileProblem> problems) {
+  const AdjustOptions options;
+  std::vector<TileState> states = block.states;
+  for (int round = 0; round < 2; ++round) {
+    SerialRunner runner(block.tiles.tree, problems, states);
+    adjust(runner);
+    states = runner.states();
+    ImageResiduals residuals;
+    for (std::size_t t = 0; t < problems.size(); ++t) residuals.add(image_residuals(problems[t], states[t], options));
+    const auto unknowns = 6 * std::ssize(block.whole.frames);
+    for (std::size_t t = 0; t < problems.size(); ++t) {
+      set_image_sigma(problems[t], image_sigma(residuals, unknowns).value());
+      screen_observations(problems[t], states[t], options.max_residual_sigmas, options);
+    }
+  }
+  auto runner = std::make_unique<SerialRunner>(block.tiles.tree, std::move(problems), std::move(states));
+  adjust(*runner);
+  return runner;
+}
+
 // Over all seams and several blocks the sum of T is chi-square distributed with the sum of the degrees.
 TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
   double statistic = 0, degrees = 0;
@@ -50,7 +74,7 @@ TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
       statistic += seam.statistic;
       degrees += static_cast<double>(seam.degrees);
     }
-    EXPECT_TRUE(describe_seams(runner.seams(), runner.tile_checks()).empty());
+    EXPECT_TRUE(describe_seams(block.tiles.tree, runner.seams(), runner.tile_checks()).empty());
     EXPECT_TRUE(describe_disagreements(runner.tile_checks()).empty());
   }
   EXPECT_GT(degrees, 500);
@@ -106,7 +130,7 @@ TEST(SeamCheck, NamesTheTileThatWasShifted) {
   int alarms = 0;
   for (const SeamReport& seam : runner.seams()) alarms += seam.alarm();
   EXPECT_GE(alarms, 1);
-  const std::vector<std::string> lines = describe_seams(runner.seams(), runner.tile_checks());
+  const std::vector<std::string> lines = describe_seams(block.tiles.tree, runner.seams(), runner.tile_checks());
   ASSERT_FALSE(lines.empty());
   EXPECT_NE(lines.front().find("tile 2 "), std::string::npos) << lines.front();
 }
@@ -120,8 +144,127 @@ TEST(SeamCheck, IsSilentOnACleanBlockOf200Tiles) {
   ASSERT_GE(block.tiles.tile_count, 200);
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
   adjust(runner);
-  EXPECT_TRUE(describe_seams(runner.seams(), runner.tile_checks()).empty());
+  EXPECT_TRUE(describe_seams(block.tiles.tree, runner.seams(), runner.tile_checks()).empty());
   EXPECT_TRUE(describe_disagreements(runner.tile_checks()).empty());
+}
+
+// The same as a job adjusts it, with wrong matches: neither does a tile by itself.
+TEST(SeamCheck, IsSilentWithLossesAndAnEstimatedSigma) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SimulationOptions options = clean_scene();
+    options.frames = seed == 1 ? 2400 : 600;
+    options.image_noise_px = 0.7;
+    options.outlier_share = 0.01;
+    options.calibrate = true;
+    options.seed = seed;
+    const TiledBlock block(simulate_block(options), 12, {}, 0.02);
+    ASSERT_GE(block.tiles.tile_count, seed == 1 ? 200 : 50);
+    const auto runner = adjusted_as_a_job(block, block.problems);
+    const std::vector<TileCheck> checks = runner->tile_checks();
+    EXPECT_TRUE(describe_seams(block.tiles.tree, runner->seams(), checks).empty()) << seed;
+    EXPECT_TRUE(describe_disagreements(checks).empty()) << describe_disagreements(checks).front() << ", seed " << seed;
+    // The chi-squares of the tiles scatter about that of the block as they should.
+    double squares = 0, degrees = 0, scatter = 0;
+    for (const TileCheck& check : checks) squares += check.own_chi2, degrees += static_cast<double>(check.own_degrees);
+    for (const TileCheck& check : checks) {
+      const auto own = static_cast<double>(check.own_degrees);
+      scatter += std::pow(check.own_chi2 * degrees / squares - own, 2) / (2 * own);
+    }
+    const auto tiles = static_cast<double>(checks.size());
+    EXPECT_NEAR(scatter, tiles, 5 * std::sqrt(2 * tiles)) << seed;
+  }
+}
+
+TileCheck tile_with(std::int64_t tile, double own_chi2, std::int64_t own_degrees, double statistic = 0) {
+  TileCheck check;
+  check.tile = tile;
+  check.own_chi2 = own_chi2;
+  check.own_degrees = own_degrees;
+  check.statistic = statistic;
+  check.degrees = 50;
+  check.threshold = 100;
+  return check;
+}
+
+TEST(SeamCheck, ComparesTheNoiseOfATileWithThatOfTheOthers) {
+  const auto noisy = [](const std::vector<TileCheck>& tiles) {
+    std::vector<std::int64_t> named;
+    for (const NoisyTile& tile : noisy_tiles(tiles)) named.push_back(tile.tile);
+    return named;
+  };
+  using Tiles = std::vector<std::int64_t>;
+  // Millions of degrees of freedom show the smallest difference; what photographs differ by means nothing.
+  EXPECT_EQ(noisy({tile_with(0, 1.003e6, 1000000), tile_with(1, 0.96e6, 1000000), tile_with(2, 1.3e6, 1000000)}),
+            Tiles());
+  // Sigmas that are wrong as a whole are no tile's fault.
+  EXPECT_EQ(noisy({tile_with(0, 900, 100), tile_with(1, 9000, 1000), tile_with(2, 9100, 1000)}), Tiles());
+  // Neither is the worst one hidden by few degrees of freedom elsewhere, nor the second by the worst.
+  EXPECT_EQ(noisy({tile_with(0, 1000, 1000), tile_with(1, 4000, 1000), tile_with(2, 1000, 1000),
+                   tile_with(3, 50000, 1000), tile_with(4, 12, 2)}),
+            (Tiles{3, 1}));
+  // Of two one may be the worse; a single one has nothing to be compared with, nor have tiles without redundancy.
+  EXPECT_EQ(noisy({tile_with(0, 1000, 1000), tile_with(1, 4000, 1000)}), Tiles{1});
+  EXPECT_EQ(noisy({tile_with(0, 4000, 1000), tile_with(1, 3, 0), tile_with(2, 0, -2)}), Tiles());
+  EXPECT_EQ(noisy({}), Tiles());
+  // Residuals of rounding.
+  EXPECT_EQ(noisy({tile_with(0, 1e-20, 1000), tile_with(1, 1e-12, 1000)}), Tiles());
+}
+
+// Tiles that are as much worse as is usual, of few degrees of freedom, against many and against few.
+TEST(SeamCheck, NamesTilesForNoiseAsRarelyAsItSays) {
+  std::mt19937_64 random(1);
+  for (const std::int64_t others : {40, 4000}) {
+    std::chi_squared_distribution<double> own(20), rest(static_cast<double>(others));
+    int named = 0;
+    constexpr int kTrials = 100000;
+    for (int k = 0; k < kTrials; ++k)
+      named += !noisy_tiles({tile_with(0, kUsualVarianceRatio * own(random), 20), tile_with(1, rest(random), others)})
+                    .empty();
+    const double expected = kTrials * kSeamAlarmProbability / 2;
+    EXPECT_NEAR(named, expected, 5 * std::sqrt(expected)) << others;
+  }
+}
+
+// Leaves 0 to 3, nodes 4 = 0 + 1, 5 = 2 + 3, 6 = 4 + 5.
+MergeTree tree_of_four() {
+  MergeTree tree;
+  tree.nodes.resize(7);
+  for (std::int64_t n = 0; n < 4; ++n) tree.nodes[n].tile = TileIndex(n), tree.nodes[n].parent = 4 + n / 2;
+  tree.nodes[4].left = 0, tree.nodes[4].right = 1, tree.nodes[5].left = 2, tree.nodes[5].right = 3;
+  tree.nodes[6].left = 4, tree.nodes[6].right = 5;
+  tree.nodes[4].parent = tree.nodes[5].parent = 6;
+  return tree;
+}
+
+// The tile that the line of each seam names; -1: no line.
+std::vector<std::int64_t> explained(const std::vector<std::int64_t>& alarms, const std::vector<TileCheck>& tiles) {
+  std::vector<SeamReport> seams;
+  for (const std::int64_t node : {4, 5, 6})
+    seams.push_back({node, std::ranges::find(alarms, node) != alarms.end() ? 200.0 : 50.0, 50, 100});
+  std::vector<std::int64_t> named(3, -1);
+  for (const std::string& line : describe_seams(tree_of_four(), seams, tiles)) {
+    long long node = 0, tile = -1;
+    std::sscanf(line.c_str(), "seam at node %lld", &node);
+    std::sscanf(line.substr(line.find("; tile")).c_str(), "; tile %lld", &tile);
+    named[static_cast<std::size_t>(node - 4)] = tile;
+  }
+  return named;
+}
+
+TEST(SeamCheck, NamesTheTileUnderTheSeamWhoseRemovalClearsMostAlarms) {
+  const auto tile = [](std::int64_t number, double statistic, double noise = 1) {
+    return tile_with(number, 1000 * noise, 1000, statistic);
+  };
+  using Named = std::vector<std::int64_t>;
+  EXPECT_EQ(explained({}, {tile(0, 150), tile(1, 90), tile(2, 300), tile(3, 80)}), (Named{-1, -1, -1}));
+  // Tile 2 is farthest from the rest, but not under the seam.
+  EXPECT_EQ(explained({4}, {tile(0, 150), tile(1, 90), tile(2, 300), tile(3, 80)}), (Named{0, -1, -1}));
+  // One of 2 and 3 explains both alarms, 0 only one.
+  EXPECT_EQ(explained({5, 6}, {tile(0, 400), tile(1, 90), tile(2, 130), tile(3, 120)}), (Named{-1, 2, 2}));
+  // When what the first explains is left out, the other alarm has a tile of its own.
+  EXPECT_EQ(explained({4, 5, 6}, {tile(0, 110), tile(1, 160), tile(2, 130), tile(3, 120)}), (Named{1, 2, 1}));
+  // A tile that disagrees with itself comes first.
+  EXPECT_EQ(explained({4, 5, 6}, {tile(0, 110, 4), tile(1, 160), tile(2, 130), tile(3, 120)}), (Named{0, 2, 0}));
 }
 
 // A rig that looks all around. 10^-4 rad are 0.14 px; with 300 measurements of 0.5 px on either side that is less than
