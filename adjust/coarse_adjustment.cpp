@@ -56,8 +56,9 @@ void add_cameras(const Block& block, const OrientationGraph& graph, const Orient
   // A row per image keeps the tables simple; mounts are held here.
   for (std::size_t i = 0; i < graph.images.size(); ++i) {
     const auto& image = graph.images[i];
-    tile.problem.mounts.push_back(
-        {block.frames[graph.frames[static_cast<std::size_t>(image.frame)].index].rig, block.images[image.index].mount});
+    const RigIndex rig = block.frames[graph.frames[static_cast<std::size_t>(image.frame)].index].rig;
+    tile.problem.mounts.push_back({rig, block.images[image.index].mount});
+    tile.problem.reference_centres.push_back(block.rigs[rig].mounts.front().pose.centre);
     tile.state.mounts.push_back(image.mount);
     tile.problem.images.push_back({image.index, LocalFrame(tile.frame_row[static_cast<std::size_t>(image.frame)]),
                                    LocalCamera(image.camera), static_cast<std::int32_t>(i)});

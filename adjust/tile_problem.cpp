@@ -213,7 +213,10 @@ class TileBuilder {
     }
     image_table_ = std::move(images);
     for (CameraIndex camera : problem_.cameras) problem_.camera_free.push_back(free_mask(block_.cameras[camera]));
-    for (const MountId& id : problem_.mounts) problem_.mount_free.push_back(mount(id).held() ? 0 : 1);
+    for (const MountId& id : problem_.mounts) {
+      problem_.mount_free.push_back(mount(id).held() ? 0 : 1);
+      problem_.reference_centres.push_back(state_.mounts[id.rig].front().centre);
+    }
     problem_.begin.push_back(0);
   }
 

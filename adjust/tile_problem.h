@@ -69,7 +69,8 @@ struct TileProblem {
   std::vector<CameraIndex> cameras;
   std::vector<ParameterMask> camera_free;  // [cameras] intrinsic parameters that are unknowns
   std::vector<MountId> mounts;
-  std::vector<std::uint8_t> mount_free;  // [mounts] 1: six unknowns
+  std::vector<std::uint8_t> mount_free;            // [mounts] 1: six unknowns
+  std::vector<Eigen::Vector3d> reference_centres;  // [mounts] of the rig's first mount, which is held
   std::vector<TileImage> images;
 
   // Points (tracks ascending, then control points ascending) and their observations.

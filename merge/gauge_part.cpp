@@ -12,13 +12,18 @@ namespace megablock {
 
 namespace {
 
-constexpr double kScaleGiven = 1e6;  // weight of the scale where held mounts give it
+constexpr double kScaleGiven = 1e6;    // weight of the scale where held mounts give it
+constexpr double kAtReference = 1e-9;  // metres from its rig's reference, so that a scale does not move a mount
 
 // Fills the parts of a tile.
 class PartBuilder {
  public:
   PartBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state)
-      : problem_(problem), plan_(plan), state_(state), part_(plan.part_of_frame) {}
+      : problem_(problem),
+        plan_(plan),
+        state_(state),
+        part_(plan.part_of_frame),
+        references_(reference_places(problem, state)) {}
 
   std::vector<GaugePart> build() {
     parts_.resize(at(plan_.part_count));
@@ -29,6 +34,7 @@ class PartBuilder {
     add_verticals();
     add_point_priors();
     add_mounts();
+    list_free_mounts();
     return std::move(parts_);
   }
 
@@ -70,7 +76,8 @@ class PartBuilder {
   }
   GaugePart& part_of(LocalFrame frame) { return parts_[at(part_[at(frame.value)])]; }
   Matrix67 move(const GaugePart& part, LocalFrame frame) const {
-    return similarity_of_frame(state_.frames[at(frame.value)].centre, part.centre, part.extent);
+    return similarity_of_frame(state_.frames[at(frame.value)].centre, references_[at(frame.value)], part.centre,
+                               part.extent);
   }
 
   void add_frame_priors() {
@@ -108,7 +115,7 @@ class PartBuilder {
   // Only the scale changes a relative pose; written out, as the other directions cancel by rounding alone.
   void add_relatives() {
     for (const auto& term : problem_.relatives) {
-      const Eigen::Vector3d base = state_.frames[at(term.to.value)].centre - state_.frames[at(term.from.value)].centre;
+      const Eigen::Vector3d base = references_[at(term.to.value)] - references_[at(term.from.value)];
       part_of(term.from).normal(6, 6) += base.squaredNorm() / (term.position_sigma_m * term.position_sigma_m);
     }
   }
@@ -133,11 +140,33 @@ class PartBuilder {
       if (rig_gives_scale(problem_, state_, at(mount))) parts_[at(part)].normal(6, 6) += kScaleGiven;
       for (const auto& term : problem_.mount_priors) {
         if (term.mount != mount) continue;
-        Eigen::Matrix<double, 6, 1> scaled = Eigen::Matrix<double, 6, 1>::Zero();
-        scaled.tail<3>() = state_.mounts[at(mount)].centre;
+        const Matrix67 scaled = similarity_of_mount(problem_, state_, at(mount));
         parts_[at(part)].normal(6, 6) +=
-            (linearise_mount(state_.mounts[at(mount)], term).by_mount * scaled).squaredNorm();
+            (linearise_mount(state_.mounts[at(mount)], term).by_mount * scaled.col(6)).squaredNorm();
       }
+    }
+  }
+
+  void list_free_mounts() {
+    std::vector<std::uint8_t> moved(problem_.mounts.size(), 0);
+    for (std::size_t m = 0; m < moved.size(); ++m)
+      moved[m] = problem_.mount_free[m] && similarity_of_mount(problem_, state_, m).norm() > kAtReference;
+    if (std::ranges::find(moved, 1) == moved.end()) return;
+    std::vector<std::uint8_t> sees(problem_.images.size(), 0);
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
+      if (!problem_.active(p)) continue;
+      for (std::int64_t row = problem_.begin[at(p)]; row < problem_.begin[at(p + 1)]; ++row)
+        if (problem_.kept[at(row)]) sees[at(problem_.image[at(row)].value)] = 1;
+    }
+    for (std::size_t i = 0; i < sees.size(); ++i) {
+      const TileImage& image = problem_.images[i];
+      if (!sees[i] || !moved[at(image.mount)]) continue;
+      const MountId& mount = problem_.mounts[at(image.mount)];
+      part_of(image.frame).mounts.push_back({UnknownKind::kMount, mount.mount, mount.rig.value});
+    }
+    for (GaugePart& part : parts_) {
+      std::ranges::sort(part.mounts);
+      part.mounts.erase(std::unique(part.mounts.begin(), part.mounts.end()), part.mounts.end());
     }
   }
 
@@ -145,6 +174,7 @@ class PartBuilder {
   const TilePlan& plan_;
   const TileState& state_;
   const std::vector<std::int64_t>& part_;  // of every frame row
+  const std::vector<Eigen::Vector3d> references_;
   std::vector<GaugePart> parts_;
 };
 
@@ -162,6 +192,7 @@ Bytes TileGauge::to_bytes() const {
     for (const double* v : {part.lowest_centre.data(), part.centre.data()}) out.values(std::vector<double>(v, v + 3));
     out.values(std::vector<double>(part.extreme_centres.data(), part.extreme_centres.data() + 18));
     for (const Matrix77* m : {&part.normal, &part.held}) out.values(std::vector<double>(m->data(), m->data() + 49));
+    out.values(part.mounts);
   }
   return out.take();
 }
@@ -187,6 +218,7 @@ TileGauge TileGauge::from_bytes(const Bytes& bytes) {
     fill(part.extreme_centres.data(), 18);
     fill(part.normal.data(), 49);
     fill(part.held.data(), 49);
+    part.mounts = in.values<UnknownId>();
     gauge.parts.push_back(part);
   }
   if (!in.at_end()) throw StoreError("merge: a tile's datum has the wrong size");

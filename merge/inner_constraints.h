@@ -12,7 +12,7 @@ namespace megablock {
 
 // Sums for the S-transformation over the frames that a tile owns; added in tile order.
 struct InnerSums {
-  Eigen::MatrixXd m, k;  // [defect x defect]: N'WN, N'W C W N; blocks of different components are not used
+  Eigen::MatrixXd m, k;  // [defect x defect]: N'WN, N'W C W N
   void add(const InnerSums& other);
   Bytes to_bytes() const;
   static InnerSums from_bytes(const Bytes& bytes);

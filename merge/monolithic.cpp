@@ -62,23 +62,22 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
   s.n.setZero(system.reduced_dimension, gauge.defect());
   Eigen::MatrixXd weighted = s.n;
   const std::vector<const BlockComponent*> components = free_component_of_frame(gauge, 0, plan);
-  const auto place = [&](std::int64_t column, const BlockComponent& c, const Matrix67& move) {
-    s.n.block(column, c.first_column, 6, c.defect) = move.leftCols(c.defect);
+  const std::vector<Eigen::Vector3d> references = reference_places(problem, state);
+  const auto place = [&](std::int64_t column, const BlockComponent& c, const Eigen::MatrixXd& move) {
+    s.n.middleRows<6>(column)(Eigen::all, c.columns) = move;
   };
   for (std::size_t f = 0; f < components.size(); ++f) {
     if (components[f] == nullptr) continue;
     const BlockComponent& c = *components[f];
     const std::int64_t column = system.frame_column[f];
-    place(column, c, c.move(state.frames[f].centre));
+    place(column, c, c.move_frame(state.frames[f].centre, references[f]));
     weighted.middleRows<6>(column) = c.weights().asDiagonal() * s.n.middleRows<6>(column);
   }
   for (const TileImage& image : problem.images) {  // free mounts follow the scale
     const std::int64_t column = system.mount_column[static_cast<std::size_t>(image.mount)];
     const BlockComponent* c = components[static_cast<std::size_t>(image.frame.value)];
     if (column < 0 || c == nullptr) continue;
-    Matrix67 move = Matrix67::Zero();
-    move.bottomRightCorner<3, 1>() = state.mounts[static_cast<std::size_t>(image.mount)].centre;
-    place(column, *c, move * c->directions);
+    place(column, *c, c->free_part(similarity_of_mount(problem, state, static_cast<std::size_t>(image.mount))));
   }
   s.t = solve_symmetric(weighted.transpose() * s.n, weighted.transpose());
   return s;

@@ -13,6 +13,7 @@
 #include "io/hdf5_file.h"
 #include "io/result.h"
 #include "tests/integration/block_folder.h"
+#include "tests/unit/merge/two_cities.h"
 
 namespace megablock {
 namespace {
@@ -190,38 +191,7 @@ TEST_F(BlockInput, TwoCities) {
     SimulationOptions options = aerial(30);
     if (free) options.gps_sigma_m = 0;
     SimulatedBlock s = simulate_block(options);
-    const SimulatedBlock one = s;
-    const Eigen::Vector3d away(200e3, 0, 0);
-    const auto frames = static_cast<std::int64_t>(one.block.frames.size());
-    for (const Frame& frame : one.block.frames) {
-      Frame copy = frame;
-      copy.name += "_b";
-      if (copy.position_prior) copy.position_prior->position += away;
-      if (copy.given_pose) copy.given_pose->centre += away;
-      s.block.frames.push_back(copy);
-    }
-    for (ImageIndex i(0); one.block.images.contains(i); ++i.value) {
-      Image copy = one.block.images[i];
-      copy.frame.value += frames;
-      s.block.add_image(one.block.name_of(i) + "_b", copy);
-    }
-    for (const Pose& pose : one.truth.frames) {
-      s.truth.frames.push_back(pose);
-      s.truth.frames.back().centre += away;
-    }
-    const std::int64_t last = s.tracks.id.back().value + 1;
-    for (std::int64_t t = 0; t < one.tracks.track_count(); ++t) {
-      for (auto o = static_cast<std::size_t>(one.tracks.begin[t]);
-           o < static_cast<std::size_t>(one.tracks.begin[t + 1]); ++o) {
-        s.tracks.image.push_back(
-            ImageIndex(one.tracks.image[o].value + static_cast<std::int64_t>(one.block.images.size())));
-        s.tracks.x.push_back(one.tracks.x[o]);
-        s.tracks.y.push_back(one.tracks.y[o]);
-        s.tracks.feature.push_back(one.tracks.feature[o]);
-      }
-      s.tracks.id.push_back(TrackIndex(last + one.tracks.id[t].value));
-      s.tracks.begin.push_back(s.tracks.observation_count());
-    }
+    append_city(s, SimulatedBlock(s), {200e3, 0, 0});
     const BlockResult result = adjust(s);
     EXPECT_THAT(report(), HasSubstr("falls into 2 parts"));
     if (free) {
