@@ -53,12 +53,15 @@ void add_cameras(const Block& block, const OrientationGraph& graph, const Orient
     }
     if (any) tile.problem.intrinsic_priors.push_back(term);
   }
+  const auto reference = [&](RigIndex rig) { return block.rigs[rig].mounts.front().pose.centre; };
+  for (const FrameIndex frame : tile.problem.frames)
+    tile.problem.reference_of_frame.push_back(reference(block.frames[frame].rig));
   // A row per image keeps the tables simple; mounts are held here.
   for (std::size_t i = 0; i < graph.images.size(); ++i) {
     const auto& image = graph.images[i];
     const RigIndex rig = block.frames[graph.frames[static_cast<std::size_t>(image.frame)].index].rig;
     tile.problem.mounts.push_back({rig, block.images[image.index].mount});
-    tile.problem.reference_centres.push_back(block.rigs[rig].mounts.front().pose.centre);
+    tile.problem.reference_of_mount.push_back(reference(rig));
     tile.state.mounts.push_back(image.mount);
     tile.problem.images.push_back({image.index, LocalFrame(tile.frame_row[static_cast<std::size_t>(image.frame)]),
                                    LocalCamera(image.camera), static_cast<std::int32_t>(i)});

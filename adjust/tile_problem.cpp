@@ -215,8 +215,10 @@ class TileBuilder {
     for (CameraIndex camera : problem_.cameras) problem_.camera_free.push_back(free_mask(block_.cameras[camera]));
     for (const MountId& id : problem_.mounts) {
       problem_.mount_free.push_back(mount(id).held() ? 0 : 1);
-      problem_.reference_centres.push_back(state_.mounts[id.rig].front().centre);
+      problem_.reference_of_mount.push_back(state_.mounts[id.rig].front().centre);
     }
+    for (FrameIndex frame : frames)
+      problem_.reference_of_frame.push_back(state_.mounts[block_.frames[frame].rig].front().centre);
     problem_.begin.push_back(0);
   }
 

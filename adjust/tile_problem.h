@@ -69,8 +69,9 @@ struct TileProblem {
   std::vector<CameraIndex> cameras;
   std::vector<ParameterMask> camera_free;  // [cameras] intrinsic parameters that are unknowns
   std::vector<MountId> mounts;
-  std::vector<std::uint8_t> mount_free;            // [mounts] 1: six unknowns
-  std::vector<Eigen::Vector3d> reference_centres;  // [mounts] of the rig's first mount, which is held
+  std::vector<std::uint8_t> mount_free;  // [mounts] 1: six unknowns
+  // Centre, in the rig, of its first mount, which is held.
+  std::vector<Eigen::Vector3d> reference_of_frame, reference_of_mount;  // [frames], [mounts]
   std::vector<TileImage> images;
 
   // Points (tracks ascending, then control points ascending) and their observations.

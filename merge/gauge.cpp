@@ -222,15 +222,8 @@ Matrix37 similarity_of_point(const Eigen::Vector3d& position, const Eigen::Vecto
   return move;
 }
 
-std::vector<Eigen::Vector3d> reference_places(const TileProblem& problem, const TileState& state) {
-  std::vector<Eigen::Vector3d> places;
-  for (const Pose& frame : state.frames) places.push_back(frame.centre);
-  for (const TileImage& image : problem.images) {
-    const Pose& frame = state.frames[at(image.frame.value)];
-    places[at(image.frame.value)] =
-        frame.centre + frame.rotation.conjugate() * problem.reference_centres[at(image.mount)];
-  }
-  return places;
+Eigen::Vector3d reference_place(const TileProblem& problem, const TileState& state, std::size_t frame) {
+  return state.frames[frame].centre + state.frames[frame].rotation.conjugate() * problem.reference_of_frame[frame];
 }
 
 Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& reference,
@@ -244,7 +237,7 @@ Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vecto
 
 Matrix67 similarity_of_mount(const TileProblem& problem, const TileState& state, std::size_t mount) {
   Matrix67 move = Matrix67::Zero();
-  move.bottomRightCorner<3, 1>() = state.mounts[mount].centre - problem.reference_centres[mount];
+  move.bottomRightCorner<3, 1>() = state.mounts[mount].centre - problem.reference_of_mount[mount];
   return move;
 }
 
@@ -330,7 +323,6 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
   }
   if (!with_columns) return datum;
   const auto components = free_component_of_frame(gauge, tile, plan);
-  const std::vector<Eigen::Vector3d> references = reference_places(problem, state);
   Step& columns = datum.columns;
   columns.columns = gauge.defect();
   for (const Unknown& u : plan.owned)
@@ -344,7 +336,7 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
     const BlockComponent* c = components[row];
     if (c == nullptr) continue;
     const Eigen::MatrixXd weighted =
-        c->weights().asDiagonal() * c->move_frame(state.frames[row].centre, references[row]);
+        c->weights().asDiagonal() * c->move_frame(state.frames[row].centre, reference_place(problem, state, row));
     for (Eigen::Index k = 0; k < weighted.cols(); ++k)
       for (std::int64_t r = 0; r < 6; ++r)
         columns.values[at(6 * static_cast<std::int64_t>(i) + r + c->columns[at(k)] * n)] = weighted(r, k);

@@ -60,8 +60,8 @@ struct TileGauge {
 };
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
-// C + R'C_0 of every frame row of a tile.
-std::vector<Eigen::Vector3d> reference_places(const TileProblem& problem, const TileState& state);
+// C + R'C_0 of a frame row.
+Eigen::Vector3d reference_place(const TileProblem& problem, const TileState& state, std::size_t frame);
 
 // Movement by a similarity about `centre`, columns (phi, t, s). `reference`: the frame's reference place.
 Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& reference,

@@ -19,11 +19,7 @@ constexpr double kAtReference = 1e-9;  // metres from its rig's reference, so th
 class PartBuilder {
  public:
   PartBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state)
-      : problem_(problem),
-        plan_(plan),
-        state_(state),
-        part_(plan.part_of_frame),
-        references_(reference_places(problem, state)) {}
+      : problem_(problem), plan_(plan), state_(state), part_(plan.part_of_frame) {}
 
   std::vector<GaugePart> build() {
     parts_.resize(at(plan_.part_count));
@@ -74,10 +70,10 @@ class PartBuilder {
   static void add(GaugePart& part, const Eigen::MatrixBase<Derived>& residual_by_similarity) {
     part.normal += residual_by_similarity.transpose() * residual_by_similarity;
   }
+  Eigen::Vector3d reference(LocalFrame frame) const { return reference_place(problem_, state_, at(frame.value)); }
   GaugePart& part_of(LocalFrame frame) { return parts_[at(part_[at(frame.value)])]; }
   Matrix67 move(const GaugePart& part, LocalFrame frame) const {
-    return similarity_of_frame(state_.frames[at(frame.value)].centre, references_[at(frame.value)], part.centre,
-                               part.extent);
+    return similarity_of_frame(state_.frames[at(frame.value)].centre, reference(frame), part.centre, part.extent);
   }
 
   void add_frame_priors() {
@@ -115,7 +111,7 @@ class PartBuilder {
   // Only the scale changes a relative pose; written out, as the other directions cancel by rounding alone.
   void add_relatives() {
     for (const auto& term : problem_.relatives) {
-      const Eigen::Vector3d base = references_[at(term.to.value)] - references_[at(term.from.value)];
+      const Eigen::Vector3d base = reference(term.to) - reference(term.from);
       part_of(term.from).normal(6, 6) += base.squaredNorm() / (term.position_sigma_m * term.position_sigma_m);
     }
   }
@@ -174,7 +170,6 @@ class PartBuilder {
   const TilePlan& plan_;
   const TileState& state_;
   const std::vector<std::int64_t>& part_;  // of every frame row
-  const std::vector<Eigen::Vector3d> references_;
   std::vector<GaugePart> parts_;
 };
 

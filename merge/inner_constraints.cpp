@@ -62,12 +62,11 @@ InnerSums inner_sums(const BlockGauge& gauge, std::int64_t tile, const TileProbl
   const std::int64_t d = gauge.defect();
   InnerSums sums{Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd::Zero(d, d)};
   const auto components = free_component_of_frame(gauge, tile, plan);
-  const std::vector<Eigen::Vector3d> references = reference_places(problem, state);
   for (std::size_t f = 0; f < problem.frames.size(); ++f) {
     const UnknownId id{UnknownKind::kFrame, 0, problem.frames[f].value};
     if (components[f] == nullptr || find_unknown(plan.owned, id) < 0) continue;
     const BlockComponent& c = *components[f];
-    const Eigen::MatrixXd n = c.move_frame(state.frames[f].centre, references[f]);
+    const Eigen::MatrixXd n = c.move_frame(state.frames[f].centre, reference_place(problem, state, f));
     const Eigen::MatrixXd weighted = c.weights().asDiagonal() * n;
     sums.m(c.columns, c.columns) += weighted.transpose() * n;
     sums.k(c.columns, Eigen::all) += weighted.transpose() * columns_of(unknowns, id, d);
@@ -86,7 +85,6 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
     of_component.push_back({own, own.transpose() * sums.k * own});
   }
   const auto components = free_component_of_frame(gauge, tile, plan);
-  const std::vector<Eigen::Vector3d> references = reference_places(problem, state);
   const auto sums_of = [&](const BlockComponent* c) -> const ComponentSums& {
     return of_component[at(c - gauge.components.data())];
   };
@@ -95,7 +93,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
     if (c == nullptr) continue;
     const UnknownId id{UnknownKind::kFrame, 0, problem.frames[f].value};
     transform(covariance.frames[f], columns_of(unknowns, id, gauge.defect()),
-              c->move_frame(state.frames[f].centre, references[f]), sums_of(c));
+              c->move_frame(state.frames[f].centre, reference_place(problem, state, f)), sums_of(c));
   }
   for (const RowList& cell : plan.points)
     for (const std::int64_t p : cell.rows()) {

@@ -62,7 +62,6 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
   s.n.setZero(system.reduced_dimension, gauge.defect());
   Eigen::MatrixXd weighted = s.n;
   const std::vector<const BlockComponent*> components = free_component_of_frame(gauge, 0, plan);
-  const std::vector<Eigen::Vector3d> references = reference_places(problem, state);
   const auto place = [&](std::int64_t column, const BlockComponent& c, const Eigen::MatrixXd& move) {
     s.n.middleRows<6>(column)(Eigen::all, c.columns) = move;
   };
@@ -70,7 +69,7 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
     if (components[f] == nullptr) continue;
     const BlockComponent& c = *components[f];
     const std::int64_t column = system.frame_column[f];
-    place(column, c, c.move_frame(state.frames[f].centre, references[f]));
+    place(column, c, c.move_frame(state.frames[f].centre, reference_place(problem, state, f)));
     weighted.middleRows<6>(column) = c.weights().asDiagonal() * s.n.middleRows<6>(column);
   }
   for (const TileImage& image : problem.images) {  // free mounts follow the scale
