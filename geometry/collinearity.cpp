@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "geometry/decompositions.h"
 #include "geometry/row_qr.h"
@@ -12,6 +14,24 @@ namespace megablock {
 namespace {
 
 const Eigen::Matrix3d kHalfTurnAboutX = Eigen::Vector3d(1, -1, -1).asDiagonal();
+
+// Of the extent: what points must be apart, or off their plane, to count.
+constexpr double kApart = 1e-5;
+
+// Whether so many of the points are apart from one another. A point measured twice gives two more equations, which its
+// errors make look independent, and says nothing new.
+bool has_distinct(std::span<const Eigen::Vector3d> points, std::size_t needed) {
+  double extent = 0;
+  for (const Eigen::Vector3d& p : points) extent = std::max(extent, (p - points.front()).norm());
+  std::vector<Eigen::Vector3d> distinct;
+  for (const Eigen::Vector3d& p : points) {
+    if (distinct.size() >= needed) break;
+    if (std::all_of(distinct.begin(), distinct.end(),
+                    [&](const Eigen::Vector3d& other) { return (p - other).norm() > kApart * extent; }))
+      distinct.push_back(p);
+  }
+  return distinct.size() >= needed;
+}
 
 }  // namespace
 
@@ -81,7 +101,7 @@ std::optional<PhysicalParameters> nine_from(const ElevenParameters& e) {
 std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> ground,
                                            std::span<const Eigen::Vector2d> image) {
   const std::size_t count = ground.size();
-  if (count < 6 || image.size() != count) return std::nullopt;
+  if (image.size() != count || !has_distinct(ground, 6)) return std::nullopt;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < count; ++i) {
@@ -97,8 +117,7 @@ std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> grou
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& m : ground) scatter += (m - origin) * (m - origin).transpose() / (extent * extent);
   const double thinnest = symmetric_eigen3(scatter).values(0);
-  constexpr double kPlane = 1e-5;  // of the extent
-  if (!(thinnest > kPlane * kPlane * static_cast<double>(count))) return std::nullopt;
+  if (!(thinnest > kApart * kApart * static_cast<double>(count))) return std::nullopt;
   RowQr<12> equations;
   for (std::size_t i = 0; i < count; ++i) {
     Eigen::Vector4d m;
@@ -158,7 +177,7 @@ bool linearise_nine(const NineParameters& image, std::span<const Eigen::Vector3d
 
 std::optional<FittedNine> fit_nine(const NineParameters& start, std::span<const Eigen::Vector3d> ground,
                                    std::span<const Eigen::Vector2d> measured) {
-  if (ground.size() < 5 || measured.size() != ground.size()) return std::nullopt;
+  if (measured.size() != ground.size() || !has_distinct(ground, 5)) return std::nullopt;
   FittedNine fitted{start, 0, Matrix9::Zero()};
   NineEquations equations;
   if (!linearise_nine(start, ground, measured, equations)) return std::nullopt;

@@ -81,14 +81,15 @@ struct PhysicalParameters {
 // and where something is not a number.
 std::optional<PhysicalParameters> nine_from(const ElevenParameters& image);
 
-// Direct linear transformation: (2) by least squares, O in the middle of the points. Empty for fewer than six points,
-// for points in one plane (their distance from it, root mean square, below 1e-5 of their extent), and where something
-// is not a number.
+// Direct linear transformation: (2) by least squares, O in the middle of the points. Empty for fewer than six points
+// (those closer together than 1e-5 of the extent count as one), for points in one plane (their distance from it, root
+// mean square, below 1e-5 of their extent), and where something is not a number.
 std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> ground,
                                            std::span<const Eigen::Vector2d> image);
 
-// (1) by least squares of the image coordinates from a start (CP-09). Empty for fewer than five points, a point that
-// comes to lie behind the image, unknowns that the points do not determine, or where the iterations do not settle.
+// (1) by least squares of the image coordinates from a start (CP-09). Empty for fewer than five points (counted
+// likewise), a point that comes to lie behind the image, unknowns that the points do not determine, or where the
+// iterations do not settle.
 struct FittedNine {
   NineParameters image;
   double squares = 0;  // of the residuals

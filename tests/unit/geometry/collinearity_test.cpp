@@ -70,7 +70,7 @@ TEST(Collinearity, FitNeedsSixPointsThatAreNotInOnePlane) {
   const ControlScene five(camera, 5, 40, random), plane(camera, 20, 0, random, 0.5), good(camera, 8, 40, random);
   EXPECT_FALSE(fit_eleven(five.ground, five.image));
   EXPECT_FALSE(fit_eleven(plane.ground, plane.image));
-  std::vector<Eigen::Vector3d> line = good.ground, twice = good.ground, bad = good.ground;
+  std::vector<Eigen::Vector3d> line = good.ground, bad = good.ground;
   for (std::size_t i = 0; i < 8; ++i) line[i] = static_cast<double>(i) * Eigen::Vector3d(1, 2, 0.5);
   EXPECT_FALSE(fit_eleven(line, good.image));
   EXPECT_FALSE(fit_eleven(std::vector<Eigen::Vector3d>(8, Eigen::Vector3d::Ones()), good.image));
@@ -83,6 +83,25 @@ TEST(Collinearity, FitNeedsSixPointsThatAreNotInOnePlane) {
   EXPECT_FALSE(fit_nine(camera, behind, good.image));
   const std::vector<Eigen::Vector3d> four(good.ground.begin(), good.ground.begin() + 4);
   EXPECT_FALSE(fit_nine(camera, four, std::vector<Eigen::Vector2d>(good.image.begin(), good.image.begin() + 4)));
+}
+
+TEST(Collinearity, APointMeasuredTwiceCountsOnce) {
+  const NineParameters camera = tilted_image();
+  std::mt19937_64 random(64);
+  for (const double noise : {0.0, 0.5})
+    for (const double apart : {0.0, 1e-4}) {  // m, of 300 m
+      ControlScene twice(camera, 6, 40, random, noise);
+      ASSERT_TRUE(fit_eleven(twice.ground, twice.image));
+      ASSERT_TRUE(fit_nine(camera, twice.ground, twice.image));
+      const Eigen::Vector2d error = twice.image[5] - project(camera, twice.ground[5]);
+      twice.ground[5] = twice.ground[1] + apart * Eigen::Vector3d::UnitZ();
+      twice.image[5] = project(camera, twice.ground[5]) + error;
+      EXPECT_FALSE(fit_eleven(twice.ground, twice.image)) << "five points, noise " << noise << " px";
+      EXPECT_TRUE(fit_nine(camera, twice.ground, twice.image)) << "five points are enough";
+      twice.ground.erase(twice.ground.begin());
+      twice.image.erase(twice.image.begin());
+      EXPECT_FALSE(fit_nine(camera, twice.ground, twice.image)) << "four points, noise " << noise << " px";
+    }
 }
 
 TEST(Collinearity, CofactorsPredictTheErrors) {
