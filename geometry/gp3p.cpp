@@ -86,6 +86,10 @@ Solutions<Pose, 8> solve_gp3p(const Corners& origins, const Corners& directions,
                               (points[1] - points[2]).squaredNorm());
   const double area = (points[1] - points[0]).cross(points[2] - points[0]).norm();
   if (!(area > kMinTriangleArea * sides.sum())) return {};
+  // The distance by which the rig may slide would come out of rounding.
+  constexpr double kParallel = 1e-9;
+  if (!(std::max(directions[0].cross(directions[1]).norm(), directions[0].cross(directions[2]).norm()) > kParallel))
+    return {};
   const double scale = std::sqrt(sides.maxCoeff());  // lengths of about one keep the coefficients comparable
   const double spread = std::max((origins[0] - origins[1]).norm(), (origins[0] - origins[2]).norm());
   Solutions<Pose, 8> poses;

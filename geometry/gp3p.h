@@ -24,8 +24,8 @@
 namespace megablock {
 
 // `origins` [m], unit `directions`: in the rig; `points`: in the ground frame, metres, same order. Poses ground -> rig
-// with all points in front of their cameras. Rays from one centre are left to solve_p3p. Empty for points on one line
-// or where there is no solution.
+// with all points in front of their cameras. Rays from one centre are left to solve_p3p. Empty for points on one line,
+// for rays that are parallel or opposite within 1e-9, and where there is no solution.
 Solutions<Pose, 8> solve_gp3p(const std::array<Eigen::Vector3d, 3>& origins,
                               const std::array<Eigen::Vector3d, 3>& directions,
                               const std::array<Eigen::Vector3d, 3>& points);

@@ -63,7 +63,8 @@ struct AttitudeFromAxes {
   double weighted_squares = 0;
   std::int64_t redundancy = 0;
 };
-// Of two axes or more, with the covariances of all. Empty for fewer, and when all are one.
+// Of two axes or more, with the covariances of all. Empty for fewer, when all are one, where an axis has no errors (a
+// covariance of zero) and where something is not a number.
 std::optional<AttitudeFromAxes> attitude_from_axes(std::span<const SeenAxis> axes);
 
 // Pixels of the image turned by R: K R K^-1, homogeneous. With R = levelling_rotation verticals become columns.

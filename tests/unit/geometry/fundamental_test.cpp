@@ -101,10 +101,14 @@ TEST(Fundamental, NothingForBadPoints) {
   plane.plane = true;
   const PairScene flat(plane, 20, random);
   EXPECT_FALSE(fit_essential(flat.a, flat.b)) << "all in one plane";
+  const PixelScene flat_pixels(flat);
+  EXPECT_FALSE(fit_fundamental(flat_pixels.a, flat_pixels.b)) << "all in one plane";
   PairSceneOptions centre = turned();
   centre.base.setZero();
   const PairScene still(centre, 20, random);
   EXPECT_FALSE(fit_essential(still.a, still.b)) << "no base";
+  const PixelScene still_pixels(still);
+  EXPECT_FALSE(fit_fundamental(still_pixels.a, still_pixels.b)) << "no base";
   PairScene line(turned(), 0, random);
   for (int i = 0; i < 20; ++i) {
     const Eigen::Vector3d point = Eigen::Vector3d(-0.5, 0.1, 2) + 0.05 * i * Eigen::Vector3d(1, 0.3, 0.5);

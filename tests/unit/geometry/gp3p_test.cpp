@@ -83,9 +83,43 @@ TEST(Gp3p, NothingForBadPoints) {
   bad = good;
   bad.directions[2].x() = std::nan("");
   EXPECT_TRUE(solve_gp3p(bad.origins, bad.directions, bad.points).empty());
-  bad = good;
-  bad.directions[0] = -bad.directions[0];
-  EXPECT_GT(distance_to_truth(good, solve_gp3p(bad.origins, bad.directions, bad.points)), 1e-3) << "a point behind";
+}
+
+// Turned about, a ray may meet its point in another pose, but not in the true one.
+TEST(Gp3p, PointsBehindAreNotMet) {
+  std::mt19937_64 random(9);
+  std::size_t found = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Case c = make_case(random, 1);
+    c.directions[0] = -c.directions[0];
+    const Solutions<Pose, 8> poses = solve_gp3p(c.origins, c.directions, c.points);
+    found += poses.size();
+    for (const Pose& pose : poses)
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_GT((to_inside(pose, c.points[k]) - c.origins[k]).normalized().dot(c.directions[k]), 1 - 1e-9);
+    EXPECT_GT(distance_to_truth(c, poses), 1e-3);
+  }
+  EXPECT_GT(found, 0u);
+}
+
+// The rig slides along them: any distance solves the equations.
+TEST(Gp3p, RefusesParallelRays) {
+  std::mt19937_64 random(8);
+  for (int trial = 0; trial < 200; ++trial) {
+    Case c = make_case(random, 1);
+    const Eigen::Vector3d along = c.directions[0];
+    const double turned = trial % 2 ? -1 : 1;  // a camera that looks back
+    c.directions = {along, turned * along, along};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d inside = c.origins[k] + (5.0 + static_cast<double>(k)) * c.directions[k];
+      c.points[k] = c.truth.centre + c.truth.rotation.conjugate() * inside;
+    }
+    EXPECT_TRUE(solve_gp3p(c.origins, c.directions, c.points).empty()) << trial;
+    // Two of them leave the third to say where.
+    c.directions[2] = (c.directions[2] + Eigen::Vector3d(0.1, -0.2, 0.15)).normalized();
+    c.points[2] = c.truth.centre + c.truth.rotation.conjugate() * (c.origins[2] + 7 * c.directions[2]);
+    EXPECT_LT(distance_to_truth(c, solve_gp3p(c.origins, c.directions, c.points)), 1e-4) << trial;
+  }
 }
 
 TEST(Gp3p, RefusesPointsOnOneLine) {

@@ -121,5 +121,47 @@ TEST(MinimalControl, NothingForBadControl) {
       << "places on one line";
 }
 
+TEST(MinimalControl, NothingForControlThatIsNoNumberOrThereTwice) {
+  const double nan = std::nan("");
+  const Eigen::Vector3d o(0, 0, 0), x(10, 0, 1), y(0, 10, 2), z(4, 5, 9);
+  using Places = std::array<PlaceControl, 3>;
+  using Heights = std::array<HeightControl, 3>;
+  const Places places = {PlaceControl{o, {0, 0}}, PlaceControl{x, {10, 0}}, PlaceControl{y, {0, 10}}};
+  const Heights heights = {HeightControl{o, 0}, HeightControl{x, 1}, HeightControl{y, 2}};
+  const auto by_heights = [](const Places& p, const Heights& h) { return solve_minimal_control({p[0], p[1]}, h); };
+  const HeightControl one{z, 9};
+  ASSERT_FALSE(by_heights(places, heights).empty());
+  ASSERT_FALSE(solve_minimal_control(places, one).empty());
+  for (std::size_t i = 0; i < 3; ++i) {
+    Places bad = places;
+    bad[i].model.z() = nan;
+    EXPECT_EQ(by_heights(bad, heights).empty(), i < 2) << i;  // the third takes no part
+    EXPECT_TRUE(solve_minimal_control(bad, one).empty()) << i;
+    bad = places;
+    bad[i].ground.y() = nan;
+    EXPECT_EQ(by_heights(bad, heights).empty(), i < 2) << i;
+    EXPECT_TRUE(solve_minimal_control(bad, one).empty()) << i;
+    bad = places;
+    bad[i] = bad[(i + 1) % 3];
+    EXPECT_TRUE(solve_minimal_control(bad, one).empty()) << "one place twice, " << i;
+    bad[i].ground += Eigen::Vector2d(3, 1);
+    EXPECT_TRUE(solve_minimal_control(bad, one).empty()) << "with two grounds, " << i;
+    Heights bad_heights = heights;
+    bad_heights[i].model.x() = nan;
+    EXPECT_TRUE(by_heights(places, bad_heights).empty()) << i;
+    bad_heights = heights;
+    bad_heights[i].ground = nan;
+    EXPECT_TRUE(by_heights(places, bad_heights).empty()) << i;
+    bad_heights = heights;
+    bad_heights[i] = bad_heights[(i + 1) % 3];
+    EXPECT_TRUE(by_heights(places, bad_heights).empty()) << "one height twice, " << i;
+  }
+  EXPECT_TRUE(solve_minimal_control(places, {z, nan}).empty());
+  EXPECT_TRUE(solve_minimal_control(places, {Eigen::Vector3d(0, nan, 0), 9}).empty());
+  const Places one_place = {PlaceControl{o, {3, 3}}, PlaceControl{x, {3, 3}}, PlaceControl{y, {3, 3}}};
+  EXPECT_TRUE(solve_minimal_control(one_place, one).empty()) << "all at one place of the ground";
+  EXPECT_TRUE(by_heights(one_place, heights).empty()) << "all at one place of the ground";
+}
+
 }  // namespace
 }  // namespace megablock

@@ -68,11 +68,38 @@ TEST(P3p, NothingForBadPoints) {
   auto bad_rays = rays;
   bad_rays[1].z() = std::nan("");
   EXPECT_TRUE(solve_p3p(bad_rays, points).empty());
-  bad_rays = rays;
-  bad_rays[1] = -bad_rays[1];
-  for (const Pose& pose : solve_p3p(bad_rays, points))
-    EXPECT_GT(rotation_angle(pose.rotation, Eigen::Quaterniond::Identity()) + pose.centre.norm(), 1e-3)
-        << "a point behind";
+}
+
+// Turned about, a ray may meet its point in another pose, but not in the true one.
+TEST(P3p, PointsBehindAreNotMet) {
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int found = 0, found_turned = 0;
+  constexpr int kTrials = 500;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::array<Eigen::Vector3d, 3> rays, points;
+    for (std::size_t k = 0; k < 3; ++k) {
+      points[k] = {2 * uniform(random), 2 * uniform(random), 3 + 2 * uniform(random)};
+      rays[k] = points[k].normalized();
+    }
+    for (const bool turned : {false, true}) {
+      if (turned) rays[1] = -rays[1];
+      double nearest = 1e9;
+      for (const Pose& pose : solve_p3p(rays, points)) {
+        nearest = std::min(nearest, pose.centre.norm() + rotation_angle(pose.rotation, {1, 0, 0, 0}));
+        for (std::size_t k = 0; k < 3; ++k)
+          EXPECT_GT(to_inside(pose, points[k]).normalized().dot(rays[k]), 1 - 1e-9) << turned;
+        found_turned += turned;
+      }
+      if (turned) {
+        EXPECT_GT(nearest, 1e-3);
+      } else {
+        found += nearest < 1e-5;
+      }
+    }
+  }
+  EXPECT_GE(found, kTrials - kTrials / 200) << "near-degenerate triangles only";
+  EXPECT_GT(found_turned, 0);
 }
 
 // Centres on the circular cylinder over the circle through the points: two solutions coincide there. Errors grow as the

@@ -95,6 +95,33 @@ TEST(PairEstimators, FourPointsOfAPlane) {
   EXPECT_GT(found, 280);
 }
 
+TEST(PairEstimators, NothingForFourBadPoints) {
+  std::mt19937_64 random(16);
+  PairSceneOptions options;
+  options.plane = true;
+  options.rotation = rotation_exp<double>({0.1, 0.2, -0.1});
+  const PairScene scene(options, 4, random);
+  const auto a = scene.first<4>(scene.a), b = scene.first<4>(scene.b);
+  ASSERT_TRUE(solve_four_point_homography(a, b));
+  for (std::size_t i = 0; i < 4; ++i) {
+    auto bad_a = a, bad_b = b;
+    bad_a[i].y() = bad_b[i].x() = std::nan("");
+    EXPECT_FALSE(solve_four_point_homography(bad_a, b)) << i;
+    EXPECT_FALSE(solve_four_point_homography(a, bad_b)) << i;
+    const std::size_t next = (i + 1) % 4, last = (i + 3) % 4;
+    bad_a = a, bad_b = b;
+    bad_a[i] = a[next];
+    bad_b[i] = b[next];
+    EXPECT_FALSE(solve_four_point_homography(bad_a, bad_b)) << "two points are one, " << i;
+    EXPECT_FALSE(solve_four_point_homography(bad_a, b)) << "in one image, " << i;
+    EXPECT_FALSE(solve_four_point_homography(a, bad_b)) << "in one image, " << i;
+    bad_a[i] = a[next] + 0.4 * (a[last] - a[next]);
+    bad_b[i] = b[next] + 0.7 * (b[last] - b[next]);
+    EXPECT_FALSE(solve_four_point_homography(bad_a, bad_b)) << "three on one line, " << i;
+    EXPECT_FALSE(solve_four_point_homography(bad_a, b)) << "in one image, " << i;
+  }
+}
+
 TEST(PairEstimators, PointsBehindAreNoInliers) {
   std::mt19937_64 random(7);
   const PairScene scene({.base = {0.3, 0.02, 0}}, 400, random);

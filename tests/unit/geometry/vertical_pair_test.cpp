@@ -67,10 +67,24 @@ TEST(VerticalPair, NothingForBadPoints) {
   bad[2] = bad[0];
   EXPECT_TRUE(solve_vertical_pair(bad, b, kDown, kDown).empty()) << "two points are one";
   EXPECT_TRUE(solve_vertical_pair(a, a, kDown, kDown).empty()) << "no base";
-  ThreeRays behind = b;
-  behind[0] = -behind[0];
-  for (const RelativeOrientation& o : solve_vertical_pair(a, behind, kDown, kDown))
-    EXPECT_GT(rotation_error_deg(o, scene.truth) + base_error_deg(o, scene.truth), 1e-3) << "a point behind";
+}
+
+// A ray turned about keeps all equations; what is left are orientations that do see its point on it.
+TEST(VerticalPair, PointsBehindAreNotMet) {
+  std::mt19937_64 random(5);
+  std::size_t found = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const PairScene scene({}, 3, random);
+    const ThreeRays a = scene.first<3>(scene.a), b = scene.first<3>(scene.b);
+    ThreeRays behind = b;
+    behind[0] = -behind[0];
+    EXPECT_LT(nearest_error_deg(solve_vertical_pair(a, b, kDown, kDown), scene.truth), 1e-5);
+    const auto others = solve_vertical_pair(a, behind, kDown, kDown);
+    EXPECT_GT(nearest_error_deg(others, scene.truth), 1e-3);
+    for (const RelativeOrientation& o : others) EXPECT_TRUE(all_in_front(o, a, behind));
+    found += others.size();
+  }
+  EXPECT_GT(found, 0u);
 }
 
 }  // namespace

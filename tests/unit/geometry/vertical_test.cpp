@@ -170,8 +170,17 @@ TEST(AttitudeFromAxes, RefusesBadInput) {
   auto axes = Town().seen(3, random);
   EXPECT_FALSE(attitude_from_axes(std::span(axes).first(1)));
   EXPECT_FALSE(attitude_from_axes(std::vector(3, axes[0])));
-  axes[1].seen.direction.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(attitude_from_axes(axes));
+  auto bad = axes;
+  bad[1].seen.direction.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(attitude_from_axes(bad));
+  bad = axes;
+  bad[2].seen.covariance(1, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(attitude_from_axes(bad));
+  bad = axes;
+  bad[1].seen.covariance.setZero();
+  EXPECT_FALSE(attitude_from_axes(bad)) << "one without errors";
+  for (SeenAxis& axis : bad) axis.seen.covariance.setZero();
+  EXPECT_FALSE(attitude_from_axes(bad)) << "none with errors";
 }
 
 }  // namespace
