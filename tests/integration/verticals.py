@@ -124,7 +124,7 @@ def main():
             said = megablock("verticals", folder / "block.yaml", "-o", table)
             assert frames > 2 or "8 of 8 images show the vertical" in said, said
             rms, normalised = errors(folder, table)
-            assert normalised < 3, normalised
+            assert 0.3 < normalised < 3, normalised
             assert rms < (0.25 if calibrated else 0.8), rms
 
         if frames > 2:

@@ -165,7 +165,7 @@ TEST_F(AT36, ThreeImagesAndAFlightLineAreMissing) {
     keep_largest(farthest, nearest);
   }
   EXPECT_EQ(d.proposals.size(), removed.size());
-  expect_at_most(farthest / d.usual_step_m, 0.5, "from a removed image to the nearest proposal, usual steps");
+  expect_at_most(farthest / d.usual_step_m, 0.25, "from a removed image to the nearest proposal, usual steps");
 }
 
 TEST_F(AT36, GroundThatTooFewImagesSeeIsFoundWhereItIs) {

@@ -146,7 +146,7 @@ TEST(Spec, AT37ThreePointsAgainstFive) {
   expect_at_most(draws_five / kPairs, 146, "mean draws, five points");
   expect_at_most(time_three / time_five, 0.4, "time of the samples over that of five points");
   // 0.4 is asked for. Refinements, tests of models and the covariance take as long with three points.
-  expect_at_most(verified_three / verified_five, 0.85, "time of the whole verification over that of five points");
+  expect_at_most(verified_three / verified_five, 0.7, "time of the whole verification over that of five points");
   expect_at_most(wrong, 4, "of 80 runs with p = 0.99, rotations off by more than half a degree");
 }
 
@@ -325,8 +325,8 @@ TEST(Spec, AT06PlanesKeepTheirTwin) {
 
 TEST(Spec, AT07AlongTheNormalIsIllConditioned) {
   for (const double noise_px : {0.1, 0.5, 1.0}) {
-    int flagged = 0;
-    double over_sigma = 0;
+    int flagged = 0, counted = 0;
+    double over_sigma = 0, squares = 0;
     for (std::uint64_t seed = 0; seed < 50; ++seed) {
       PairSceneOptions options;
       options.plane = true;
@@ -337,11 +337,17 @@ TEST(Spec, AT07AlongTheNormalIsIllConditioned) {
       flagged += found.ill_conditioned;
       if (found.model == PairModel::kRotationOnly) continue;
       const double error = base_error_deg({found.rotation, found.translation}, truth);
-      keep_largest(over_sigma, error / degrees(found.precision.base_sigma()));
+      const double over = error / degrees(found.precision.base_sigma());
+      keep_largest(over_sigma, over);
+      squares += over * over;
+      ++counted;
     }
     const std::string name = " at " + std::to_string(noise_px).substr(0, 3) + " px";
     expect_at_most(50 - flagged, 0, "pairs of 50 without the flag" + name);
     expect_at_most(over_sigma, 3, "largest error of the base over its sigma" + name);
+    // One would be true: a sigma of pi says that nothing is known.
+    std::printf("[ reached  ] rms error of the base over its sigma%s: %.3g\n", name.c_str(),
+                std::sqrt(squares / std::max(1, counted)));
   }
   int flagged = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) flagged += two_view(half_wrong(), seed).ill_conditioned;

@@ -170,7 +170,7 @@ TEST(Spec, AT32SimilarityNearHalfTurns) {
       }
     }
   }
-  expect_at_most(largest(errors.rotation_deg), 1e-6, "largest rotation, deg");
+  expect_at_most(largest(errors.rotation_deg), 1e-9, "largest rotation, deg");
   expect_at_most(largest(errors.scale), 1e-9, "largest scale");
 }
 

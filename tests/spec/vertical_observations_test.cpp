@@ -104,10 +104,10 @@ TEST(Spec, AT34VerticalsFlattenADome) {
   const Adjusted wrong = adjusted(with_verticals(scene, 0.01, 0.1), kWrongRadial);
   print("0.01 degrees, one in ten 20 degrees off", wrong);
   EXPECT_GT(without.dome, 1) << "the strip must dome without them";
-  expect_at_most(seen.dome / without.dome, 1.0 / 3, "dome with verticals of 0.01 deg over that without");
+  expect_at_most(seen.dome / without.dome, 0.03, "dome with verticals of 0.01 deg over that without");
   expect_at_most(imu.iterations, without.iterations, "iterations with verticals of 0.5 deg");
   expect_at_most(seen.iterations, without.iterations, "iterations with verticals of 0.01 deg");
-  expect_at_most(wrong.dome / without.dome, 1.0 / 3, "dome with one vertical in ten 20 degrees off");
+  expect_at_most(wrong.dome / without.dome, 0.05, "dome with one vertical in ten 20 degrees off");
   expect_at_most(wrong.iterations, without.iterations, "iterations with one vertical in ten 20 degrees off");
   expect_at_least(wrong.wrong_verticals, 10, "wrong verticals of 200");
   expect_at_most(wrong.wrong_weight, 0.01, "largest weight of a wrong vertical");
