@@ -48,6 +48,9 @@ Plane plane_of_most(const std::vector<Eigen::Vector3d>& points) {
 StripCheck check_strip(const std::vector<Eigen::Vector3d>& centres) {
   StripCheck check;
   if (centres.size() < 3) return check;
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& c : centres)
+    if (!c.allFinite()) return {kInfinite, kInfinite};
   const auto count = static_cast<double>(centres.size());
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& c : centres) mean += c / count;
@@ -61,7 +64,7 @@ StripCheck check_strip(const std::vector<Eigen::Vector3d>& centres) {
     farthest = std::max(farthest, (c - mean - along.back() * direction).norm());
   }
   const double spacing = (along.back() - along.front()) / (count - 1);
-  if (spacing == 0) return {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  if (spacing == 0) return {kInfinite, kInfinite};
   check.off_line = farthest / std::abs(spacing);
   for (std::size_t i = 1; i < along.size(); ++i)
     check.uneven = std::max(check.uneven, std::abs((along[i] - along[i - 1]) / spacing - 1));

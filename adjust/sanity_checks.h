@@ -7,7 +7,8 @@
 
 namespace megablock {
 
-// Centres in the order of their acquisition, three or more (fewer: nothing to check, all zero).
+// Centres in the order of their acquisition, three or more (fewer: nothing to check, all zero). Infinite where one is
+// not finite, or all are one.
 struct StripCheck {
   static constexpr double kLimit = 0.05;  // of the mean spacing
   double off_line = 0;                    // largest distance from their line, over the mean spacing

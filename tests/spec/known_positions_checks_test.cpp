@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "adjust/sanity_checks.h"
 #include "adjust/subset_check.h"
+#include "io/error.h"
 #include "known_positions_scene.h"
 #include "merge/tile_solver.h"
 #include "reached.h"
@@ -124,6 +127,23 @@ TEST(KnownPositions, TKP14PointSubsetsAgreeAndSayWhatTheyShare) {
     }
     expect_at_most(error, 3 * check.rotation_sigma_rad(), what + "true error of the attitudes, rad");
   }
+}
+
+TEST(KnownPositions, PointSubsetsThatMakeNoCheckAreRefused) {
+  const KnownPositionsScene scene(KnownPositionsOptions::satellite(60, 0.1, 14));
+  SingleTile tile(scene.block(), adjustment_of(scene));
+  triangulate_points(tile.problem, tile.state, tile.options);
+  const MotionReference motion = motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
+  const auto check = [&](std::int64_t reference, int subsets) {
+    return check_point_subsets(tile.problem, tile.state, reference, subsets, motion, solve_by_condensation);
+  };
+  EXPECT_EQ(check(0, 2).subsets, 2);
+  for (const int subsets : {1, 0, -1}) EXPECT_THROW(check(0, subsets), InputError) << subsets;
+  for (const std::int64_t reference : {std::int64_t{-1}, tile.problem.point_count()})
+    EXPECT_THROW(check(reference, 2), InputError) << reference;
+  const auto first = tile.problem.kept.begin() + tile.problem.begin[0];
+  std::fill(first, tile.problem.kept.begin() + tile.problem.begin[1], 0);
+  EXPECT_THROW(check(0, 2), InputError) << "a point that nothing measures any more";
 }
 
 // Over many scenes the mean squared error is the mean of the stated squared sigmas. Three rotations in common for the

@@ -26,5 +26,21 @@ TEST(SanityChecks, PointsThatAreNotFiniteAreLeftOut) {
   EXPECT_EQ(check_one_level(none).separation, 0);
 }
 
+TEST(SanityChecks, CentresThatAreNotFiniteMakeNoStrip) {
+  std::vector<Eigen::Vector3d> strip;
+  for (int i = 0; i < 6; ++i) strip.emplace_back(100.0 * i, 50.0 * i, 500);
+  ASSERT_TRUE(check_strip(strip).sound());
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    for (std::size_t i = 0; i < strip.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        auto centres = strip;
+        centres[i][axis] = bad;
+        const StripCheck check = check_strip(centres);
+        EXPECT_FALSE(check.sound());
+        EXPECT_GT(check.off_line, 1e9) << "no number, of which a report could make nothing";
+        EXPECT_GT(check.uneven, 1e9);
+      }
+}
+
 }  // namespace
 }  // namespace megablock
