@@ -132,7 +132,7 @@ void add_prior_options(SimulateOptions& s) {
   s.add("--relative-rotation-sigma", &O::relative_rotation_sigma_deg, "Relative poses, degrees [0.01]");
   s.add("--start-offset", &O::start_offset_m,
         "Start from the integrated relative poses, every stretch of them off by up to this, m; 0 = other start [0]");
-  s.add("--start-chain", &O::start_chain_frames, "Length of these stretches, frames [250]");
+  s.add("--start-chain", &O::start_chain_frames, "Length of these stretches, frames; 0: whole passes [0]");
   s.add("--control-points", &O::control_points, "Control points [0; target-field 154]");
   s.add("--check-points", &O::check_points, "Check points [0; target-field 77]");
   s.add("--control-zones", &O::control_zones, "Stereopolis: crossings with 8 to 40 control and check points [0]");

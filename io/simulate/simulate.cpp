@@ -126,7 +126,8 @@ void SimulationOptions::check() const {
       start_offset_m == 0 || (relative_position_sigma_m > 0 && scene != Scene::kStereopolis),
       "start_offset_m (--start-offset) needs relative poses to integrate (--relative-position-sigma) and another scene "
       "than stereopolis");
-  require_option(start_chain_frames >= 2, "start_chain_frames (--start-chain) must be at least 2");
+  require_option(start_chain_frames == 0 || start_chain_frames >= 2,
+                 "start_chain_frames (--start-chain) must be at least 2, or 0 for whole passes");
   require_option(control_points >= 0, "control_points must not be negative");
   require_option(check_points >= 0, "check_points must not be negative");
   require_option(control_sigma_m > 0, "control_sigma_m must be positive");

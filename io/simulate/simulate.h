@@ -59,10 +59,10 @@ struct SimulationOptions {
   double attitude_sigma_deg = 0;  // <= 0: no attitude priors
   double relative_position_sigma_m = 0, relative_rotation_sigma_deg = 0.01;  // successive frames; <= 0: none
   double start_position_error_m = 1, start_rotation_error_deg = 1;           // of given poses; < 0: no given poses
-  // > 0, with relative poses: given poses are these, integrated over stretches of start_chain_frames successive frames
-  // from the true first one, and every stretch is off by one vector of up to this length, m.
+  // > 0, with relative poses: given poses are these, integrated from the true first one over a whole pass, or over
+  // stretches of start_chain_frames successive frames, and each is off by one vector of up to this length, m.
   double start_offset_m = 0;
-  int start_chain_frames = 250;
+  int start_chain_frames = 0;  // 0: whole passes
   int control_points = 0, check_points = 0;
   double control_sigma_m = 0.01;
   // Camera truth and what the block says of it.

@@ -126,12 +126,12 @@ double rms(const std::vector<Eigen::Vector3d>& normalised) {
   return std::sqrt(sum / static_cast<double>(normalised.size()));
 }
 
-TEST_P(SimulateTest, GivenPosesAreTheIntegratedRelativePosesWithOffsets) {
-  SimulationOptions options = GetParam();
+// `chain`: frames of a stretch; 0: whole passes.
+void expect_integrated_start(SimulationOptions options, int chain) {
   options.relative_position_sigma_m = 0.02;
   const SimulatedBlock before = simulate_block(options);
   options.start_offset_m = 2;
-  options.start_chain_frames = 12;
+  options.start_chain_frames = chain;
   const SimulatedBlock s = simulate_block(options);
   const auto start = [&](FrameIndex f) { return *s.block.frames[f].given_pose; };
   std::map<FrameIndex, const RelativePose*> relative_to;
@@ -143,7 +143,7 @@ TEST_P(SimulateTest, GivenPosesAreTheIntegratedRelativePosesWithOffsets) {
   int length = 0;
   for (FrameIndex f(0); s.block.frames.contains(f); ++f.value, ++length) {
     const auto linked = relative_to.find(f);
-    if (linked != relative_to.end() && length < 12) {
+    if (linked != relative_to.end() && (chain == 0 || length < chain)) {
       const Pose a = start(linked->second->from), b = start(f), &r = linked->second->pose;
       ASSERT_LT((a.rotation * (b.centre - a.centre) - r.centre).norm(), 1e-9);
       ASSERT_LT((a.rotation.conjugate() * r.rotation.conjugate() * b.rotation).vec().norm(), 1e-9);
@@ -155,6 +155,11 @@ TEST_P(SimulateTest, GivenPosesAreTheIntegratedRelativePosesWithOffsets) {
     EXPECT_GT(offset, 0);
     EXPECT_EQ(start(f).rotation.coeffs(), s.truth.frames[f].rotation.coeffs());
   }
+}
+
+TEST_P(SimulateTest, GivenPosesAreTheIntegratedRelativePosesWithOffsets) {
+  expect_integrated_start(GetParam(), 12);
+  expect_integrated_start(GetParam(), 0);
 }
 
 TEST_P(SimulateTest, PriorsHaveTheStatedNoise) {
