@@ -2,7 +2,7 @@
 //
 // street: grid of 100 m, every street driven twice, a frame of ten cameras each 4 m, 1 000 observations per frame, five
 // per point, 0.5 px; position priors of 0.5 m on half of the frames, relative poses of 1 cm and 0.01 degrees;
-// calibration held; start = these integrated over each pass, off by up to 2 m at its start. aerial: 80 % and 60 %
+// calibration held; start = these integrated over stretches of 1 km, each off by up to 2 m. aerial: 80 % and 60 %
 // overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated.
 //
 // Of a street with shared calibration all eight intrinsics of every camera are free, and of all mounts but the first
@@ -101,7 +101,7 @@ inline void simulate_scene(const SceneOptions& options, const std::filesystem::p
   }
   const bool street = options.scene == "street";
   std::string scene = street ? "--scene street --rig-cameras 10 --points-per-frame 1000 --relative-position-sigma 0.01 "
-                               "--relative-rotation-sigma 0.01 --start-offset 2"
+                               "--relative-rotation-sigma 0.01 --start-offset 2 --start-chain 250"
                              : "--scene aerial --points-per-frame 300";
   if (options.free)
     scene += " --gps-sigma 0";
