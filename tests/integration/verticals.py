@@ -124,7 +124,8 @@ def main():
             said = megablock("verticals", folder / "block.yaml", "-o", table)
             assert frames > 2 or "8 of 8 images show the vertical" in said, said
             rms, normalised = errors(folder, table)
-            assert 0.3 < normalised < 3, normalised
+            # The sigma of an unknown lens is far larger than what it does to most pictures.
+            assert (0.3 if calibrated else 0) < normalised < 3, normalised
             assert rms < (0.25 if calibrated else 0.8), rms
 
         if frames > 2:
