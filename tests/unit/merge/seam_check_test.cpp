@@ -280,6 +280,57 @@ SimulationOptions dense_street() {
   return options;
 }
 
+// Frames that other tiles have as well.
+std::vector<std::uint8_t> shared_frames(const TiledBlock& block, std::size_t tile) {
+  std::vector<std::uint8_t> shared;
+  for (const FrameIndex frame : block.problems[tile].frames) {
+    const auto has = [&](const TileProblem& problem) { return std::ranges::binary_search(problem.frames, frame); };
+    shared.push_back(std::ranges::count_if(block.problems, has) > 1);
+  }
+  return shared;
+}
+
+// Doubles the noise of the points that no frame of another tile sees, which say little to a seam; the share of the
+// observations that these have.
+double double_noise_inside(const TiledBlock& block, std::size_t tile, double noise_px, TileProblem& problem) {
+  const std::vector<std::uint8_t> shared = shared_frames(block, tile);
+  std::mt19937_64 random(tile + 1);
+  std::normal_distribution<double> noise(0, std::sqrt(3) * noise_px);
+  std::int64_t inside = 0;
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    const auto first = problem.image.begin() + problem.begin[p], end = problem.image.begin() + problem.begin[p + 1];
+    if (std::any_of(first, end, [&](LocalImage i) { return shared[problem.images[i.value].frame.value]; })) continue;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row, ++inside)
+      problem.x[row] += noise(random), problem.y[row] += noise(random);
+  }
+  return static_cast<double>(inside) / static_cast<double>(problem.observation_count());
+}
+
+TEST(SeamCheck, NamesOneTileOfTenWithDoubledNoiseThoughItsSeamsAgree) {
+  SimulationOptions options = dense_street();
+  options.frames = 900;
+  options.points_per_frame = 60;
+  const TiledBlock block(simulate_block(options), 100, {}, 0.02);
+  ASSERT_GE(block.tiles.tile_count, 10);
+  int tried = 0;
+  for (std::size_t wrong = 0; wrong < block.problems.size(); ++wrong) {
+    std::vector<TileProblem> problems = block.problems;
+    if (double_noise_inside(block, wrong, options.image_noise_px, problems[wrong]) < 0.5) continue;
+    ++tried;
+    const auto runner = adjusted_as_a_job(block, problems);
+    const std::vector<TileCheck> checks = runner->tile_checks();
+    EXPECT_TRUE(describe_seams(block.tiles.tree, runner->seams(), checks).empty()) << "tile " << wrong;
+    const std::vector<NoisyTile> noisy = noisy_tiles(checks);
+    ASSERT_EQ(noisy.size(), 1u) << "tile " << wrong;
+    EXPECT_EQ(noisy[0].tile, static_cast<std::int64_t>(wrong));
+    EXPECT_GT(std::sqrt(noisy[0].ratio), 1.4);
+    EXPECT_LT(std::sqrt(noisy[0].ratio), 2.1);
+    const std::vector<std::string> lines = describe_disagreements(checks);
+    EXPECT_EQ(lines[0].find("tile " + std::to_string(wrong) + " disagrees with itself"), 0u) << lines[0];
+  }
+  EXPECT_GE(tried, 5);
+}
+
 // The first line names the tile that is wrong, alone or with another one; whether alone.
 bool expect_named(const TiledBlock& block, const std::vector<TileProblem>& problems, std::size_t wrong,
                   const std::vector<TileState>& states) {
