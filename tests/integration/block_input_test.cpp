@@ -112,47 +112,45 @@ TEST_F(BlockInput, SoundBlock) {
   EXPECT_LT(error_m(s, result, 0, 60), kGood);
 }
 
-// All tie points of one tile's images are noise: what is kept of them agrees by chance, and the tile is named where the
-// merge converges. With some noise it does not, and its neighbour may be named (docs/benchmarks.md, "Not reached").
+// All tie points of one tile's images are noise: what is kept of them agrees by chance, and the tile is named, whether
+// the merge converges or not.
 TEST_F(BlockInput, TileWithoutOneGoodObservation) {
-  SimulatedBlock s = simulate_block(aerial(60));
-  const BlockResult sound = adjust(s);
+  const SimulatedBlock good = simulate_block(aerial(60));
+  const BlockResult sound = adjust(good);
   const TileIndex wrong = sound.tiles.tile_of_frame[FrameIndex(0)];
-  std::mt19937_64 random(1);
-  std::uniform_int_distribution<std::int32_t> x(0, 1920 * 1024 - 1), y(0, 1280 * 1024 - 1);
-  std::size_t in_tile = 0;
-  for (std::size_t o = 0; o < s.tracks.image.size(); ++o) {
-    const FrameIndex frame = s.block.images[s.tracks.image[o]].frame;
-    if (sound.tiles.tile_of_frame[frame] != wrong) continue;
-    s.tracks.x[o] = x(random), s.tracks.y[o] = y(random);
-    ++in_tile;
-  }
-  ASSERT_GT(in_tile, 500u);
-  // Points of noise alone may keep the adjustment from coming to an end, and then it says so.
-  folder_.write(s, kTiles);
-  const int code = folder_.run();
-  const BlockResult result = read_result(folder_.job("result/block.h5"));
-  EXPECT_EQ(code, said(result).find("did not converge") == std::string::npos ? kExitDone : kExitFailedUnits);
-  EXPECT_THAT(said(result), HasSubstr("tile " + std::to_string(wrong.value) + " disagrees most with the rest"));
-  for (FrameIndex f(0); f.value < 60; ++f.value) {
-    ASSERT_TRUE(result.state.frames[f].centre.allFinite());
-    ASSERT_TRUE(result.frame_covariance[f].allFinite());
-  }
-  // Frames that share no track with it are as good as ever.
-  std::vector<bool> touched(60, false);
-  for (std::int64_t t = 0; t < s.tracks.track_count(); ++t) {
-    const auto first = s.tracks.image.begin() + s.tracks.begin[t], end = s.tracks.image.begin() + s.tracks.begin[t + 1];
-    const auto in_wrong = [&](ImageIndex i) { return sound.tiles.tile_of_frame[s.block.images[i].frame] == wrong; };
+  const auto in_wrong = [&](ImageIndex i) { return sound.tiles.tile_of_frame[good.block.images[i].frame] == wrong; };
+  std::vector<bool> touched(60, false);  // frames that share a track with it
+  for (std::int64_t t = 0; t < good.tracks.track_count(); ++t) {
+    const auto first = good.tracks.image.begin() + good.tracks.begin[t],
+               end = good.tracks.image.begin() + good.tracks.begin[t + 1];
     if (std::any_of(first, end, in_wrong))
-      for (auto i = first; i != end; ++i) touched[static_cast<std::size_t>(s.block.images[*i].frame.value)] = true;
+      for (auto i = first; i != end; ++i) touched[static_cast<std::size_t>(good.block.images[*i].frame.value)] = true;
   }
-  int others = 0;
-  for (std::size_t f = 0; f < 60; ++f) {
-    if (touched[f]) continue;
-    EXPECT_LT(error_m(s, result, f, f + 1), 3 * kGood) << f;
-    ++others;
+  ASSERT_LT(std::ranges::count(touched, true), 50);
+  ASSERT_GT(std::ranges::count_if(good.tracks.image, in_wrong), 500);
+
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    SimulatedBlock s = good;
+    std::mt19937_64 random(seed);
+    std::uniform_int_distribution<std::int32_t> x(0, 1920 * 1024 - 1), y(0, 1280 * 1024 - 1);
+    for (std::size_t o = 0; o < s.tracks.image.size(); ++o)
+      if (in_wrong(s.tracks.image[o])) s.tracks.x[o] = x(random), s.tracks.y[o] = y(random);
+    // Points of noise alone may keep the adjustment from coming to an end, and then it says so.
+    folder_.write(s, kTiles);
+    const int code = folder_.run();
+    const BlockResult result = read_result(folder_.job("result/block.h5"));
+    EXPECT_EQ(code, said(result).find("did not converge") == std::string::npos ? kExitDone : kExitFailedUnits) << seed;
+    EXPECT_THAT(said(result), HasSubstr("tile " + std::to_string(wrong.value) + " disagrees most with the rest"))
+        << seed;
+    for (FrameIndex f(0); f.value < 60; ++f.value) {
+      ASSERT_TRUE(result.state.frames[f].centre.allFinite()) << seed;
+      ASSERT_TRUE(result.frame_covariance[f].allFinite()) << seed;
+    }
+    for (std::size_t f = 0; f < 60; ++f) {
+      if (touched[f]) continue;
+      EXPECT_LT(error_m(s, result, f, f + 1), 3 * kGood) << f << ", " << seed;  // as good as ever
+    }
   }
-  EXPECT_GT(others, 10);
 }
 
 // No tie point reaches fifteen of the images.
