@@ -7,7 +7,7 @@
 // its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of a rank,
 // but for the summary that is printed at the end; stage_peak_rss_mib: that of each stage, of the merge without its
 // result. Of the last round of the merge: leaf_seconds_per_image, work on tiles (leaves) of one pass up and down, of
-// both ranks; front_seconds_per_iteration, work on the fronts above them, in the mean of the ranks; peak_front_mib,
+// all ranks; front_seconds_per_iteration, work on the fronts above them, in the mean of the ranks; peak_front_mib,
 // what fronts and updates at work took of a rank at most; steps_tried: accepted ones, refused ones and those that
 // confirm. seam_alarms: lines of the result that say that tiles disagree. What --folder holds is not simulated again.
 // image_sigma_px: that of the tie points, which the job estimates, so that chi2_per_dof
