@@ -9,7 +9,7 @@
 namespace megablock {
 namespace {
 
-constexpr double kLimit = 4e-3;  // rad, noise 1e-3
+constexpr double kSightLimit = 4e-3;  // rad, noise 1e-3
 
 struct SightScene {
   Pose truth;
@@ -47,7 +47,7 @@ TEST(ResectionEstimator, FindsThePoseAmongWrongSights) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       const SightScene scene(cameras, 200, 0.6, seed);
       const ResectionEstimator estimator(scene.sights);
-      const auto found = ransac(estimator, {.threshold = kLimit, .max_draws = 500, .seed = seed});
+      const auto found = ransac(estimator, {.threshold = kSightLimit, .max_draws = 500, .seed = seed});
       ASSERT_TRUE(found);
       EXPECT_NEAR(found->consensus.count, 80, 25);
       EXPECT_LT((found->model.centre - scene.truth.centre).norm(), 0.1);
@@ -74,7 +74,7 @@ TEST(ResectionEstimator, AdjustmentEndsInAMinimum) {
 
 TEST(ResectionEstimator, BadInput) {
   const auto count = [](const std::vector<RaySight>& sights) {
-    const auto found = ransac(ResectionEstimator(sights), {.threshold = kLimit, .max_draws = 200, .seed = 1});
+    const auto found = ransac(ResectionEstimator(sights), {.threshold = kSightLimit, .max_draws = 200, .seed = 1});
     return found ? found->consensus.count : 0;
   };
   EXPECT_EQ(count({}), 0);
@@ -91,7 +91,7 @@ TEST(ResectionEstimator, BadInput) {
     scene.sights[5 * i].point.x() = std::numeric_limits<double>::quiet_NaN();
     scene.sights[5 * i + 1].direction *= -1;
   }
-  const auto found = ransac(ResectionEstimator(scene.sights), {.threshold = kLimit, .max_draws = 500, .seed = 1});
+  const auto found = ransac(ResectionEstimator(scene.sights), {.threshold = kSightLimit, .max_draws = 500, .seed = 1});
   ASSERT_TRUE(found);
   EXPECT_LT((found->model.centre - scene.truth.centre).norm(), 0.1);
   for (std::size_t i = 0; i < 40; ++i) {
