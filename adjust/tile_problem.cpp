@@ -81,12 +81,8 @@ std::int32_t row_of(const std::vector<Value>& table, const Value& value) {
 class TileBuilder {
  public:
   TileBuilder(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile, const TrackSet& owned,
-              const ObservationOptions& options, const std::vector<std::int32_t>& verticals)
-      : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options) {
-    for (const std::int32_t row : verticals)
-      if (const SeenVertical& vertical = block.verticals[static_cast<std::size_t>(row)]; oriented(vertical.image))
-        verticals_.push_back(&vertical);
-  }
+              const ObservationOptions& options, const RowsOfTile& rows)
+      : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options), rows_(rows) {}
 
   TileProblem build() {
     problem_.image_sigma_px = options_.image_sigma_px;
@@ -98,8 +94,6 @@ class TileBuilder {
     problem_.vertical_loss = options_.vertical_loss;
     lines_ = line_terms(block_, state_, tiles_, tile_);
     select_control_points();
-    select_relative_poses();
-    select_prior_owners();
     make_tables();
     for (std::int64_t t = 0; t < owned_.track_count(); ++t) add_track(t);
     for (std::int64_t row : control_points_) add_control_point(row);
@@ -134,46 +128,9 @@ class TileBuilder {
     }
   }
 
-  void select_relative_poses() {
-    for (std::size_t row = 0; row < block_.relative_poses.size(); ++row) {
-      const RelativePose& relative = block_.relative_poses[row];
-      if (!oriented(relative.from) || !oriented(relative.to)) continue;
-      if (owner_tile(tiles_, relative.from, relative.to) == tile_) relative_poses_.push_back(row);
-    }
-  }
-
-  // The priors of a camera and of a mount belong to the tile of the first oriented image that uses it.
-  void select_prior_owners() {
-    IndexedVector<CameraIndex, std::uint8_t> camera_seen(block_.cameras.size(), 0);
-    std::vector<std::vector<std::uint8_t>> mount_seen;
-    std::size_t open = block_.cameras.size();
-    for (const Rig& rig : block_.rigs) {
-      mount_seen.emplace_back(rig.mounts.size(), 0);
-      open += rig.mounts.size();
-    }
-    for (std::size_t i = 0; i < block_.images.size() && open > 0; ++i) {
-      const ImageIndex image(static_cast<std::int64_t>(i));
-      const TileIndex home = tiles_.tile_of_frame[block_.images[image].frame];
-      if (!oriented(image) || !home.valid()) continue;
-      const MountId id = mount_of(image);
-      auto& mount_flag = mount_seen[static_cast<std::size_t>(id.rig.value)][static_cast<std::size_t>(id.mount)];
-      if (mount_flag) continue;  // then its camera has been seen as well
-      mount_flag = 1;
-      --open;
-      if (home == tile_) prior_mounts_.push_back(id);
-      const CameraIndex camera = mount(id).camera;
-      if (camera_seen[camera]) continue;
-      camera_seen[camera] = 1;
-      --open;
-      if (home == tile_) prior_cameras_.push_back(camera);
-    }
-    make_distinct(prior_cameras_);
-    make_distinct(prior_mounts_);
-  }
-
   void make_tables() {
     std::vector<ImageIndex> images(owned_.image);
-    for (const SeenVertical* vertical : verticals_) images.push_back(vertical->image);
+    for (const std::size_t row : rows_.verticals) images.push_back(block_.verticals[row].image);
     for (std::int64_t row : control_points_)
       for (const ImageMeasurement& m : block_.control_points[static_cast<std::size_t>(row)].measurements)
         images.push_back(m.image);
@@ -181,19 +138,16 @@ class TileBuilder {
     std::erase_if(images, [&](ImageIndex image) { return !oriented(image); });
 
     std::vector<FrameIndex>& frames = problem_.frames;
-    problem_.cameras = prior_cameras_;
-    problem_.mounts = prior_mounts_;
+    problem_.cameras = rows_.cameras;
+    problem_.mounts = rows_.mounts;
     for (ImageIndex image : images) {
       frames.push_back(block_.images[image].frame);
       problem_.mounts.push_back(mount_of(image));
       problem_.cameras.push_back(block_.camera_of(image));
     }
-    for (std::size_t f = 0; f < block_.frames.size(); ++f) {
-      const FrameIndex frame(static_cast<std::int64_t>(f));
-      if (tiles_.tile_of_frame[frame] == tile_ && oriented(frame) && has_prior(block_.frames[frame]))
-        frames.push_back(frame);
-    }
-    for (std::size_t row : relative_poses_) {
+    for (const FrameIndex frame : rows_.frames)
+      if (has_prior(block_.frames[frame])) frames.push_back(frame);
+    for (std::size_t row : rows_.relative_poses) {
       frames.push_back(block_.relative_poses[row].from);
       frames.push_back(block_.relative_poses[row].to);
     }
@@ -276,7 +230,7 @@ class TileBuilder {
   }
 
   void add_relative_poses() {
-    for (std::size_t row : relative_poses_) {
+    for (std::size_t row : rows_.relative_poses) {
       const RelativePose& relative = block_.relative_poses[row];
       problem_.relatives.push_back({LocalFrame(row_of(problem_.frames, relative.from)),
                                     LocalFrame(row_of(problem_.frames, relative.to)), relative.pose,
@@ -293,17 +247,18 @@ class TileBuilder {
   }
 
   void add_verticals() {
-    if (verticals_.empty()) return;
+    if (rows_.verticals.empty()) return;
     const GroundVertical ground(block_.ground);
-    for (const SeenVertical* vertical : verticals_) {
-      const Pose& frame = state_.frames[block_.images[vertical->image].frame];
-      problem_.verticals.push_back(vertical_term(*vertical, ground, frame.centre));
-      problem_.verticals.back().image = LocalImage(row_of(image_table_, vertical->image));
+    for (const std::size_t row : rows_.verticals) {
+      const SeenVertical& vertical = block_.verticals[row];
+      const Pose& frame = state_.frames[block_.images[vertical.image].frame];
+      problem_.verticals.push_back(vertical_term(vertical, ground, frame.centre));
+      problem_.verticals.back().image = LocalImage(row_of(image_table_, vertical.image));
     }
   }
 
   void add_camera_priors() {
-    for (CameraIndex index : prior_cameras_) {
+    for (CameraIndex index : rows_.cameras) {
       const Camera& camera = block_.cameras[index];
       const bool any = std::any_of(camera.prior_sigma.begin(), camera.prior_sigma.end(),
                                    [](double sigma) { return sigma > 0 && std::isfinite(sigma); });
@@ -314,7 +269,7 @@ class TileBuilder {
   }
 
   void add_mount_priors() {
-    for (const MountId& id : prior_mounts_) {
+    for (const MountId& id : rows_.mounts) {
       const Mount& m = mount(id);
       if (m.held() || (std::isinf(m.rotation_sigma_rad) && std::isinf(m.position_sigma_m))) continue;
       problem_.mount_priors.push_back({row_of(problem_.mounts, id), m.pose,
@@ -329,13 +284,10 @@ class TileBuilder {
   const TileIndex tile_;
   const TrackSet& owned_;
   const ObservationOptions& options_;
+  const RowsOfTile& rows_;
   TileProblem problem_;
   std::vector<std::int64_t> control_points_;
-  std::vector<std::size_t> relative_poses_;
   std::vector<BlockLineTerm> lines_;
-  std::vector<const SeenVertical*> verticals_;
-  std::vector<CameraIndex> prior_cameras_;
-  std::vector<MountId> prior_mounts_;
   std::vector<ImageIndex> image_table_;
 };
 
@@ -357,26 +309,75 @@ Tiles single_tile(const Block& block) {
 }
 
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
-                              const TrackSet& owned, const ObservationOptions& options,
-                              const VerticalsOfTiles& verticals) {
+                              const TrackSet& owned, const ObservationOptions& options, const RowsOfTile& rows) {
   check_sizes(block, state, tiles);
   options.check();
-  return TileBuilder(block, state, tiles, tile, owned, options, verticals.at(static_cast<std::size_t>(tile.value)))
-      .build();
+  return TileBuilder(block, state, tiles, tile, owned, options, rows).build();
 }
 
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options) {
-  check_sizes(block, state, tiles);
-  return make_tile_problem(block, state, tiles, tile, owned, options, verticals_of_tiles(block, tiles));
+  const RowsOfTiles rows = rows_of_tiles(block, state, tiles);
+  return make_tile_problem(block, state, tiles, tile, owned, options, rows.at(static_cast<std::size_t>(tile.value)));
 }
 
-VerticalsOfTiles verticals_of_tiles(const Block& block, const Tiles& tiles) {
-  VerticalsOfTiles rows(static_cast<std::size_t>(tiles.tile_count));
-  for (std::size_t row = 0; row < block.verticals.size(); ++row) {
-    const TileIndex tile = tiles.tile_of_frame[block.images[block.verticals[row].image].frame];
-    if (tile.valid()) rows[static_cast<std::size_t>(tile.value)].push_back(static_cast<std::int32_t>(row));
+namespace {
+
+// The priors of a camera and of a mount belong to the tile of the first oriented image that uses it.
+void find_first_users(const Block& block, const BlockState& state, const Tiles& tiles, RowsOfTiles& rows) {
+  IndexedVector<CameraIndex, std::uint8_t> camera_seen(block.cameras.size(), 0);
+  std::vector<std::vector<std::uint8_t>> mount_seen;
+  std::size_t open = block.cameras.size();
+  for (const Rig& rig : block.rigs) {
+    mount_seen.emplace_back(rig.mounts.size(), 0);
+    open += rig.mounts.size();
   }
+  for (ImageIndex image(0); block.images.contains(image) && open > 0; ++image.value) {
+    const FrameIndex frame = block.images[image].frame;
+    const TileIndex home = tiles.tile_of_frame[frame];
+    if (!state.oriented[frame] || !home.valid()) continue;
+    const MountId id{block.frames[frame].rig, block.images[image].mount};
+    auto& mount_flag = mount_seen[static_cast<std::size_t>(id.rig.value)][static_cast<std::size_t>(id.mount)];
+    if (mount_flag) continue;  // then its camera has been seen as well
+    mount_flag = 1;
+    --open;
+    RowsOfTile& tile = rows[static_cast<std::size_t>(home.value)];
+    tile.mounts.push_back(id);
+    const CameraIndex camera = block.camera_of(image);
+    if (camera_seen[camera]) continue;
+    camera_seen[camera] = 1;
+    --open;
+    tile.cameras.push_back(camera);
+  }
+  for (RowsOfTile& tile : rows) {
+    make_distinct(tile.cameras);
+    make_distinct(tile.mounts);
+  }
+}
+
+}  // namespace
+
+RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles) {
+  check_sizes(block, state, tiles);
+  RowsOfTiles rows(static_cast<std::size_t>(tiles.tile_count));
+  for (FrameIndex frame(0); block.frames.contains(frame); ++frame.value) {
+    const TileIndex tile = tiles.tile_of_frame[frame];
+    const bool prior = block.frames[frame].position_prior || block.frames[frame].attitude_prior;
+    if (tile.valid() && state.oriented[frame] && prior)
+      rows[static_cast<std::size_t>(tile.value)].frames.push_back(frame);
+  }
+  for (std::size_t row = 0; row < block.relative_poses.size(); ++row) {
+    const RelativePose& relative = block.relative_poses[row];
+    if (!state.oriented[relative.from] || !state.oriented[relative.to]) continue;
+    const TileIndex tile = owner_tile(tiles, relative.from, relative.to);
+    if (tile.valid()) rows[static_cast<std::size_t>(tile.value)].relative_poses.push_back(row);
+  }
+  for (std::size_t row = 0; row < block.verticals.size(); ++row) {
+    const FrameIndex frame = block.images[block.verticals[row].image].frame;
+    const TileIndex tile = tiles.tile_of_frame[frame];
+    if (tile.valid() && state.oriented[frame]) rows[static_cast<std::size_t>(tile.value)].verticals.push_back(row);
+  }
+  find_first_users(block, state, tiles, rows);
   return rows;
 }
 

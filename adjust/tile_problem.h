@@ -190,13 +190,20 @@ Tiles single_tile(const Block& block);
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options);
 
-// Rows of Block::verticals in each tile, found in one pass over them for all tiles.
-using VerticalsOfTiles = std::vector<std::vector<std::int32_t>>;  // [tiles], ascending
-VerticalsOfTiles verticals_of_tiles(const Block& block, const Tiles& tiles);
-// The same problem; `verticals` of the same block and tiles.
+// What the block's tables hold of each tile, found in one pass over them for all tiles: a tile then asks for its own
+// rows alone, however large the block is.
+struct RowsOfTile {
+  std::vector<FrameIndex> frames;           // oriented and with a prior of any kind, ascending
+  std::vector<std::size_t> relative_poses;  // that the tile owns, between oriented frames, ascending
+  std::vector<std::size_t> verticals;       // of oriented images, ascending
+  std::vector<CameraIndex> cameras;         // whose first oriented image lies in the tile, ascending
+  std::vector<MountId> mounts;              // the same
+};
+using RowsOfTiles = std::vector<RowsOfTile>;  // [tiles]
+RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles);
+// The same problem; `rows` of the tile, by the same block, state and tiles.
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
-                              const TrackSet& owned, const ObservationOptions& options,
-                              const VerticalsOfTiles& verticals);
+                              const TrackSet& owned, const ObservationOptions& options, const RowsOfTile& rows);
 
 // Whether a held mount and one of a lower row of its rig stand at different places: they give the scale of the ground.
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount);

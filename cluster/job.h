@@ -8,6 +8,7 @@
 
 #include "cluster/communicator.h"
 #include "cluster/job_options.h"
+#include "cluster/paged_tables.h"
 #include "cluster/process_memory.h"
 #include "cluster/stage_record.h"
 #include "io/block.h"
@@ -36,13 +37,14 @@ struct Job {
   JobOptions settings;
   EventLog events;
   Block block;
-  std::vector<std::int64_t> generations;           // image counts at which the block grew; the last is its size
-  std::vector<StageRecord> records;                // of the stages so far, in order
-  std::vector<FailedUnit> failures;                // of all stages so far
-  std::map<FrameIndex, std::string> not_oriented;  // by the initial orientation, and why
-  std::vector<std::string> notes;                  // warnings for the report
-  std::int64_t parts_done = 0;                     // of the unit in hand (work_queue.h)
-  PeakMemory peak_memory = {};                     // of this rank
+  std::vector<std::int64_t> generations;                // image counts at which the block grew; the last is its size
+  std::vector<StageRecord> records;                     // of the stages so far, in order
+  std::vector<FailedUnit> failures;                     // of all stages so far
+  std::map<FrameIndex, std::string> not_oriented;       // by the initial orientation, and why
+  std::vector<std::string> notes;                       // warnings for the report
+  std::int64_t parts_done = 0;                          // of the unit in hand (work_queue.h)
+  PeakMemory peak_memory = {};                          // of this rank
+  PagedTables tables = PagedTables(store.directory());  // where those of the block lie
 
   bool is_first_rank() const { return ranks.rank() == 0; }
 };

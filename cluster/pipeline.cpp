@@ -15,6 +15,7 @@
 #include "cluster/exit_codes.h"
 #include "cluster/job_json.h"
 #include "cluster/process_memory.h"
+#include "cluster/stages/block_tables.h"
 #include "cluster/stages/given_tracks.h"
 #include "cluster/stages/stages.h"
 #include "cluster/version.h"
@@ -71,10 +72,11 @@ std::optional<Block> previous_block(const JobStore& store) {
 
 // The images of an earlier run keep their indices; new ones follow. Records when the block grew.
 std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job,
-                                              Project& project) {
+                                              PagedTables& tables, Project& project) {
   Block& block = project.block;
   std::vector<std::int64_t> generations;
   if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
+    page_tables(*previous, tables);
     refuse_another_block(store, *previous, project);
     // Images taken away or changed start a new block; growing keeps what is there.
     if (has_all_images_of(*previous, block)) {
@@ -110,12 +112,15 @@ void refuse_other_folders(const JobStore& store) {
 // Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
 std::string prepare(const RunOptions& options, const JobStore& store, Project project) {
   store.remove_temporaries();
+  PagedTables tables(store.directory());
+  page_tables(project.block, tables);
   const std::optional<JobJson> before = JobJson::read(store);
   if (before) check_job_json(store, *before);
   if (project.block.images.empty())
     throw InputError(options.project + ": no readable image in the block; check the images folder");
-  const std::vector<std::int64_t> generations = merge_with_previous(store, before, project);
+  const std::vector<std::int64_t> generations = merge_with_previous(store, before, tables, project);
   check(project.block);
+  tables.release();
   Hasher fingerprint;
   fingerprint.add(hash_file(options.project)).add(generations);
   store.write("block.h5", fingerprint.value(), [&](const std::string& path) { write_block(path, project.block); });
@@ -159,13 +164,11 @@ void update_measurement_index(Job& job, const std::vector<std::string>& tracks) 
   if (!damage.empty() && job.is_first_rank()) tell_of_damage(job.store, kMeasurementIndex, damage);
 }
 
-// Tiles, tracks and adjustments do without the names of images, of which every rank has a table.
-void release_names(Job& job) {
-  job.block.image_names = {};
-  return_freed_memory();
+// An orientation that only takes over what the project gives has nothing to say of single images.
+bool orients_by_names(const Block& block) {
+  return !block.verticals.empty() ||
+         std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
 }
-
-void restore_names(Job& job) { job.block.image_names = read_image_names(job.store.verified_path("block.h5")); }
 
 void run_stages(Job& job, const std::string& tie_points) {
   const std::string& last = job.options.last_stage;
@@ -182,7 +185,6 @@ void run_stages(Job& job, const std::string& tie_points) {
     tiles = run_tiles(job, matches);
     tracks = run_tracks(job, matches, tiles);
   } else {
-    release_names(job);
     tiles = run_tiles_of_tracks(job, tie_points);
     if (last == "partition") return;
     tracks = run_given_tracks(job, tie_points, tiles);
@@ -192,7 +194,7 @@ void run_stages(Job& job, const std::string& tie_points) {
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   update_measurement_index(job, tracks);
   if (last == "match") return;
-  restore_names(job);
+  if (orients_by_names(job.block)) restore_names(job);
   BlockState oriented = run_orientation(job, matches);
   release_names(job);
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
@@ -271,20 +273,22 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   });
   const JobJson written(store.path("job.json"), text);
   const auto tie_points = written.at<std::string>("tie_points");
-  // No pictures, so that nothing speaks for keeping what is freed; the block's tables then lie where all of their memory
-  // can be given back (release_tables in stages/merge.cpp), not among what stays.
+  // No pictures, so that nothing speaks for keeping what is freed; the block's tables then lie where all of their
+  // memory can be given back (page_tables), not among what stays.
   if (!tie_points.empty()) use_memory_sparingly();
   Job job{.options = run_options,
           .ranks = ranks,
           .store = store,
           .settings = read_options(written.settings()),
           .events = EventLog(store, ranks.rank()),
-          .block = read_block(store.verified_path("block.h5")),
+          .block = read_block_without_names(store.verified_path("block.h5")),
           .generations = written.at<std::vector<std::int64_t>>("generations"),
           .records = {},
           .failures = {},
           .not_oriented = {},
           .notes = written.at<std::vector<std::string>>("warnings")};
+  page_tables(job.block, job.tables);
+  if (tie_points.empty()) restore_names(job);
   if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
   omp_set_num_threads(job.options.threads);  // where no other number is asked for: inside tiles
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
@@ -322,6 +326,7 @@ int register_job(const RunOptions& options, const RegistrationSettings& settings
   check_once(ranks, settings);
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
     refuse_environment(job, "register");
+    if (!tie_points.empty()) restore_names(job);
     const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
     if (job.is_first_rank()) std::printf("%s", to_text(summary).c_str());
   });
@@ -331,6 +336,7 @@ int calibrate_job(const RunOptions& options, const CalibrationSettings& settings
   check_once(ranks, settings.rig);
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
     refuse_environment(job, "calibrate");
+    if (!tie_points.empty()) restore_names(job);
     CalibrationSettings own = settings;
     own.rig.adjustment = job.settings.adjustment;
     calibrate_rigs(job, tie_points, own);

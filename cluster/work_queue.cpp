@@ -113,6 +113,7 @@ void part_done(Job& job, std::int64_t parts) {
 StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units, const std::string& parts) {
   begin_stage(job, stage, units);
   return_freed_memory();
+  job.tables.release();
   job.peak_memory.begin_stage();
   job.ranks.reset_counter();
   RankRecord mine;
@@ -134,6 +135,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       try {
         if (!is_current(job.store, unit.name, unit.fingerprint)) {
           compute_unit(job, stage, unit, claim_s);
+          job.tables.release();
           ++mine.computed;
         }
       } catch (const InputError& error) {

@@ -447,6 +447,21 @@ std::vector<SeenVertical> get_verticals(const Hdf5Reader& file) {
   return verticals;
 }
 
+Block get_block_without_names(const Hdf5Reader& file) {
+  Block block;
+  block.ground = get_ground(file);
+  block.cameras = get_cameras(file);
+  block.rigs = get_rigs(file);
+  block.frames = get_frames(file);
+  block.image_folder = get_image_folder(file);
+  block.images = get_images(file);
+  block.relative_poses = get_relative_poses(file);
+  block.control_points = get_control(file);
+  block.lines = get_lines(file);
+  block.verticals = get_verticals(file);
+  return block;
+}
+
 }  // namespace
 
 void put_block(Hdf5Writer& file, const Block& block) {
@@ -462,18 +477,8 @@ void put_block(Hdf5Writer& file, const Block& block) {
 }
 
 Block get_block(const Hdf5Reader& file) {
-  Block block;
-  block.ground = get_ground(file);
-  block.cameras = get_cameras(file);
-  block.rigs = get_rigs(file);
-  block.frames = get_frames(file);
-  block.image_folder = get_image_folder(file);
-  block.images = get_images(file);
+  Block block = get_block_without_names(file);
   block.image_names = get_image_names(file);
-  block.relative_poses = get_relative_poses(file);
-  block.control_points = get_control(file);
-  block.lines = get_lines(file);
-  block.verticals = get_verticals(file);
   return block;
 }
 
@@ -484,6 +489,8 @@ void write_block(const std::string& path, const Block& block) {
 }
 
 Block read_block(const std::string& path) { return get_block(Hdf5Reader(path, "block")); }
+
+Block read_block_without_names(const std::string& path) { return get_block_without_names(Hdf5Reader(path, "block")); }
 
 NameTable<ImageIndex> read_image_names(const std::string& path) { return get_image_names(Hdf5Reader(path, "block")); }
 

@@ -15,7 +15,8 @@ namespace megablock {
 
 void write_block(const std::string& path, const Block& block);
 Block read_block(const std::string& path);
-NameTable<ImageIndex> read_image_names(const std::string& path);  // Block::image_names of such a file
+Block read_block_without_names(const std::string& path);          // all but Block::image_names
+NameTable<ImageIndex> read_image_names(const std::string& path);  // these
 
 void write_features(const std::string& path, const std::vector<ImageFeatures>& images);
 std::vector<ImageFeatures> read_features(const std::string& path);

@@ -23,7 +23,7 @@ namespace {
 struct OrientedTiles {
   const BlockState& oriented;
   const Tiles& tiles;
-  const VerticalsOfTiles verticals;
+  const RowsOfTiles rows;
 };
 
 // A tile before its adjustment.
@@ -36,8 +36,9 @@ struct TileStart {
 TileStart measured_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks) {
   TileStart start;
   start.tracks = std::move(tracks);
-  start.problem = make_tile_problem(job.block, from.oriented, from.tiles, tile, start.tracks,
-                                    job.settings.adjustment.observations, from.verticals);
+  start.problem =
+      make_tile_problem(job.block, from.oriented, from.tiles, tile, start.tracks, job.settings.adjustment.observations,
+                        from.rows.at(static_cast<std::size_t>(tile.value)));
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   start.state =
       make_tile_state(start.problem, from.oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
@@ -142,6 +143,7 @@ std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, cons
       if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
       add_to_hash(hasher, start.problem, start.state);
       writer.value(TileMark{hasher.value(), start.problem.observation_count()});
+      job.tables.release();
     }
   } catch (const InputError& e) {
     kind = 'i';
@@ -163,7 +165,7 @@ std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, cons
 
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
-  const OrientedTiles from{oriented, tiles, verticals_of_tiles(job.block, tiles)};
+  const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles)};
   const std::vector<TileMark> marks = tile_marks(job, from, tracks);
   std::vector<Unit> units;
   std::vector<std::string> names;

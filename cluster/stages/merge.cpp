@@ -15,6 +15,7 @@
 #include "cluster/signals.h"
 #include "cluster/stages/assemble_result.h"
 #include "cluster/stages/block_image_sigma.h"
+#include "cluster/stages/block_tables.h"
 #include "cluster/stages/merge_checkpoint.h"
 #include "cluster/stages/merge_start.h"
 #include "cluster/stages/provenance.h"
@@ -88,24 +89,6 @@ void say_iteration(const Job& job, const GlobalState& state) {
   std::fprintf(stderr, "merge        %s\n", describe(state).c_str());
 }
 
-// What tables of images and frames say is in the tiles now. Of a million images they take 60 MiB on every rank, beside
-// which tiles and fronts are at work.
-void release_tables(Job& job, MergeInputs& inputs) {
-  job.block.images = {};
-  job.block.frames = {};
-  job.block.relative_poses = {};
-  job.block.lines = {};
-  inputs.oriented = {};
-  return_freed_memory();
-}
-
-// The same for the result. Verticals that orientation set aside are not in the block any more, but in its file.
-void restore_tables(Job& job) {
-  Block block = read_block(job.store.verified_path("block.h5"));
-  block.verticals = std::move(job.block.verticals);
-  job.block = std::move(block);
-}
-
 // This rank's tiles from their own adjustments, or from the checkpoint that was found, and the block's state.
 BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
                       const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
@@ -142,7 +125,8 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   Adjusted adjusted;
   BlockState& block = adjusted.state;
   block = load_block(job, inputs, checkpoint, found, rank_of_tile, tiles);
-  release_tables(job, inputs);
+  inputs.oriented = {};
+  job.tables.release();
 
   MergePosition& position = adjusted.position;
   position = within ? *within : start;
@@ -265,7 +249,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   const double start = monotonic_seconds();
   return_freed_memory();
   job.peak_memory.begin_stage();
-  MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units, verticals_of_tiles(job.block, tiles)};
+  MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
   const std::string before = unconverged_before(job);
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
@@ -282,7 +266,6 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
   clear_scratch(job);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
-  gather_covariances(job, adjusted);
   UnitEvent event;
   event.stage = "merge";
   event.unit = kResult;
@@ -292,8 +275,8 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   double process_peak_mib = largest(job, job.peak_memory.mib());
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
-    restore_tables(job);
-    write_final(job, inputs, fingerprint, adjusted, make_outcome(adjusted, job.block, inputs.tiles.tree), parts, event);
+    restore_names(job);
+    write_final(job, inputs, fingerprint, adjusted, make_outcome(job, adjusted, inputs.tiles), parts, event);
     // What was written could not say it of itself.
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());
     process_peak_mib = std::max(process_peak_mib, job.peak_memory.mib());

@@ -1,14 +1,17 @@
 #include "cluster/stages/merge_outcome.h"
 
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
-#include <map>
-#include <utility>
+#include <fstream>
+#include <iterator>
 
 #include "cluster/gather_by_tile.h"
 #include "cluster/matrix_bytes.h"
 #include "cluster/stages/merge_start.h"
 #include "cluster/stages/provenance.h"
+#include "io/error.h"
+#include "io/file_error.h"
 #include "merge/gauge.h"
 
 namespace megablock {
@@ -27,59 +30,60 @@ std::vector<SeamCheck> seam_checks(const MergeTree& tree, const RankRunner::Post
   return checks;
 }
 
-constexpr int kCovarianceTag = 1 << 20;  // beyond those of the merge tree's nodes
-
-// A message per tile, after their number and the cameras. Each tile's go as they are written: messages wait here.
-void send_covariances(Job& job, Adjusted& adjusted) {
-  std::vector<PoseCovariances> tiles = std::exchange(adjusted.covariances_of_tiles, {});
-  ByteWriter head;
-  head.value(tiles.size());
-  for (const Eigen::MatrixXd& covariance : adjusted.camera_covariance) write_matrix(head, covariance);
-  job.ranks.send(0, kCovarianceTag, head.take());
-  for (PoseCovariances& tile : tiles) {
-    ByteWriter writer;
-    writer.value(tile.tile);
-    writer.values(tile.frames);
-    write_matrices(writer, std::exchange(tile.of_frames, {}));
-    writer.values(tile.mounts);
-    write_matrices(writer, tile.of_mounts);
-    job.ranks.send(0, kCovarianceTag, writer.take());
-  }
+void write_file(const std::string& path, const Bytes& bytes) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) throw_file_error(path, "written", errno);
 }
 
-PoseCovariances read_covariances(const Bytes& bytes) {
+Bytes read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  Bytes bytes{std::istreambuf_iterator<char>(file), {}};
+  if (bytes.empty()) throw StoreError("cannot read " + path + "; run again to resume");
+  return bytes;
+}
+
+// Of the frames, cameras and mounts of a tile, zero where it does not touch one.
+void write_covariances(const std::string& path, const TileProblem& problem, const TileCovariance& covariance) {
+  ByteWriter writer;
+  writer.values(problem.frames);
+  write_matrices(writer, covariance.frames);
+  writer.values(problem.mounts);
+  write_matrices(writer, covariance.mounts);
+  writer.values(problem.cameras);
+  for (const Eigen::MatrixXd& camera : covariance.cameras) write_matrix(writer, camera);
+  write_file(path, writer.take());
+}
+
+// A frame of several tiles has the same bits in all of them; of a mount or a camera the lowest tile's are taken.
+template <typename Matrix>
+void take_first(const Matrix& from, Matrix& to) {
+  if (to.isZero(0)) to = from;
+}
+
+void read_covariances(const std::string& path, MergeOutcome& outcome) {
+  const Bytes bytes = read_file(path);
   ByteReader reader(bytes);
-  PoseCovariances tile{reader.value<std::int64_t>(), reader.values<FrameIndex>(), {}, {}, {}};
-  tile.of_frames = read_matrices<BlockResult::Matrix6>(reader);
-  tile.mounts = reader.values<MountId>();
-  tile.of_mounts = read_matrices<BlockResult::Matrix6>(reader);
-  return tile;
+  const auto frames = reader.values<FrameIndex>();
+  const auto of_frames = read_matrices<BlockResult::Matrix6>(reader);
+  for (std::size_t f = 0; f < frames.size(); ++f) take_first(of_frames[f], outcome.frame_covariance[frames[f]]);
+  const auto mounts = reader.values<MountId>();
+  const auto of_mounts = read_matrices<BlockResult::Matrix6>(reader);
+  for (std::size_t m = 0; m < mounts.size(); ++m)
+    take_first(of_mounts[m], outcome.mount_covariance[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)]);
+  for (const CameraIndex camera : reader.values<CameraIndex>())
+    take_first(read_matrix(reader), outcome.camera_covariance[camera]);
 }
 
-using TileOfMount = std::map<MountId, std::int64_t>;  // that its covariance is from
-
-// Of a mount that of the lowest tile, in whatever order the tiles come.
-void take_covariances(const PoseCovariances& tile, TileOfMount& tile_of_mount, Adjusted& adjusted) {
-  for (std::size_t f = 0; f < tile.frames.size(); ++f)
-    if (!tile.of_frames[f].isZero(0)) adjusted.frame_covariance[tile.frames[f]] = tile.of_frames[f];
-  for (std::size_t m = 0; m < tile.mounts.size(); ++m) {
-    if (tile.of_mounts[m].isZero(0)) continue;
-    const MountId& mount = tile.mounts[m];
-    const auto found = tile_of_mount.emplace(mount, tile.tile).first;
-    if (found->second < tile.tile) continue;
-    found->second = tile.tile;
-    adjusted.mount_covariance[mount.rig][static_cast<std::size_t>(mount.mount)] = tile.of_mounts[m];
-  }
-}
-
-void receive_covariances(Job& job, int from, TileOfMount& tile_of_mount, Adjusted& adjusted) {
-  const Bytes bytes = job.ranks.receive(from, kCovarianceTag);
-  ByteReader reader(bytes);
-  const auto tiles = reader.value<std::size_t>();
-  for (Eigen::MatrixXd& covariance : adjusted.camera_covariance)
-    if (Eigen::MatrixXd camera = read_matrix(reader); !camera.isZero(0)) covariance = std::move(camera);
-  for (std::size_t t = 0; t < tiles; ++t)
-    take_covariances(read_covariances(job.ranks.receive(from, kCovarianceTag)), tile_of_mount, adjusted);
+void read_covariances(const Job& job, const Tiles& tiles, MergeOutcome& outcome) {
+  outcome.frame_covariance.assign(outcome.state.frames.size(), BlockResult::Matrix6::Zero());
+  for (const Intrinsics& camera : outcome.state.cameras)
+    outcome.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
+  for (const std::vector<Pose>& rig : outcome.state.mounts)
+    outcome.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
+  for (std::int64_t tile = 0; tile < tiles.tile_count; ++tile) read_covariances(covariance_path(job, tile), outcome);
 }
 
 }  // namespace
@@ -88,16 +92,15 @@ std::string part_path(const Job& job, std::int64_t tile) {
   return job.store.path("merge/parts/" + std::to_string(tile) + ".bin");
 }
 
+std::string covariance_path(const Job& job, std::int64_t tile) {
+  return job.store.path("merge/parts/" + std::to_string(tile) + ".covariances");
+}
+
 void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     RankRunner& runner, Adjusted& adjusted) {
-  for (const Intrinsics& camera : adjusted.state.cameras)
-    adjusted.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
   std::filesystem::create_directories(job.store.path("merge/parts"));
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
-    adjusted.covariances_of_tiles.push_back(
-        {tile.tile, tile.problem.frames, covariance.frames, tile.problem.mounts, covariance.mounts});
-    for (std::size_t c = 0; c < tile.problem.cameras.size(); ++c)
-      if (!covariance.cameras[c].isZero(0)) adjusted.camera_covariance[tile.problem.cameras[c]] = covariance.cameras[c];
+    write_covariances(covariance_path(job, tile.tile), tile.problem, covariance);
     const auto t = static_cast<std::size_t>(tile.tile);
     const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
     adjusted.parts.push_back(write_part(part_path(job, tile.tile), tile, tracks, covariance));
@@ -114,21 +117,6 @@ std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size
   return gather_by_tile(job.ranks, tile_count, adjusted.parts, [&](std::size_t i) { return adjusted.parts[i].tile; });
 }
 
-void gather_covariances(Job& job, Adjusted& adjusted) {
-  if (job.is_first_rank()) {
-    adjusted.frame_covariance.assign(adjusted.state.frames.size(), BlockResult::Matrix6::Zero());
-    for (const std::vector<Pose>& rig : adjusted.state.mounts)
-      adjusted.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
-    TileOfMount tile_of_mount;
-    for (const PoseCovariances& tile : std::exchange(adjusted.covariances_of_tiles, {}))
-      take_covariances(tile, tile_of_mount, adjusted);
-    for (int r = 1; r < job.ranks.size(); ++r) receive_covariances(job, r, tile_of_mount, adjusted);
-  } else {
-    send_covariances(job, adjusted);
-  }
-  job.ranks.flush_sends();
-}
-
 std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts) {
   const std::vector<MotionReference> references = motion_references(block, tiles);
   std::vector<CommonMotion> motions(references.size());
@@ -141,12 +129,10 @@ std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, c
   return lines;
 }
 
-MergeOutcome make_outcome(Adjusted& adjusted, const Block& block, const MergeTree& tree) {
+MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles) {
   MergeOutcome outcome;
   outcome.state = std::move(adjusted.state);
-  outcome.frame_covariance = std::move(adjusted.frame_covariance);
-  outcome.camera_covariance = std::move(adjusted.camera_covariance);
-  outcome.mount_covariance = std::move(adjusted.mount_covariance);
+  read_covariances(job, tiles, outcome);
   const SubtreeSums& sums = adjusted.posterior.sums;
   outcome.chi2 = sums.weighted_squares;
   outcome.degrees_of_freedom =
@@ -155,13 +141,13 @@ MergeOutcome make_outcome(Adjusted& adjusted, const Block& block, const MergeTre
   outcome.global_iterations = adjusted.position.global.accepted;
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
   const BlockGauge& gauge = adjusted.posterior.gauge;
-  outcome.gauge = judge_gauge(sums, gauge, names_of(block)).text;
+  outcome.gauge = judge_gauge(sums, gauge, names_of(job.block)).text;
   for (const BlockComponent& part : gauge.components)
     if (!part.columns.empty()) {
       outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.columns.size())});
       outcome.degrees_of_freedom += part.defect;  // what only the datum fixes takes nothing of the observations
     }
-  outcome.seams = seam_checks(tree, adjusted.posterior);
+  outcome.seams = seam_checks(tiles.tree, adjusted.posterior);
   outcome.observations = adjusted.posterior.observations;
   for (std::size_t k = 0; k < kObservationKinds; ++k)
     outcome.observations.kinds[k].scale = adjusted.position.scales.of[k];

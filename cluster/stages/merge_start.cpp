@@ -205,7 +205,7 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
 }
 
 MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const MergeStart& start, const Tiles& tiles,
-                          TileIndex tile, const VerticalsOfTiles& verticals, const std::string& tracks,
+                          TileIndex tile, const RowsOfTile& rows, const std::string& tracks,
                           const std::string& adjusted) {
   const BlockState& state = start.state;
   MergeTile merge;
@@ -217,7 +217,7 @@ MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const Merg
     merge.tracks = split_tracks(merge.tracks, adjustment.parts);
   }
   const AdjustOptions& options = job.settings.adjustment;
-  merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations, verticals);
+  merge.problem = make_tile_problem(job.block, state, tiles, tile, merge.tracks, options.observations, rows);
   take_plumb_lines(job.block, oriented, merge.problem);
   const std::size_t points = merge.problem.points.size();
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());

@@ -40,7 +40,7 @@ TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std:
 // done so, or whose cameras are the mean of several tiles', are triangulated anew. Of a checkpoint, which has points of
 // its own, they are left as they were. `oriented`: what stays the same when the merge is resumed.
 MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const MergeStart& start, const Tiles& tiles,
-                          TileIndex tile, const VerticalsOfTiles& verticals, const std::string& tracks,
+                          TileIndex tile, const RowsOfTile& rows, const std::string& tracks,
                           const std::string& adjusted);
 
 }  // namespace megablock

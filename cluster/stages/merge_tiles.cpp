@@ -12,14 +12,16 @@ namespace megablock {
 void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart& start,
                     const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
                     TileStore& own) {
+  const RowsOfTiles rows = rows_of_tiles(job.block, start.state, inputs.tiles);
   for (std::size_t t = 0; t < rank_of_tile.size(); ++t) {
     if (rank_of_tile[t] != job.ranks.rank()) continue;
     MergeTile loaded =
-        load_merge_tile(job, inputs.oriented, start, inputs.tiles, TileIndex(static_cast<std::int64_t>(t)),
-                        inputs.verticals, inputs.tracks[t], inputs.adjusted[t]);
+        load_merge_tile(job, inputs.oriented, start, inputs.tiles, TileIndex(static_cast<std::int64_t>(t)), rows[t],
+                        inputs.tracks[t], inputs.adjusted[t]);
     RankTile tile{static_cast<std::int64_t>(t), std::move(loaded.problem), std::move(loaded.state)};
     prepare(tile);
     own.add(std::move(tile));
+    job.tables.release();
   }
 }
 

@@ -20,7 +20,6 @@ struct MergeInputs {
   const Tiles& tiles;
   const std::vector<std::string>& tracks;
   const std::vector<std::string>& adjusted;
-  const VerticalsOfTiles verticals;
 };
 
 // Adds this rank's tiles to `own`, each as `prepare` leaves it.

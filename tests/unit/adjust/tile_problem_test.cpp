@@ -263,9 +263,14 @@ TEST(TileProblem, TilesShareNoResidualAndMissNone) {
   for (int t = 0; t < 3; ++t) sum += cost(three, TileIndex(t));
   EXPECT_TRUE(std::isfinite(whole));
   EXPECT_NEAR(sum, whole, 1e-9 * whole);
-  const VerticalsOfTiles dealt = verticals_of_tiles(simulated.block, three);
+  const RowsOfTiles dealt = rows_of_tiles(simulated.block, state, three);
   ASSERT_EQ(dealt.size(), 3u);
-  EXPECT_EQ(dealt[0].size() + dealt[1].size() + dealt[2].size(), 14u);
+  const auto all = [&](auto member) {
+    return (dealt[0].*member).size() + (dealt[1].*member).size() + (dealt[2].*member).size();
+  };
+  EXPECT_EQ(all(&RowsOfTile::verticals), 14u);
+  EXPECT_EQ(all(&RowsOfTile::relative_poses), simulated.block.relative_poses.size());
+  EXPECT_EQ(all(&RowsOfTile::cameras), simulated.block.cameras.size());
 }
 
 }  // namespace

@@ -55,13 +55,14 @@ TEST(Reliability, TauOfFewDegrees) {
 // Upper bounds of the largest standardised residual of a straight line through n points, tests at probability / n (Lund
 // 1975; as in J. Appl. Math. 2021, 1478843, table 1).
 TEST(Reliability, TauOfPublishedTables) {
-  struct Row {
+  struct Bounds {
     std::int64_t n;
     double p10, p5, p1;
   };
-  for (const Row& row : {Row{5, 1.6974, 1.7147, 1.7286}, Row{6, 1.8838, 1.9270, 1.9751}, Row{8, 2.1125, 2.1961, 2.3178},
-                         Row{10, 2.2562, 2.3643, 2.5407}, Row{20, 2.6126, 2.7651, 3.0575},
-                         Row{30, 2.7869, 2.9516, 3.2812}, Row{60, 3.0508, 3.2247, 3.5869}}) {
+  for (const Bounds& row :
+       {Bounds{5, 1.6974, 1.7147, 1.7286}, Bounds{6, 1.8838, 1.9270, 1.9751}, Bounds{8, 2.1125, 2.1961, 2.3178},
+        Bounds{10, 2.2562, 2.3643, 2.5407}, Bounds{20, 2.6126, 2.7651, 3.0575}, Bounds{30, 2.7869, 2.9516, 3.2812},
+        Bounds{60, 3.0508, 3.2247, 3.5869}}) {
     const auto n = static_cast<double>(row.n);
     EXPECT_NEAR(tau_critical_value(row.n - 2, 0.10 / n), row.p10, 6e-5) << row.n;
     EXPECT_NEAR(tau_critical_value(row.n - 2, 0.05 / n), row.p5, 6e-5) << row.n;

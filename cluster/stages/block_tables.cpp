@@ -1,0 +1,20 @@
+#include "cluster/stages/block_tables.h"
+
+#include "io/unit_files.h"
+
+namespace megablock {
+
+void page_tables(const Block& block, PagedTables& tables) {
+  tables.put(block.frames);
+  tables.put(block.images);
+  tables.put(block.relative_poses);
+}
+
+void release_names(Job& job) {
+  job.block.image_names = {};
+  return_freed_memory();
+}
+
+void restore_names(Job& job) { job.block.image_names = read_image_names(job.store.verified_path("block.h5")); }
+
+}  // namespace megablock
