@@ -114,7 +114,8 @@ namespace {
 
 double image_cost(const TileProblem& problem, const TileState& state) {
   double sum = 0;
-  ResidualSquares residuals(problem, state);
+  const SeenImages seen(problem, state);
+  ResidualSquares residuals(problem, state, seen);
   residuals.visit(residuals.active_points(), [&](std::int64_t, std::int64_t, double squares) {
     sum += std::isfinite(squares) ? problem.image_loss.evaluate(squares)[0] : std::numeric_limits<double>::infinity();
   });

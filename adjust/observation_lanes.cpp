@@ -38,9 +38,8 @@ LaneView::LaneView(const ImageView& view) {
   if (simple) std::copy_n(k.data(), kDecentring2 + 1, out);
 }
 
-std::vector<LaneView> lane_views(std::span<const ImageView> views) {
-  return std::vector<LaneView>(views.begin(), views.end());
-}
+SeenImages::SeenImages(const TileProblem& problem, const TileState& state)
+    : views(image_views(problem, state)), lanes(views.begin(), views.end()) {}
 
 void AlignedValues::resize(std::int64_t count) {
   constexpr std::uintptr_t kLine = 64;

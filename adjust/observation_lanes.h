@@ -23,7 +23,13 @@ struct alignas(64) LaneView {
   bool simple = false;  // a camera of Brown's model; else the values say nothing
   explicit LaneView(const ImageView& view);
 };
-std::vector<LaneView> lane_views(std::span<const ImageView> views);
+
+// The images of a tile as they are seen from a state; the threads of a tile share it.
+struct SeenImages {
+  std::vector<ImageView> views;
+  std::vector<LaneView> lanes;
+  SeenImages(const TileProblem& problem, const TileState& state);
+};
 
 // Doubles in a buffer that begins a line of the cache.
 class AlignedValues {

@@ -9,9 +9,9 @@ namespace megablock {
 
 class ResidualSquares {
  public:
-  // Problem and state outlive it; the state's frames, cameras and mounts stay as they are, its points may move.
-  ResidualSquares(const TileProblem& problem, const TileState& state)
-      : problem_(problem), state_(state), views_(image_views(problem, state)), lane_views_(lane_views(views_)) {
+  // Problem, state and views outlive it, the latter of the state's frames, cameras and mounts; its points may move.
+  ResidualSquares(const TileProblem& problem, const TileState& state, const SeenImages& images)
+      : problem_(problem), state_(state), images_(images) {
     lanes_.reserve(kLanes);
   }
 
@@ -31,7 +31,7 @@ class ResidualSquares {
       for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
         if (!problem_.kept[row]) continue;
         sources_[static_cast<std::size_t>(lanes_.size())] = {point, row};
-        lanes_.add(lane_views_[problem_.image[row].value], state_.points[point], problem_.x[row], problem_.y[row],
+        lanes_.add(images_.lanes[problem_.image[row].value], state_.points[point], problem_.x[row], problem_.y[row],
                    problem_.inverse_sigma[row]);
         if (lanes_.size() == kLanes) flush(visit);
       }
@@ -56,16 +56,15 @@ class ResidualSquares {
   }
   double squares(std::int64_t point, std::int64_t row, std::int64_t lane) const {
     const std::int64_t image = problem_.image[row].value;
-    if (lane_views_[image].simple) return lanes_.residual(lane).squaredNorm();
+    if (images_.lanes[image].simple) return lanes_.residual(lane).squaredNorm();
     return (problem_.inverse_sigma[row] *
-            views_[image].difference_px(state_.points[point], {problem_.x[row], problem_.y[row]}))
+            images_.views[image].difference_px(state_.points[point], {problem_.x[row], problem_.y[row]}))
         .squaredNorm();
   }
 
   const TileProblem& problem_;
   const TileState& state_;
-  std::vector<ImageView> views_;
-  std::vector<LaneView> lane_views_;
+  const SeenImages& images_;
   ObservationLanes lanes_;
   std::array<Source, kLanes> sources_;
 };

@@ -25,7 +25,8 @@ struct ResidualSum {
 };
 
 void add_images(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
-  ResidualSquares residuals(problem, state);
+  const SeenImages seen(problem, state);
+  ResidualSquares residuals(problem, state, seen);
   const std::vector<std::int64_t> active = residuals.active_points();
   sum.points += std::ssize(active);
   residuals.visit(active, [&](std::int64_t, std::int64_t, double squares) {

@@ -30,6 +30,9 @@ constexpr Setting kSettings[] = {
     {"GLIBC_TUNABLES",
      "glibc.malloc.mmap_threshold=1073741824:glibc.malloc.trim_threshold=2147483648:glibc.malloc.hugetlb=1"},
 };
+// Unless the user has one: threads that wait for another leave the processor to it, or to other programs. Where these
+// keep one of two busy, waiting at work is most of what there is to measure.
+constexpr Setting kWaiting = {"OMP_WAIT_POLICY", "passive"};
 // Named only where the processor has it: OpenCV complains of features it cannot disable.
 constexpr Setting kWithoutAvx512 = {"OPENCV_CPU_DISABLE", "AVX512-SKX"};
 
@@ -69,6 +72,7 @@ void pin_arithmetic(int argc, char** argv) {
   bool pinned = set({kCoreType, wide ? kAvx512Cores : "Haswell"});
   for (const Setting& setting : kSettings) pinned = set(setting) && pinned;
   if (__builtin_cpu_supports("avx512f")) pinned = set(kWithoutAvx512) && pinned;
+  if (std::getenv(kWaiting.name) == nullptr) pinned = set(kWaiting);
   if (pinned) return;
   execv("/proc/self/exe", argv);  // returns only when it failed
   throw ComputeError(std::string("cannot start anew with pinned arithmetic (/proc/self/exe: ") + std::strerror(errno) +

@@ -5,6 +5,7 @@
 #include "geometry/decompositions.h"
 #include "geometry/rotation.h"
 #include "geometry/workers.h"
+#include "merge/point_portions.h"
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -149,8 +150,9 @@ TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& mo
       next.frames[f] = movers[at(plan.part_of_frame[f])].pose(
           state.frames[f],
           Eigen::Map<const PoseIncrement>(step.unknowns.find({UnknownKind::kFrame, 0, problem.frames[f].value})));
-  visit_in_parallel(std::ssize(plan.points), [&](std::int64_t cell) {
-    for (const std::int64_t p : plan.points[at(cell)].rows()) {
+  const PointPortions portions(plan);
+  visit_in_parallel(portions.size(), [&](std::int64_t portion) {
+    for (const std::int64_t p : portions[portion]) {
       const Mover& mover = movers[at(plan.part_of_frame[at(frame_of_point(problem, p))])];
       next.points[at(p)] = mover.position(state.points[at(p)], step.points[at(p)]);
     }

@@ -6,6 +6,7 @@
 #include "geometry/decompositions.h"
 #include "merge/cell_assembler.h"
 #include "merge/point_equations.h"
+#include "merge/point_portions.h"
 #include "merge/tree_workers.h"
 #include "merge/unknowns.h"
 
@@ -87,8 +88,9 @@ TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan,
                                const Pass& pass, const TileDatum& datum) {
   const std::int64_t right_hand_sides = 1 + datum.columns.columns;
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
+  const PointTables tables(problem, plan, state);
   PerThread<Workspace> workspaces([&] {
-    return std::unique_ptr<Workspace>(new Workspace{{problem, plan, state}, {}, {}});
+    return std::unique_ptr<Workspace>(new Workspace{{problem, state, tables}, {}, {}});
   });
   std::vector<UpdateMatrix> updates(nodes.size());
   std::vector<std::vector<double>> diagonals(plan.points.size());  // of J'J of each cell
@@ -156,16 +158,18 @@ void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const T
                        TileStep& step) {
   step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
   const UnknownMotions motions(plan, step.unknowns.values.data());
-  PerThread<PointEquations> all_equations([&] { return std::make_unique<PointEquations>(problem, plan, state); });
-  std::vector<double> damping_norms(plan.points.size(), 0);
-  visit_in_parallel(std::ssize(plan.points), [&](std::int64_t cell) {
+  const PointTables tables(problem, plan, state);
+  PerThread<PointEquations> all_equations([&] { return std::make_unique<PointEquations>(problem, state, tables); });
+  const PointPortions portions(plan);
+  std::vector<double> damping_norms(at(portions.size()), 0);
+  visit_in_parallel(portions.size(), [&](std::int64_t portion) {
     PointEquations& equations = all_equations.mine();
-    const std::vector<std::int32_t> points = plan.points[at(cell)].rows();
-    for (std::span<const std::int32_t> rest = points; !rest.empty();) {
+    for (std::span<const std::int32_t> rest = portions[portion]; !rest.empty();) {
       rest = rest.subspan(equations.linearise(rest, pass));
       equations.steps(motions, step.points);
       for (std::size_t i = 0; i < equations.points().size(); ++i)
-        damping_norms[at(cell)] += equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
+        damping_norms[at(portion)] +=
+            equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
     }
   });
   for (const double norm : damping_norms) step.damping_norm += norm;

@@ -46,7 +46,7 @@ struct TilePlan {
 // Frame row of an active point's first kept observation.
 std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);
 // `node` is the tile's leaf in the plan of the merge tree.
-TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 32);
+TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 16);
 // Of a tile that is a block of its own: nothing is passed on.
 TilePlan make_lone_tile_plan(const TileProblem& problem, const std::vector<ParameterMask>& camera_free);
 

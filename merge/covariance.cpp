@@ -21,15 +21,15 @@ ObservationKind image_kind(PointRole role) {
 class CellCovariances {
  public:
   // `offsets`: of plan.unknowns in columns.
-  CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Step& columns,
-                  const std::vector<std::int64_t>& offsets, TileCovariance& result)
+  CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const PointTables& tables,
+                  const Step& columns, const std::vector<std::int64_t>& offsets, TileCovariance& result)
       : problem_(problem),
         plan_(plan),
         state_(state),
         columns_(columns),
         offsets_(offsets),
         result_(result),
-        equations_(problem, plan, state),
+        equations_(problem, state, tables),
         frame_sums_(plan.unknowns.size()),
         row_of_unknown_(plan.unknowns.size(), -1) {}
 
@@ -180,8 +180,12 @@ class TileCovarianceBuilder {
  public:
   TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                         const TileFactor& factor, const Step& columns)
-      : plan_(plan), factor_(factor), offsets_(row_offsets(plan.unknowns)), cells_([&, this] {
-          return std::make_unique<CellCovariances>(problem, plan, state, columns, offsets_, result_);
+      : plan_(plan),
+        factor_(factor),
+        offsets_(row_offsets(plan.unknowns)),
+        tables_(problem, plan, state),
+        cells_([&, this] {
+          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, result_);
         }) {
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
@@ -255,6 +259,7 @@ class TileCovarianceBuilder {
   const TileFactor& factor_;
   std::vector<std::int64_t> offsets_;
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_;
+  PointTables tables_;
   PerThread<CellCovariances> cells_;
   TileCovariance result_;
 };

@@ -75,15 +75,18 @@ using point_kernels::kRecordSize;
 using point_kernels::kV;
 using point_kernels::kYSize;
 
-PointEquations::PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state)
+PointTables::PointTables(const TileProblem& problem, const TilePlan& plan, const TileState& state)
+    : images(problem, state), unknowns(image_unknowns(problem, plan, images.lanes)), prior(prior_rows(problem)) {}
+
+PointEquations::PointEquations(const TileProblem& problem, const TileState& state, const PointTables& tables)
     : problem_(problem),
       state_(state),
       kernels_(&point_kernels_of_processor()),
       usual_squares_(end_of_squares(problem.image_loss)),
-      views_(image_views(problem, state)),
-      lane_views_(lane_views(views_)),
-      unknowns_(image_unknowns(problem, plan, lane_views_)),
-      prior_(prior_rows(problem)) {
+      views_(tables.images.views),
+      lane_views_(tables.images.lanes),
+      unknowns_(tables.unknowns),
+      prior_(tables.prior) {
   int widest = 0;
   for (const ImageUnknowns& u : unknowns_) widest = std::max(widest, u.shared_width);
   all_plain_ = std::ranges::all_of(unknowns_, &ImageUnknowns::plain);

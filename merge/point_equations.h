@@ -60,6 +60,14 @@ class UnknownMotions {
   std::vector<std::array<double, 8>> frames_;
 };
 
+// What the threads of a tile share, of one state.
+struct PointTables {
+  SeenImages images;
+  std::vector<ImageUnknowns> unknowns;  // [images]
+  std::vector<std::int64_t> prior;      // [points] (prior_rows)
+  PointTables(const TileProblem& problem, const TilePlan& plan, const TileState& state);
+};
+
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
@@ -85,7 +93,8 @@ class PointEquations {
     const double* by_point = nullptr;  // W_sk, [shared_width x 3] column by column
   };
 
-  PointEquations(const TileProblem& problem, const TilePlan& plan, const TileState& state);
+  // All three outlive it.
+  PointEquations(const TileProblem& problem, const TileState& state, const PointTables& tables);
 
   // Linearises all kept observations of the first of the points, as many as there is room for, and factorises their own
   // blocks. Returns how many. Throws ComputeError behind a camera.
@@ -152,10 +161,10 @@ class PointEquations {
   const point_kernels::Kernels* kernels_;
   double usual_squares_;  // squared residuals up to there cost what they are
   bool all_plain_;        // all images
-  std::vector<ImageView> views_;
-  std::vector<LaneView> lane_views_;
-  std::vector<ImageUnknowns> unknowns_;
-  std::vector<std::int64_t> prior_;
+  const std::vector<ImageView>& views_;
+  const std::vector<LaneView>& lane_views_;
+  const std::vector<ImageUnknowns>& unknowns_;
+  const std::vector<std::int64_t>& prior_;
   // Of the points at hand.
   std::vector<Point> points_;
   ObservationLanes lanes_;

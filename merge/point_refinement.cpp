@@ -12,6 +12,7 @@
 #include "geometry/triangulation.h"
 #include "geometry/workers.h"
 #include "merge/point_equations.h"
+#include "merge/point_portions.h"
 
 namespace megablock {
 
@@ -66,9 +67,8 @@ struct Trial {
 // The costs of many points at once, their observations in lanes.
 class PointCosts {
  public:
-  // `views`: of the images, as they stay (image_views).
-  PointCosts(const TileProblem& problem, const std::vector<ImageView>& views)
-      : problem_(problem), views_(views), lane_views_(lane_views(views)), prior_(prior_rows(problem)) {
+  PointCosts(const TileProblem& problem, const SeenImages& images)
+      : problem_(problem), views_(images.views), lane_views_(images.lanes), prior_(prior_rows(problem)) {
     lanes_.reserve(ObservationLanes::kUsual);
   }
 
@@ -122,7 +122,7 @@ class PointCosts {
 
   const TileProblem& problem_;
   const std::vector<ImageView>& views_;
-  std::vector<LaneView> lane_views_;
+  const std::vector<LaneView>& lane_views_;
   std::vector<std::int64_t> prior_;
   ObservationLanes lanes_;
   std::array<Source, ObservationLanes::kUsual> sources_;
@@ -130,9 +130,13 @@ class PointCosts {
 
 class PointRefiner {
  public:
-  // `views`: of the state's images (image_views).
-  PointRefiner(const TileProblem& problem, TileState& state, const std::vector<ImageView>& views, double settled)
-      : problem_(problem), state_(state), settled_squared_(settled * settled), views_(views), costs_(problem, views) {}
+  // `images` of the state, which outlive it.
+  PointRefiner(const TileProblem& problem, TileState& state, const SeenImages& images, double settled)
+      : problem_(problem),
+        state_(state),
+        settled_squared_(settled * settled),
+        views_(images.views),
+        costs_(problem, images) {}
 
   // Brings points to their optimum; returns what their observations cost then.
   double refine(std::span<const std::int64_t> points) {
@@ -280,22 +284,23 @@ class LossSums {
 
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
-  PerThread<ResidualSquares> residuals([&] { return std::make_unique<ResidualSquares>(problem, state); });
-  std::vector<LossSums> of_cells(plan.points.size(), LossSums(problem.image_loss));
-  visit_in_parallel(std::ssize(plan.points), [&](std::int64_t cell) {
-    LossSums& sums = of_cells[static_cast<std::size_t>(cell)];
-    residuals.mine().visit(plan.points[static_cast<std::size_t>(cell)].rows(),
+  const SeenImages seen(problem, state);
+  PerThread<ResidualSquares> residuals([&] { return std::make_unique<ResidualSquares>(problem, state, seen); });
+  const PointPortions portions(plan);
+  std::vector<LossSums> of_portions(static_cast<std::size_t>(portions.size()), LossSums(problem.image_loss));
+  visit_in_parallel(portions.size(), [&](std::int64_t portion) {
+    LossSums& sums = of_portions[static_cast<std::size_t>(portion)];
+    residuals.mine().visit(portions[portion],
                            [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
     sums.finish();
   });
   double images = 0;
   std::vector<std::int64_t> tail;
-  for (const LossSums& sums : of_cells) {
+  for (const LossSums& sums : of_portions) {
     images += 0.5 * sums.settled();
     tail.insert(tail.end(), sums.tail().begin(), sums.tail().end());
   }
-  const std::vector<ImageView> views = tail.empty() ? std::vector<ImageView>() : image_views(problem, state);
-  PerThread<PointRefiner> refiners([&] { return std::make_unique<PointRefiner>(problem, state, views, settled); });
+  PerThread<PointRefiner> refiners([&] { return std::make_unique<PointRefiner>(problem, state, seen, settled); });
   std::vector<double> costs((tail.size() + kAtOnce - 1) / kAtOnce);
   visit_in_parallel(std::ssize(costs), [&](std::int64_t chunk) {
     const auto rest = std::span<const std::int64_t>(tail).subspan(static_cast<std::size_t>(chunk) * kAtOnce);

@@ -3,6 +3,7 @@
 
 #include <omp.h>
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <functional>
@@ -13,32 +14,36 @@
 
 namespace megablock {
 
-// Calls visit(n) for all nodes of a tree, children first, subtrees on different threads. Exceptions as
-// visit_in_parallel; nodes above one that threw are left out.
+// Calls visit(n) for all nodes of a tree, children first: every thread takes the next leaf and goes on upwards as long
+// as what is beside its way is done. Exceptions as visit_in_parallel; nodes above one that threw are left out.
 template <typename Visit>
 void visit_children_first(const std::vector<PlanNode>& nodes, Visit&& visit) {
   std::vector<std::exception_ptr> errors(nodes.size());
-  const std::function<void(std::int64_t)> descend = [&](std::int64_t n) {
+  std::vector<std::atomic<int>> open_children(nodes.size());
+  std::vector<std::int64_t> leaves;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (nodes[n].leaf >= 0) leaves.push_back(static_cast<std::int64_t>(n));
+    open_children[n] = nodes[n].leaf >= 0 ? 0 : 2;
+  }
+  const auto visit_unless_failed = [&](std::int64_t n) {
     const PlanNode& node = nodes[static_cast<std::size_t>(n)];
     std::exception_ptr& error = errors[static_cast<std::size_t>(n)];
-    if (node.leaf < 0) {
-#pragma omp task default(shared) firstprivate(n)
-      descend(node.left);
-      descend(node.right);
-#pragma omp taskwait
-      const std::exception_ptr& left = errors[static_cast<std::size_t>(node.left)];
-      error = left ? left : errors[static_cast<std::size_t>(node.right)];
-      if (error) return;
-    }
+    for (const std::int64_t child : {node.left, node.right})
+      if (node.leaf < 0 && !error) error = errors[static_cast<std::size_t>(child)];
+    if (error) return;
     try {
       visit(n);
     } catch (...) {
       error = std::current_exception();
     }
   };
-#pragma omp parallel
-#pragma omp single
-  descend(static_cast<std::int64_t>(nodes.size()) - 1);
+  visit_in_parallel(std::ssize(leaves), [&](std::int64_t leaf) {
+    for (std::int64_t n = leaves[static_cast<std::size_t>(leaf)];;) {
+      visit_unless_failed(n);
+      n = nodes[static_cast<std::size_t>(n)].parent;
+      if (n < 0 || open_children[static_cast<std::size_t>(n)].fetch_sub(1, std::memory_order_acq_rel) > 1) return;
+    }
+  });
   if (errors.back()) std::rethrow_exception(errors.back());
 }
 

@@ -76,6 +76,7 @@ Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points) {
         for (std::size_t i = 0; i < frames.size(); ++i)
           for (std::size_t j = i + 1; j < frames.size(); ++j) links.add(frames[i], frames[j], 1);
       }
+      job.tables.release();
     };
     TrackReader(tie_points).visit(add_tracks, [](std::int64_t, std::int64_t) { return false; });
     return links;

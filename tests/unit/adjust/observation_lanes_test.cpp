@@ -28,7 +28,7 @@ class Lanes : public testing::Test {
       measured_.emplace_back(1000 + 300 * normal(random), 800 + 300 * normal(random));
       inverse_sigma_.push_back(1 + std::abs(normal(random)));
     }
-    lane_views_ = lane_views(views_);
+    for (const ImageView& view : views_) lane_views_.emplace_back(view);
   }
   void put(ObservationLanes& lanes) const {
     lanes.reserve(std::ssize(points_));
