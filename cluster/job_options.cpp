@@ -39,6 +39,7 @@ void describe(Visitor& visit, MatchOptions& o) {
   visit.number("max_residual_px", o.max_residual_px);
   visit.number("sample_spacing_px", o.sample_spacing_px);
   visit.integer("min_inliers", o.min_inliers);
+  visit.flag("by_turn", o.by_turn);
   visit.flag("guided", o.guided);
   visit.number("min_distance_m", o.min_distance_m);
   visit.number("max_distance_m", o.max_distance_m);

@@ -13,6 +13,7 @@
 #include "match/guided_matching.h"
 #include "match/match_filter.h"
 #include "match/nearest.h"
+#include "match/turned_matching.h"
 #include "match/two_view.h"
 
 namespace megablock {
@@ -110,25 +111,41 @@ Matches match_descriptors(const std::vector<SiftDescriptor>& a, const std::vecto
   return mutual_matches(nearest_neighbours(a, b, static_cast<std::size_t>(options.k_best) + 1), options.ratio);
 }
 
-Standing standing_of_coarsest(const ImageFeatures& a, const ImageFeatures& b, const std::vector<std::int8_t>& upright_a,
-                              const std::vector<std::int8_t>& upright_b, const MatchOptions& options) {
+namespace {
+
+// Of the coarsest features, which come first.
+Matches match_coarsest(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options) {
   static constexpr std::size_t kCoarsest = 1000;
   const auto coarsest = [](const ImageFeatures& image) {
     const auto first = image.descriptors.begin();
     return std::vector<SiftDescriptor>(
         first, first + static_cast<std::ptrdiff_t>(std::min(kCoarsest, image.descriptors.size())));
   };
-  return compare_standing(match_descriptors(coarsest(a), coarsest(b), options), upright_a, upright_b);
+  return match_descriptors(coarsest(a), coarsest(b), options);
+}
+
+}  // namespace
+
+Standing standing_of_coarsest(const ImageFeatures& a, const ImageFeatures& b, const std::vector<std::int8_t>& upright_a,
+                              const std::vector<std::int8_t>& upright_b, const MatchOptions& options) {
+  return compare_standing(match_coarsest(a, b, options), upright_a, upright_b);
 }
 
 namespace {
 
+Matches match_alike(const ImageFeatures& a, const ImageFeatures& b, const std::vector<std::int8_t>& sectors_a,
+                    const std::vector<std::int8_t>& sectors_b, const MatchOptions& options) {
+  const auto k = static_cast<std::size_t>(options.k_best) + 1;
+  return mutual_matches(nearest_alike(a.descriptors, b.descriptors, sectors_a, sectors_b, k), options.ratio);
+}
+
 Matches match_features(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options,
                        const PairKnowledge& known) {
-  if (!known.upright_a || !known.upright_b) return match_descriptors(a.descriptors, b.descriptors, options);
-  const auto k = static_cast<std::size_t>(options.k_best) + 1;
-  return mutual_matches(nearest_upright(a.descriptors, b.descriptors, *known.upright_a, *known.upright_b, k),
-                        options.ratio);
+  if (known.upright_a && known.upright_b) return match_alike(a, b, *known.upright_a, *known.upright_b, options);
+  if (options.by_turn)
+    if (const auto turn = turn_from_above(a, b, match_coarsest(a, b, options)))
+      return match_alike(a, b, sectors_from(a, 0), sectors_from(b, *turn), options);
+  return match_descriptors(a.descriptors, b.descriptors, options);
 }
 
 // Verification of matches by two-view geometry; `by_chance`: see TwoViewOptions.

@@ -23,6 +23,7 @@ struct MatchOptions {
   double max_residual_px = 3.0;  // of verification: largest epipolar (Sampson) residual (see TwoViewOptions)
   double sample_spacing_px = 0;  // least distance of the points of a sample of verification in the first image
   int min_inliers = 20;          // fewer: the pair is not verified
+  bool by_turn = true;           // from above, only features that agree in the turn of the pair (turned_matching.h)
   // Of pairs whose relative orientation is trusted (trusted_pair.h).
   bool guided = false;          // only features near the epipolar line are compared
   double min_distance_m = 2;    // of what is matched so, and

@@ -55,6 +55,12 @@ void insert_neighbour(Neighbours& all, std::size_t of, std::int32_t distance, st
 
 }  // namespace
 
+std::int8_t sector_of(double angle_rad) {
+  const double turns = angle_rad / (2 * std::numbers::pi), part = turns - std::floor(turns);
+  if (!(part >= 0)) return kAnySector;
+  return static_cast<std::int8_t>(std::min<int>(kUprightSectors - 1, static_cast<int>(part * kUprightSectors)));
+}
+
 std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camera& camera,
                                          const Eigen::Vector3d& down) {
   constexpr double kLowest = 0.5, kHighest = -0.866;  // sines of 30 degrees below the horizon and 60 above
@@ -69,17 +75,14 @@ std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camer
     const double below = ray.dot(down);
     if (!(below < kLowest && below > kHighest)) continue;
     const Eigen::Vector2d vertical = project(camera.intrinsics, ray + kStep * down) - pixel;
-    const double turn = keypoint.angle_deg * kDegree - std::atan2(vertical.y(), vertical.x());
-    const double part = turn / (2 * std::numbers::pi) - std::floor(turn / (2 * std::numbers::pi));
-    if (!(part >= 0)) continue;
-    sectors[i] = static_cast<std::int8_t>(std::min<int>(kUprightSectors - 1, static_cast<int>(part * kUprightSectors)));
+    sectors[i] = sector_of(keypoint.angle_deg * kDegree - std::atan2(vertical.y(), vertical.x()));
   }
   return sectors;
 }
 
-MutualNeighbours nearest_upright(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
-                                 std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
-                                 std::size_t k) {
+MutualNeighbours nearest_alike(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
+                               std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
+                               std::size_t k) {
   MutualNeighbours all{no_neighbours(a.size(), k), no_neighbours(b.size(), k)};
   for (std::int8_t sector = kAnySector; sector < kUprightSectors; ++sector) {
     std::vector<std::int32_t> rows_a, rows_b;  // ascending, as ties are decided by rows

@@ -23,13 +23,16 @@ namespace megablock {
 inline constexpr int kUprightSectors = 12;
 inline constexpr std::int8_t kAnySector = -1;
 
+// The sector of a direction, in radians, any number of turns.
+std::int8_t sector_of(double angle_rad);
+
 // [features]: 0 to kUprightSectors - 1, or kAnySector. `down`: unit, camera axes.
 std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camera& camera, const Eigen::Vector3d& down);
 
 // As nearest_neighbours of all, those left out that differ by more than one sector.
-MutualNeighbours nearest_upright(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
-                                 std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
-                                 std::size_t k);
+MutualNeighbours nearest_alike(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
+                               std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
+                               std::size_t k);
 
 // How features that match, found regardless of sectors, stand in two images.
 enum class Standing : std::int8_t {

@@ -72,7 +72,8 @@ struct CellMatches {
 };
 
 // Of both streets, in one cell, by the stage of a job.
-CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& features) {
+CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& features, bool by_turn = false,
+                       int threads = 1) {
   const ScratchDirectory folder;
   const JobStore store(folder.path("job"));
   store.create();
@@ -81,7 +82,7 @@ CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& fea
   const CandidateGraph graph{
       {{ImageIndex(0), ImageIndex(1)}, {ImageIndex(2), ImageIndex(3)}}, {0, 2}, {0, 1}};  // one cell
   RunOptions options;
-  options.threads = 1;
+  options.threads = threads;
   options.quiet = true;
   int argc = 0;
   char** argv = nullptr;
@@ -97,6 +98,7 @@ CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& fea
           .failures = {},
           .not_oriented = {},
           .notes = {}};
+  job.settings.matching.by_turn = by_turn;
   const std::vector<std::string> names = run_matching(job, {std::vector<std::uint64_t>(kImages, 7), {shard}}, graph);
   const UnitSeal seal = store.seal(names.at(0)).value();
   return {seal.fingerprint, seal.content_hash, read_all_matches(job, names)};
@@ -155,6 +157,19 @@ TEST_F(MatchingByVerticals, PosesInAxesOfTheirOwnKeepThem) {
   ASSERT_EQ(aside.size(), static_cast<std::size_t>(kImages));
   for (const SetAsideVertical& vertical : aside) EXPECT_EQ(vertical.verdict, VerticalVerdict::kAgainstPoses);
   expect_same(matched(), together);
+}
+
+// Without verticals the turn of a pair leaves out what they do; on any number of threads it is the same.
+TEST_F(MatchingByVerticals, TheTurnDoesWithoutThem) {
+  const CellMatches upright = matched();
+  street_.block.verticals.clear();
+  const CellMatches turned = matches_of(street_.block, street_.features, true);
+  ASSERT_EQ(turned.pairs.size(), 2u);
+  for (std::size_t pair = 0; pair < 2; ++pair) EXPECT_EQ(turned.pairs[pair].putative, upright.pairs[pair].putative);
+  expect_same(matches_of(street_.block, street_.features, true, 2), turned);
+  const CellMatches all = matches_of(street_.block, street_.features);
+  EXPECT_NE(all.fingerprint, turned.fingerprint);
+  EXPECT_EQ(all.pairs[0].putative, turned.pairs[0].putative + kRivals);
 }
 
 }  // namespace

@@ -174,6 +174,22 @@ TEST(MatchPair, WrongVerticalsCostNoMatches) {
   }
 }
 
+// Without verticals, the turn of the pictures does: wrong matches of another turn are not compared, right ones all are.
+TEST(MatchPair, TheTurnCostsNoMatches) {
+  const UprightPictures turned(0);
+  const auto match = [&](bool by_turn) {
+    MatchOptions options;
+    options.by_turn = by_turn;
+    return match_pair(turned.scene.a, turned.scene.b, make_camera(), make_camera(), options);
+  };
+  const VerifiedPair with = match(true), without = match(false);
+  EXPECT_EQ(without.putative, kMatches + 200);
+  EXPECT_LT(with.putative, kMatches + 150);
+  EXPECT_GE(with.putative, kMatches + 100);
+  EXPECT_GE(std::ssize(with.feature_a), kMatches);
+  EXPECT_LE(std::ssize(with.feature_a), std::ssize(without.feature_a));
+}
+
 TEST(MatchPair, IsRepeatable) {
   const TwoPictures scene = make_scene();
   const VerifiedPair first = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
@@ -187,9 +203,14 @@ TEST(MatchPair, UnrelatedImagesAreNotVerified) {
   TwoPictures scene = make_scene();
   std::mt19937_64 generator(8);
   for (auto& d : scene.b.descriptors) d = random_descriptor(generator);
+  for (auto& keypoint : scene.b.keypoints) keypoint.angle_deg = static_cast<float>(generator() % 360);
+  MatchOptions all;
+  all.by_turn = false;
   const VerifiedPair pair = match_pair(scene.a, scene.b, make_camera(), make_camera(), {});
   EXPECT_EQ(pair.model, PairModel::kNone);
   EXPECT_TRUE(pair.feature_a.empty());
+  EXPECT_EQ(pair.putative, match_pair(scene.a, scene.b, make_camera(), make_camera(), all).putative)
+      << "not taken for turned";
 }
 
 TEST(MatchPair, ImagesWithoutFeaturesAreNotVerified) {

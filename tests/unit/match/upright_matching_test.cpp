@@ -61,7 +61,7 @@ TEST(UprightMatching, IsThatOfAllThatStandAlike) {
   for (const auto& [count_a, count_b] : {std::pair<std::size_t, std::size_t>{300, 250}, {20, 3}, {5, 0}, {0, 7}}) {
     const auto a = random_descriptors(count_a, generator), b = random_descriptors(count_b, generator);
     const auto sectors_a = random_sectors(count_a, generator), sectors_b = random_sectors(count_b, generator);
-    const MutualNeighbours found = nearest_upright(a, b, sectors_a, sectors_b, kNearest);
+    const MutualNeighbours found = nearest_alike(a, b, sectors_a, sectors_b, kNearest);
     expect_nearest(a, b, sectors_a, sectors_b, found.of_a);
     expect_nearest(b, a, sectors_b, sectors_a, found.of_b);
   }
@@ -71,7 +71,7 @@ TEST(UprightMatching, WithoutSectorsItIsThatOfAll) {
   std::mt19937_64 generator(6);
   const auto a = random_descriptors(90, generator), b = random_descriptors(70, generator);
   const std::vector<std::int8_t> any_a(90, kAnySector), any_b(70, kAnySector);
-  const MutualNeighbours found = nearest_upright(a, b, any_a, any_b, kNearest),
+  const MutualNeighbours found = nearest_alike(a, b, any_a, any_b, kNearest),
                          all = nearest_neighbours(a, b, kNearest);
   EXPECT_EQ(found.of_a.row, all.of_a.row);
   EXPECT_EQ(found.of_b.row, all.of_b.row);
