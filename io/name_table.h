@@ -21,6 +21,10 @@ class NameTable {
     end_.push_back(std::ssize(text_));
   }
 
+  // Of all names, one behind the other, and where each ends in it.
+  const std::vector<char>& text() const { return text_; }
+  const std::vector<std::int64_t>& ends() const { return end_; }
+
   // Valid until the table changes. Throws std::out_of_range where there is no such row, so of a table that is away.
   std::string_view operator[](Index row) const {
     const auto i = static_cast<std::size_t>(row.value);

@@ -4,7 +4,17 @@
 
 namespace megablock {
 
+namespace {
+
+void page_names(const Block& block, PagedTables& tables) {
+  tables.put(block.image_names.text());
+  tables.put(block.image_names.ends());
+}
+
+}  // namespace
+
 void page_tables(const Block& block, PagedTables& tables) {
+  page_names(block, tables);
   tables.put(block.frames);
   tables.put(block.images);
   tables.put(block.relative_poses);
@@ -15,6 +25,9 @@ void release_names(Job& job) {
   return_freed_memory();
 }
 
-void restore_names(Job& job) { job.block.image_names = read_image_names(job.store.verified_path("block.h5")); }
+void restore_names(Job& job) {
+  job.block.image_names = read_image_names(job.store.verified_path("block.h5"));
+  page_names(job.block, job.tables);
+}
 
 }  // namespace megablock

@@ -5,7 +5,7 @@
 
 namespace megablock {
 
-// Frames, images and relative poses go to the disk; a million images of ten cameras take 64 MB.
+// Frames, images and their names, and relative poses go to the disk; a million images of ten cameras take 100 MB.
 void page_tables(const Block& block, PagedTables& tables);
 
 // Tiles, tracks and adjustments do without the names of images, a third as much again.

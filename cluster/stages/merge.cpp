@@ -229,7 +229,9 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   std::filesystem::create_directories(job.store.path("result"));
   std::vector<PartTracks::File> files;
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
-  const PartTracks tracks(std::move(files), result.sigma_scaled ? result.variance_factor : 1);
+  job.tables.put(result.frame_covariance);
+  const PartTracks tracks(std::move(files), result.sigma_scaled ? result.variance_factor : 1,
+                          [&job] { job.tables.release(); });
   // Both go through all tracks, while the other ranks have nothing left to do.
   auto gathered = std::async(std::launch::async, [&] {
     Report report(result, tracks);

@@ -20,7 +20,7 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kPieceTracks = 128;      // read at a time of each tile, of which there may be thousands
+constexpr std::int64_t kPieceTracks = 64;       // read at a time of each tile, of which there may be thousands
 constexpr std::int64_t kBatchTracks = 1 << 14;  // handed on at a time
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
@@ -263,8 +263,8 @@ TilePart write_part(const std::string& path, const RankTile& tile, const TrackSe
   return part;
 }
 
-PartTracks::PartTracks(std::vector<File> files, double covariance_factor)
-    : files_(std::move(files)), covariance_factor_(covariance_factor) {
+PartTracks::PartTracks(std::vector<File> files, double covariance_factor, std::function<void()> after_batch)
+    : files_(std::move(files)), covariance_factor_(covariance_factor), after_batch_(std::move(after_batch)) {
   for (const File& file : files_) count_ += file.track_count;
 }
 
@@ -281,6 +281,7 @@ void PartTracks::visit(const Visit& visit) const {
     for (Eigen::Matrix3d& covariance : batch.point_covariance) covariance *= covariance_factor_;
     visit(batch);
     batch = {};
+    if (after_batch_) after_batch_();
   };
   while (!order.empty()) {
     const std::size_t p = order.top().second;

@@ -3,6 +3,7 @@
 // tile at a time: no rank holds more of the result than a tile.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -41,13 +42,15 @@ class PartTracks final : public TrackBatches {
     std::string path;
     std::int64_t track_count = 0;
   };
-  PartTracks(std::vector<File> files, double covariance_factor);
+  // `after_batch` is called behind every batch of a visit, of which there may be several at a time.
+  PartTracks(std::vector<File> files, double covariance_factor, std::function<void()> after_batch = {});
   std::int64_t track_count() const override { return count_; }
   void visit(const Visit& visit) const override;
 
  private:
   std::vector<File> files_;  // [tiles]
   double covariance_factor_;
+  std::function<void()> after_batch_;
   std::int64_t count_ = 0;
 };
 
