@@ -5,8 +5,6 @@
 #include <cmath>
 #include <numbers>
 #include <random>
-#include <utility>
-#include <vector>
 
 #include "geometry/binomial.h"
 #include "geometry/decompositions.h"
@@ -124,26 +122,7 @@ struct FoundCircle {
   std::vector<int> lines;
 };
 
-// Of feet that may be those of one line, by their covariances, only the surest. In the order given.
-std::vector<int> distinct_lines(const std::vector<LineFoot>& feet, const std::vector<int>& lines) {
-  constexpr double kSameSigmas = 4;
-  const auto foot = [&](int i) -> const LineFoot& { return feet[static_cast<std::size_t>(i)]; };
-  std::vector<std::pair<double, int>> by_sigma;
-  for (const int i : lines) by_sigma.emplace_back(larger_half_axis(foot(i).covariance), i);
-  std::sort(by_sigma.begin(), by_sigma.end());
-  std::vector<int> distinct;
-  for (const auto& [sigma, i] : by_sigma)
-    if (std::none_of(distinct.begin(), distinct.end(), [&](int other) {
-          const Eigen::Vector2d off = foot(i).point - foot(other).point;
-          const Eigen::Matrix2d covariance = foot(i).covariance + foot(other).covariance;
-          return off.dot(covariance.inverse() * off) < kSameSigmas * kSameSigmas;
-        }))
-      distinct.push_back(i);
-  std::sort(distinct.begin(), distinct.end());
-  return distinct;
-}
-
-// One pass about one origin; `left`: the lines to look at, ascending. What is one line counts once in search and stop.
+// One pass about one origin; `use`: the lines to look at.
 std::vector<FoundCircle> search_circles(const std::vector<LineFoot>& feet, std::vector<int> left, double reach,
                                         const CircleOptions& options) {
   std::vector<FoundCircle> found;
@@ -152,20 +131,19 @@ std::vector<FoundCircle> search_circles(const std::vector<LineFoot>& feet, std::
   const double band = median(axes);
   std::mt19937_64 random(options.seed);
   const auto foot = [&](int i) -> const Eigen::Vector2d& { return feet[static_cast<std::size_t>(i)].point; };
-  std::vector<int> distinct = distinct_lines(feet, left);
-  while (distinct.size() >= 5) {
-    const std::size_t n = distinct.size();
+  while (left.size() >= 5) {
+    const std::size_t n = left.size();
     const std::size_t draws = std::max(n / 2, static_cast<std::size_t>(std::max(0, options.min_draws)));
     std::int64_t captured = 0;
     Eigen::Vector2d best = Eigen::Vector2d::Zero();
     for (std::size_t draw = 0; draw < draws; ++draw) {
-      const int i = distinct[random() % n], j = distinct[random() % n];
+      const int i = left[random() % n], j = left[random() % n];
       Eigen::Matrix2d rows;
       rows << foot(i).transpose(), foot(j).transpose();
       if (!(std::abs(rows.determinant()) > 1e-9 * foot(i).norm() * foot(j).norm())) continue;
       const Eigen::Vector2d point = rows.inverse() * Eigen::Vector2d(foot(i).squaredNorm(), foot(j).squaredNorm());
       std::int64_t count = 0;
-      for (const int k : distinct) count += std::abs(circle_residual(0.5 * point, foot(k))) < band;
+      for (const int k : left) count += std::abs(circle_residual(0.5 * point, foot(k))) < band;
       if (count <= captured) continue;
       captured = count;
       best = point;
@@ -188,12 +166,12 @@ std::vector<FoundCircle> search_circles(const std::vector<LineFoot>& feet, std::
       if (!refined || !CircleEquation::pixel(*refined).allFinite()) break;
       circle.point = CircleEquation::pixel(*refined);
     }
-    const auto is_explained = [&](int k) {
+    const std::size_t before = left.size();
+    std::erase_if(left, [&](int k) {
       const double sigma = larger_half_axis(feet[static_cast<std::size_t>(k)].covariance);
       return std::abs(circle_residual(0.5 * circle.point, foot(k))) < std::max(2 * band, 3 * sigma);
-    };
-    std::erase_if(left, is_explained);
-    if (std::erase_if(distinct, is_explained) == 0) break;
+    });
+    if (left.size() == before) break;
     found.push_back(std::move(circle));
   }
   return found;

@@ -11,9 +11,8 @@
 // below 3 sigma or 2 % of the diagonal are left out (M35).
 //
 //   band     median of the larger half axes of the feet's error ellipses (M28).
-//   search   as in vanishing_points.h, by pairs of feet; feet that may be one line's count once in search and stop. A
-//            line without reason has theta and rho anywhere in the image; the probability p of the stop is the share of
-//            (theta, rho) in the band of the circle at hand.
+//   search   as in vanishing_points.h, by pairs of feet. A line without reason has theta and rho anywhere in the
+//            image; the probability p of the stop is the share of (theta, rho) in the band of the circle at hand.
 //   fit      w |H|^2 = (w P)'H as a null vector in units of the feet's distances, which P at infinity does not disturb
 //            (M26), then Gauss-Helmert with the covariances of the lines in the direction of P and the inverse of its
 //            distance (M27, M30), which are normally distributed where P, close to infinity, is not.

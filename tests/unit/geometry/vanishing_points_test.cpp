@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <random>
 
 #include "geometry/binomial.h"
 #include "geometry/vanishing_circles.h"
@@ -157,30 +156,6 @@ TEST(VanishingCircles, FindsFamiliesAndRefusesBadInput) {
   EXPECT_FALSE(fit_vanishing_circle({}));
   EXPECT_FALSE(fit_vanishing_circle(std::vector(6, lines[3])));
   EXPECT_FALSE(fit_vanishing_circle_algebraic(std::vector(6, lines[3])));
-}
-
-// The same segment again and again, as it is and with the errors of measuring it, is one line.
-TEST(VanishingCircles, ALineSeenManyTimesIsOne) {
-  const auto count = [](double sigma_px, int others) {
-    std::mt19937_64 generator(4);
-    std::normal_distribution<double> error(0, 1);
-    std::uniform_real_distribution<double> unit(0, 1);
-    std::vector<ImageLine> lines;
-    const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to, double sigma) {
-      std::vector<Eigen::Vector2d> places;
-      for (int i = 0; i < 21; ++i)
-        places.push_back(from + i / 20.0 * (to - from) + sigma * Eigen::Vector2d(error(generator), error(generator)));
-      lines.push_back(*fit_image_line(places, 0.3));
-    };
-    for (int i = 0; i < 20; ++i) add({500, 900}, {700, 400}, sigma_px);
-    const auto place = [&] { return Eigen::Vector2d(1600 * unit(generator), 1200 * unit(generator)); };
-    for (int i = 0; i < others; ++i) add(place(), place(), 0.3);
-    return find_vanishing_points_by_circles(lines, 1600, 1200).size();
-  };
-  for (const int others : {0, 6, 30}) {
-    EXPECT_EQ(count(0, others), 0u) << others;
-    EXPECT_EQ(count(0.3, others), 0u) << others;
-  }
 }
 
 }  // namespace
