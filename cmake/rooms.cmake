@@ -99,5 +99,7 @@ function(megablock_tests target folder)
   target_compile_options(${target} PRIVATE ${megablock_test_options})
   gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS ${TESTS_LABEL} TIMEOUT ${TESTS_TIMEOUT}
-                                  ENVIRONMENT OPENBLAS_NUM_THREADS=1)  # as the program itself; more threads spin
+                                  # As the program itself: more threads would spin, and those that wait beside others.
+                                  ENVIRONMENT OPENBLAS_NUM_THREADS=1
+                                  ENVIRONMENT_MODIFICATION OMP_WAIT_POLICY=set:passive)
 endfunction()

@@ -52,10 +52,13 @@ void check_image_names(const Block& block) {
   require(block.image_names.size() == block.images.size(), std::to_string(block.images.size()) + " images have " +
                                                                std::to_string(block.image_names.size()) +
                                                                " names; the file of the block is damaged");
-  std::unordered_set<std::string_view> seen;
-  for (ImageIndex i(0); block.images.contains(i); ++i.value)
-    require(seen.insert(block.image_names[i]).second,
-            "image '" + block.name_of(i) + "' appears twice; names must differ");
+  std::vector<std::string_view> names;
+  names.reserve(block.images.size());
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) names.push_back(block.image_names[i]);
+  std::sort(names.begin(), names.end());
+  const auto twice = std::adjacent_find(names.begin(), names.end());
+  require(twice == names.end(),
+          twice == names.end() ? "" : "image '" + std::string(*twice) + "' appears twice; names must differ");
 }
 
 bool positive(const Eigen::Vector3d& sigma) { return (sigma.array() > 0).all(); }

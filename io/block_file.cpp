@@ -477,8 +477,9 @@ void put_block(Hdf5Writer& file, const Block& block) {
 }
 
 Block get_block(const Hdf5Reader& file) {
+  NameTable<ImageIndex> names = get_image_names(file);  // before the tables, as it moves while it grows
   Block block = get_block_without_names(file);
-  block.image_names = get_image_names(file);
+  block.image_names = std::move(names);
   return block;
 }
 

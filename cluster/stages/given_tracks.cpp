@@ -141,7 +141,7 @@ TrackSet read_given_tracks(const std::string& tie_points, const Block& block) {
 
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
                        const std::string& scratch_file, const std::function<void(const TrackSet&)>& take,
-                       std::int64_t observations_at_a_time) {
+                       const std::function<void()>& after_batch, std::int64_t observations_at_a_time) {
   TracksOfTiles dealt(tiles.tile_count, scratch_file, observations_at_a_time);
   TrackReader(tie_points).visit([&](const TrackSet& batch) {
     check_images(tie_points, batch, block);
@@ -150,6 +150,7 @@ void deal_given_tracks(const std::string& tie_points, const Block& block, const 
       const TileIndex owner = owner_tile(block, tiles, images + batch.begin[t], images + batch.begin[t + 1]);
       if (owner.valid()) dealt.add(owner, batch, t);
     }
+    if (after_batch) after_batch();
   });
   for (std::size_t tile = 0; tile < static_cast<std::size_t>(tiles.tile_count); ++tile) take(dealt.take(tile));
 }

@@ -15,11 +15,13 @@ void check_images(const std::string& tie_points, const TrackSet& tracks, const B
 // The whole file, checked so.
 TrackSet read_given_tracks(const std::string& tie_points, const Block& block);
 
-// Calls `take` with the tracks of tile 0, 1, ... in turn. The file is read once; what is beyond
+// Calls `take` with the tracks of tile 0, 1, ... in turn, and `after_batch` behind every batch of the file, in which
+// tracks lie by place. The file is read once; what is beyond
 // `observations_at_a_time` (24 bytes each) waits in the scratch file, which is made where it is needed and removed. The
 // result does not depend on it. Errors as check_images; StoreError where the scratch file cannot be written.
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
                        const std::string& scratch_file, const std::function<void(const TrackSet&)>& take,
+                       const std::function<void()>& after_batch = {},
                        std::int64_t observations_at_a_time = std::int64_t{1} << 21);
 
 }  // namespace megablock

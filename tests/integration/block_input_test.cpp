@@ -140,7 +140,8 @@ TEST_F(BlockInput, TileWithoutOneGoodObservation) {
     const int code = folder_.run();
     const BlockResult result = read_result(folder_.job("result/block.h5"));
     EXPECT_EQ(code, said(result).find("did not converge") == std::string::npos ? kExitDone : kExitFailedUnits) << seed;
-    EXPECT_THAT(said(result), HasSubstr("tile " + std::to_string(wrong.value) + " disagrees most with the rest"))
+    // With the rest of the block, or with itself where what is kept of the noise shows it by its residuals.
+    EXPECT_THAT(said(result), testing::ContainsRegex("tile " + std::to_string(wrong.value) + " disagrees (most )?with"))
         << seed;
     for (FrameIndex f(0); f.value < 60; ++f.value) {
       ASSERT_TRUE(result.state.frames[f].centre.allFinite()) << seed;

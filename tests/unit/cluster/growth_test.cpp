@@ -154,7 +154,7 @@ TEST(GivenTracks, GoToTheirOwnersHoweverFewAreHeld) {
           dealt += row;
           ++tile;
         },
-        held);
+        {}, held);
     EXPECT_EQ(tile, 7);
     EXPECT_GT(dealt, 300);
     EXPECT_FALSE(std::filesystem::exists(scratch.path("waiting/tracks")));
