@@ -1,7 +1,7 @@
 // The merge of a block in tiles against Ceres, which holds it as one problem:
 //
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
-//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--ranks 2] [--exactness|--speed]
+//                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--ranks 1|2] [--exactness|--speed]
 //
 // Scenes: tests/benchmark/scenes.h. A job of the block on two ranks, merged to a decrement of 1e-7, gives the tiles,
 // the observations it kept and its solution. How exact this is (cluster/monolithic_comparison.h):
@@ -13,7 +13,8 @@
 // normal deviate of its sigma, run, each in processes of their own and with the arithmetic that the processor is best
 // at, Ceres on two threads, with SPARSE_SCHUR by automatic and by analytic derivatives and with ITERATIVE_SCHUR
 // (Schur-Jacobi, three steps) by analytic ones, and before each of them three times the merge on two ranks, or on
-// one with two threads. Of Ceres' runs the one with the fastest iterations counts, of ours the middle one.
+// one with two threads (below 1 500 frames). Of Ceres' runs the one with the fastest iterations counts, of ours the
+// middle one.
 //
 // Prints one JSON object as its last line: the two figures above; of the second runs' ends
 // relative_cost_difference_of_runs ((ours - Ceres') / Ceres', of the best SPARSE_SCHUR) and
@@ -93,7 +94,7 @@ struct Options {
   std::string role;  // of a process that this program starts: "exactness", "ours" or the name of Ceres' linear solver
   bool analytic = false;
   bool exactness = true, speed = true;  // what is asked for
-  int ranks = 2;                        // of ours, with a thread each; 1: one with two threads
+  int ranks = 0;                        // of ours, with a thread each; 1: one with two threads; 0: by the block's size
   int tile_frames = 120;                // so that ranks have several; 0: as the program chooses
   std::string loss = "huber";
   Options() { scene.frames = 2000; }
@@ -448,7 +449,8 @@ int main(int argc, char** argv) {
   CLI::App app("The merge against Ceres on one simulated block; prints one JSON object");
   add_scene_options(app, options.scene);
   app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most; 0: as the program chooses");
-  app.add_option("--ranks", options.ranks, "Ranks of ours, with a thread each; 1: one with two threads")
+  app.add_option("--ranks", options.ranks,
+                 "Ranks of ours, with a thread each; 1: one with two threads, as below 1500 frames by default")
       ->check(CLI::Range(1, 2));
   app.add_option("--calibration", options.scene.calibration, "Calibration held, or shared by all frames and adjusted")
       ->check(CLI::IsMember({"held", "shared"}));
@@ -461,6 +463,8 @@ int main(int argc, char** argv) {
   app.add_flag("--analytic", options.analytic)->group("");
   app.add_option(kArithmeticOption)->group("");  // pin_arithmetic() reads it
   CLI11_PARSE(app, argc, argv);
+  // Ranks are the faster where each has a dozen tiles; with a few they wait for one another, and each is a process.
+  if (options.ranks == 0) options.ranks = options.scene.frames < 1500 ? 1 : 2;
   try {
     const Start start{options.scene.folder, options.ranks};
     if (options.role == "ours") {
