@@ -58,6 +58,11 @@ void PagedTables::put(const void* table, std::size_t bytes) {
   pages_.push_back({at, last - first});
 }
 
+void PagedTables::forget(const void* table, std::size_t bytes) {
+  const char* const begin = static_cast<const char*>(table);
+  std::erase_if(pages_, [&](const Pages& pages) { return pages.first >= begin && pages.first < begin + bytes; });
+}
+
 void PagedTables::release() const {
   for (const Pages& pages : pages_) madvise(pages.first, pages.bytes, MADV_PAGEOUT);
 }

@@ -20,11 +20,17 @@ class PagedTables {
   void put(const std::vector<Value>& table) {
     put(table.data(), table.size() * sizeof(Value));
   }
-  // Tables that have been freed in the meantime do no harm.
+  // Before a table is freed while others stay: what comes to its place would be taken out of memory, to where the
+  // system swaps. Its bits are safe either way.
+  template <typename Value>
+  void forget(const std::vector<Value>& table) {
+    forget(table.data(), table.size() * sizeof(Value));
+  }
   void release() const;
 
  private:
   void put(const void* table, std::size_t bytes);
+  void forget(const void* table, std::size_t bytes);
 
   struct Pages {
     void* first;

@@ -21,6 +21,8 @@ void page_tables(const Block& block, PagedTables& tables) {
 }
 
 void release_names(Job& job) {
+  job.tables.forget(job.block.image_names.text());
+  job.tables.forget(job.block.image_names.ends());
   job.block.image_names = {};
   return_freed_memory();
 }

@@ -69,6 +69,20 @@ TEST(PagedTables, LeaveNoFileAndLetTheirMemoryBeUsedAnew) {
   EXPECT_EQ(other_rows(next), 0u);
 }
 
+TEST(PagedTables, AreForgottenOneByOne) {
+  const ScratchDirectory scratch;
+  PagedTables tables(scratch.path());
+  const std::vector<std::int64_t> first = numbers(), second = numbers();
+  tables.put(first);
+  tables.put(second);
+  tables.forget(first);
+  EXPECT_EQ(other_rows(first) + other_rows(second), 0u);
+  const double held = resident_mib();
+  tables.release();
+  EXPECT_LT(resident_mib(), held - 50);
+  EXPECT_GT(resident_mib(), held - 80);  // the first one's pages stay
+}
+
 TEST(PagedTables, StayInMemoryWhereThereIsNoFolder) {
   const ScratchDirectory scratch;
   PagedTables tables(scratch.path() + "/missing");
