@@ -17,7 +17,7 @@ constexpr std::size_t kLeastBytes = 1 << 20;
 class ScratchFile {
  public:
   explicit ScratchFile(const std::string& directory) {
-    std::string path = directory + "/tables-XXXXXX";
+    std::string path = directory + "/tables-XXXXXX";  // mkostemp puts letters of its own in their place
     descriptor_ = mkostemp(path.data(), O_CLOEXEC);
     if (descriptor_ >= 0) unlink(path.c_str());
   }
