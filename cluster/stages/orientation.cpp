@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "adjust/given_trajectories.h"
 #include "adjust/vertical_check.h"
 #include "cluster/collective.h"
 #include "cluster/stages/block_hash.h"
@@ -183,6 +184,18 @@ void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std
   if (job.is_first_rank() && !job.options.quiet) std::fprintf(stderr, "orientation  %s\n", text.c_str());
 }
 
+// Where every pose is given nothing is oriented; given poses may still be poor.
+BlockState given_orientation(const Job& job, BlockState given) {
+  const TrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
+  if (change.frames > 0 && job.is_first_rank() && !job.options.quiet)
+    std::fprintf(stderr,
+                 "orientation  given poses of %lld frames in %lld trajectories contradict their positions and relative "
+                 "poses: moved by %.3g m rms, %.3g m at most\n",
+                 static_cast<long long>(change.frames), static_cast<long long>(change.trajectories), change.rms_m,
+                 change.largest_m);
+  return held_in_place(job, std::move(given));
+}
+
 }  // namespace
 
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
@@ -193,7 +206,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
     if (job.is_first_rank()) remove_record(job.store, "orientation");  // an earlier run may have needed the stage
     tell_of_verticals(job, aside, verticals);
-    return held_in_place(job, std::move(start));
+    return given_orientation(job, std::move(start));
   }
   if (matches.empty())
     throw AgreedError<InputError>(

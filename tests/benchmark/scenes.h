@@ -79,11 +79,13 @@ inline bool calibration_held(const SceneOptions& options) {
   return options.calibration.empty() ? options.scene == "street" : options.calibration == "held";
 }
 
-// What a folder's block was made of. Streets with shared calibration once had seven free intrinsics.
+// What a folder's block was made of, and what once was otherwise. Streets with shared calibration had seven free
+// intrinsics.
 inline nlohmann::json description_of(const SceneOptions& options, const std::string& project_lines) {
   nlohmann::json description{{"scene", options.scene}, {"frames", options.frames},
                              {"seed", options.seed},   {"calibration", options.calibration},
                              {"free", options.free},   {"project_lines", project_lines}};
+  if (options.scene == "street") description["start"] = "whole passes";  // once over stretches of 1 km
   if (options.scene == "street" && !calibration_held(options)) description["intrinsics"] = 8;
   return description;
 }
@@ -101,7 +103,7 @@ inline void simulate_scene(const SceneOptions& options, const std::filesystem::p
   }
   const bool street = options.scene == "street";
   std::string scene = street ? "--scene street --rig-cameras 10 --points-per-frame 1000 --relative-position-sigma 0.01 "
-                               "--relative-rotation-sigma 0.01 --start-offset 2 --start-chain 250"
+                               "--relative-rotation-sigma 0.01 --start-offset 2"
                              : "--scene aerial --points-per-frame 300";
   if (options.free)
     scene += " --gps-sigma 0";
