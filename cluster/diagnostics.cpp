@@ -12,12 +12,11 @@ namespace megablock {
 
 namespace {
 
-// Links of frames and heights of what images see, gathered from tracks.
+// Links of frames and, where they matter, heights of what images see, gathered from tracks.
 class TrackEvidence {
  public:
-  explicit TrackEvidence(const Block& block) : block_(block) {
-    sum_.assign(block.images.size(), 0);
-    count_.assign(block.images.size(), 0);
+  TrackEvidence(const Block& block, const BlockState& state) : block_(block) {
+    if (looks_down(block, state)) heights_.resize(block.images.size());
   }
 
   // `kept` and `points` may be empty: all observations, no points.
@@ -28,9 +27,9 @@ class TrackEvidence {
         if (!kept.empty() && !kept[o]) continue;
         const ImageIndex image = tracks.image[o];
         frames_.push_back(block_.images[image].frame);
-        if (t >= points.size() || !std::isfinite(points[t].z())) continue;
-        sum_[image] += points[t].z();
-        ++count_[image];
+        if (heights_.empty() || t >= points.size() || !std::isfinite(points[t].z())) continue;
+        heights_[image].sum += points[t].z();
+        ++heights_[image].count;
       }
       std::sort(frames_.begin(), frames_.end());
       frames_.erase(std::unique(frames_.begin(), frames_.end()), frames_.end());
@@ -42,17 +41,20 @@ class TrackEvidence {
   const LinkWeights& links() const { return links_; }
   IndexedVector<ImageIndex, double> ground_height() const {
     IndexedVector<ImageIndex, double> height;
-    for (ImageIndex i(0); count_.contains(i); ++i.value)
-      height.push_back(count_[i] > 0 ? sum_[i] / static_cast<double>(count_[i])
-                                     : std::numeric_limits<double>::quiet_NaN());
+    for (const Heights& seen : heights_)
+      height.push_back(seen.count > 0 ? seen.sum / static_cast<double>(seen.count)
+                                      : std::numeric_limits<double>::quiet_NaN());
     return height;
   }
 
  private:
+  struct Heights {  // of points
+    double sum = 0;
+    std::int64_t count = 0;
+  };
   const Block& block_;
   LinkWeights links_;
-  IndexedVector<ImageIndex, double> sum_;  // of heights of points
-  IndexedVector<ImageIndex, std::int64_t> count_;
+  IndexedVector<ImageIndex, Heights> heights_;
   std::vector<FrameIndex> frames_;  // of one track
 };
 
@@ -65,7 +67,7 @@ BlockDiagnostics diagnose_with(const TrackEvidence& evidence, const Block& block
 
 BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
                                  const DiagnosticsOptions& options) {
-  TrackEvidence evidence(result.block);
+  TrackEvidence evidence(result.block, result.state);
   tracks.visit([&](const TrackResults& batch) { evidence.add(batch.tracks, batch.kept, batch.points); });
   return diagnose_with(evidence, result.block, result.state, options);
 }
@@ -78,7 +80,7 @@ JobDiagnostics diagnose_job(const JobStore& store) {
     return {result.block, diagnose_result(result, StoredTracks(path), options), "the result"};
   }
   const JobSoFar job = read_job_so_far(store);
-  TrackEvidence evidence(job.block);
+  TrackEvidence evidence(job.block, job.state);
   visit_tracks(store, [&](const TrackSet& tracks) { evidence.add(tracks, {}, {}); });
   return {job.block, diagnose_with(evidence, job.block, job.state, options), job.source};
 }

@@ -36,6 +36,15 @@ std::int64_t missing_in(double usual_distances) {
   return std::llround(std::clamp(usual_distances - 1, 1.0, static_cast<double>(kMostMissing)));
 }
 
+Pose pose_of(const Block& block, const BlockState& state, ImageIndex image) {
+  const Image& i = block.images[image];
+  return camera_pose(state.frames[i.frame], state.mounts[block.frames[i.frame].rig][static_cast<std::size_t>(i.mount)]);
+}
+
+double slope_down(const Block& block, const BlockState& state, ImageIndex image) {
+  return -(pose_of(block, state, image).rotation.conjugate() * Eigen::Vector3d::UnitZ()).z();
+}
+
 class Diagnosis {
  public:
   Diagnosis(const Block& block, const BlockState& state, const IndexedVector<ImageIndex, double>& ground_height,
@@ -48,11 +57,12 @@ class Diagnosis {
 
   BlockDiagnostics find() {
     const std::vector<std::vector<FrameIndex>> order = acquisition_order(block_, state_);
-    look_down();
+    found_.aerial = looks_down(block_, state_);
     lines_ = found_.aerial ? flight_lines(order, state_) : order;
     if (found_.aerial) found_.lines = static_cast<std::int64_t>(lines_.size());
     find_steps();
     if (found_.aerial) {
+      find_down_images();
       find_heights();
       find_footprints();
       find_missing_lines();
@@ -72,29 +82,17 @@ class Diagnosis {
   Eigen::Vector2d place(FrameIndex frame) const { return state_.frames[frame].centre.head<2>(); }
   double distance(FrameIndex a, FrameIndex b) const { return (place(a) - place(b)).norm(); }
 
-  Pose camera_of(ImageIndex image) const {
-    const Image& i = block_.images[image];
-    return camera_pose(state_.frames[i.frame],
-                       state_.mounts[block_.frames[i.frame].rig][static_cast<std::size_t>(i.mount)]);
-  }
-  double slope_down(ImageIndex image) const {
-    return -(camera_of(image).rotation.conjugate() * Eigen::Vector3d::UnitZ()).z();
-  }
-
-  // Which image of a frame looks down most steeply, and whether most images do.
-  void look_down() {
+  Pose camera_of(ImageIndex image) const { return pose_of(block_, state_, image); }
+  // Which image of a frame looks down most steeply.
+  void find_down_images() {
     down_image_.assign(block_.frames.size(), ImageIndex());
     IndexedVector<FrameIndex, double> steepest(block_.frames.size(), kDown);
-    std::int64_t down = 0, all = 0;
     for (ImageIndex i(0); block_.images.contains(i); ++i.value) {
       const FrameIndex frame = block_.images[i].frame;
       if (!state_.oriented[frame]) continue;
-      ++all;
-      const double slope = slope_down(i);
-      down += slope > kDown;
+      const double slope = slope_down(block_, state_, i);
       if (slope > steepest[frame]) steepest[frame] = slope, down_image_[frame] = i;
     }
-    found_.aerial = 2 * down > all;
   }
 
   // Heights above ground of the frames that look down.
@@ -149,7 +147,7 @@ class Diagnosis {
     footprint_row_.assign(block_.frames.size(), -1);
     for (ImageIndex i(0); block_.images.contains(i); ++i.value) {
       const FrameIndex frame = block_.images[i].frame;
-      if (!state_.oriented[frame] || !std::isfinite(height_[frame]) || !(slope_down(i) > kDown)) continue;
+      if (!state_.oriented[frame] || !std::isfinite(height_[frame]) || !(slope_down(block_, state_, i) > kDown)) continue;
       const auto corners = footprint_of(camera_now(i), camera_of(i), height_[frame]);
       if (!corners) continue;
       if (i == down_image_[frame]) footprint_row_[frame] = static_cast<std::int64_t>(found_.footprints.size());
@@ -420,6 +418,16 @@ class Diagnosis {
 };
 
 }  // namespace
+
+bool looks_down(const Block& block, const BlockState& state) {
+  std::int64_t down = 0, all = 0;
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    if (!state.oriented[block.images[i].frame]) continue;
+    ++all;
+    down += slope_down(block, state, i) > kDown;
+  }
+  return 2 * down > all;
+}
 
 BlockDiagnostics diagnose(const Block& block, const BlockState& state,
                           const IndexedVector<ImageIndex, double>& ground_height, const LinkWeights& links,

@@ -25,10 +25,13 @@
 namespace megablock {
 
 // Frames with a pose are looked at: those of `state` that are oriented. `ground_height`: of what each image sees, z in
-// the block's frame; NaN: not known. `links`: common tie points of frames; empty: not known.
+// the block's frame; NaN: not known; may be empty. `links`: common tie points of frames; empty: not known.
 BlockDiagnostics diagnose(const Block& block, const BlockState& state,
                           const IndexedVector<ImageIndex, double>& ground_height, const LinkWeights& links,
                           const DiagnosticsOptions& options);
+
+// Whether most oriented images look down: only then does ground_height matter.
+bool looks_down(const Block& block, const BlockState& state);
 
 // Before anything is oriented: frames with a given pose, or position and attitude prior.
 BlockState state_of_priors(const Block& block);

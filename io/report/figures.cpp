@@ -348,8 +348,24 @@ bool oriented(const BlockResult& result, FrameIndex frame) {
   return result.state.oriented.contains(frame) && result.state.oriented[frame] != 0;
 }
 
+std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before) {
+  std::vector<ImageIndex> first;  // a heap, its last on top
+  for (ImageIndex image(0); result.block.images.contains(image) && count > 0; ++image.value) {
+    if (!oriented(result, result.block.images[image].frame)) continue;
+    if (first.size() == count) {
+      if (!before(image, first.front())) continue;
+      std::pop_heap(first.begin(), first.end(), before);
+      first.pop_back();
+    }
+    first.push_back(image);
+    std::push_heap(first.begin(), first.end(), before);
+  }
+  std::sort_heap(first.begin(), first.end(), before);
+  return first;
+}
+
 double image_rms(const Figures& figures, ImageIndex image) {
-  const std::int64_t n = figures.observations[image];
+  const std::int32_t n = figures.observations[image];
   return n ? std::sqrt(figures.image_squares[image] / static_cast<double>(n)) : kUnknown;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -94,7 +95,7 @@ struct Figures {
   std::int64_t frames = 0, oriented_frames = 0, boundary_frames = 0, components = 0;
   std::int64_t all_observations = 0;  // of triangulated points, rejected ones included
   Histogram track_length, intersection_deg, residual_px, observations_per_image;
-  IndexedVector<ImageIndex, std::int64_t> observations;      // kept, per image
+  IndexedVector<ImageIndex, std::int32_t> observations;      // kept, per image
   IndexedVector<CameraIndex, ResidualField> fields;          // kept residuals over the sensors
   IndexedVector<CameraIndex, std::int64_t> camera_images;    // oriented
   double ground_resolution_m = kUnknown;                     // median of distance over focal length
@@ -103,7 +104,7 @@ struct Figures {
   std::vector<MeasurementResidual> measurements;             // of these, worst first
   std::vector<AttitudeResidual> attitudes;                   // frames with observed attitude and pose, block order
   IndexedVector<ImageIndex, double> image_squares;           // sum of squared kept residuals, px^2
-  IndexedVector<ImageIndex, std::int64_t> measured;          // observations in tracks, rejected ones included
+  IndexedVector<ImageIndex, std::int32_t> measured;          // observations in tracks, rejected ones included
   Reliability reliability;                                   // tested = 0: redundancy numbers are not known
   std::vector<BlockPart> parts;                              // largest first
   IndexedVector<FrameIndex, std::int32_t> part_of_frame;     // row of parts; -1: not oriented
@@ -121,6 +122,10 @@ bool oriented(const BlockResult& result, FrameIndex frame);
 
 // Fills in parts and part_of_frame.
 void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
+
+// The first `count` oriented images in an order, without a list of all.
+using ImageOrder = std::function<bool(ImageIndex, ImageIndex)>;
+std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before);
 
 double image_rms(const Figures& figures, ImageIndex image);  // px; unknown without observations
 Pose image_pose(const BlockResult& result, ImageIndex image);

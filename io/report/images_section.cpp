@@ -83,17 +83,14 @@ void add_image(const BlockResult& result, const Figures& f, const Columns& colum
 
 // All oriented images in block order; of a huge block those with the largest residuals.
 std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& f) {
-  std::vector<ImageIndex> images;
-  for (ImageIndex image(0); result.block.images.contains(image); ++image.value)
-    if (oriented(result, result.block.images[image].frame)) images.push_back(image);
-  if (images.size() <= kListedImages) return images;
+  if (f.reprojection.oriented_images <= static_cast<std::int64_t>(kListedImages))
+    return first_images(result, kListedImages, std::less<ImageIndex>());
   const auto rms = [&](ImageIndex image) {
     const double value = image_rms(f, image);
     return std::isfinite(value) ? value : -1;
   };
-  std::stable_sort(images.begin(), images.end(), [&](ImageIndex a, ImageIndex b) { return rms(a) > rms(b); });
-  images.resize(kListedImages);
-  return images;
+  return first_images(result, kListedImages,
+                      [&](ImageIndex a, ImageIndex b) { return std::pair(-rms(a), a) < std::pair(-rms(b), b); });
 }
 
 }  // namespace

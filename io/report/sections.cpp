@@ -27,16 +27,11 @@ std::string tie_points_section(const BlockResult& result, const Figures& f) {
              "Intersection angle.") +
       figure(draw(BarChart{f.observations_per_image, "observations", "images", 0, false}),
              "Observations per oriented image.");
-  std::vector<ImageIndex> weakest;
-  for (ImageIndex image(0); result.block.images.contains(image); ++image.value)
-    if (oriented(result, result.block.images[image].frame)) weakest.push_back(image);
-  const std::size_t listed = std::min<std::size_t>(8, weakest.size());
-  std::partial_sort(
-      weakest.begin(), weakest.begin() + static_cast<std::ptrdiff_t>(listed), weakest.end(),
-      [&](ImageIndex a, ImageIndex b) { return std::pair(f.observations[a], a) < std::pair(f.observations[b], b); });
+  const std::vector<ImageIndex> weakest = first_images(result, 8, [&](ImageIndex a, ImageIndex b) {
+    return std::pair(f.observations[a], a) < std::pair(f.observations[b], b);
+  });
   Table table({"image with fewest", "observations"});
-  for (std::size_t i = 0; i < listed; ++i)
-    table.add({escape(result.block.name_of(weakest[i])), count(f.observations[weakest[i]])});
+  for (const ImageIndex image : weakest) table.add({escape(result.block.name_of(image)), count(f.observations[image])});
   return section("tie-points", "Tie points",
                  "<div class=row>" + charts + "<div class=aside>" + table.html() + "</div></div>");
 }
