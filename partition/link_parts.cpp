@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <tuple>
 
 #include "io/disjoint_sets.h"
 
@@ -15,28 +14,34 @@ struct GoodLink {
   std::int64_t points;
 };
 
-// Links of enough points and relative poses, ascending; two that join the same frames are one.
-std::vector<GoodLink> good_links(const Block& block, const BlockState& state, const LinkWeights& links,
-                                 std::int64_t enough) {
-  std::vector<GoodLink> good;
-  const auto is_good = [&](const FrameEdge& edge) {
-    return edge.weight >= enough && state.oriented[edge.a] && state.oriented[edge.b];
-  };
-  std::size_t count = block.relative_poses.size();
-  links.visit([&](const FrameEdge& edge) { count += is_good(edge); });
-  good.reserve(count);
+// Calls visit(a, b, points) for every link of enough points and then every relative pose, of frames with a pose.
+template <typename Visit>
+void visit_good_links(const Block& block, const BlockState& state, const LinkWeights& links, std::int64_t enough,
+                      Visit&& visit) {
+  const auto oriented = [&](FrameIndex a, FrameIndex b) { return a != b && state.oriented[a] && state.oriented[b]; };
   links.visit([&](const FrameEdge& edge) {
-    if (is_good(edge)) good.push_back({edge.a, edge.b, edge.weight});
+    if (edge.weight >= enough && oriented(edge.a, edge.b)) visit(edge.a, edge.b, edge.weight);
   });
   for (const RelativePose& pose : block.relative_poses)
-    if (pose.from != pose.to && state.oriented[pose.from] && state.oriented[pose.to])
-      good.push_back({std::min(pose.from, pose.to), std::max(pose.from, pose.to), 0});
-  std::sort(good.begin(), good.end(), [](const GoodLink& x, const GoodLink& y) {  // tie points before a relative pose
-    return std::tuple(x.a, x.b, -x.points) < std::tuple(y.a, y.b, -y.points);
+    if (oriented(pose.from, pose.to)) visit(std::min(pose.from, pose.to), std::max(pose.from, pose.to), 0);
+}
+
+// Enough of the good links to tell which of them are bridges, fewer than two per frame: a spanning forest and one of
+// what is left (H. Nagamochi, T. Ibaraki, Algorithmica 7, 1992). Whatever divides the frames in two parts, the first
+// forest has one of the links between them, and the second another one if there is any. `sets` become the parts.
+// A relative pose between frames that a link joins already is no second link.
+std::vector<GoodLink> two_forests(const Block& block, const BlockState& state, const LinkWeights& links,
+                                  std::int64_t enough, DisjointSets& sets) {
+  std::vector<GoodLink> forests;
+  DisjointSets second(static_cast<std::int64_t>(state.oriented.size()));
+  IndexedVector<FrameIndex, std::vector<FrameIndex>> joined(state.oriented.size());  // by links of the forests
+  visit_good_links(block, state, links, enough, [&](FrameIndex a, FrameIndex b, std::int64_t points) {
+    if (points == 0 && std::ranges::find(joined[a], b) != joined[a].end()) return;
+    if (!sets.unite(a.value, b.value) && !second.unite(a.value, b.value)) return;
+    joined[a].push_back(b);
+    forests.push_back({a, b, points});
   });
-  const auto same = [](const GoodLink& x, const GoodLink& y) { return x.a == y.a && x.b == y.b; };
-  good.erase(std::unique(good.begin(), good.end(), same), good.end());
-  return good;
+  return forests;
 }
 
 // Bridges by depth-first search without recursion; how many frames lie below each.
@@ -134,9 +139,8 @@ void find_link_parts(const Block& block, const BlockState& state, const LinkWeig
     d.part_of_frame.assign(state.oriented.size(), -1);
     return;
   }
-  const std::vector<GoodLink> good = good_links(block, state, links, d.requested.min_link_points);
   DisjointSets sets(static_cast<std::int64_t>(state.oriented.size()));
-  for (const GoodLink& link : good) sets.unite(link.a.value, link.b.value);
+  const std::vector<GoodLink> good = two_forests(block, state, links, d.requested.min_link_points, sets);
   number_parts(state, sets, d);
   links.visit([&](const FrameEdge& edge) {
     const std::int32_t a = d.part_of_frame[edge.a], b = d.part_of_frame[edge.b];

@@ -234,11 +234,14 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
                           [&job] { job.tables.release(); });
   // Both go through all tracks, while the other ranks have nothing left to do.
   auto gathered = std::async(std::launch::async, [&] {
-    Report report(result, tracks);
-    return std::pair(std::move(report), diagnose_result(result, tracks, job.settings.diagnostics));
+    BlockDiagnostics diagnostics = diagnose_result(result, tracks, job.settings.diagnostics);
+    return_freed_memory();  // links of frames
+    return std::pair(std::move(diagnostics), Report(result, tracks));
   });
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  auto [report, diagnostics] = gathered.get();
+  auto [diagnostics, report] = gathered.get();
+  job.tables.release();
+  return_freed_memory();
   job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
   const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics};
   job.store.write_text("result/report.html", std::move(report).html(std::move(result), context));

@@ -6,7 +6,10 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <set>
+#include <tuple>
 
+#include "io/disjoint_sets.h"
 #include "io/error.h"
 #include "partition/flight_lines.h"
 #include "partition/ground_cover.h"
@@ -228,6 +231,48 @@ TEST(BlockDiagnostics, RelativePosesHoldPartsTogether) {
   const BlockDiagnostics d = survey.found();
   EXPECT_EQ(d.part_frames.size(), 1u);
   EXPECT_TRUE(d.single_links.empty());  // it is no link of tie points
+}
+
+// Frames that hang together with the first one, without one of the links.
+std::int64_t reached(std::int64_t frames, const std::vector<FrameEdge>& links, std::size_t without, FrameIndex from) {
+  DisjointSets sets(frames);
+  for (std::size_t l = 0; l < links.size(); ++l)
+    if (l != without) sets.unite(links[l].a.value, links[l].b.value);
+  std::int64_t count = 0;
+  for (std::int64_t f = 0; f < frames; ++f) count += sets.find(f) == sets.find(from.value);
+  return count;
+}
+
+TEST(BlockDiagnostics, SingleLinksAreThoseWithoutWhichFramesAreApart) {
+  constexpr std::int64_t kFrames = 24;
+  std::mt19937 random(11);
+  const auto any = [&] { return FrameIndex(static_cast<std::int64_t>(random() % kFrames)); };
+  std::size_t bridges = 0;
+  for (int graph = 0; graph < 300; ++graph) {
+    Survey survey;
+    for (int f = 0; f < kFrames; ++f) survey.add(16 * f, 0, 0, 0, false);
+    std::set<std::pair<FrameIndex, FrameIndex>> pairs;
+    const std::size_t wanted = 15 + random() % 25;
+    while (pairs.size() < wanted)
+      if (const FrameIndex a = any(), b = any(); a < b) pairs.emplace(a, b);
+    std::vector<FrameEdge> good;
+    for (const auto& [a, b] : pairs) {
+      const bool relative = random() % 4 == 0;  // alone, or beside a link
+      if (relative || random() % 4 == 0) survey.block.relative_poses.push_back({b, a, Pose(), 0.01, 0.01});
+      if (!relative) survey.link(a, b, 20);
+      good.push_back({a, b, relative ? 0 : 20});
+    }
+    std::vector<std::tuple<FrameIndex, FrameIndex, std::int64_t>> expected, found;
+    for (std::size_t l = 0; l < good.size(); ++l) {
+      const std::int64_t whole = reached(kFrames, good, good.size(), good[l].a),
+                         left = reached(kFrames, good, l, good[l].a), smaller = std::min(left, whole - left);
+      if (left < whole && smaller >= 2 && good[l].weight > 0) expected.emplace_back(good[l].a, good[l].b, smaller);
+    }
+    for (const auto& link : survey.found().single_links) found.emplace_back(link.a, link.b, link.frames);
+    EXPECT_EQ(found, expected) << graph;
+    bridges += expected.size();
+  }
+  EXPECT_GT(bridges, 300u);
 }
 
 TEST(BlockDiagnostics, NothingPlacedAndBadOptions) {
