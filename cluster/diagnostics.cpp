@@ -12,11 +12,11 @@ namespace megablock {
 
 namespace {
 
-// Links of frames and, where they matter, heights of what images see, gathered from tracks.
-class TrackEvidence {
+// Gathers links of frames and, where they matter, heights of what images see from tracks.
+class TieGatherer {
  public:
-  TrackEvidence(const Block& block, const BlockState& state) : block_(block) {
-    if (looks_down(block, state)) heights_.resize(block.images.size());
+  TieGatherer(const Block& block, bool with_heights) : block_(block) {
+    if (with_heights) heights_.resize(block.images.size());
   }
 
   // `kept` and `points` may be empty: all observations, no points.
@@ -34,17 +34,15 @@ class TrackEvidence {
       std::sort(frames_.begin(), frames_.end());
       frames_.erase(std::unique(frames_.begin(), frames_.end()), frames_.end());
       for (std::size_t i = 0; i < frames_.size(); ++i)
-        for (std::size_t j = i + 1; j < frames_.size(); ++j) links_.add(frames_[i], frames_[j], 1);
+        for (std::size_t j = i + 1; j < frames_.size(); ++j) gathered_.links.add(frames_[i], frames_[j], 1);
     }
   }
 
-  const LinkWeights& links() const { return links_; }
-  IndexedVector<ImageIndex, double> ground_height() const {
-    IndexedVector<ImageIndex, double> height;
+  TieEvidence take() {
     for (const Heights& seen : heights_)
-      height.push_back(seen.count > 0 ? seen.sum / static_cast<double>(seen.count)
-                                      : std::numeric_limits<double>::quiet_NaN());
-    return height;
+      gathered_.ground_height.push_back(seen.count > 0 ? seen.sum / static_cast<double>(seen.count)
+                                                       : std::numeric_limits<double>::quiet_NaN());
+    return std::move(gathered_);
   }
 
  private:
@@ -53,23 +51,21 @@ class TrackEvidence {
     std::int64_t count = 0;
   };
   const Block& block_;
-  LinkWeights links_;
+  TieEvidence gathered_;
   IndexedVector<ImageIndex, Heights> heights_;
   std::vector<FrameIndex> frames_;  // of one track
 };
-
-BlockDiagnostics diagnose_with(const TrackEvidence& evidence, const Block& block, const BlockState& state,
-                               const DiagnosticsOptions& options) {
-  return diagnose(block, state, evidence.ground_height(), evidence.links(), options);
-}
 
 }  // namespace
 
 BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
                                  const DiagnosticsOptions& options) {
-  TrackEvidence evidence(result.block, result.state);
-  tracks.visit([&](const TrackResults& batch) { evidence.add(batch.tracks, batch.kept, batch.points); });
-  return diagnose_with(evidence, result.block, result.state, options);
+  const auto gather = [&](bool with_heights) {
+    TieGatherer gatherer(result.block, with_heights);
+    tracks.visit([&](const TrackResults& batch) { gatherer.add(batch.tracks, batch.kept, batch.points); });
+    return gatherer.take();
+  };
+  return diagnose(result.block, result.state, gather, options);
 }
 
 JobDiagnostics diagnose_job(const JobStore& store) {
@@ -80,9 +76,12 @@ JobDiagnostics diagnose_job(const JobStore& store) {
     return {result.block, diagnose_result(result, StoredTracks(path), options), "the result"};
   }
   const JobSoFar job = read_job_so_far(store);
-  TrackEvidence evidence(job.block, job.state);
-  visit_tracks(store, [&](const TrackSet& tracks) { evidence.add(tracks, {}, {}); });
-  return {job.block, diagnose_with(evidence, job.block, job.state, options), job.source};
+  const auto gather = [&](bool with_heights) {
+    TieGatherer gatherer(job.block, with_heights);
+    visit_tracks(store, [&](const TrackSet& tracks) { gatherer.add(tracks, {}, {}); });
+    return gatherer.take();
+  };
+  return {job.block, diagnose(job.block, job.state, gather, options), job.source};
 }
 
 }  // namespace megablock

@@ -56,14 +56,29 @@ namespace {
 
 std::string page_of(const BlockResult& result, const report::Figures& figures, const ReportContext& context) {
   using namespace report;
-  const std::string body =
-      headline(result, figures) + assessment(result, figures) + map_section(result, figures) +
-      coverage_section(result, figures) + tie_points_section(result, figures) + residuals_section(result, figures) +
-      (context.diagnostics ? diagnostics_section(result, *context.diagnostics) : "") + images_section(result, figures) +
-      observations_section(result, figures) + positions_section(result, figures) + attitudes_section(result, figures) +
-      control_section(result, figures) + cameras_section(result, figures) + accuracy_section(result, figures) +
-      tiles_section(result, figures) + failures_section(result, figures) + stages_section(result) +
-      provenance_section(result, context);
+  std::string body;
+  const auto add = [&](const std::string& section) {
+    body += section;
+    if (context.after_section) context.after_section();
+  };
+  add(headline(result, figures));
+  add(assessment(result, figures));
+  add(map_section(result, figures));
+  add(coverage_section(result, figures));
+  add(tie_points_section(result, figures));
+  add(residuals_section(result, figures));
+  if (context.diagnostics) add(diagnostics_section(result, *context.diagnostics));
+  add(images_section(result, figures));
+  add(observations_section(result, figures));
+  add(positions_section(result, figures));
+  add(attitudes_section(result, figures));
+  add(control_section(result, figures));
+  add(cameras_section(result, figures));
+  add(accuracy_section(result, figures));
+  add(tiles_section(result, figures));
+  add(failures_section(result, figures));
+  add(stages_section(result));
+  add(provenance_section(result, context));
   const std::string name = title_of(result, context.job);
   return page(name.empty() ? "Block report" : "Block report: " + escape(name), subtitle_of(result, figures, context),
               body, figures_json(result, figures));

@@ -2,6 +2,7 @@
 // fetched), for the screen, a phone and paper.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -17,6 +18,7 @@ struct ReportContext {
   std::string job;                                               // directory
   double computed_s = std::numeric_limits<double>::quiet_NaN();  // when the result was written, since 1970
   const BlockDiagnostics* diagnostics = nullptr;                 // null: not looked for
+  std::function<void()> after_section = {};                      // called when a section is written
 };
 
 // Works for any result, however incomplete: what was not computed is left out or said to be missing, and no figure that

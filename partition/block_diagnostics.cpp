@@ -36,28 +36,18 @@ std::int64_t missing_in(double usual_distances) {
   return std::llround(std::clamp(usual_distances - 1, 1.0, static_cast<double>(kMostMissing)));
 }
 
-Pose pose_of(const Block& block, const BlockState& state, ImageIndex image) {
-  const Image& i = block.images[image];
-  return camera_pose(state.frames[i.frame], state.mounts[block.frames[i.frame].rig][static_cast<std::size_t>(i.mount)]);
-}
-
-double slope_down(const Block& block, const BlockState& state, ImageIndex image) {
-  return -(pose_of(block, state, image).rotation.conjugate() * Eigen::Vector3d::UnitZ()).z();
-}
-
 class Diagnosis {
  public:
-  Diagnosis(const Block& block, const BlockState& state, const IndexedVector<ImageIndex, double>& ground_height,
-            const LinkWeights& links, const DiagnosticsOptions& options)
-      : block_(block), state_(state), ground_(ground_height), links_(links) {
+  Diagnosis(const Block& block, const BlockState& state, const DiagnosticsOptions& options)
+      : block_(block), state_(state) {
     options.check();
     found_.requested = options;
-    found_.links_known = !links.empty();
   }
 
-  BlockDiagnostics find() {
+  BlockDiagnostics find(const std::function<TieEvidence(bool)>& gather) {
+    found_.aerial = looks_down();
+    if (found_.aerial) ties_ = gather(true);
     const std::vector<std::vector<FrameIndex>> order = acquisition_order(block_, state_);
-    found_.aerial = looks_down(block_, state_);
     lines_ = found_.aerial ? flight_lines(order, state_) : order;
     if (found_.aerial) found_.lines = static_cast<std::int64_t>(lines_.size());
     find_steps();
@@ -68,7 +58,9 @@ class Diagnosis {
       find_missing_lines();
       find_pairs();
     }
-    find_link_parts(block_, state_, links_, found_);
+    if (!found_.aerial) ties_ = gather(false);
+    found_.links_known = !ties_.links.empty();
+    find_link_parts(block_, state_, ties_.links, found_);
     if (found_.aerial) {
       GroundCover cover(found_.footprints, found_.requested.min_images);
       place_exposures();
@@ -82,7 +74,25 @@ class Diagnosis {
   Eigen::Vector2d place(FrameIndex frame) const { return state_.frames[frame].centre.head<2>(); }
   double distance(FrameIndex a, FrameIndex b) const { return (place(a) - place(b)).norm(); }
 
-  Pose camera_of(ImageIndex image) const { return pose_of(block_, state_, image); }
+  Pose camera_of(ImageIndex image) const {
+    const Image& i = block_.images[image];
+    return camera_pose(state_.frames[i.frame],
+                       state_.mounts[block_.frames[i.frame].rig][static_cast<std::size_t>(i.mount)]);
+  }
+  double slope_down(ImageIndex image) const {
+    return -(camera_of(image).rotation.conjugate() * Eigen::Vector3d::UnitZ()).z();
+  }
+  // Whether most oriented images do.
+  bool looks_down() const {
+    std::int64_t down = 0, all = 0;
+    for (ImageIndex i(0); block_.images.contains(i); ++i.value) {
+      if (!state_.oriented[block_.images[i].frame]) continue;
+      ++all;
+      down += slope_down(i) > kDown;
+    }
+    return 2 * down > all;
+  }
+
   // Which image of a frame looks down most steeply.
   void find_down_images() {
     down_image_.assign(block_.frames.size(), ImageIndex());
@@ -90,7 +100,7 @@ class Diagnosis {
     for (ImageIndex i(0); block_.images.contains(i); ++i.value) {
       const FrameIndex frame = block_.images[i].frame;
       if (!state_.oriented[frame]) continue;
-      const double slope = slope_down(block_, state_, i);
+      const double slope = slope_down(i);
       if (slope > steepest[frame]) steepest[frame] = slope, down_image_[frame] = i;
     }
   }
@@ -98,7 +108,7 @@ class Diagnosis {
   // Heights above ground of the frames that look down.
   void find_heights() {
     std::vector<double> known;
-    for (const double height : ground_)
+    for (const double height : ties_.ground_height)
       if (std::isfinite(height)) known.push_back(height);
     if (known.empty())
       for (const ControlPoint& point : block_.control_points)
@@ -109,7 +119,8 @@ class Diagnosis {
     for (FrameIndex f(0); block_.frames.contains(f); ++f.value) {
       const ImageIndex image = down_image_[f];
       if (!image.valid()) continue;
-      const double ground = ground_.contains(image) && std::isfinite(ground_[image]) ? ground_[image] : middle;
+      const double seen = ties_.ground_height.contains(image) ? ties_.ground_height[image] : unknown();
+      const double ground = std::isfinite(seen) ? seen : middle;
       height_[f] = std::isfinite(ground) ? state_.frames[f].centre.z() - ground : height_of_overlap(image);
       if (!(height_[f] > 0)) height_[f] = unknown();
       if (std::isfinite(height_[f])) heights.push_back(height_[f]);
@@ -147,7 +158,7 @@ class Diagnosis {
     footprint_row_.assign(block_.frames.size(), -1);
     for (ImageIndex i(0); block_.images.contains(i); ++i.value) {
       const FrameIndex frame = block_.images[i].frame;
-      if (!state_.oriented[frame] || !std::isfinite(height_[frame]) || !(slope_down(block_, state_, i) > kDown)) continue;
+      if (!state_.oriented[frame] || !std::isfinite(height_[frame]) || !(slope_down(i) > kDown)) continue;
       const auto corners = footprint_of(camera_now(i), camera_of(i), height_[frame]);
       if (!corners) continue;
       if (i == down_image_[frame]) footprint_row_[frame] = static_cast<std::int64_t>(found_.footprints.size());
@@ -310,7 +321,7 @@ class Diagnosis {
       for (const FlightLine& line : lines_)
         for (std::size_t i = 0; i + 1 < line.size(); ++i) add_pair(line[i], line[i + 1]);
     } else {
-      links_.visit([this](const FrameEdge& edge) {
+      ties_.links.visit([this](const FrameEdge& edge) {
         if (edge.weight >= found_.requested.min_link_points && state_.oriented[edge.a] && state_.oriented[edge.b])
           add_pair(edge.a, edge.b);
       });
@@ -404,8 +415,7 @@ class Diagnosis {
 
   const Block& block_;
   const BlockState& state_;
-  const IndexedVector<ImageIndex, double>& ground_;
-  const LinkWeights& links_;
+  TieEvidence ties_;
   BlockDiagnostics found_;
   std::vector<FlightLine> lines_;
   IndexedVector<FrameIndex, ImageIndex> down_image_;       // invalid: none looks down
@@ -419,20 +429,10 @@ class Diagnosis {
 
 }  // namespace
 
-bool looks_down(const Block& block, const BlockState& state) {
-  std::int64_t down = 0, all = 0;
-  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
-    if (!state.oriented[block.images[i].frame]) continue;
-    ++all;
-    down += slope_down(block, state, i) > kDown;
-  }
-  return 2 * down > all;
-}
-
 BlockDiagnostics diagnose(const Block& block, const BlockState& state,
-                          const IndexedVector<ImageIndex, double>& ground_height, const LinkWeights& links,
+                          const std::function<TieEvidence(bool with_heights)>& gather,
                           const DiagnosticsOptions& options) {
-  return Diagnosis(block, state, ground_height, links, options).find();
+  return Diagnosis(block, state, options).find(gather);
 }
 
 BlockState state_of_priors(const Block& block) {

@@ -19,19 +19,24 @@
 // the frames.
 #pragma once
 
+#include <functional>
+
 #include "io/block_diagnostics.h"
 #include "partition/link_weights.h"
 
 namespace megablock {
 
-// Frames with a pose are looked at: those of `state` that are oriented. `ground_height`: of what each image sees, z in
-// the block's frame; NaN: not known; may be empty. `links`: common tie points of frames; empty: not known.
-BlockDiagnostics diagnose(const Block& block, const BlockState& state,
-                          const IndexedVector<ImageIndex, double>& ground_height, const LinkWeights& links,
-                          const DiagnosticsOptions& options);
+// What tie points say of a block.
+struct TieEvidence {
+  LinkWeights links;                                // common tie points of frames; empty: not known
+  IndexedVector<ImageIndex, double> ground_height;  // of what each image sees, z in the block's frame; NaN: not known
+};
 
-// Whether most oriented images look down: only then does ground_height matter.
-bool looks_down(const Block& block, const BlockState& state);
+// Frames with a pose are looked at: those of `state` that are oriented. `gather(with_heights)` is called once: of a
+// block that looks down at the beginning, of others, whose heights do not matter, when frames have been looked at.
+BlockDiagnostics diagnose(const Block& block, const BlockState& state,
+                          const std::function<TieEvidence(bool with_heights)>& gather,
+                          const DiagnosticsOptions& options);
 
 // Before anything is oriented: frames with a given pose, or position and attitude prior.
 BlockState state_of_priors(const Block& block);

@@ -11,6 +11,7 @@ namespace megablock {
 namespace {
 
 constexpr std::int64_t kLargest = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t kMore = 4;  // links that a frame gets room for: there are many frames, and few links of each
 
 }  // namespace
 
@@ -29,10 +30,13 @@ void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
   const bool known = it != links.end() && it->further == further;
   const auto sum =
       static_cast<std::uint32_t>(std::min(kLargest, (known ? it->tracks : 0) + std::min(kLargest, tracks)));
-  if (known)
+  if (known) {
     it->tracks = sum;
-  else
-    links.insert(it, {further, sum});
+    return;
+  }
+  const auto place = it - links.begin();
+  if (links.size() == links.capacity()) links.reserve(links.size() + kMore);
+  links.insert(links.begin() + place, {further, sum});
 }
 
 FrameGraph LinkWeights::graph(std::int64_t frames) const {

@@ -243,7 +243,8 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   job.tables.release();
   return_freed_memory();
   job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
-  const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics};
+  const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics,
+                              [&job] { job.tables.release(); }};
   job.store.write_text("result/report.html", std::move(report).html(std::move(result), context));
 }
 

@@ -44,19 +44,20 @@ class AT36 : public testing::Test {
   BlockDiagnostics found(const std::set<FrameIndex>& removed, const DiagnosticsOptions& options) {
     BlockState state = simulated_.truth;
     for (const FrameIndex f : removed) state.oriented[f] = 0;
-    LinkWeights weights;
+    TieEvidence ties;
     const TrackSet& t = simulated_.tracks;
     points_.clear();
-    IndexedVector<ImageIndex, double> ground(simulated_.block.images.size(), 0.0);
+    ties.ground_height.assign(simulated_.block.images.size(), 0.0);
     for (std::int64_t track = 0; track < t.track_count(); ++track)
       for (std::int64_t i = t.begin[track]; i < t.begin[track + 1]; ++i)
         for (std::int64_t j = i + 1; j < t.begin[track + 1]; ++j) {
           const FrameIndex a = simulated_.block.images[t.image[i]].frame, b = simulated_.block.images[t.image[j]].frame;
           if (removed.contains(a) || removed.contains(b)) continue;
-          weights.add(a, b, 1);
+          ties.links.add(a, b, 1);
           ++points_[std::minmax(a, b)];
         }
-    return diagnose(simulated_.block, state, ground, weights, options);
+    return diagnose(
+        simulated_.block, state, [&](bool) { return ties; }, options);
   }
   double base_to_height(FrameIndex a, FrameIndex b) const {
     const Eigen::Vector3d &p = simulated_.truth.frames[a].centre, &q = simulated_.truth.frames[b].centre;

@@ -66,9 +66,13 @@ struct Survey {
 
   BlockDiagnostics found(const DiagnosticsOptions& options = {}) {
     state = initial_state(block);
-    LinkWeights weights;
-    for (const FrameEdge& link : links) weights.add(link.a, link.b, link.weight);
-    return diagnose(block, state, IndexedVector<ImageIndex, double>(block.images.size(), 0.0), weights, options);
+    const auto gather = [&](bool with_heights) {
+      TieEvidence ties;
+      for (const FrameEdge& link : links) ties.links.add(link.a, link.b, link.weight);
+      if (with_heights) ties.ground_height.assign(block.images.size(), 0.0);
+      return ties;
+    };
+    return diagnose(block, state, gather, options);
   }
 };
 
