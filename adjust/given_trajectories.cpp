@@ -226,7 +226,7 @@ class TrajectoryAdjuster {
 };
 
 void adjust_trajectory(const Block& block, const ObservationOptions& use, const Trajectory& trajectory, double limit,
-                       BlockState& state, TrajectoryChange& change) {
+                       BlockState& state, GivenTrajectoryChange& change) {
   std::vector<Pose> given;
   for (const FrameIndex frame : trajectory.frames) given.push_back(state.frames[frame]);
   TrajectoryAdjuster adjuster(block, use, trajectory, std::move(given));
@@ -248,9 +248,9 @@ void adjust_trajectory(const Block& block, const ObservationOptions& use, const 
 
 }  // namespace
 
-TrajectoryChange adjust_trajectories(const Block& block, const ObservationOptions& use, BlockState& state,
-                                     const TrajectoryOptions& options) {
-  TrajectoryChange change;
+GivenTrajectoryChange adjust_trajectories(const Block& block, const ObservationOptions& use, BlockState& state,
+                                          const GivenTrajectoryOptions& options) {
+  GivenTrajectoryChange change;
   const IndexedVector<FrameIndex, Neighbours> neighbours = neighbours_of(block, state);
   IndexedVector<FrameIndex, std::uint8_t> done(block.frames.size(), 0);
   const auto adjust_from = [&](FrameIndex first) {

@@ -23,20 +23,20 @@
 
 namespace megablock {
 
-struct TrajectoryOptions {
+struct GivenTrajectoryOptions {
   // A trajectory stays as it is given unless its positions, attitudes or relative poses contradict it: the mean of the
   // squared residuals per component, in sigmas and with gross errors held down, is larger.
   double max_mean_square = 2;
 };
 
-struct TrajectoryChange {
+struct GivenTrajectoryChange {
   std::int64_t trajectories = 0, frames = 0;  // that were adjusted
   double rms_m = 0, largest_m = 0;            // how far their frames were moved
 };
 
 // Adjusts the trajectories of oriented frames of `state` that contradict what is observed of them, each to where it
 // contradicts less; one without any observed position or attitude stays. `use`: which observations count.
-TrajectoryChange adjust_trajectories(const Block& block, const ObservationOptions& use, BlockState& state,
-                                     const TrajectoryOptions& options = {});
+GivenTrajectoryChange adjust_trajectories(const Block& block, const ObservationOptions& use, BlockState& state,
+                                          const GivenTrajectoryOptions& options = {});
 
 }  // namespace megablock

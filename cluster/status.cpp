@@ -7,13 +7,11 @@
 
 #include "cluster/job_json.h"
 #include "cluster/progress.h"
+#include "cluster/result_figures.h"
 #include "cluster/stage_record.h"
 #include "io/error.h"
 #include "io/events.h"
-#include "io/feature_statistics.h"
-#include "io/remarks.h"
 #include "io/result.h"
-#include "io/track_batches.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -42,16 +40,11 @@ Json stages_json(const JobStore& store, const std::vector<StageStatus>& stages) 
   return list;
 }
 
-Json failures_json(const JobJson& job, const std::vector<StageStatus>& stages,
-                   const std::optional<BlockResult>& result) {
+Json failures_json(const JobJson& job, const std::vector<StageStatus>& stages) {
   Json list = Json::array();
   const auto add = [&](const std::string& stage, const std::string& unit, const std::string& reason) {
     list.push_back({{"stage", stage}, {"unit", unit}, {"reason", reason}});
   };
-  if (result) {  // with the images that got no pose
-    for (const FailedUnit& failure : result->failures) add(failure.stage, failure.unit, failure.reason);
-    return list;
-  }
   for (const auto& [file, reason] : job.value("unreadable", std::vector<std::pair<std::string, std::string>>()))
     add("init", file, reason);
   for (const StageStatus& stage : stages)
@@ -59,66 +52,11 @@ Json failures_json(const JobJson& job, const std::vector<StageStatus>& stages,
   return list;
 }
 
-Json observation_kinds(const ObservationTable& table) {
-  Json kinds = Json::object();
-  for (std::size_t k = 0; k < kObservationKinds; ++k) {
-    const ObservationStatistics& s = table.kinds[k];
-    if (s.count == 0) continue;
-    const double factor = s.sigma_factor();
-    kinds[word_of(static_cast<ObservationKind>(k))] = {{"count", s.count},
-                                                       {"redundancy", s.redundancy},
-                                                       {"sigma_factor", std::isfinite(factor) ? Json(factor) : Json()}};
-  }
-  return kinds;
-}
-
-Json interest_points_json(const BlockResult& result) {
-  Json list = Json::array();
-  const auto statistics = feature_statistics(result);
-  for (CameraIndex c(0); statistics.contains(c); ++c.value) {
-    const FeatureStatistics& s = statistics[c];
-    if (s.images == 0) continue;
-    list.push_back({{"camera", result.block.cameras[c].name},
-                    {"images", s.images},
-                    {"least", s.least},
-                    {"most", s.most},
-                    {"mean", s.mean()},
-                    {"total", s.total}});
-  }
-  return list;
-}
-
-void add_figures(Json& json, const BlockResult& result, const TrackBatches& tracks) {
-  const ReprojectionStatistics statistics = reprojection_statistics(result, tracks);
-  json["images"] = result.block.images.size();
-  json["oriented"] = statistics.oriented_images;
-  json["points"] = statistics.points;
-  json["observations"] = statistics.observations;
-  json["mean_track_length"] = statistics.mean_track_length;
-  json["mean_reprojection_px"] = statistics.mean_px;
-  json["rms_reprojection_px"] = statistics.rms_px;
-  json["chi2_per_dof"] = result.variance_factor;
-  json["degrees_of_freedom"] = result.degrees_of_freedom;
-  json["image_sigma_px"] = result.image_sigma_px;
-  json["observation_kinds"] = observation_kinds(result.observation_table);
-  json["tiles"] = result.tiles.tile_count;
-  json["boundary_frames"] = std::count(result.boundary.begin(), result.boundary.end(), 1);
-  json["global_iterations"] = result.global_iterations;
-  json["newton_decrement"] = result.newton_decrement;
-  json["gauge"] = result.gauge;
-  json["control_points_unused"] = unused_points(result, PointRole::kControl).size();
-  json["check_points_unused"] = unused_points(result, PointRole::kCheck).size();
-  json["interest_points"] = interest_points_json(result);
-  json["remarks"] = remarks(result, tracks);
-  json["digest"] = result.digest;
-}
-
 // All keys from the start; null where nothing is known yet.
 Json status(const JobStore& store) {
   const JobJson job = JobJson::of_job(store);
   const std::vector<StageStatus> stages = stages_of(store, job);
-  std::optional<BlockResult> result;
-  if (store.seal(kResult)) result = read_result_without_tracks(store.verified_path(kResult));
+  const bool has_result = store.seal(kResult).has_value();
   const std::optional<JobHolder> holder = holder_of(store);
   Json json{{"job", store.directory()},
             {"in_use_by", holder ? Json(holder->who) : Json()},
@@ -128,13 +66,16 @@ Json status(const JobStore& store) {
                           "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
                           "control_points_unused", "check_points_unused", "interest_points", "remarks"})
     json[key] = nullptr;
-  const bool only_block = !result && store.seal("block.h5");
+  const bool only_block = !has_result && store.seal("block.h5");
   json["images"] = only_block ? read_block(store.verified_path("block.h5")).images.size() : 0;
   const bool current = stages.back().state == StageState::kDone;
-  json["result"] = !result ? "none" : current ? "current" : "stale";
-  if (result) add_figures(json, *result, StoredTracks(store.path(kResult)));
-  if (!current) result.reset();
-  json["failures"] = failures_json(job, stages, result);
+  json["result"] = !has_result ? "none" : current ? "current" : "stale";
+  json["failures"] = failures_json(job, stages);
+  if (has_result) {
+    Json figures = Json::parse(result_figures(store));
+    if (!current) figures["failures"] = json["failures"];
+    json.update(figures);
+  }
   json["failed"] = json["failures"].size();
   return json;
 }
@@ -243,7 +184,7 @@ std::string status_digest(const JobStore& store) {
   JobJson::of_job(store);
   if (!store.seal(kResult))
     throw InputError(store.directory() + ": the job has no result yet; run it to the end first");
-  return read_result_without_tracks(store.verified_path(kResult)).digest;
+  return read_result_digest(store.verified_path(kResult));
 }
 
 }  // namespace megablock

@@ -132,6 +132,7 @@ void write_result(const std::string& path, BlockResult& result, const TrackBatch
 BlockResult read_result(const std::string& path);
 // Without tracks: these batch by batch as StoredTracks (io/track_batches.h).
 BlockResult read_result_without_tracks(const std::string& path);
+std::string read_result_digest(const std::string& path);
 
 // Hash of the exact bits of every pose, camera, point and kept observation in global order; independent of file layout,
 // tiles' files and ranks.

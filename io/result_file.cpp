@@ -383,6 +383,10 @@ BlockResult read_result(const std::string& path) {
   return result;
 }
 
+std::string read_result_digest(const std::string& path) {
+  return Hdf5Reader(path, "result").text_attribute("/", "digest");
+}
+
 BlockResult read_result_without_tracks(const std::string& path) {
   return get_head_and_tail(Hdf5Reader(path, "result"));
 }

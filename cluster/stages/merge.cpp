@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <future>
+#include <tuple>
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
@@ -12,6 +13,7 @@
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
+#include "cluster/result_figures.h"
 #include "cluster/signals.h"
 #include "cluster/stages/assemble_result.h"
 #include "cluster/stages/block_image_sigma.h"
@@ -236,12 +238,14 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   auto gathered = std::async(std::launch::async, [&] {
     BlockDiagnostics diagnostics = diagnose_result(result, tracks, job.settings.diagnostics);
     return_freed_memory();  // links of frames
-    return std::pair(std::move(diagnostics), Report(result, tracks));
+    ResultFigures figures = figures_of_tracks(result, tracks);
+    return std::tuple(std::move(diagnostics), std::move(figures), Report(result, tracks));
   });
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  auto [diagnostics, report] = gathered.get();
+  auto [diagnostics, figures, report] = gathered.get();
   job.tables.release();
   return_freed_memory();
+  job.store.write_text(kResultFigures, to_json(figures, result));
   job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
   const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics,
                               [&job] { job.tables.release(); }};

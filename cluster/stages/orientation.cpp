@@ -186,7 +186,7 @@ void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std
 
 // Where every pose is given nothing is oriented; given poses may still be poor.
 BlockState given_orientation(const Job& job, BlockState given) {
-  const TrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
+  const GivenTrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
   if (change.frames > 0 && job.is_first_rank() && !job.options.quiet)
     std::fprintf(stderr,
                  "orientation  given poses of %lld frames in %lld trajectories contradict their positions and relative "

@@ -101,7 +101,7 @@ TEST(GivenTrajectories, AnIntegratedDriveComesToItsPositions) {
   const Drive drive(20000);
   BlockState state = drive.given;
   EXPECT_GT(drive.largest_error(state), 100);  // what the test is about
-  const TrajectoryChange change = adjust_trajectories(drive.block, {}, state);
+  const GivenTrajectoryChange change = adjust_trajectories(drive.block, {}, state);
   EXPECT_EQ(change.trajectories, 1);
   EXPECT_EQ(change.frames, 20000);
   EXPECT_GT(change.largest_m, 100);
@@ -190,7 +190,7 @@ TEST(GivenTrajectories, FramesWithoutPoseDivideATrajectory) {
   BlockState state = drive.given;
   for (Pose& pose : state.frames) pose.centre.y() += 30;
   const Pose left = state.frames[FrameIndex(150)];
-  const TrajectoryChange change = adjust_trajectories(drive.block, {}, state);
+  const GivenTrajectoryChange change = adjust_trajectories(drive.block, {}, state);
   EXPECT_EQ(change.trajectories, 2);
   EXPECT_EQ(change.frames, 299);
   EXPECT_EQ(state.frames[FrameIndex(150)].centre, left.centre);

@@ -1,0 +1,102 @@
+#include "cluster/result_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "io/feature_statistics.h"
+#include "io/remarks.h"
+#include "io/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+using Json = nlohmann::json;
+
+Json observation_kinds(const ObservationTable& table) {
+  Json kinds = Json::object();
+  for (std::size_t k = 0; k < kObservationKinds; ++k) {
+    const ObservationStatistics& s = table.kinds[k];
+    if (s.count == 0) continue;
+    const double factor = s.sigma_factor();
+    kinds[word_of(static_cast<ObservationKind>(k))] = {{"count", s.count},
+                                                       {"redundancy", s.redundancy},
+                                                       {"sigma_factor", std::isfinite(factor) ? Json(factor) : Json()}};
+  }
+  return kinds;
+}
+
+Json interest_points(const BlockResult& result) {
+  Json list = Json::array();
+  const auto statistics = feature_statistics(result);
+  for (CameraIndex c(0); statistics.contains(c); ++c.value) {
+    const FeatureStatistics& s = statistics[c];
+    if (s.images == 0) continue;
+    list.push_back({{"camera", result.block.cameras[c].name},
+                    {"images", s.images},
+                    {"least", s.least},
+                    {"most", s.most},
+                    {"mean", s.mean()},
+                    {"total", s.total}});
+  }
+  return list;
+}
+
+Json failures(const BlockResult& result) {
+  Json list = Json::array();
+  for (const FailedUnit& failure : result.failures)
+    list.push_back({{"stage", failure.stage}, {"unit", failure.unit}, {"reason", failure.reason}});
+  return list;
+}
+
+// Of this very result; empty: there are none.
+std::string written_figures(const JobStore& store) {
+  std::ifstream file(store.path(kResultFigures));
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const Json json = Json::parse(text, nullptr, false);
+  const bool of_result = json.is_object() && json.value("digest", "") == read_result_digest(store.path(kResult));
+  return of_result ? text : std::string();
+}
+
+}  // namespace
+
+ResultFigures figures_of_tracks(const BlockResult& result, const TrackBatches& tracks) {
+  return {reprojection_statistics(result, tracks), remarks(result, tracks)};
+}
+
+std::string to_json(const ResultFigures& figures, const BlockResult& result) {
+  const Json json = {{"images", result.block.images.size()},
+                     {"oriented", figures.statistics.oriented_images},
+                     {"points", figures.statistics.points},
+                     {"observations", figures.statistics.observations},
+                     {"mean_track_length", figures.statistics.mean_track_length},
+                     {"mean_reprojection_px", figures.statistics.mean_px},
+                     {"rms_reprojection_px", figures.statistics.rms_px},
+                     {"chi2_per_dof", result.variance_factor},
+                     {"degrees_of_freedom", result.degrees_of_freedom},
+                     {"image_sigma_px", result.image_sigma_px},
+                     {"observation_kinds", observation_kinds(result.observation_table)},
+                     {"tiles", result.tiles.tile_count},
+                     {"boundary_frames", std::count(result.boundary.begin(), result.boundary.end(), 1)},
+                     {"global_iterations", result.global_iterations},
+                     {"newton_decrement", result.newton_decrement},
+                     {"gauge", result.gauge},
+                     {"control_points_unused", unused_points(result, PointRole::kControl).size()},
+                     {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
+                     {"interest_points", interest_points(result)},
+                     {"remarks", figures.remarks},
+                     {"failures", failures(result)},
+                     {"digest", result.digest}};
+  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string result_figures(const JobStore& store) {
+  const std::string path = store.verified_path(kResult);
+  if (std::string written = written_figures(store); !written.empty()) return written;
+  const BlockResult result = read_result_without_tracks(path);
+  return to_json(figures_of_tracks(result, StoredTracks(path)), result);
+}
+
+}  // namespace megablock

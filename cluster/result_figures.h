@@ -1,0 +1,28 @@
+// What 'status' says of a result: written beside it, as finding it anew goes through all of its tracks.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/job_store.h"
+#include "io/result.h"
+#include "io/track_batches.h"
+
+namespace megablock {
+
+inline constexpr const char* kResultFigures = "result/figures.json";
+
+// What takes a pass through the tracks.
+struct ResultFigures {
+  ReprojectionStatistics statistics;
+  std::vector<std::string> remarks;
+};
+ResultFigures figures_of_tracks(const BlockResult& result, const TrackBatches& tracks);
+
+// One JSON object; keys as in 'status --json', `failures` with the images that got no pose.
+std::string to_json(const ResultFigures& figures, const BlockResult& result);
+
+// Of the job's result, which is there: as they were written with it, else found anew.
+std::string result_figures(const JobStore& store);
+
+}  // namespace megablock
