@@ -1,7 +1,9 @@
 // The largest part of a point's rays that agree with one another, at held poses.
 //
 // Every pair of rays (a fixed number of them where there are many) proposes a point. The one with the least truncated
-// cost sum min(r^2, t^2) is refined with the rays that pass, and these are its part.
+// cost sum min(r^2, t^2) is refined with the rays that pass until they no longer change, and these are its part. Not by
+// ransac.h: it refines every point that is the best so far, as long as the cost falls, which takes longer and in one
+// point of a hundred leaves out a ray that passes in the end.
 #pragma once
 
 #include <cstdint>

@@ -4,10 +4,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "geometry/decompositions.h"
 #include "geometry/row_qr.h"
+#include "geometry/solutions.h"
 
 namespace megablock {
 
@@ -20,17 +20,18 @@ constexpr double kApart = 1e-5;
 
 // Whether so many of the points are apart from one another. A point measured twice gives two more equations, which its
 // errors make look independent, and says nothing new.
-bool has_distinct(std::span<const Eigen::Vector3d> points, std::size_t needed) {
+template <std::size_t Needed>
+bool has_distinct(std::span<const Eigen::Vector3d> points) {
   double extent = 0;
   for (const Eigen::Vector3d& p : points) extent = std::max(extent, (p - points.front()).norm());
-  std::vector<Eigen::Vector3d> distinct;
+  Solutions<Eigen::Vector3d, Needed> distinct;
   for (const Eigen::Vector3d& p : points) {
-    if (distinct.size() >= needed) break;
+    if (distinct.size() == Needed) break;
     if (std::all_of(distinct.begin(), distinct.end(),
                     [&](const Eigen::Vector3d& other) { return (p - other).norm() > kApart * extent; }))
       distinct.push_back(p);
   }
-  return distinct.size() >= needed;
+  return distinct.size() == Needed;
 }
 
 }  // namespace
@@ -101,7 +102,7 @@ std::optional<PhysicalParameters> nine_from(const ElevenParameters& e) {
 std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> ground,
                                            std::span<const Eigen::Vector2d> image) {
   const std::size_t count = ground.size();
-  if (image.size() != count || !has_distinct(ground, 6)) return std::nullopt;
+  if (image.size() != count || !has_distinct<6>(ground)) return std::nullopt;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < count; ++i) {
@@ -177,7 +178,7 @@ bool linearise_nine(const NineParameters& image, std::span<const Eigen::Vector3d
 
 std::optional<FittedNine> fit_nine(const NineParameters& start, std::span<const Eigen::Vector3d> ground,
                                    std::span<const Eigen::Vector2d> measured) {
-  if (measured.size() != ground.size() || !has_distinct(ground, 5)) return std::nullopt;
+  if (measured.size() != ground.size() || !has_distinct<5>(ground)) return std::nullopt;
   FittedNine fitted{start, 0, Matrix9::Zero()};
   NineEquations equations;
   if (!linearise_nine(start, ground, measured, equations)) return std::nullopt;

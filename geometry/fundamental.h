@@ -19,7 +19,8 @@
 
 namespace megablock {
 
-// Pixels. Of Frobenius norm one and rank two.
+// Pixels. Of Frobenius norm one and rank two. Empty for degenerate ones, two pairs that are one among them, and where
+// one is not a number.
 Solutions<Eigen::Matrix3d, 3> solve_seven_point(const std::array<Eigen::Vector2d, 7>& a,
                                                 const std::array<Eigen::Vector2d, 7>& b);
 

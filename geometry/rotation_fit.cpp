@@ -24,9 +24,11 @@ Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Ve
 
 Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                 std::span<const double> weights) {
+  const Eigen::Quaterniond unknown(Eigen::Vector4d::Constant(std::nan("")));
+  if (to.size() != from.size() || (!weights.empty() && weights.size() != from.size())) return unknown;
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < from.size(); ++i) sum += (weights.empty() ? 1 : weights[i]) * to[i] * from[i].transpose();
-  if (!sum.allFinite()) return Eigen::Quaterniond(Eigen::Vector4d::Constant(std::nan("")));
+  if (!sum.allFinite()) return unknown;
   const SingularValues3 svd = singular_values3(sum);
   Eigen::Matrix3d middle = Eigen::Matrix3d::Identity();
   middle(2, 2) = (svd.u * svd.v.transpose()).determinant() < 0 ? -1 : 1;
@@ -36,6 +38,7 @@ Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span
 Eigen::Quaterniond fit_rotation_robust(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to) {
   constexpr int kRounds = 8;
   Eigen::Quaterniond rotation = fit_rotation(from, to);
+  if (!rotation.coeffs().allFinite()) return rotation;
   std::vector<double> residual(from.size()), weight(from.size());
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t i = 0; i < from.size(); ++i) residual[i] = (to[i] - rotation * from[i]).norm();

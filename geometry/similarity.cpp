@@ -24,7 +24,7 @@ Similarity Similarity::operator*(const Similarity& first) const {
 std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                          std::span<const double> weights) {
   const std::size_t count = from.size();
-  if (count < 2 || to.size() != count) return std::nullopt;
+  if (count < 2 || to.size() != count || (!weights.empty() && weights.size() != count)) return std::nullopt;
   const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
 
   double total = 0;
@@ -135,6 +135,7 @@ std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d>
                                                 std::span<const Eigen::Vector3d> to, std::span<const double> sigma,
                                                 int max_draws, std::uint64_t seed) {
   const std::size_t count = from.size();
+  if (to.size() != count || sigma.size() != count) return std::nullopt;
   std::vector<double> weights(count);
   for (std::size_t i = 0; i < count; ++i) weights[i] = 1 / (sigma[i] * sigma[i]);
   auto best = fit_similarity(from, to, weights);

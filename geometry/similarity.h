@@ -3,7 +3,7 @@
 // Least squares in closed form after Umeyama, "Least-squares estimation of transformation parameters between two point
 // patterns", IEEE PAMI 13(4), 1991, with weights. The robust variant minimises sum log(1 + (|r_i| / sigma_i)^2)
 // (Cauchy): the best of the least squares solution and of what samples of three points find (ransac.h), refined by
-// iterated reweighting.
+// iterated reweighting. Each has one solution.
 //
 // Steps of a similarity are (w, q, d): R Exp(w) (rotation.h), s exp(q), t + d. About the centroids, y = s R (x - c) +
 // u, the normal equations of the closed form fall apart,
@@ -38,8 +38,8 @@ struct Similarity {
 };
 
 // Weighted least squares from -> to; weights of squared distances, empty = all one. Two points or points on one line
-// leave the rotation about the line arbitrary (but proper). Empty with fewer than two points, no extent, or what is not
-// a number.
+// leave the rotation about the line arbitrary (but proper). Empty with fewer than two points, no extent, what is not a
+// number, or not equally many of each.
 std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                          std::span<const double> weights = {});
 
@@ -60,7 +60,7 @@ SimilarityCovariance covariance_about_origin(const Similarity& similarity, const
                                              const SimilarityCovariance& about_centre);
 
 // Robust fit; sigma of a coordinate in the units of `to`, one per point. Deterministic: the samples depend on `seed`
-// alone.
+// alone. Empty where the least squares are.
 std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d> from,
                                                 std::span<const Eigen::Vector3d> to, std::span<const double> sigma,
                                                 int max_draws = 300, std::uint64_t seed = 1);

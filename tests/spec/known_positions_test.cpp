@@ -173,23 +173,25 @@ double expected_squared_error(const KnownPositionsScene& scene) {
 }
 
 // Published: means of twenty scenes, which do not say how their cameras lie on a line; ours lie from corner to corner
-// of the space of the cameras. Limits are these means, of satellites with what such a mean scatters by, and what is
-// asked for where that is less (spread satellites; their angles, and those of collinear ones with two control points,
-// reach 2.4 and 4.6 for 2.5 and 4.8). The errors of points must be those that the covariances expect, scene by scene.
-// The verdict is of what the attitude priors alone tell: the rotation about the line, a common rotation.
+// of the space of the cameras. Limits are these means, and what is asked for where that is less (spread satellites;
+// their angles, and those of collinear ones with two control points, reach 2.4 and 4.6 for 2.5 and 4.8). Three means of
+// points are held to their limit with what a mean of twenty scenes scatters by: those of ours exceed it, as do those
+// that the covariances expect. The errors of points must be these, scene by scene. The verdict is of what the attitude
+// priors alone tell: the rotation about the line, a common rotation.
 TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
   struct Case {
     bool drone, collinear;
     int control;
     double least_gain, largest_rms;
     bool line_flagged, common_flagged;
+    bool within_scatter = false;  // of the largest rms
   };
-  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},     {true, true, 1, 121, 0.011, false, false},
-                        {true, true, 2, 175, 0.008, false, false},   {true, true, 4, 228, 0.006, false, false},
-                        {true, false, 0, 3000, 0.001, false, false}, {false, false, 0, 2, 7, false, true},
-                        {false, false, 1, 3.8, 2.5, false, true},    {false, true, 0, 2.1, 160, true, true},
-                        {false, true, 1, 3.8, 2.5, false, true},     {false, true, 2, 4.5, 2, false, true},
-                        {false, true, 4, 4.8, 1.9, false, true}};
+  const Case cases[] = {{true, true, 0, 3.8, 0.34, true, false},      {true, true, 1, 121, 0.011, false, false},
+                        {true, true, 2, 175, 0.008, false, false},    {true, true, 4, 228, 0.006, false, false},
+                        {true, false, 0, 3000, 0.001, false, false},  {false, false, 0, 2, 7, false, true, true},
+                        {false, false, 1, 3.8, 2.5, false, true},     {false, true, 0, 2.1, 160, true, true},
+                        {false, true, 1, 3.8, 2.5, false, true},      {false, true, 2, 4.5, 2, false, true, true},
+                        {false, true, 4, 4.8, 1.9, false, true, true}};
   for (const Case& c : cases) {
     const auto scene_of = [&](std::uint64_t seed) {
       KnownPositionsOptions options =
@@ -217,7 +219,7 @@ TEST(KnownPositions, TKP20ControlRepairsCollinearCentres) {
     const double scatter = std::sqrt(squares / kPublishedRuns);  // of a mean of so many scenes
     std::printf("[ reached  ] %smean %.4g m, median %.4g; mean of the expected %.4g; scatter of a mean of %d %.3g\n",
                 what.c_str(), mean, middle, best_mean, kPublishedRuns, scatter);
-    expect_at_most(mean, c.largest_rms + (c.drone ? 0 : scatter), what + "mean rms of the points, m");
+    expect_at_most(mean, c.largest_rms + (c.within_scatter ? scatter : 0), what + "mean rms of the points, m");
     if (!c.drone && !c.collinear) expect_at_most(middle, c.largest_rms, what + "median rms of the points, m");
     expect_at_most(std::abs(std::sqrt(ratio) - 1), 0.1, what + "off the expected rms by");
     EXPECT_EQ(runs.collinear, c.line_flagged ? kRuns : 0) << what;

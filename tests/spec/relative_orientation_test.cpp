@@ -105,8 +105,10 @@ MeanErrors vertical(const Eigen::Vector3d& base, double noise_px, bool plane = f
   return mean_errors(protocol_of(base, noise_px, plane), MinimalSolver::kVertical);
 }
 
-// The aerial geometry that section 4.4 of the specification asks for, to be held to the same limits.
+// The aerial geometry that section 4.4 of the specification asks for, which has no limits for it: twice what is
+// reached, all of it better than the limits of the other scenes.
 constexpr std::array<double, 3> kBaseToHeight = {0.2, 0.4, 0.6};
+using Ratios = std::array<double, 3>;  // of these
 Protocol aerial_protocol(double base_to_height, double noise_px) {
   Protocol p;
   p.scene = PairSceneOptions::aerial(base_to_height * kLateral, noise_px);
@@ -187,17 +189,20 @@ TEST(Spec, AT04FivePointLateral) {
 }
 
 TEST(Spec, AT04FivePointAerial) {
-  for (const double ratio : kBaseToHeight) {
-    const MeanErrors half = mean_errors(aerial_protocol(ratio, 0.5), MinimalSolver::kFivePoint),
-                     one = mean_errors(aerial_protocol(ratio, 1), MinimalSolver::kFivePoint);
-    const std::string name = aerial_name(ratio);
-    expect_at_most(half.base, 1.5, name + "base at 0.5 px");
-    expect_at_most(one.base, 3, name + "base at 1 px");
-    expect_at_most(half.refined_base, 0.12, name + "refined base at 0.5 px");
-    expect_at_most(one.refined_base, 0.28, name + "refined base at 1 px");
-    expect_at_most(half.refined_rotation, 0.08, name + "refined rotation at 0.5 px");
-    expect_at_most(one.refined_rotation, 0.15, name + "refined rotation at 1 px");
-  }
+  struct Limits {
+    double noise_px;
+    Ratios base, refined_base, refined_rotation;
+  };
+  for (const Limits& l : {Limits{0.5, {0.74, 0.42, 0.30}, {0.074, 0.040, 0.032}, {0.018, 0.022, 0.030}},
+                          Limits{1, {1.44, 0.82, 0.60}, {0.148, 0.078, 0.064}, {0.036, 0.044, 0.060}}})
+    for (std::size_t i = 0; i < kBaseToHeight.size(); ++i) {
+      const double ratio = kBaseToHeight[i];
+      const MeanErrors mean = mean_errors(aerial_protocol(ratio, l.noise_px), MinimalSolver::kFivePoint);
+      const std::string name = aerial_name(ratio), at = " at " + std::to_string(l.noise_px).substr(0, 3) + " px";
+      expect_at_most(mean.base, l.base[i], name + "base" + at);
+      expect_at_most(mean.refined_base, l.refined_base[i], name + "refined base" + at);
+      expect_at_most(mean.refined_rotation, l.refined_rotation[i], name + "refined rotation" + at);
+    }
 }
 
 TEST(Spec, AT05FivePointForward) {
@@ -288,9 +293,9 @@ TEST(Spec, AT10VerticalPairIsExactForEveryHeadingAerial) {
       keep_largest(largest, errors.back());
     }
     const std::string name = aerial_name(ratio);
-    expect_at_most(median, 1e-9, name + "median, deg");
-    expect_at_most(most, 1e-6, name + "99.9 %");
-    expect_at_most(largest, 1e-2, name + "largest");
+    expect_at_most(median, 3.8e-13, name + "median, deg");
+    expect_at_most(most, 8e-10, name + "99.9 %");
+    expect_at_most(largest, 5e-7, name + "largest");
   }
 }
 
@@ -307,13 +312,15 @@ TEST(Spec, AT11VerticalPairIsBetterThanFivePoint) {
 }
 
 TEST(Spec, AT11VerticalPairIsBetterThanFivePointAerial) {
-  for (const double ratio : kBaseToHeight)
-    for (const auto& [noise_px, limit] : {std::pair{0.5, 0.8}, std::pair{1.0, 1.9}}) {
-      const Protocol p = aerial_protocol(ratio, noise_px);
-      const std::string what = aerial_name(ratio) + "base at " + std::to_string(noise_px).substr(0, 3) + " px";
+  for (const auto& [noise_px, limits] :
+       {std::pair{0.5, Ratios{0.094, 0.046, 0.036}}, std::pair{1.0, Ratios{0.186, 0.092, 0.074}}})
+    for (std::size_t i = 0; i < kBaseToHeight.size(); ++i) {
+      const Protocol p = aerial_protocol(kBaseToHeight[i], noise_px);
+      const std::string what =
+          aerial_name(kBaseToHeight[i]) + "base at " + std::to_string(noise_px).substr(0, 3) + " px";
       const double reached = mean_errors(p, MinimalSolver::kVertical).base,
                    five_points = mean_errors(p, MinimalSolver::kFivePoint).base;
-      expect_at_most(reached, limit, what);
+      expect_at_most(reached, limits[i], what);
       expect_at_most(reached, five_points, what + " against five points");
       EXPECT_LT(reached, five_points);
     }
@@ -349,15 +356,18 @@ TEST(Spec, AT14WrongVertical) {
 }
 
 TEST(Spec, AT14WrongVerticalAerial) {
-  for (const double ratio : kBaseToHeight)
-    for (const auto& [error, limit] :
-         {std::pair{0.01, 0.9}, std::pair{0.1, 1.3}, std::pair{0.25, 2.8}, std::pair{0.5, 5.0}}) {
+  const Ratios refined = {0.074, 0.040, 0.032};
+  for (const auto& [error, limits] :
+       {std::pair{0.01, Ratios{0.14, 0.068, 0.050}}, std::pair{0.1, Ratios{0.96, 0.44, 0.30}},
+        std::pair{0.25, Ratios{2.34, 1.08, 0.78}}, std::pair{0.5, Ratios{4.68, 2.14, 1.52}}})
+    for (std::size_t i = 0; i < kBaseToHeight.size(); ++i) {
+      const double ratio = kBaseToHeight[i];
       Protocol p = aerial_protocol(ratio, 0.5);
       p.vertical_error_deg = error;
       const MeanErrors mean = mean_errors(p, MinimalSolver::kVertical);
       const std::string name = "vertical off by " + std::to_string(error).substr(0, 4) + " deg";
-      expect_at_most(mean.base, limit, aerial_name(ratio) + "base, " + name);
-      expect_at_most(mean.refined_base, 0.14, aerial_name(ratio) + "refined base, " + name);
+      expect_at_most(mean.base, limits[i], aerial_name(ratio) + "base, " + name);
+      expect_at_most(mean.refined_base, refined[i], aerial_name(ratio) + "refined base, " + name);
     }
 }
 
@@ -398,7 +408,7 @@ TEST(Spec, AT15SpeedOfVerticalPair) {
     found += solve_vertical_pair(a, b, down, down).size();
   });
   EXPECT_GT(found, 0u);
-  expect_at_most(time, 5, "microseconds per solve");
+  expect_at_most(time, 2.5, "microseconds per solve");
 }
 
 TEST(Spec, AT16SpeedOfFivePoint) {
@@ -409,7 +419,7 @@ TEST(Spec, AT16SpeedOfFivePoint) {
     found += solve_five_point(a, b).size();
   });
   EXPECT_GT(found, 0u);
-  expect_at_most(time, 100, "microseconds per solve");
+  expect_at_most(time, 25, "microseconds per solve");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "geometry/gauss_helmert.h"
 #include "geometry/rotation.h"
 #include "geometry/vanishing_circles.h"
+#include "geometry/vanishing_votes.h"
 #include "geometry/vertical.h"
 #include "reached.h"
 #include "tests/unit/geometry/segment_scenes.h"
@@ -117,32 +118,12 @@ double circle_error_deg(const SegmentScene& scene) {
   return axis_error_deg(Eigen::Vector3d(off.x(), off.y(), scene.camera.distance).normalized(), scene.axes[0]);
 }
 
-// M36: of the intersections of two lines the one that most lines pass, by the sum of their angles to it; from every
-// tenth line.
-double best_pair_error_deg(const SegmentScene& scene) {
-  const auto planes = scene.planes();
-  double least = std::numeric_limits<double>::infinity();
-  Eigen::Vector3d best = Eigen::Vector3d::UnitX();
-  for (std::size_t i = 0; i < planes.size(); i += 10)
-    for (std::size_t j = 0; j < planes.size(); ++j) {
-      const Eigen::Vector3d cross = planes[i].normal.cross(planes[j].normal);
-      if (!(cross.norm() > 1e-6)) continue;
-      const Eigen::Vector3d axis = cross.normalized();
-      double sum = 0;
-      for (const InterpretationPlane& plane : planes) sum += std::abs(axis.dot(plane.normal));
-      if (sum >= least) continue;
-      least = sum;
-      best = axis;
-    }
-  return axis_error_deg(best, scene.axes[0]);
-}
-
 TEST(Spec, AT20DistanceOfTheVanishingPoint) {
   constexpr int kTrials = 200;
   for (const double y : kHeights) {
     double mean[2] = {0, 0};
     for (int n = 0; n < 2; ++n) {
-      double circles = 0, pairs = 0;
+      double circles = 0, votes = 0;
       for (int trial = 0; trial < kTrials; ++trial) {
         const SegmentScene scene = bundle(y, kNoises[n], static_cast<std::uint64_t>(trial) + 1);
         const PerspectiveCentre from = perspective_centre(scene.width, scene.height);
@@ -150,11 +131,11 @@ TEST(Spec, AT20DistanceOfTheVanishingPoint) {
         ASSERT_TRUE(fit);
         mean[n] += axis_error_deg(seen_from(fit->axis, from, scene.camera).direction, scene.axes[0]) / kTrials;
         circles += circle_error_deg(scene) / kTrials;
-        pairs += best_pair_error_deg(scene) / kTrials;
+        votes += axis_error_deg(vanishing_point_by_votes(scene.planes()).value(), scene.axes[0]) / kTrials;
       }
       record("circles" + std::to_string(kNoises[n]) + "_" + std::to_string(static_cast<int>(-y)), circles);
-      record("pairs" + std::to_string(kNoises[n]) + "_" + std::to_string(static_cast<int>(-y)), pairs);
-      EXPECT_GT(pairs, mean[n]) << y;
+      record("votes" + std::to_string(kNoises[n]) + "_" + std::to_string(static_cast<int>(-y)), votes);
+      EXPECT_GT(votes, mean[n]) << y;
       if (y >= -1e5) {
         EXPECT_LT(circles, 1.1 * mean[n]) << "the same estimator, up to where its numbers hold: " << y;
       }

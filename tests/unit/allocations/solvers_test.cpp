@@ -4,6 +4,8 @@
 #include <random>
 #include <vector>
 
+#include "geometry/camera_matrix.h"
+#include "geometry/collinearity.h"
 #include "geometry/coplanarity.h"
 #include "geometry/five_point.h"
 #include "geometry/fundamental.h"
@@ -13,6 +15,7 @@
 #include "geometry/minimal_similarity.h"
 #include "geometry/p3p.h"
 #include "geometry/rotation_pair.h"
+#include "geometry/similarity.h"
 #include "geometry/two_rays.h"
 #include "geometry/vertical_pair.h"
 #include "tests/unit/allocations/counted_allocations.h"
@@ -132,6 +135,12 @@ TEST(Allocations, NoneInPosesSimilaritiesAndIntersections) {
   expect_no_allocation("similarity of three points", [&](const PairScene& s) -> std::size_t {
     return solve_similarity(points_on(s), outside(points_on(s))).has_value();
   });
+  expect_no_allocation("similarity of three points and more, with its covariance", [&](const PairScene& s) {
+    const std::array<Eigen::Vector3d, 3> from = points_on(s), to = outside(from);
+    const std::array<double, 3> weights = {1, 2, 0.5};
+    const auto fitted = fit_similarity(from, to, weights);
+    return fitted ? std::size_t{similarity_covariance(*fitted, from, weights).has_value()} : 0;
+  });
   expect_no_allocation("minimal control", [&](const PairScene& s) {
     const std::array<Eigen::Vector3d, 3> model = points_on(s), ground = outside(model);
     const auto place = [&](std::size_t i) { return PlaceControl{model[i], ground[i].head<2>()}; };
@@ -148,6 +157,49 @@ TEST(Allocations, NoneInPosesSimilaritiesAndIntersections) {
     const XyzAngles first{3.1, 0.1, 0.2}, second{3.0, -0.1, 0.1};
     const Eigen::Vector2d a = s.a[0].hnormalized(), b = s.b[0].hnormalized();
     return std::isfinite(coplanarity_determinant({1, 0, 0}, 1, first, a, second, b).value);
+  });
+}
+
+TEST(Allocations, NoneInTheImageFormula) {
+  const Pose pose{rotation_exp<double>({0.2, -0.4, 0.9}), {1, 2, 3}};
+  const NineParameters camera = nine_from(pose, kSceneFocalPx, {12, -7});
+  NineParameters near = camera;
+  near.centre.x() += 0.01;
+  NineParameters aside = camera;
+  aside.centre.y() += 0.3;
+  // Rays of `a` as control points at different depths.
+  const auto ground = [&](const PairScene& scene) {
+    std::array<Eigen::Vector3d, 8> points;
+    for (std::size_t i = 0; i < 8; ++i)
+      points[i] = pose.centre + pose.rotation.conjugate() * ((2 + 0.3 * static_cast<double>(i * i % 7)) * scene.a[i]);
+    return points;
+  };
+  const auto seen = [&](const std::array<Eigen::Vector3d, 8>& points) {
+    std::array<Eigen::Vector2d, 8> image;
+    for (std::size_t i = 0; i < 8; ++i) image[i] = project(camera, points[i]);
+    return image;
+  };
+  expect_no_allocation("direct linear transformation", [&](const PairScene& s) -> std::size_t {
+    return fit_eleven(ground(s), seen(ground(s))).has_value();
+  });
+  expect_no_allocation("nine parameters by least squares", [&](const PairScene& s) -> std::size_t {
+    return fit_nine(near, ground(s), seen(ground(s))).has_value();
+  });
+  expect_no_allocation("nine to eleven and back", [&](const PairScene& s) -> std::size_t {
+    const auto eleven = eleven_from(camera, ground(s)[0]);
+    return eleven && nine_from(*eleven).has_value();
+  });
+  expect_no_allocation("point of eleven parameters", [&](const PairScene& s) -> std::size_t {
+    const Eigen::Vector3d point = ground(s)[0], origin = origin_before(camera, 3);
+    const auto first = eleven_from(camera, origin), second = eleven_from(aside, origin);
+    if (!first || !second) return 0;
+    const std::array<ElevenParameters, 2> images = {*first, *second};
+    return restitute(images, std::array<Eigen::Vector2d, 2>{project(camera, point), project(aside, point)}).has_value();
+  });
+  expect_no_allocation("camera matrix into its parts", [&](const PairScene& s) -> std::size_t {
+    const CameraMatrix matrix =
+        camera_matrix({Eigen::Vector3d(kSceneFocalPx, kSceneFocalPx, 1).asDiagonal(), {s.truth.rotation, s.a[0]}});
+    return decompose_camera_matrix(matrix).has_value() + decompose_camera_matrix(matrix, ground(s)[0]).has_value();
   });
 }
 

@@ -78,6 +78,10 @@ TEST(Collinearity, FitNeedsSixPointsThatAreNotInOnePlane) {
   EXPECT_FALSE(fit_eleven(bad, good.image));
   EXPECT_FALSE(fit_nine(camera, bad, good.image));
   EXPECT_FALSE(fit_nine(camera, line, good.image));
+  std::vector<Eigen::Vector2d> unknown = good.image;
+  unknown[3].y() = std::nan("");
+  EXPECT_FALSE(fit_eleven(good.ground, unknown));
+  EXPECT_FALSE(fit_nine(camera, good.ground, unknown));
   std::vector<Eigen::Vector3d> behind = good.ground;
   behind[0] = origin_before(camera, -500);
   EXPECT_FALSE(fit_nine(camera, behind, good.image));

@@ -122,6 +122,11 @@ TEST(Fundamental, NothingForBadPoints) {
   unknown[2].x() = std::nan("");
   EXPECT_FALSE(fit_essential(unknown, rays.b));
   EXPECT_FALSE(fit_essential(std::span(rays.a).first(7), std::span(rays.b).first(7)));
+  std::vector<Eigen::Vector3d> twice_a = rays.a, twice_b = rays.b;
+  twice_a[4] = twice_a[5];
+  twice_b[4] = twice_b[5];
+  EXPECT_TRUE(fit_essential(rays.a, rays.b));
+  EXPECT_FALSE(fit_essential(twice_a, twice_b)) << "two points are one";
 }
 
 TEST(Fundamental, NothingForSevenBadPoints) {
@@ -137,6 +142,10 @@ TEST(Fundamental, NothingForSevenBadPoints) {
   a[4] = a[5];
   b[4] = b[5];
   EXPECT_TRUE(solve_seven_point(a, b).empty()) << "two points are one";
+  PairSceneOptions plane = turned();
+  plane.plane = true;
+  const PixelScene flat(PairScene(plane, 7, random));
+  EXPECT_TRUE(solve_seven_point(seven(flat.a), seven(flat.b)).empty()) << "all in one plane";
   PairSceneOptions centre = turned();
   centre.base.setZero();
   const PixelScene still(PairScene(centre, 7, random));

@@ -59,6 +59,14 @@ TEST(RotationFit, NotANumberGivesNotANumber) {
   EXPECT_TRUE(fit_rotation_robust(d.from, d.to).coeffs().hasNaN());
 }
 
+TEST(RotationFit, NotEquallyManyGiveNotANumber) {
+  const Directions d;
+  const auto fewer = std::span(d.to).first(59);
+  EXPECT_TRUE(fit_rotation(d.from, fewer).coeffs().hasNaN());
+  EXPECT_TRUE(fit_rotation_robust(d.from, fewer).coeffs().hasNaN());
+  EXPECT_TRUE(fit_rotation(d.from, d.to, std::vector<double>(59, 1.0)).coeffs().hasNaN());
+}
+
 TEST(RotationFit, RobustFitWithstandsAThirdOfWrongPairs) {
   Directions d;
   for (std::size_t i = 0; i < d.to.size(); ++i) {

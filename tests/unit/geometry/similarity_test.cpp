@@ -200,6 +200,17 @@ TEST(Similarity, RefusesPointsWithoutExtent) {
   EXPECT_FALSE(fit_similarity(same, same));
 }
 
+TEST(Similarity, RefusesWhatIsNotEquallyMany) {
+  const Clouds clouds(10);
+  const std::vector<double> nine(9, 1.0), ten(10, 1.0);
+  const auto nine_to = std::span(clouds.to).first(9);
+  EXPECT_FALSE(fit_similarity(clouds.from, nine_to));
+  EXPECT_FALSE(fit_similarity(clouds.from, clouds.to, nine));
+  EXPECT_FALSE(fit_similarity_robust(clouds.from, nine_to, ten));
+  EXPECT_FALSE(fit_similarity_robust(clouds.from, clouds.to, nine));
+  EXPECT_FALSE(fit_similarity_robust(clouds.from, clouds.to, {}));
+}
+
 TEST(Similarity, RefusesWhatIsNotANumber) {
   Clouds clouds(10);
   clouds.to[4].y() = std::numeric_limits<double>::quiet_NaN();
