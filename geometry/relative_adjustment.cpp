@@ -3,65 +3,20 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "geometry/angles.h"
 #include "geometry/decompositions.h"
 #include "geometry/median.h"
+#include "geometry/open_base.h"
 
 namespace megablock {
 
 namespace {
 
+// Of the base's direction: where least squares give more than that, their curvature may tell little.
+constexpr double kLinear = 0.5 * kDegree;
+
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
-
-// Residual of a pair with its derivatives.
-class SampsonEquations {
- public:
-  explicit SampsonEquations(const RelativeOrientation& o)
-      : rotation_(o.rotation.toRotationMatrix()),
-        essential_(skew<double>(o.base) * rotation_),
-        across_(axes_across(o.base)) {}
-
-  // False where the residual is not defined.
-  bool at(const Eigen::Vector2d& point_a, const Eigen::Vector2d& point_b) {
-    a_ = point_a.homogeneous();
-    b_ = point_b.homogeneous();
-    line_b_.noalias() = essential_ * a_;
-    line_a_.noalias() = essential_.transpose() * b_;
-    square_ = line_b_.head<2>().squaredNorm() + line_a_.head<2>().squaredNorm();
-    if (!(square_ > 0)) return false;
-    n_ = b_.dot(line_b_);
-    residual = n_ / std::sqrt(square_);
-    return true;
-  }
-  double residual = 0;
-
-  Vector5 derivative() const {
-    const Eigen::Vector3d flat_b(line_b_.x(), line_b_.y(), 0), flat_a(line_a_.x(), line_a_.y(), 0);
-    const Eigen::Vector3d turned = rotation_ * a_;
-    Eigen::Vector3d n_base = turned.cross(b_);
-    Eigen::Vector3d half_base = turned.cross(flat_b) - b_.cross(rotation_ * flat_a);
-    Eigen::Vector3d n_rotation = a_.cross(line_a_);
-    Eigen::Vector3d half_rotation = a_.cross(essential_.transpose() * flat_b) + flat_a.cross(line_a_);
-    const double root = 1 / std::sqrt(square_), share = n_ / square_;
-    Vector5 j;
-    j << root * (n_rotation - share * half_rotation), root * (across_.transpose() * (n_base - share * half_base));
-    return j;
-  }
-
-  // What the errors of both points add to the square of the derivative by the base, over those of a coordinate: the
-  // parallax that determines the base has the points' own errors in it, and without a base nothing else.
-  Eigen::Matrix2d base_noise() const {
-    const Eigen::Matrix<double, 2, 3> in_b = skew<double>(rotation_ * a_).topRows<2>(),
-                                      in_a = rotation_.leftCols<2>().transpose() * skew<double>(b_);
-    return across_.transpose() * (in_b.transpose() * in_b + in_a.transpose() * in_a) * across_ / square_;
-  }
-
- private:
-  Eigen::Matrix3d rotation_, essential_;
-  Eigen::Matrix<double, 3, 2> across_;
-  Eigen::Vector3d a_, b_, line_a_, line_b_;
-  double n_ = 0, square_ = 0;
-};
 
 struct NormalEquations {
   Matrix5 normal = Matrix5::Zero();
@@ -120,13 +75,6 @@ Vector5 sampson_derivative(const RelativeOrientation& orientation, const Eigen::
 double intersection_angle(const Eigen::Quaterniond& rotation, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector3d u = rotation * a.homogeneous(), v = b.homogeneous();
   return std::atan2(u.cross(v).norm(), u.dot(v));
-}
-
-Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base) {
-  Eigen::Matrix<double, 3, 2> axes;
-  axes.col(0) = base.unitOrthogonal();
-  axes.col(1) = base.cross(axes.col(0));
-  return axes;
 }
 
 RelativeOrientation adjust_orientation(const RelativeOrientation& start, const PointPairs& points,
@@ -206,8 +154,19 @@ OrientationPrecision precision_of(const RelativeOrientation& orientation, const 
   }
   if (!(count >= 6) || !(slopes > 0)) return {};
   const double variance = std::max(min_sigma * min_sigma, squares * count / (slopes * slopes) * count / (count - 5));
+  const Matrix5 with_noise = normal;
   normal.bottomRightCorner<2, 2>() -= variance * noise;
-  return precision_from(normal, variance);
+  OrientationPrecision result = precision_from(normal, variance);
+  if (result.base_sigma() <= kLinear) return result;
+  const Eigen::Matrix2d about = precision_from(with_noise, variance).covariance.bottomRightCorner<2, 2>();
+  if (!about.allFinite()) return result;
+  std::vector<double> of_inliers(points.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (inlier[i]) of_inliers[i] = weights.empty() ? 1 : weights[i];
+  const BaseCost cost{scale, slopes / count, variance};
+  if (const auto open = covariance_of_open_base(orientation, about, points, of_inliers, cost))
+    result.covariance = *open;
+  return result;
 }
 
 OrientationPrecision precision_of_rotation(const Eigen::Quaterniond& rotation, std::span<const Eigen::Vector3d> a,

@@ -1,34 +1,17 @@
-// Least squares of a relative orientation over many matches, with covariance, from a start that is near. Residuals are
-// those of P. D. Sampson, "Fitting conic sections to 'very scattered' data", CGIP 18, 1982.
-//
-//     E = [t]x R,  n = x_b' E x_a,  d = |(E x_a)_{1,2}|^2 + |(E' x_b)_{1,2}|^2,  r = n / sqrt(d)   (Sampson)
-//
-// for normalised image points x (X/Z, Y/Z, 1). r is the distance of the match from the nearest one that satisfies the
-// coplanarity equation, to first order; its standard deviation is that of an image coordinate. Unknowns: increment w of
-// the rotation, R Exp(w) (rotation.h), and the base t on the unit sphere, along two axes p across it. With u = R x_a,
-// the epipolar lines l_b = E x_a and l_a = E' x_b, and l' the vectors with a zero as third component
-//
-//     dn/dw = x_a x l_a,        (dd/dw)/2 = x_a x E' l_b' + l_a' x l_a,
-//     dn/dp = p . (u x x_b),    (dd/dp)/2 = p . (u x l_b' - x_b x R l_a').
+// Least squares of a relative orientation over many matches, with covariance, from a start that is near; residuals and
+// unknowns are those of sampson.h.
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <span>
 #include <vector>
 
 #include "geometry/point_pairs.h"
-#include "geometry/relative_orientation.h"
+#include "geometry/sampson.h"
 
 namespace megablock {
-
-inline double sampson_residual(const Eigen::Matrix3d& essential, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  const Eigen::Vector3d line_b = essential * a.homogeneous(), line_a = essential.transpose() * b.homogeneous();
-  const double d = line_b.head<2>().squaredNorm() + line_a.head<2>().squaredNorm();
-  return b.homogeneous().dot(line_b) / std::sqrt(d);
-}
 
 // By w and along axes_across of the base, as above.
 Eigen::Matrix<double, 5, 1> sampson_derivative(const RelativeOrientation& orientation, const Eigen::Vector2d& a,
@@ -56,9 +39,6 @@ RelativeOrientation adjust_orientation(const RelativeOrientation& start, const P
 std::vector<double> leverage_weights(const RelativeOrientation& orientation, const PointPairs& points,
                                      std::span<const std::uint8_t> inlier);
 
-// Two unit axes across the base.
-Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base);
-
 // Of w (3) and the base along axes_across (2), radians. Where the pairs leave a direction open its sigma is pi.
 struct OrientationPrecision {
   Eigen::Matrix<double, 5, 5> covariance =
@@ -73,7 +53,8 @@ struct OrientationPrecision {
 // are inliers: weights cost accuracy, wrong matches among the inliers cost more. With psi = r / (1 + (r / scale)^2)^2
 // sigma^2 is mean(psi^2) / mean(psi')^2 (P. Huber, "Robust statistics", 1981, 7.6), at least `min_sigma` squared:
 // matches are never exact. What the points' own errors add to the parallaxes is taken from them, so that without a base
-// it is open. Six inliers at least, else all is.
+// it is open. Where that leaves the base worse than half a degree, the covariance is that of open_base.h, if there is
+// one. Six inliers at least, else all is open.
 OrientationPrecision precision_of(const RelativeOrientation& orientation, const PointPairs& points,
                                   std::span<const std::uint8_t> inlier, double scale, double min_sigma,
                                   std::span<const double> weights = {});

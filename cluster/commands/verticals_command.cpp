@@ -10,10 +10,11 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "cluster/commands/found_verticals.h"
 #include "cluster/exit_codes.h"
+#include "cluster/stages/block_hash.h"
 #include "geometry/median.h"
 #include "io/error.h"
-#include "io/hash.h"
 #include "io/image_header.h"
 #include "io/job_store.h"
 #include "io/picture_codec.h"
@@ -29,6 +30,9 @@ struct VerticalsOptions {
   std::string project, output;
   SegmentOptions segments;
 };
+
+// Part of what a picture's row follows from; raised when results change.
+constexpr int kAlgorithm = 1;
 
 // Attitudes of sensors are those of the sensor: mountings, and edges of buildings, are off by this much.
 constexpr double kLeastSensorSigma = 2 * kDegree;
@@ -62,10 +66,10 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
 
 // Cameras are held within a sigma of the level two times out of three. What looks upright from above, rows of fields or
 // trees, lies anywhere.
-std::string remark_on(const std::vector<ImageVertical>& verticals) {
+std::string remark_on(const std::vector<PictureVertical>& pictures) {
   constexpr std::size_t kFewest = 5;
   std::vector<double> rolls;
-  for (const ImageVertical& v : verticals)
+  for (const PictureVertical& v : pictures)
     if (v.found) rolls.push_back(std::abs(v.roll));
   if (rolls.size() < kFewest || median(rolls) < 1) return "";
   return "Most of them are turned farther than cameras are held: pictures from above show no vertical, but rows of "
@@ -75,12 +79,12 @@ std::string remark_on(const std::vector<ImageVertical>& verticals) {
 namespace {
 
 // One line that names the first pictures in which no straight edge was found; empty where there are none.
-std::string edgeless_text(const Block& block, const std::vector<ImageVertical>& verticals) {
+std::string edgeless_text(const Block& block, const std::vector<PictureVertical>& pictures) {
   constexpr std::size_t kNamed = 5;
   std::size_t count = 0;
   std::string names;
-  for (std::size_t k = 0; k < verticals.size(); ++k) {
-    if (verticals[k].segments > 0 || !verticals[k].failure.empty() || ++count > kNamed) continue;
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    if (pictures[k].segments > 0 || !pictures[k].failure.empty() || ++count > kNamed) continue;
     names += (count > 1 ? ", " : "") + block.name_of(ImageIndex(static_cast<std::int64_t>(k)));
   }
   if (count == 0) return "";
@@ -106,6 +110,58 @@ std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
                                                  std::sqrt(whole(1, 1)) * kDegreesPerRadian);
 }
 
+// Of all that the row of a picture follows from.
+std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prior, std::uint64_t mask,
+                     const SegmentOptions& segments) {
+  const Camera& camera = block.cameras[block.camera_of(i)];
+  Hasher hasher;
+  hasher.add(kAlgorithm).add(block.name_of(i)).add(block.images[i].file_hash).add(mask);
+  hasher.add(camera.width).add(camera.height);
+  add_to_hash(hasher, camera.intrinsics);
+  for (const double sigma : camera.prior_sigma) hasher.add(sigma);
+  add_to_hash(hasher, prior.down);
+  hasher.add(prior.roll_sigma).add(prior.pitch_sigma);
+  hasher.add(segments.min_length_px).add(segments.max_megapixels).add(segments.straightness_px);
+  return hasher.value();
+}
+
+// What the command says of every picture: of those in `file` as it is there, the others are looked at.
+std::vector<PictureVertical> look_at_pictures(const Block& block, const SegmentOptions& segments, const JobStore& store,
+                                              const std::string& file) {
+  IndexedVector<CameraIndex, std::uint64_t> masks;
+  for (const Camera& camera : block.cameras)
+    masks.push_back(camera.mask_path.empty() ? 0 : hash_file(camera.mask_path));
+  const auto count = static_cast<std::int64_t>(block.images.size());
+  std::vector<VerticalPrior> priors(block.images.size());
+  std::vector<std::uint64_t> keys(block.images.size());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::int64_t k = 0; k < count; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    priors[at] = expected_vertical(block, ImageIndex(k));
+    keys[at] = key_of(block, ImageIndex(k), priors[at], masks[block.camera_of(ImageIndex(k))], segments);
+  }
+  FoundVerticals found(store, file, std::move(keys));
+  if (found.count() > 0) std::printf("%zu of %zu images were looked at before\n", found.count(), priors.size());
+  cv::setNumThreads(1);
+  load_picture_codecs();
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::int64_t k = 0; k < count; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    if (found.has(at)) continue;
+    const ImageIndex i(k);
+    const ImageVertical v = find_image_vertical(block.path_of(i), block.cameras[block.camera_of(i)], priors[at],
+                                                seed_of(block.image_names[i]), segments);
+    PictureVertical picture{row_of(block, i, v), v.failure, v.found, v.roll, v.segments};
+#pragma omp critical(found_verticals)
+    {
+      found.add(at, std::move(picture));
+      found.save_now_and_then();
+    }
+  }
+  found.save();
+  return found.pictures();
+}
+
 int write_verticals(VerticalsOptions options) {
   options.segments.check();
   const Project project = read_project(options.project);
@@ -116,32 +172,25 @@ int write_verticals(VerticalsOptions options) {
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "verticals.csv").string();
   const fs::path output = fs::absolute(options.output);
 
-  std::vector<ImageVertical> verticals(block.images.size());
-  const auto count = static_cast<std::int64_t>(block.images.size());
-  cv::setNumThreads(1);
-  load_picture_codecs();
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::int64_t k = 0; k < count; ++k) {
-    const ImageIndex i(k);
-    verticals[static_cast<std::size_t>(k)] =
-        find_image_vertical(block.path_of(i), block.cameras[block.camera_of(i)], expected_vertical(block, i),
-                            seed_of(block.image_names[i]), options.segments);
-  }
+  const JobStore store(output.parent_path().string());
+  const std::vector<PictureVertical> pictures =
+      look_at_pictures(block, options.segments, store, output.filename().string() + ".found");
 
   std::string table = verticals_header() +
                       ",segments,vanishing_points,lines,variance_factor,whole_sigma_roll_deg,whole_sigma_pitch_deg\n";
   int found = 0, failed = 0;
-  for (std::int64_t k = 0; k < count; ++k) {
-    const ImageVertical& v = verticals[static_cast<std::size_t>(k)];
-    table += row_of(block, ImageIndex(k), v);
-    found += v.found;
-    failed += !v.failure.empty();
-    if (!v.failure.empty())
-      std::fprintf(stderr, "megablock: %s: %s\n", block.name_of(ImageIndex(k)).c_str(), v.failure.c_str());
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    const PictureVertical& picture = pictures[k];
+    table += picture.row;
+    found += picture.found;
+    if (picture.failure.empty()) continue;
+    ++failed;
+    std::fprintf(stderr, "megablock: %s: %s\n", block.name_of(ImageIndex(static_cast<std::int64_t>(k))).c_str(),
+                 picture.failure.c_str());
   }
-  JobStore(output.parent_path().string()).write_text(output.filename().string(), table);
-  std::printf("%d of %zu images show the vertical: %s\n", found, verticals.size(), options.output.c_str());
-  std::printf("%s%s", edgeless_text(block, verticals).c_str(), remark_on(verticals).c_str());
+  store.write_text(output.filename().string(), table);
+  std::printf("%d of %zu images show the vertical: %s\n", found, pictures.size(), options.output.c_str());
+  std::printf("%s%s", edgeless_text(block, pictures).c_str(), remark_on(pictures).c_str());
   std::printf("To use them, give 'verticals: FILE' in the project file.\n");
   return failed > 0 ? kExitFailedUnits : kExitDone;
 }
@@ -152,7 +201,10 @@ void add_verticals(CLI::App& app, std::function<int()>& action) {
   auto options = std::make_shared<VerticalsOptions>();
   SegmentOptions& s = options->segments;
   CLI::App* command = app.add_subcommand("verticals", "Write where down is in every picture, from its straight edges");
-  command->footer("Example: megablock verticals block.yaml -o verticals.csv");
+  command->footer(
+      "What is found is kept in OUTPUT.found: started again, after a kill or with more images, the command looks at "
+      "the "
+      "other pictures only.\nExample: megablock verticals block.yaml -o verticals.csv");
   command->add_option("project", options->project, "Project file")->required();
   command->add_option("-o,--output", options->output, "CSV file [verticals.csv beside the project]");
   command->add_option("--min-length", s.min_length_px, "Shortest segment, px of images reduced to --max-megapixels")

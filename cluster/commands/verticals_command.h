@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "cluster/commands/found_verticals.h"
+#include "geometry/vertical.h"
 #include "io/block.h"
-#include "match/image_vertical.h"
 
 namespace CLI {
 class App;
@@ -18,7 +19,7 @@ namespace megablock {
 VerticalPrior expected_vertical(const Block& block, ImageIndex image);
 
 // What is said of verticals of which most lie where no camera is held; else empty.
-std::string remark_on(const std::vector<ImageVertical>& verticals);
+std::string remark_on(const std::vector<PictureVertical>& pictures);
 
 void add_verticals(CLI::App& app, std::function<int()>& action);
 

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cluster/collective.h"
-#include "cluster/progress.h"
+#include "cluster/save_times.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/hash.h"
@@ -86,13 +86,12 @@ class GrowingShard {
   // The same; on the main thread, to which HDF5 belongs.
   void save_now_and_then() {
     const auto end = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), 0) - done_.begin());
-    if (end == saved_ || end == done_.size() || monotonic_seconds() < next_save_s_) return;
-    save(end);
+    if (end == saved_ || end == done_.size() || !times_.due()) return;
+    times_.run([&] { save(end); });
   }
 
  private:
   void save(std::size_t count) {
-    const double start = monotonic_seconds();
     const auto end = images_.begin() + static_cast<std::ptrdiff_t>(count);
     std::vector<ImageFeatures> first(std::make_move_iterator(images_.begin()), std::make_move_iterator(end));
     const auto& fingerprints = shard_.image_fingerprints;
@@ -105,16 +104,14 @@ class GrowingShard {
       // The unit itself will be written to the same disk, and says what is wrong with it.
     }
     std::move(first.begin(), first.end(), images_.begin());
-    next_save_s_ = monotonic_seconds() + std::max(kInterval_s, 20 * (monotonic_seconds() - start));
   }
 
-  static constexpr double kInterval_s = 1;  // and at most a twentieth of the time goes into saving
   const JobStore& store_;
   const Shard& shard_;
   std::vector<ImageFeatures> images_;
   std::vector<std::uint8_t> done_;
   std::size_t saved_ = 0;
-  double next_save_s_ = monotonic_seconds() + kInterval_s;
+  SaveTimes times_;
 };
 
 void write_shard(Job& job, const Shard& shard, const std::string& path) {

@@ -10,18 +10,18 @@
 namespace megablock {
 namespace {
 
-ImageVertical found_at(double roll) {
-  ImageVertical vertical;
-  vertical.found = true;
-  vertical.roll = roll;
-  return vertical;
+PictureVertical found_at(double roll) {
+  PictureVertical picture;
+  picture.found = true;
+  picture.roll = roll;
+  return picture;
 }
 
 // By the median of five or more.
 TEST(VerticalsCommand, SaysWhereMostAreTurnedTooFar) {
-  const std::vector<ImageVertical> held{found_at(0.1), found_at(-0.8), found_at(0.9), found_at(-4), found_at(3)};
+  const std::vector<PictureVertical> held{found_at(0.1), found_at(-0.8), found_at(0.9), found_at(-4), found_at(3)};
   EXPECT_EQ(remark_on(held), "");
-  std::vector<ImageVertical> fields{found_at(-1.2), found_at(3), found_at(0.2), found_at(-5)};
+  std::vector<PictureVertical> fields{found_at(-1.2), found_at(3), found_at(0.2), found_at(-5)};
   fields.emplace_back().roll = 5;  // shows none
   EXPECT_EQ(remark_on(fields), "");
   fields.push_back(found_at(1.1));
