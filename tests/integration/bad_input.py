@@ -364,6 +364,19 @@ class BadInput(CopyOfTheBlock):
         self.assertEqual(done.returncode, FAILED_UNITS)
         self.assertRegex(done.stdout, "matches/000000.h5: is damaged .*; run the job again, which computes it anew")
 
+    def test_figures_of_another_result_are_not_believed(self):
+        shutil.copytree(work / "clean_job", self.job)
+        figures, written = self.job / "result/figures.json", status(self.job)
+        content = json.loads(figures.read_text())
+        self.assertEqual({key: written[key] for key in content}, content)
+        for text in (None, figures.read_text()[:-40], "[]", json.dumps(content | {"points": 7, "digest": "0" * 16})):
+            figures.unlink(missing_ok=True)
+            if text is not None:
+                figures.write_text(text)
+            self.assertEqual(status(self.job), written)
+        figures.write_text(json.dumps(content | {"points": 7}))  # they are read where they are of the result
+        self.assertEqual(status(self.job)["points"], 7)
+
     def test_questions_for_measurements(self):
         shutil.copytree(work / "clean_job", self.job)
 
