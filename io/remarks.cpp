@@ -15,6 +15,7 @@ namespace {
 constexpr std::size_t kNamed = 5;           // points by name
 constexpr std::size_t kParts = 5;           // of a free datum, described
 constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
+constexpr double kMisstated = 2;            // times the stated sigma, beyond what chance explains
 
 // Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
 std::string pixels(double value) {
@@ -152,10 +153,31 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
   return lines;
 }
 
+std::vector<std::string> misstated_texts(const BlockResult& result) {
+  using enum ObservationKind;
+  std::vector<std::string> lines;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) {
+    const auto kind = static_cast<ObservationKind>(k);
+    const ObservationStatistics& s = result.observation_table.kinds[k];
+    const double factor = s.sigma_factor(), by_chance = 1 + 5 / std::sqrt(2 * s.redundancy);
+    if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, by_chance))) continue;
+    const bool weighed = kind >= kPositionHorizontal && kind <= kRelativePosition;
+    lines.push_back(
+        fmt::format("Residuals of {} ({}) are {:.1f} times what the stated sigmas let expect: some are wrong, or the "
+                    "sigmas are too "
+                    "small{}{}",
+                    name_of(kind), s.count, factor,
+                    weighed ? "; 'merge: {estimate_sigmas: true}' weighs them by what they show" : "",
+                    kind == kAttitude ? ", 'adjustment: {attitude_loss: cauchy}' forgets single ones" : ""));
+  }
+  return lines;
+}
+
 std::vector<std::string> remarks(const BlockResult& result) { return remarks(result, WholeTracks(result)); }
 
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks) {
   std::vector<std::string> lines = datum_texts(result, parts_of(result, tracks));
+  for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
   return lines;

@@ -31,6 +31,10 @@ std::string unused_points_text(const BlockResult& result, PointRole role);
 std::vector<std::string> datum_texts(const BlockResult& result);
 std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures);  // parts are enough
 
+// Kinds of observations whose residuals are several times what their stated sigmas let expect, a line each, with what
+// can be done. Sigma naught does not show them: it is that of the tie points, which are many.
+std::vector<std::string> misstated_texts(const BlockResult& result);
+
 // All of this file, one line each.
 std::vector<std::string> remarks(const BlockResult& result);
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks);

@@ -189,10 +189,10 @@ BlockState given_orientation(const Job& job, BlockState given) {
   const GivenTrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
   if (change.frames > 0 && job.is_first_rank() && !job.options.quiet)
     std::fprintf(stderr,
-                 "orientation  given poses of %lld frames in %lld trajectories contradict their positions and relative "
-                 "poses: moved by %.3g m rms, %.3g m at most\n",
-                 static_cast<long long>(change.frames), static_cast<long long>(change.trajectories), change.rms_m,
-                 change.largest_m);
+                 "orientation  given poses drift away from what was observed of their frames; adjusted to that as a "
+                 "start: %lld frames in %lld %s, moved by %.3g m rms, %.3g m at most\n",
+                 static_cast<long long>(change.frames), static_cast<long long>(change.trajectories),
+                 change.trajectories == 1 ? "drive" : "drives", change.rms_m, change.largest_m);
   return held_in_place(job, std::move(given));
 }
 

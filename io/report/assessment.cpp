@@ -96,12 +96,17 @@ std::string seams_item(const BlockResult& result) {
 }
 
 std::string residuals_item(const BlockResult& result) {
-  if (result.degrees_of_freedom <= 0) return "";
+  std::string list;
+  for (const std::string& text : misstated_texts(result))
+    list += item("look", escape(text) + ": see <a href=\"#observations\">observations</a>.");
+  if (result.degrees_of_freedom <= 0) return list;
   const double s0 = std::sqrt(std::max(0.0, result.variance_factor));
-  if (s0 > 1.5) return item("look", "Residuals are " + fixed(s0, 1) + " times what the stated sigmas let expect.");
+  if (s0 > 1.5)
+    return list + item("look", "Residuals are " + fixed(s0, 1) + " times what the stated sigmas let expect.");
   if (s0 < 0.5)
-    return item("look", "Residuals are much smaller than the stated sigmas let expect (σ₀ " + fixed(s0, 2) + ").");
-  return item("good", "Residuals agree with the stated sigmas (σ₀ " + fixed(s0, 2) + ").");
+    return list +
+           item("look", "Residuals are much smaller than the stated sigmas let expect (σ₀ " + fixed(s0, 2) + ").");
+  return list.empty() ? item("good", "Residuals agree with the stated sigmas (σ₀ " + fixed(s0, 2) + ").") : list;
 }
 
 std::string unused_points_item(const BlockResult& result) {

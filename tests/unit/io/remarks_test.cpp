@@ -52,6 +52,25 @@ TEST(Remarks, SaysInPlainWordsWhatAFreeDatumLeavesOpen) {
   EXPECT_THAT(first(line), HasSubstr("known to 28 degrees only"));
 }
 
+TEST(Remarks, KindsThatAreWorseThanStated) {
+  BlockResult result = made_up_result(small_block());
+  result.observation_table = {};
+  ObservationStatistics& attitudes = result.observation_table[ObservationKind::kAttitude];
+  attitudes = {54, 31 * 50, 50, 1};  // 5.57 times
+  const auto first = [&] { return misstated_texts(result).at(0); };
+  EXPECT_THAT(first(), testing::StartsWith("Residuals of attitude (54) are 5.6 times what the stated sigmas let"));
+  EXPECT_THAT(first(), HasSubstr("attitude_loss: cauchy"));
+  EXPECT_THAT(report_html(result), HasSubstr("<li class=look>Residuals of attitude (54) are 5.6 times"));
+  EXPECT_EQ(remarks(result).size(), 1u);
+  attitudes.weighted_squares = 3.9 * 50;  // not twice
+  EXPECT_TRUE(misstated_texts(result).empty());
+  attitudes = {3, 6, 1.2, 1};  // 2.2 times, by chance
+  EXPECT_TRUE(misstated_texts(result).empty());
+  result.observation_table[ObservationKind::kControlHeight] = {20, 900, 9, 1};
+  EXPECT_THAT(first(),
+              testing::AllOf(HasSubstr("control, height (20) are 10.0"), testing::Not(HasSubstr("estimate_sigmas"))));
+}
+
 TEST(Remarks, PointsThatAreNotSeenAndTheWorstFirst) {
   BlockResult result = made_up_result(small_block());
   EXPECT_TRUE(remarks(result).empty());
