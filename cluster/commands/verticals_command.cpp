@@ -201,12 +201,11 @@ void add_verticals(CLI::App& app, std::function<int()>& action) {
   auto options = std::make_shared<VerticalsOptions>();
   SegmentOptions& s = options->segments;
   CLI::App* command = app.add_subcommand("verticals", "Write where down is in every picture, from its straight edges");
-  command->footer(
-      "What is found is kept in OUTPUT.found: started again, after a kill or with more images, the command looks at "
-      "the "
-      "other pictures only.\nExample: megablock verticals block.yaml -o verticals.csv");
+  command->footer("Example: megablock verticals block.yaml -o verticals.csv");
   command->add_option("project", options->project, "Project file")->required();
-  command->add_option("-o,--output", options->output, "CSV file [verticals.csv beside the project]");
+  command->add_option("-o,--output", options->output,
+                      "CSV file [verticals.csv beside the project]; what is found is kept in FILE.found, so that the "
+                      "command, started again, looks at other pictures only");
   command->add_option("--min-length", s.min_length_px, "Shortest segment, px of images reduced to --max-megapixels")
       ->capture_default_str();
   command->add_option("--max-megapixels", s.max_megapixels, "Larger images are reduced")->capture_default_str();
