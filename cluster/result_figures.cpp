@@ -7,6 +7,7 @@
 
 #include "io/feature_statistics.h"
 #include "io/remarks.h"
+#include "io/track_batches.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -62,10 +63,6 @@ std::string written_figures(const JobStore& store) {
 
 }  // namespace
 
-ResultFigures figures_of_tracks(const BlockResult& result, const TrackBatches& tracks) {
-  return {reprojection_statistics(result, tracks), remarks(result, tracks)};
-}
-
 std::string to_json(const ResultFigures& figures, const BlockResult& result) {
   const Json json = {{"images", result.block.images.size()},
                      {"oriented", figures.statistics.oriented_images},
@@ -96,7 +93,8 @@ std::string result_figures(const JobStore& store) {
   const std::string path = store.verified_path(kResult);
   if (std::string written = written_figures(store); !written.empty()) return written;
   const BlockResult result = read_result_without_tracks(path);
-  return to_json(figures_of_tracks(result, StoredTracks(path)), result);
+  const StoredTracks tracks(path);
+  return to_json({reprojection_statistics(result, tracks), remarks(result, tracks)}, result);
 }
 
 }  // namespace megablock

@@ -6,18 +6,16 @@
 
 #include "io/job_store.h"
 #include "io/result.h"
-#include "io/track_batches.h"
 
 namespace megablock {
 
 inline constexpr const char* kResultFigures = "result/figures.json";
 
-// What takes a pass through the tracks.
+// What takes passes through the tracks.
 struct ResultFigures {
   ReprojectionStatistics statistics;
   std::vector<std::string> remarks;
 };
-ResultFigures figures_of_tracks(const BlockResult& result, const TrackBatches& tracks);
 
 // One JSON object; keys as in 'status --json', `failures` with the images that got no pose.
 std::string to_json(const ResultFigures& figures, const BlockResult& result);

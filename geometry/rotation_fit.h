@@ -14,8 +14,7 @@ namespace megablock {
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 // Minimises sum w |y - R x|^2; weights empty = all one. Directions all on one line leave the rotation about it
-// arbitrary (but proper). Not a number where some of them is not, or there
-// are not equally many of each.
+// arbitrary (but proper). Not a number where some of them is not, or there are not equally many of each.
 Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                 std::span<const double> weights = {});
 

@@ -153,14 +153,16 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
   return lines;
 }
 
+double chance_of_factor(const ObservationStatistics& statistics) { return 5 / std::sqrt(2 * statistics.redundancy); }
+
 std::vector<std::string> misstated_texts(const BlockResult& result) {
   using enum ObservationKind;
   std::vector<std::string> lines;
   for (std::size_t k = 0; k < kObservationKinds; ++k) {
     const auto kind = static_cast<ObservationKind>(k);
     const ObservationStatistics& s = result.observation_table.kinds[k];
-    const double factor = s.sigma_factor(), by_chance = 1 + 5 / std::sqrt(2 * s.redundancy);
-    if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, by_chance))) continue;
+    const double factor = s.sigma_factor();
+    if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, 1 + chance_of_factor(s)))) continue;
     const bool weighed = kind >= kPositionHorizontal && kind <= kRelativePosition;
     lines.push_back(
         fmt::format("Residuals of {} ({}) are {:.1f} times what the stated sigmas let expect: some are wrong, or the "
@@ -176,7 +178,11 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
 std::vector<std::string> remarks(const BlockResult& result) { return remarks(result, WholeTracks(result)); }
 
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks) {
-  std::vector<std::string> lines = datum_texts(result, parts_of(result, tracks));
+  return remarks(result, parts_of(result, tracks));
+}
+
+std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
+  std::vector<std::string> lines = datum_texts(result, figures);
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));

@@ -34,9 +34,12 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
 // Kinds of observations whose residuals are several times what their stated sigmas let expect, a line each, with what
 // can be done. Sigma naught does not show them: it is that of the tie points, which are many.
 std::vector<std::string> misstated_texts(const BlockResult& result);
+// By how much a factor between shown and stated sigma differs from one by chance: five standard deviations.
+double chance_of_factor(const ObservationStatistics& statistics);
 
 // All of this file, one line each.
 std::vector<std::string> remarks(const BlockResult& result);
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks);
+std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures);
 
 }  // namespace megablock

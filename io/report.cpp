@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "io/remarks.h"
 #include "io/report/figures.h"
 #include "io/report/html.h"
 #include "io/report/page.h"
@@ -120,6 +121,12 @@ Report::Report(const BlockResult& result, const TrackBatches& tracks) {
 
 Report::~Report() = default;
 Report::Report(Report&&) noexcept = default;
+
+const ReprojectionStatistics& Report::statistics() const { return gathered_->figures.reprojection; }
+
+std::vector<std::string> Report::remarks(const BlockResult& result) const {
+  return megablock::remarks(result, gathered_->figures);
+}
 
 std::string Report::html(BlockResult result, const ReportContext& context) && {
   static_cast<TrackResults&>(result) = std::move(gathered_->drawn);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "io/block_diagnostics.h"
 #include "io/result.h"
@@ -35,6 +36,9 @@ class Report {
   Report(const BlockResult& result, const TrackBatches& tracks);
   ~Report();
   Report(Report&&) noexcept;
+  // Of what was gathered, for other summaries.
+  const ReprojectionStatistics& statistics() const;
+  std::vector<std::string> remarks(const BlockResult& result) const;      // io/remarks.h
   std::string html(BlockResult result, const ReportContext& context) &&;  // hands over what was gathered
 
  private:

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <future>
-#include <tuple>
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
@@ -238,14 +237,13 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   auto gathered = std::async(std::launch::async, [&] {
     BlockDiagnostics diagnostics = diagnose_result(result, tracks, job.settings.diagnostics);
     return_freed_memory();  // links of frames
-    ResultFigures figures = figures_of_tracks(result, tracks);
-    return std::tuple(std::move(diagnostics), std::move(figures), Report(result, tracks));
+    return std::pair(std::move(diagnostics), Report(result, tracks));
   });
   job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  auto [diagnostics, figures, report] = gathered.get();
+  auto [diagnostics, report] = gathered.get();
   job.tables.release();
   return_freed_memory();
-  job.store.write_text(kResultFigures, to_json(figures, result));
+  job.store.write_text(kResultFigures, to_json({report.statistics(), report.remarks(result)}, result));
   job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
   const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics,
                               [&job] { job.tables.release(); }};

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "io/reliability.h"
+#include "io/remarks.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
 
@@ -12,10 +13,10 @@ namespace megablock::report {
 
 namespace {
 
-// Five standard deviations of a factor estimated from `redundancy` observations, and at least 10 %.
+// By more than chance, and at least 10 %.
 bool misstated(const ObservationStatistics& statistics) {
   const double factor = statistics.sigma_factor();
-  const double tolerance = std::max(0.1, 5 / std::sqrt(2 * statistics.redundancy));
+  const double tolerance = std::max(0.1, chance_of_factor(statistics));
   return std::isfinite(factor) && std::abs(factor - 1) > tolerance;
 }
 
