@@ -462,6 +462,10 @@ std::vector<std::string> CoplanaritySolution::remarks() const {
         fmt::format("the held angles contradict the images: corrections of {:.3g} times their sigmas; "
                     "estimate the angles too",
                     std::sqrt(chi2_per_freedom)));
+  if (mean_after > mean_before)
+    lines.push_back(
+        "the determinants have grown: the step leads away from the solution; begin nearer to it, or take more steps "
+        "and more forcing");
   return lines;
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "adjust/calibration/rig_observations.h"
 #include "cluster/arithmetic.h"
 #include "cluster/collective.h"
 #include "cluster/exit_codes.h"
@@ -336,6 +337,10 @@ int calibrate_job(const RunOptions& options, const CalibrationSettings& settings
   check_once(ranks, settings.rig);
   return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
     refuse_environment(job, "calibrate");
+    on_first_rank(ranks, [&] {  // before hours of matching
+      calibration_block(job.block, settings.rig);
+      return std::string();
+    });
     if (!tie_points.empty()) restore_names(job);
     CalibrationSettings own = settings;
     own.rig.adjustment = job.settings.adjustment;

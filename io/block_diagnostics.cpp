@@ -165,7 +165,10 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
   for (const auto& link : d.single_links)
     text += fmt::format("{} frames hang on the link between {}\n", link.frames, between(link.a, link.b));
   if (!d.proposals.empty()) text += fmt::format("{} exposures are proposed\n", d.proposals.size());
-  return text.empty() ? "nothing is missing\n" : text;
+  if (text.empty()) text = "nothing of what was looked for is missing\n";
+  if (!d.aerial) text += "not looked for, as the images do not look down: flight lines, ground, bases, overlaps\n";
+  if (!d.links_known) text += "not looked for, as there are no matches or tie points yet: links\n";
+  return text;
 }
 
 }  // namespace megablock

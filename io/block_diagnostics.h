@@ -96,7 +96,7 @@ struct BlockDiagnostics {
 // One JSON object; docs/job-format.md. Places in the block's frame and, when it is georeferenced, as latitude and
 // longitude too.
 std::string to_json(const BlockDiagnostics& diagnostics, const Block& block);
-// A few lines.
+// A few lines, what could not be looked for at the end.
 std::string to_text(const BlockDiagnostics& diagnostics, const Block& block);
 
 }  // namespace megablock

@@ -1,4 +1,6 @@
 // Position and attitude priors: what the images say (EXIF, XMP), the options `gps`, `attitude`, `origin`.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -84,7 +86,9 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
   if (!origin) return std::nullopt;
   const Geodetic position{(*origin)[0], (*origin)[1], (*origin)[2]};
   if (std::abs(position.latitude_deg) > 90 || std::abs(position.longitude_deg) > 180)
-    throw InputError(top.where("origin") + ": origin must be [latitude_deg, longitude_deg, height_m] (WGS84)");
+    throw InputError(
+        fmt::format("{}: origin: {:g}, {:g} is no place; it must be [latitude_deg, longitude_deg, height_m] (WGS84)",
+                    top.where("origin"), position.latitude_deg, position.longitude_deg));
   return ground_at(position);
 }
 

@@ -46,6 +46,12 @@ class BadInput(CopyOfTheBlock):
         said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
         self.assertIn("argument '--thread' was not expected; see 'megablock run --help'", said)
 
+    def test_rig_to_calibrate_is_missed_before_any_picture_is_read(self):
+        calibration = self.folder / "calibration"
+        line = one_line(megablock("calibrate", self.project, "-q", "-o", calibration, expect=BAD_INPUT))
+        self.assertIn("no rig of two or more cameras", line)
+        self.assertFalse(list(calibration.glob("features/*")))
+
     def test_edited_project_of_a_simulation(self):
         simulation = ("simulate", "--frames", 6, "-o", self.folder / "simulated")
         megablock(*simulation)

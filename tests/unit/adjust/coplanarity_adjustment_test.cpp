@@ -74,6 +74,15 @@ TEST(CoplanaritySolution, IsDeficientUnlessAllThatIsFreeIsForcedOrDetermined) {
   EXPECT_FALSE(adjust_by_coplanarity(network, options).rank_deficient);
 }
 
+TEST(CoplanaritySolution, SaysThatTheDeterminantsHaveGrown) {
+  CoplanaritySolution found;
+  found.mean_before = 3;
+  found.mean_after = 2.9;
+  EXPECT_TRUE(found.remarks().empty());
+  found.mean_after = 3.1;
+  EXPECT_THAT(found.remarks(), testing::ElementsAre(testing::HasSubstr("have grown")));
+}
+
 TEST(CoplanarityDiagnosis, CollinearIsWhatTheCamerasOfEveryPointAre) {
   // Two strips of real flights, a metre beside their lines.
   std::vector<Eigen::Vector3d> centres;
