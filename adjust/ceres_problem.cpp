@@ -111,12 +111,29 @@ class AnalyticImage : public ceres::CostFunction {
   double inverse_sigma_;
 };
 
+// Cauchy's tail, which Ceres does not have.
+class CauchyTail final : public ceres::LossFunction {
+ public:
+  explicit CauchyTail(double scale) : square_(scale * scale) {}
+  void Evaluate(double s, double rho[3]) const override {
+    const bool beyond = s > square_;
+    rho[0] = beyond ? square_ * (1 + std::log(s / square_)) : s;
+    rho[1] = beyond ? square_ / s : 1;
+    rho[2] = beyond ? -square_ / (s * s) : 0;
+  }
+
+ private:
+  double square_;
+};
+
 std::unique_ptr<ceres::LossFunction> ceres_loss(const RobustLoss& loss) {
   switch (loss.kind) {
     case RobustLoss::Kind::kHuber:
       return std::make_unique<ceres::HuberLoss>(loss.scale);
     case RobustLoss::Kind::kCauchy:
       return std::make_unique<ceres::CauchyLoss>(loss.scale);
+    case RobustLoss::Kind::kCauchyTail:
+      return std::make_unique<CauchyTail>(loss.scale);
     case RobustLoss::Kind::kNone:
       break;
   }

@@ -251,6 +251,7 @@ class TileAdjuster {
   }
 
   // A few iterations of the chosen points with a loss that forgets gross errors and is as wide as the residuals are.
+  // Attitudes, which may be the only ones to know how the whole is turned, pull from anywhere.
   static constexpr int kMany = 10;
   void solve_rough(Stage stage, int iterations = kMany) {
     constexpr double kNear = 0.5, kFlat = 1e-3;  // sigmas of the frames, share of the cost
@@ -258,11 +259,13 @@ class TileAdjuster {
     for (std::int64_t p = 0; p < problem_.point_count(); ++p)
       if (!chosen_[p])
         std::fill(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0);
-    const RobustLoss loss = problem_.image_loss;
+    const RobustLoss loss = problem_.image_loss, attitude_loss = problem_.attitude_loss;
     problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_, options_))};
+    problem_.attitude_loss = attitude_loss.from_afar();
     const double near = 0.5 * kNear * kNear * frame_unknowns() / static_cast<double>(active_observations());
     solve({std::min(iterations, options_.max_iterations), std::max(kFlat, near), camera_free(stage)});
     problem_.image_loss = loss;
+    problem_.attitude_loss = attitude_loss;
     problem_.kept = all;
   }
 

@@ -20,6 +20,10 @@ std::array<double, 3> RobustLoss::evaluate_beyond(double squared_norm) const {
     const double first = std::max(kTiny, scale / r);
     return {2 * scale * r - b, first, -first / (2 * s)};
   }
+  if (kind == Kind::kCauchyTail) {
+    const double first = b / s;
+    return {b * (1 + std::log(s / b)), std::max(kTiny, first), -first / s};
+  }
   const double sum = 1 + s / b, inverse = 1 / sum;  // Cauchy
   return {b * std::log(sum), std::max(kTiny, inverse), -inverse * inverse / b};
 }

@@ -31,15 +31,22 @@
 namespace megablock {
 
 struct RobustLoss {
-  enum class Kind : std::uint8_t { kNone, kHuber, kCauchy };
+  // Cauchy's tail: rho(s) = s up to the corner c^2, c^2 (1 + log(s / c^2)) beyond. It takes good observations for what
+  // they are, as Huber's, so that their sigmas and chi-square stay true, and forgets gross ones, as Cauchy's.
+  enum class Kind : std::uint8_t { kNone, kHuber, kCauchy, kCauchyTail };
   Kind kind = Kind::kNone;
-  double scale = 1;  // in sigmas: Huber's corner, Cauchy's scale
+  double scale = 1;  // in sigmas: the corner c, Cauchy's scale
   // rho(s) of the squared norm s, with first and second derivative: {rho, rho', rho''}, as ceres::LossFunction.
   std::array<double, 3> evaluate(double squared_norm) const {
     return squares(squared_norm) ? std::array<double, 3>{squared_norm, 1, 0} : evaluate_beyond(squared_norm);
   }
   // Whether rho(s) = s there, as for nearly every observation.
-  bool squares(double s) const { return kind == Kind::kNone || (kind == Kind::kHuber && !(s > scale * scale)); }
+  bool squares(double s) const { return kind == Kind::kNone || (has_corner() && !(s > scale * scale)); }
+  bool has_corner() const { return kind == Kind::kHuber || kind == Kind::kCauchyTail; }
+  // For starts far off: what forgets would take good observations for gross ones there; Huber's pulls from anywhere.
+  RobustLoss from_afar() const {
+    return kind == Kind::kCauchy || kind == Kind::kCauchyTail ? RobustLoss{Kind::kHuber, scale} : *this;
+  }
 
  private:
   std::array<double, 3> evaluate_beyond(double squared_norm) const;
@@ -165,7 +172,7 @@ struct ObservationOptions {
   double image_sigma_px = 0.5;  // a-priori sigma of a tie point measurement per axis, px
   RobustLoss image_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
-  RobustLoss attitude_loss{RobustLoss::Kind::kNone, 3.0};
+  RobustLoss attitude_loss{RobustLoss::Kind::kCauchyTail, 3.0};
   RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
   RobustLoss line_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss vertical_loss{RobustLoss::Kind::kCauchy, 3.0};

@@ -68,7 +68,7 @@ void describe(Visitor& visit, TileOptions& o) {
 template <typename Visitor>
 void describe_loss(Visitor& visit, const std::string& name, RobustLoss& loss) {
   int kind = static_cast<int>(loss.kind);
-  visit.choice(name, {"none", "huber", "cauchy"}, kind);
+  visit.choice(name, {"none", "huber", "cauchy", "cauchy_tail"}, kind);
   loss.kind = static_cast<RobustLoss::Kind>(kind);
   visit.number(name + "_scale", loss.scale);
 }

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "geometry/angles.h"
+#include "io/held_priors.h"
+#include "io/prior_differences.h"
 #include "io/report/figures.h"
 
 namespace megablock {
@@ -16,6 +19,7 @@ constexpr std::size_t kNamed = 5;           // points by name
 constexpr std::size_t kParts = 5;           // of a free datum, described
 constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
 constexpr double kMisstated = 2;            // times the stated sigma, beyond what chance explains
+constexpr double kContradicted = 6;         // sigmas; one of 14 million normal deviates in three dimensions is beyond
 
 // Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
 std::string pixels(double value) {
@@ -77,6 +81,36 @@ report::Figures parts_of(const BlockResult& result, const TrackBatches& tracks) 
   report::Figures figures;
   if (result.state.oriented.size() == result.block.frames.size()) report::find_parts(result, tracks, figures);
   return figures;
+}
+
+struct Contradiction {
+  FrameIndex frame;
+  double sigmas = 0, size = 0;  // of the difference; metres or degrees
+};
+
+// The frames whose observed position or attitude the block contradicts, worst first, as text; empty without any.
+template <typename Prior>
+std::string contradicted_text(const BlockResult& result, std::optional<Prior> Frame::*prior_of,
+                              Eigen::Vector3d Prior::*sigma_of, const char* kind, double unit, const char* unit_name) {
+  std::vector<Contradiction> wrong;
+  std::int64_t observed = 0;
+  for (FrameIndex f(0); f.value < static_cast<std::int64_t>(result.state.oriented.size()); ++f.value) {
+    const std::optional<Prior>& prior = result.block.frames[f].*prior_of;
+    if (!result.state.oriented[f] || !prior || held(*prior)) continue;
+    ++observed;
+    const Eigen::Vector3d off = difference(result.state.frames[f], *prior);
+    const double sigmas = off.cwiseQuotient((*prior).*sigma_of).norm();
+    if (sigmas > kContradicted) wrong.push_back({f, sigmas, off.norm() * unit});
+  }
+  if (wrong.empty()) return "";
+  std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  std::string text = fmt::format("{} of {} {} {} from the block by more than {:.0f} sigmas: ", wrong.size(), observed,
+                                 kind, wrong.size() == 1 ? "differs" : "differ", kContradicted);
+  for (std::size_t i = 0; i < std::min(kNamed, wrong.size()); ++i)
+    text += fmt::format("{}{} by {:.{}f} {}", i > 0 ? ", " : "", result.block.frames[wrong[i].frame].name,
+                        wrong[i].size, wrong[i].size < 10 ? 2 : 0, unit_name);
+  if (wrong.size() > kNamed) text += fmt::format(" and {} more", wrong.size() - kNamed);
+  return text;
 }
 
 std::string sigmas_of(const Placing& placing) {
@@ -166,12 +200,20 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
     const bool weighed = kind >= kPositionHorizontal && kind <= kRelativePosition;
     lines.push_back(
         fmt::format("Residuals of {} ({}) are {:.1f} times what the stated sigmas let expect: some are wrong, or the "
-                    "sigmas are too "
-                    "small{}{}",
+                    "sigmas are too small{}",
                     name_of(kind), s.count, factor,
-                    weighed ? "; 'merge: {estimate_sigmas: true}' weighs them by what they show" : "",
-                    kind == kAttitude ? ", 'adjustment: {attitude_loss: cauchy}' forgets single ones" : ""));
+                    weighed ? "; 'merge: {estimate_sigmas: true}' weighs them by what they show" : ""));
   }
+  return lines;
+}
+
+std::vector<std::string> contradicted_texts(const BlockResult& result) {
+  std::vector<std::string> lines;
+  for (const std::string& text :
+       {contradicted_text(result, &Frame::position_prior, &PositionPrior::sigma, "positions", 1, "m"),
+        contradicted_text(result, &Frame::attitude_prior, &AttitudePrior::sigma_rad, "attitudes", kDegreesPerRadian,
+                          "degrees")})
+    if (!text.empty()) lines.push_back(text);
   return lines;
 }
 
@@ -184,6 +226,7 @@ std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& 
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines = datum_texts(result, figures);
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
+  for (std::string& text : contradicted_texts(result)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
   return lines;

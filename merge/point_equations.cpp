@@ -56,7 +56,7 @@ const point_kernels::Kernels& point_kernels_of_processor() {
 // The largest squared norm s with rho(s) = s; -1: none.
 double end_of_squares(const RobustLoss& loss) {
   if (loss.kind == RobustLoss::Kind::kNone) return std::numeric_limits<double>::max();
-  return loss.kind == RobustLoss::Kind::kHuber ? loss.scale * loss.scale : -1;
+  return loss.has_corner() ? loss.scale * loss.scale : -1;
 }
 
 }  // namespace

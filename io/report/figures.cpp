@@ -7,6 +7,7 @@
 #include <set>
 
 #include "geometry/angles.h"
+#include "io/prior_differences.h"
 #include "io/reliability.h"
 
 namespace megablock::report {
@@ -211,13 +212,10 @@ class Gatherer {
     for (FrameIndex frame(0); frame.value < f_.frames; ++frame.value) {
       if (!oriented(result_, frame)) continue;
       const Pose& pose = result_.state.frames[frame];
-      if (const auto& prior = block_.frames[frame].position_prior) {
-        const Eigen::Vector3d antenna = pose.centre + pose.rotation.conjugate() * prior->lever_arm;
-        f_.positions.push_back({frame, antenna - prior->position, prior->sigma});
-      }
+      if (const auto& prior = block_.frames[frame].position_prior)
+        f_.positions.push_back({frame, difference(pose, *prior), prior->sigma});
       if (const auto& prior = block_.frames[frame].attitude_prior)
-        f_.attitudes.push_back(
-            {frame, rotation_log<double>(pose.rotation * prior->rotation_cw.conjugate()), prior->sigma_rad});
+        f_.attitudes.push_back({frame, difference(pose, *prior), prior->sigma_rad});
     }
   }
 

@@ -48,7 +48,8 @@ class CeresTileTest : public testing::Test {
 };
 
 TEST_F(CeresTileTest, HasOurCost) {
-  for (const auto kind : {RobustLoss::Kind::kNone, RobustLoss::Kind::kHuber, RobustLoss::Kind::kCauchy}) {
+  for (const auto kind :
+       {RobustLoss::Kind::kNone, RobustLoss::Kind::kHuber, RobustLoss::Kind::kCauchy, RobustLoss::Kind::kCauchyTail}) {
     tile_->problem.image_loss = tile_->problem.position_loss = tile_->problem.relative_loss = {kind, 2};
     const double ours = evaluate_cost(tile_->problem, tile_->state);
     ASSERT_FALSE(tile_->problem.relatives.empty());

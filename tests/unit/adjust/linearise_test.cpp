@@ -300,5 +300,21 @@ TEST(RobustLoss, MatchesCeres) {
   }
 }
 
+TEST(RobustLoss, CauchysTailSquaresToItsCornerAndForgetsBeyond) {
+  const RobustLoss loss{RobustLoss::Kind::kCauchyTail, 3};
+  for (const double s : {0.0, 0.1, 4.0, 9.0}) EXPECT_EQ(loss.evaluate(s), (std::array<double, 3>{s, 1, 0}));
+  for (const double s : {9.0 + 1e-9, 12.0, 100.0, 1e6}) {
+    const double h = 1e-4 * s;
+    const auto [value, first, second] = loss.evaluate(s);
+    // Its derivative is Cauchy's far out, c^2 / s.
+    EXPECT_NEAR(first, 9 / s, 1e-15) << s;
+    EXPECT_NEAR(value, 9 + 9 * std::log(s / 9), 1e-14 * value) << s;
+    if (s < 10) continue;  // both sides beyond the corner
+    EXPECT_NEAR((loss.evaluate(s + h)[0] - loss.evaluate(s - h)[0]) / (2 * h), first, 1e-7 * first) << s;
+    EXPECT_NEAR((loss.evaluate(s + h)[1] - loss.evaluate(s - h)[1]) / (2 * h), second, -1e-7 * second) << s;
+  }
+  EXPECT_GT(loss.evaluate(std::numeric_limits<double>::max())[1], 0);
+}
+
 }  // namespace
 }  // namespace megablock

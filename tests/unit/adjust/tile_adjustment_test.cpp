@@ -4,6 +4,8 @@
 #include <ceres/covariance.h>
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "adjust/ceres_problem.h"
 #include "adjust/datum.h"
 #include "geometry/similarity.h"
@@ -117,6 +119,33 @@ TEST_P(Blocks, SurvivesManyOutliers) {
   EXPECT_NEAR(summary.sigma0, 1, 0.1);
   EXPECT_GE(verdicts(tile).outliers_found, 0.97);
   EXPECT_LT(tile.position_rms(), 0.2);
+}
+
+// Headings that are far off, as of pictures that were turned and saved again, tell nothing by the default loss of
+// attitudes, and turn the block without one.
+TEST(TileAdjustment, ForgetsWrongAttitudes) {
+  SimulationOptions simulation = aerial(18, 9);
+  simulation.gps_sigma_m = 500;  // tells little of directions
+  simulation.attitude_sigma_deg = 3;
+  constexpr double kTurn = 2.8;  // rad; of half a turn the sign is chance
+  const auto turn_of_block = [&](bool with_wrong, RobustLoss::Kind kind) {
+    SimulatedBlock block = simulate_block(simulation);
+    if (with_wrong)
+      for (std::size_t f = 0; f < block.block.frames.size(); f += 3) {
+        Eigen::Quaterniond& rotation = block.block.frames[FrameIndex(f)].attitude_prior->rotation_cw;
+        rotation = Eigen::AngleAxisd(kTurn, Eigen::Vector3d::UnitZ()) * rotation;
+      }
+    AdjustOptions options;
+    options.observations.attitude_loss.kind = kind;
+    SingleTile tile(std::move(block), options);
+    EXPECT_TRUE(adjust_tile(tile.problem, tile.state, tile.options).usable);
+    return tile.rotation_rms() * 180 / std::numbers::pi;
+  };
+  const RobustLoss::Kind usual = ObservationOptions().attitude_loss.kind;
+  constexpr double kTwoSigmas = 2 * 1.5;  // of the mean of twelve, three axes, degrees
+  EXPECT_LT(turn_of_block(false, usual), kTwoSigmas);
+  EXPECT_LT(turn_of_block(true, usual), kTwoSigmas);
+  EXPECT_GT(turn_of_block(true, RobustLoss::Kind::kNone), 5);
 }
 
 TEST_P(Blocks, IsDeterministic) {

@@ -12,7 +12,8 @@
 namespace megablock {
 namespace {
 
-const RobustLoss kHuber{RobustLoss::Kind::kHuber, 1.5}, kCauchy{RobustLoss::Kind::kCauchy, 1.5};
+const RobustLoss kHuber{RobustLoss::Kind::kHuber, 1.5}, kCauchy{RobustLoss::Kind::kCauchy, 1.5},
+    kCauchyTail{RobustLoss::Kind::kCauchyTail, 1.5};
 
 // Gradient of 1/2 rho(|r|^2), by central differences.
 Eigen::VectorXd gradient(const RobustLoss& loss, const Eigen::VectorXd& r) {
@@ -58,6 +59,7 @@ TEST(LossCurvature, EqualsFiniteDifferences) {
   for (const double length : {0.3, 1.2, 1.8, 4.0, 30.0}) {
     expect_weighting(kHuber, length * Eigen::Vector3d(0.6, -0.48, 0.64));
     expect_weighting(kCauchy, length * Eigen::Vector3d(0.6, -0.48, 0.64));
+    expect_weighting(kCauchyTail, length * Eigen::Vector3d(0.6, -0.48, 0.64));
   }
 }
 

@@ -158,7 +158,8 @@ TEST(TileSolver, FreeDatum) {
 }
 
 TEST(TileSolver, LossesOfAllKinds) {
-  for (const RobustLoss& loss : {RobustLoss{}, RobustLoss{RobustLoss::Kind::kCauchy, 3}}) {
+  for (const RobustLoss& loss :
+       {RobustLoss{}, RobustLoss{RobustLoss::Kind::kCauchy, 3}, RobustLoss{RobustLoss::Kind::kCauchyTail, 3}}) {
     Start start(aerial_tile(6));
     start.problem.image_loss = loss;
     expect_optimum_of_ceres(start);
