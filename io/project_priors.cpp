@@ -86,9 +86,8 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
   if (!origin) return std::nullopt;
   const Geodetic position{(*origin)[0], (*origin)[1], (*origin)[2]};
   if (std::abs(position.latitude_deg) > 90 || std::abs(position.longitude_deg) > 180)
-    throw InputError(
-        fmt::format("{}: origin: {:g}, {:g} is no place; it must be [latitude_deg, longitude_deg, height_m] (WGS84)",
-                    top.where("origin"), position.latitude_deg, position.longitude_deg));
+    throw InputError(fmt::format("{}: origin must be [latitude_deg, longitude_deg, height_m] (WGS84), not {:g}, {:g}",
+                                 top.where("origin"), position.latitude_deg, position.longitude_deg));
   return ground_at(position);
 }
 
