@@ -51,13 +51,16 @@ bool natural_less(std::string_view a, std::string_view b) {
   return a < b;
 }
 
+bool name_before(const Block& block, ImageIndex a, ImageIndex b) {
+  return natural_less(block.image_names[a], block.image_names[b]);
+}
+
 // Place of every image in the natural order of names.
 IndexedVector<ImageIndex, std::int64_t> name_ranks(const Block& block) {
   std::vector<ImageIndex> order;
   order.reserve(block.images.size());
   for (std::size_t i = 0; i < block.images.size(); ++i) order.emplace_back(static_cast<std::int64_t>(i));
-  std::sort(order.begin(), order.end(),
-            [&](ImageIndex a, ImageIndex b) { return natural_less(block.image_names[a], block.image_names[b]); });
+  std::sort(order.begin(), order.end(), [&](ImageIndex a, ImageIndex b) { return name_before(block, a, b); });
   IndexedVector<ImageIndex, std::int64_t> ranks(block.images.size(), 0);
   for (std::size_t r = 0; r < order.size(); ++r) ranks[order[r]] = static_cast<std::int64_t>(r);
   return ranks;
@@ -125,8 +128,9 @@ View view_of(const Block& block, ImageIndex image, double spacing, double ground
   return view;
 }
 
-std::vector<std::vector<ImageIndex>> passes_of(const Block& block,
-                                               const IndexedVector<ImageIndex, std::int64_t>& ranks) {
+// `before(a, b)`: by name.
+template <typename Before>
+std::vector<std::vector<ImageIndex>> passes_of(const Block& block, const Before& before) {
   std::map<std::tuple<std::int64_t, std::int64_t, int>, std::vector<ImageIndex>> groups;
   for (std::size_t i = 0; i < block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
@@ -139,7 +143,7 @@ std::vector<std::vector<ImageIndex>> passes_of(const Block& block,
     const bool timed = std::all_of(images.begin(), images.end(), [&](ImageIndex i) { return std::isfinite(time(i)); });
     std::sort(images.begin(), images.end(), [&](ImageIndex a, ImageIndex b) {
       const double ta = timed ? time(a) : 0, tb = timed ? time(b) : 0;
-      return std::pair(ta, ranks[a]) < std::pair(tb, ranks[b]);
+      return ta != tb ? ta < tb : before(a, b);
     });
     passes.push_back(std::move(images));
   }
@@ -200,7 +204,10 @@ double half_opening(const Camera& camera) {
   return std::atan(0.5 * std::max(camera.width, camera.height) / camera.intrinsics[kFocal]);
 }
 
-std::vector<std::vector<ImageIndex>> passes_of(const Block& block) { return passes_of(block, name_ranks(block)); }
+// Without ranks: where frames have times no name is looked at.
+std::vector<std::vector<ImageIndex>> passes_of(const Block& block) {
+  return passes_of(block, [&](ImageIndex a, ImageIndex b) { return name_before(block, a, b); });
+}
 
 Views views_of(const Block& block) {
   Views views;
@@ -209,7 +216,7 @@ Views views_of(const Block& block) {
     views.of_image.push_back(view_of(block, ImageIndex(static_cast<std::int64_t>(i)), spacing, ground));
   const IndexedVector<ImageIndex, std::int64_t> ranks = name_ranks(block);
   for (ImageIndex i(0); ranks.contains(i); ++i.value) views.of_image[i].rank = ranks[i];
-  views.passes = passes_of(block, ranks);
+  views.passes = passes_of(block, [&](ImageIndex a, ImageIndex b) { return ranks[a] < ranks[b]; });
   for (const std::vector<ImageIndex>& pass : views.passes) {
     find_doubtful(pass, views);
     place_between(pass, views);

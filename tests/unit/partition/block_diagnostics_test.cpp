@@ -100,6 +100,22 @@ TEST(FlightLines, TwoExposuresOfOnePlaceDoNotEndALine) {
   EXPECT_EQ(flight_lines(acquisition_order(survey.block, state), state).size(), 1u);
 }
 
+// Without times by name, numbers in it by value; no table of all names' places is made for it.
+TEST(FlightLines, AreInTheOrderOfNamesOrTimes) {
+  Survey survey;
+  for (int i = 0; i < 12; ++i) survey.add(16 * i, 0);
+  Block& block = survey.block;
+  block.image_names = {};
+  for (int i = 0; i < 12; ++i) block.image_names.push_back("img_" + std::to_string(12 - i) + ".jpg");
+  const BlockState state = initial_state(block);
+  const auto by_name = acquisition_order(block, state);
+  ASSERT_EQ(by_name.size(), 1u);
+  for (std::int64_t i = 0; i < 12; ++i) EXPECT_EQ(by_name[0][static_cast<std::size_t>(i)], FrameIndex(11 - i));
+  for (FrameIndex f(0); block.frames.contains(f); ++f.value) block.frames[f].time_s = static_cast<double>(f.value / 2);
+  const auto by_time = acquisition_order(block, state);  // of equal times by name
+  for (std::int64_t i = 0; i < 12; ++i) EXPECT_EQ(by_time[0][static_cast<std::size_t>(i)], FrameIndex(i ^ 1));
+}
+
 TEST(GroundCover, CommonShareOfQuadrilaterals) {
   const Quadrilateral a = {Eigen::Vector2d(0, 0), {4, 0}, {4, 2}, {0, 2}};
   const Quadrilateral turned = {Eigen::Vector2d(0, 2), {4, 2}, {4, 0}, {0, 0}};
