@@ -10,6 +10,9 @@ namespace megablock {
 template <typename Scalar, typename Matrices>
 std::vector<Scalar> flattened(const Matrices& matrices) {
   std::vector<Scalar> values;
+  std::size_t size = 0;
+  for (const auto& matrix : matrices) size += static_cast<std::size_t>(matrix.size());
+  values.reserve(size);
   for (const auto& matrix : matrices)
     for (Eigen::Index i = 0; i < matrix.size(); ++i) values.push_back(static_cast<Scalar>(matrix.data()[i]));
   return values;

@@ -32,18 +32,23 @@ std::string pixels(double value) {
 // What places a part: positions of its frames and control points that hold, and whether any attitude is observed.
 struct Placing {
   std::int64_t positions = 0, attitudes = 0;
-  double rotation_deg = report::kUnknown;  // median sigma of the frames, largest axis
 };
+
+// Median sigma of the part's frames, largest axis.
+double rotation_deg_of(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  std::vector<double> sigmas;
+  for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
+    if (figures.part_of_frame[f] == part)
+      sigmas.push_back(std::sqrt(result.frame_covariance[f].diagonal().head<3>().maxCoeff()) * kDegreesPerRadian);
+  return report::spread(std::move(sigmas)).median;
+}
 
 Placing placing_of(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
   Placing placing;
-  std::vector<double> sigmas;
   for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
     if (figures.part_of_frame[f] != part) continue;
     placing.positions += result.block.frames[f].position_prior.has_value();
     placing.attitudes += result.block.frames[f].attitude_prior.has_value();
-    if (result.frame_covariance.contains(f))
-      sigmas.push_back(std::sqrt(result.frame_covariance[f].diagonal().head<3>().maxCoeff()) * kDegreesPerRadian);
   }
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
     const ControlPoint& given = result.block.control_points[p];
@@ -54,7 +59,6 @@ Placing placing_of(const BlockResult& result, const report::Figures& figures, st
                       figures.part_of_frame[result.block.images[given.measurements[m].image].frame] == part);
     placing.positions += here;
   }
-  placing.rotation_deg = report::spread(std::move(sigmas)).median;
   return placing;
 }
 
@@ -113,9 +117,9 @@ std::string contradicted_text(const BlockResult& result, std::optional<Prior> Fr
   return text;
 }
 
-std::string sigmas_of(const Placing& placing) {
-  if (!std::isfinite(placing.rotation_deg) || placing.rotation_deg < 1) return "";
-  return fmt::format(" (sigma of the rotations {:.0f} degrees)", placing.rotation_deg);
+std::string rotation_text(double rotation_deg) {
+  if (!std::isfinite(rotation_deg) || rotation_deg < 1) return "";
+  return fmt::format(" (sigma of the rotations {:.0f} degrees)", rotation_deg);
 }
 
 }  // namespace
@@ -168,19 +172,20 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
   std::size_t free = 0;
   for (std::size_t p = 0; p < figures.parts.size(); ++p) {
     const report::BlockPart& part = figures.parts[p];
-    const Placing placing = placing_of(result, figures, static_cast<std::int32_t>(p));
+    const double rotation_deg = rotation_deg_of(result, figures, static_cast<std::int32_t>(p));
     const bool whole = figures.parts.size() == 1;
     if (part.defect > 0) {
       if (++free > kParts) continue;
-      lines.push_back(
-          fmt::format("{} free: nothing determines {}{}; {}",
-                      whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
-                      undetermined(part.defect, placing), sigmas_of(placing), consequence(part.defect, placing)));
-    } else if (placing.rotation_deg > kUnusableRotationDeg) {
+      const Placing placing = placing_of(result, figures, static_cast<std::int32_t>(p));
+      lines.push_back(fmt::format(
+          "{} free: nothing determines {}{}; {}",
+          whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
+          undetermined(part.defect, placing), rotation_text(rotation_deg), consequence(part.defect, placing)));
+    } else if (rotation_deg > kUnusableRotationDeg) {
       lines.push_back(
           fmt::format("The rotations{} are known to {:.0f} degrees only (sigma): heights and attitudes are "
                       "not usable; add control points or attitudes",
-                      whole ? "" : fmt::format(" of part {}", p + 1), placing.rotation_deg));
+                      whole ? "" : fmt::format(" of part {}", p + 1), rotation_deg));
     }
   }
   if (free > kParts) lines.push_back(fmt::format("The datum of {} more parts is free", free - kParts));
