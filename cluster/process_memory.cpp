@@ -53,10 +53,12 @@ void divide_huge_pages_of_heap() {
 
 void use_memory_sparingly() {
   constexpr int kLargeBlock = 1 << 20;
-  mallopt(M_MMAP_THRESHOLD, kLargeBlock);
+  map_blocks_from(kLargeBlock);
   divide_huge_pages_of_heap();
   return_freed_memory();
 }
+
+void map_blocks_from(int bytes) { mallopt(M_MMAP_THRESHOLD, bytes); }
 
 double host_memory_mib() {
   return std::min(read_kib("/proc/meminfo", "MemTotal:") / 1024,

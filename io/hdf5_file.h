@@ -15,6 +15,7 @@
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace megablock {
@@ -87,6 +88,8 @@ class Hdf5Writer {
   ~Hdf5Writer();
   // Writes the file, in place of one that is there; nothing may follow.
   void close();
+  // From now on behind every dataset that is written whole: what its values were taken from may leave memory.
+  void after_datasets(std::function<void()> call) { after_dataset_ = std::move(call); }
 
   // Names are paths in the file, '/' between groups; a group must be made before what is in it.
   void group(const std::string& name, const std::string& description = {});
@@ -166,6 +169,7 @@ class Hdf5Writer {
   std::unique_ptr<Image> image_;  // kMemory
   Hdf5Handle file_;
   std::map<std::string, Growing> growing_;
+  std::function<void()> after_dataset_ = [] {};
 };
 
 // Ascending rows as few ranges, each with all rows between its first and its last: rows closer than `gap` join.

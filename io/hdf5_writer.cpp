@@ -210,6 +210,7 @@ void Hdf5Writer::texts(const std::string& name, std::int64_t count, const std::f
     write_rows(set.id(), name, type.id(), padded.data(), {}, {first, rows});
   }
   describe(name, note);
+  after_dataset_();
 }
 
 void Hdf5Writer::dataset(const std::string& name, ElementType type, const void* values,
@@ -223,6 +224,7 @@ void Hdf5Writer::write_dataset(const std::string& name, std::int64_t file_type, 
   if (std::find(shape.begin(), shape.end(), 0) == shape.end())
     checked(H5Dwrite(set.id(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
   describe(name, note);
+  after_dataset_();
 }
 
 Hdf5Handle Hdf5Writer::make_dataset(const std::string& name, std::int64_t file_type,

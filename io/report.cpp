@@ -60,7 +60,7 @@ std::string page_of(const BlockResult& result, const report::Figures& figures, c
   std::string body;
   const auto add = [&](const std::string& section) {
     body += section;
-    if (context.after_section) context.after_section();
+    context.after_reading();
   };
   add(headline(result, figures));
   add(assessment(result, figures));
@@ -69,13 +69,13 @@ std::string page_of(const BlockResult& result, const report::Figures& figures, c
   add(tie_points_section(result, figures));
   add(residuals_section(result, figures));
   if (context.diagnostics) add(diagnostics_section(result, *context.diagnostics));
-  add(images_section(result, figures));
+  add(images_section(result, figures, context.after_reading));
   add(observations_section(result, figures));
   add(positions_section(result, figures));
   add(attitudes_section(result, figures));
   add(control_section(result, figures));
   add(cameras_section(result, figures));
-  add(accuracy_section(result, figures));
+  add(accuracy_section(result, figures, context.after_reading));
   add(tiles_section(result, figures));
   add(failures_section(result, figures));
   add(stages_section(result));
@@ -115,8 +115,8 @@ TrackResults drawn_of(const TrackBatches& tracks) {
 
 }  // namespace
 
-Report::Report(const BlockResult& result, const TrackBatches& tracks) {
-  gathered_.reset(new Gathered{report::figures_of(result, tracks), drawn_of(tracks)});
+Report::Report(const BlockResult& result, const TrackBatches& tracks, const std::function<void()>& after_reading) {
+  gathered_.reset(new Gathered{report::figures_of(result, tracks, after_reading), drawn_of(tracks)});
 }
 
 Report::~Report() = default;

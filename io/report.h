@@ -19,7 +19,9 @@ struct ReportContext {
   std::string job;                                               // directory
   double computed_s = std::numeric_limits<double>::quiet_NaN();  // when the result was written, since 1970
   const BlockDiagnostics* diagnostics = nullptr;                 // null: not looked for
-  std::function<void()> after_section = {};                      // called when a section is written
+  // Called when a section is written, and behind what a section has gone through: tables of the result that lie in a
+  // file may leave memory.
+  std::function<void()> after_reading = [] {};
 };
 
 // Works for any result, however incomplete: what was not computed is left out or said to be missing, and no figure that
@@ -33,7 +35,9 @@ std::string report_html(BlockResult result, const TrackBatches& tracks, const Re
 // its digest.
 class Report {
  public:
-  Report(const BlockResult& result, const TrackBatches& tracks);
+  // `after_reading` as in ReportContext.
+  Report(
+      const BlockResult& result, const TrackBatches& tracks, const std::function<void()>& after_reading = [] {});
   ~Report();
   Report(Report&&) noexcept;
   // Of what was gathered, for other summaries.

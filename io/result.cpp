@@ -71,6 +71,12 @@ void TrackResults::append(const TrackResults& from, std::size_t first, std::size
   copy(from.redundancy_y, row, behind, redundancy_y);
 }
 
+void TrackResults::clear() {
+  const auto clear = [](auto&... columns) { (columns.clear(), ...); };
+  clear(tracks.id, tracks.begin, tracks.image, tracks.x, tracks.y, tracks.feature, points, file_tracks, file_tiles,
+        point_covariance, kept, residual_x, residual_y, redundancy_x, redundancy_y);
+}
+
 void visit_sample(const TrackBatches& tracks, std::int64_t most,
                   const std::function<void(const TrackResults& batch, std::size_t row)>& visit) {
   const std::int64_t step = 1 + (tracks.track_count() - 1) / most;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -76,6 +77,8 @@ struct TrackResults {
 
   // Rows [first, last) of another one's tracks.
   void append(const TrackResults& from, std::size_t first, std::size_t last);
+  // No tracks; their memory stays for the next ones.
+  void clear();
 };
 
 // Its own tracks are those of all tiles in global order, a sample of them, or none: as the function says that gives it.
@@ -126,9 +129,11 @@ struct BlockResult : TrackResults {
 };
 
 void write_result(const std::string& path, const BlockResult& result);
-// With these tracks instead of the result's own; fills in its digest.
+// With these tracks instead of the result's own; fills in its digest. `after_table` is called behind every table that
+// is written, before the tracks and after them.
 class TrackBatches;
-void write_result(const std::string& path, BlockResult& result, const TrackBatches& tracks);
+void write_result(const std::string& path, BlockResult& result, const TrackBatches& tracks,
+                  std::function<void()> after_table = {});
 BlockResult read_result(const std::string& path);
 // Without tracks: these batch by batch as StoredTracks (io/track_batches.h).
 BlockResult read_result_without_tracks(const std::string& path);

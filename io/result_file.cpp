@@ -360,9 +360,11 @@ void write_result(const std::string& path, const BlockResult& result) {
   file.close();
 }
 
-void write_result(const std::string& path, BlockResult& result, const TrackBatches& tracks) {
+void write_result(const std::string& path, BlockResult& result, const TrackBatches& tracks,
+                  std::function<void()> after_table) {
   check_sizes(result);
   Hdf5Writer file(path, "result", storage_for(tracks));
+  if (after_table) file.after_datasets(std::move(after_table));
   put_head(file, result);
   ResultTrackWriter points(file);
   ResultDigest digest(result.state, tracks.track_count());

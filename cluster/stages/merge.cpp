@@ -4,15 +4,12 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <future>
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
-#include "cluster/diagnostics.h"
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
-#include "cluster/result_figures.h"
 #include "cluster/signals.h"
 #include "cluster/stages/assemble_result.h"
 #include "cluster/stages/block_image_sigma.h"
@@ -20,11 +17,11 @@
 #include "cluster/stages/merge_checkpoint.h"
 #include "cluster/stages/merge_start.h"
 #include "cluster/stages/provenance.h"
+#include "cluster/stages/result_files.h"
 #include "cluster/stages/stages.h"
 #include "io/error.h"
 #include "io/events.h"
 #include "io/hash.h"
-#include "io/report.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -223,31 +220,13 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
     job.notes.push_back(line);
     if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());
   }
-  return_freed_memory();  // fronts, tiles
+  job.tables.release();  // frames
   BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
   if (!adjusted.converged) result.failures.push_back({"merge", kResult, not_converged(adjusted)});
   result.stages = statistics_of(job, event);
-  std::filesystem::create_directories(job.store.path("result"));
   std::vector<PartTracks::File> files;
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
-  job.tables.put(result.frame_covariance);
-  const PartTracks tracks(std::move(files), result.sigma_scaled ? result.variance_factor : 1,
-                          [&job] { job.tables.release(); });
-  // Both go through all tracks, while the other ranks have nothing left to do.
-  auto gathered = std::async(std::launch::async, [&] {
-    BlockDiagnostics diagnostics = diagnose_result(result, tracks, job.settings.diagnostics);
-    return_freed_memory();  // links of frames
-    return std::pair(std::move(diagnostics), Report(result, tracks));
-  });
-  job.store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, tracks); });
-  auto [diagnostics, report] = gathered.get();
-  job.tables.release();
-  return_freed_memory();
-  job.store.write_text(kResultFigures, to_json({report.statistics(), report.remarks(result)}, result));
-  job.store.write_text(kDiagnostics, to_json(diagnostics, result.block));
-  const ReportContext context{job.options.directory, seconds_since_1970(), &diagnostics,
-                              [&job] { job.tables.release(); }};
-  job.store.write_text("result/report.html", std::move(report).html(std::move(result), context));
+  write_result_files(job.store, job.tables, fingerprint, std::move(result), std::move(files), job.settings.diagnostics);
 }
 
 }  // namespace
@@ -272,6 +251,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
 
   MergeCheckpoint checkpoint(job, fingerprint);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
+  return_freed_memory();  // fronts, tiles
   clear_scratch(job);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
   UnitEvent event;

@@ -280,7 +280,7 @@ void PartTracks::visit(const Visit& visit) const {
     for (TrackIndex& id : batch.tracks.id) id = TrackIndex(dense++);
     for (Eigen::Matrix3d& covariance : batch.point_covariance) covariance *= covariance_factor_;
     visit(batch);
-    batch = {};
+    batch.clear();
     if (after_batch_) after_batch_();
   };
   while (!order.empty()) {

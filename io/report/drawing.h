@@ -44,8 +44,9 @@ std::string draw_coverage(const BlockResult& result, const FrameSelection& selec
 std::string coverage_legend();
 
 // Horizontal error ellipses of the frames' positions and bars for the sigma of the height, exaggerated; the caption
-// says how much. Empty without covariances.
-FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit);
+// says how much. Empty without covariances. `after_reading` as in ReportContext.
+FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit,
+                           const std::function<void()>& after_reading);
 
 // A step of 1, 2 or 5 times a power of ten that divides `range` into at most `parts`.
 double round_step(double range, int parts);

@@ -67,8 +67,8 @@ struct Tests {
 
 class Gatherer {
  public:
-  Gatherer(const BlockResult& result, const TrackBatches& tracks)
-      : result_(result), block_(result.block), tracks_(tracks), tests_(result) {
+  Gatherer(const BlockResult& result, const TrackBatches& tracks, const std::function<void()>& after_reading)
+      : result_(result), block_(result.block), tracks_(tracks), after_reading_(after_reading), tests_(result) {
     f_.reliability.normal_limit = tests_.normal_limit;
     f_.reliability.tau_limit = tests_.tau_limit;
   }
@@ -80,13 +80,22 @@ class Gatherer {
     frames();
     if (sound) observations();
     find_parts(result_, tracks_, f_);
+    after_reading_();
     positions();
+    after_reading_();
     points();
     accuracy();
+    after_reading_();
     return std::move(f_);
   }
 
  private:
+  // A pass over the images goes through their table and that of the frames piece by piece.
+  void rest_at(ImageIndex image) const {
+    constexpr std::int64_t kImages = 1 << 16;
+    if (image.value % kImages == 0) after_reading_();
+  }
+
   // The state is there for all that the block names.
   bool complete() const {
     return result_.state.oriented.size() == block_.frames.size() &&
@@ -131,6 +140,7 @@ class Gatherer {
     }
     f_.components = static_cast<std::int64_t>(components.size());
     for (ImageIndex image(0); block_.images.contains(image); ++image.value) {
+      rest_at(image);
       if (oriented(result_, block_.images[image].frame))
         ++f_.camera_images[block_.camera_of(image)];
       else
@@ -172,9 +182,11 @@ class Gatherer {
     for (std::int64_t n : f_.observations) most = std::max(most, n);
     f_.observations_per_image = {0, std::max(1.0, std::ceil(static_cast<double>(most + 1) / 25)),
                                  std::vector<std::int64_t>(25, 0)};
-    for (ImageIndex image(0); block_.images.contains(image); ++image.value)
+    for (ImageIndex image(0); block_.images.contains(image); ++image.value) {
+      rest_at(image);
       if (oriented(result_, block_.images[image].frame))
         f_.observations_per_image.add(static_cast<double>(f_.observations[image]));
+    }
   }
 
   void observation(const TrackResults& batch, std::size_t o) {
@@ -310,6 +322,7 @@ class Gatherer {
   const BlockResult& result_;
   const Block& block_;
   const TrackBatches& tracks_;
+  const std::function<void()>& after_reading_;
   Tests tests_;
   std::vector<double> detectable_px_;  // of a sample of the tracks
   double least_redundancy_ = 1;
@@ -393,6 +406,8 @@ Figures figures_of(const BlockResult& result) {
   return figures_of(result, WholeTracks(consistent(result) ? result : none));
 }
 
-Figures figures_of(const BlockResult& result, const TrackBatches& tracks) { return Gatherer(result, tracks).run(); }
+Figures figures_of(const BlockResult& result, const TrackBatches& tracks, const std::function<void()>& after_reading) {
+  return Gatherer(result, tracks, after_reading).run();
+}
 
 }  // namespace megablock::report

@@ -116,7 +116,9 @@ struct Figures {
 };
 
 Figures figures_of(const BlockResult& result);
-Figures figures_of(const BlockResult& result, const TrackBatches& tracks);
+// `after_reading` as in ReportContext.
+Figures figures_of(
+    const BlockResult& result, const TrackBatches& tracks, const std::function<void()>& after_reading = [] {});
 
 bool oriented(const BlockResult& result, FrameIndex frame);
 

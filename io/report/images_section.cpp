@@ -95,12 +95,16 @@ std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& 
 
 }  // namespace
 
-std::string images_section(const BlockResult& result, const Figures& f) {
+std::string images_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
+  constexpr std::size_t kAtATime = 64;  // images, whose rows lie all over the tables
   const std::vector<ImageIndex> images = listed_images(result, f);
   if (images.empty() || f.reprojection.oriented_images == 0) return "";
   const Columns columns = columns_of(result, f);
   Table table = empty_table(columns);
-  for (const ImageIndex image : images) add_image(result, f, columns, image, table);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (i % kAtATime == 0) after_reading();
+    add_image(result, f, columns, images[i], table);
+  }
   const std::int64_t all = f.reprojection.oriented_images;
   std::string note =
       "Observations: kept ones; rejected: of all measurements in tracks. Positions of the projection "

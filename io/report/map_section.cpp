@@ -101,10 +101,10 @@ std::string coverage_section(const BlockResult& result, const Figures& f) {
   return section("coverage", "Coverage", coverage_legend() + figure(drawing, caption));
 }
 
-std::string ellipses_figure(const BlockResult& result, const Figures& f) {
+std::string ellipses_figure(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   const std::vector<MapSubject> subjects = subjects_of(f);
   if (subjects.empty()) return "";
-  const FieldDrawing drawing = draw_ellipses(result, subjects.front().selected, subjects.front().unit);
+  const FieldDrawing drawing = draw_ellipses(result, subjects.front().selected, subjects.front().unit, after_reading);
   if (drawing.svg.empty()) return "";
   return figure(drawing.svg, drawing.caption + (subjects.size() > 1 ? " The first map's part." : ""));
 }

@@ -110,7 +110,7 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
           "</div></div>");
 }
 
-std::string accuracy_section(const BlockResult& result, const Figures& f) {
+std::string accuracy_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   if (!std::isfinite(f.sigma_east.median) && !std::isfinite(f.point_sigma_horizontal.median)) return "";
   const double s0 = result.degrees_of_freedom > 0 ? std::sqrt(std::max(0.0, result.variance_factor)) : kUnknown;
   const double scale = result.sigma_scaled ? 1 : s0;
@@ -136,7 +136,7 @@ std::string accuracy_section(const BlockResult& result, const Figures& f) {
                 (result.sigma_scaled ? "multiplied by σ₀ a posteriori, as is the last column."
                                      : "a-priori variance factor 1; the last column multiplies by σ₀ a posteriori.") +
                 " Rotation: the largest of the three axes.") +
-          table.html("compact") + ellipses_figure(result, f));
+          table.html("compact") + ellipses_figure(result, f, after_reading));
 }
 
 }  // namespace megablock::report

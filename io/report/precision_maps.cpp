@@ -19,6 +19,7 @@ constexpr double kMostCells = 56, kLeastCells = 8;  // along the map's longer si
 constexpr double kPointsPerCell = 12;               // in the mean, so that an empty cell says something
 constexpr std::size_t kCoveragePoints = 200000;     // looked at
 constexpr std::size_t kEllipses = 1500;             // drawn
+constexpr std::size_t kNamesAtATime = 64;           // of these, which lie all over the table of frames
 
 // 1, 2, 3, 4, 5 to 6, 7 to 9, 10 and more images.
 constexpr std::array<int, 7> kSteps = {1, 2, 3, 4, 5, 7, 10};
@@ -70,7 +71,9 @@ class Coverage {
   void gather(const BlockResult& result, const FrameSelection& selected) {
     if (result.kept.size() != result.tracks.image.size()) return;
     const std::size_t step = 1 + result.points.size() / kCoveragePoints;
-    std::vector<std::pair<std::size_t, std::int64_t>> seen;  // cell, image
+    std::vector<std::int64_t> seen;  // image + cell * images
+    const auto images = std::ssize(result.block.images);
+    seen.reserve(result.tracks.image.size() / step);
     for (std::size_t t = 0; t < result.points.size() && t + 1 < result.tracks.begin.size(); t += step) {
       if (!result.points[t].allFinite()) continue;
       const Eigen::Vector2d p = plane_.at(result.points[t].head<2>());
@@ -82,7 +85,7 @@ class Coverage {
         const ImageIndex image = result.tracks.image[static_cast<std::size_t>(o)];
         if (!result.kept[static_cast<std::size_t>(o)] || !selected(result.block.images[image].frame)) continue;
         ++rays;
-        seen.emplace_back(cell, image.value);
+        seen.push_back(image.value + static_cast<std::int64_t>(cell) * images);
       }
       if (rays == 0) continue;
       ++points_[cell];
@@ -90,7 +93,7 @@ class Coverage {
     }
     std::sort(seen.begin(), seen.end());
     seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-    for (const auto& [cell, image] : seen) ++images_[cell];
+    for (const std::int64_t key : seen) ++images_[static_cast<std::size_t>(key / images)];
   }
 
   const Plane& plane_;
@@ -106,9 +109,12 @@ struct Ellipse {
   const std::string* name;
 };
 
-std::vector<Ellipse> ellipses_of(const BlockResult& result, const FrameSelection& selected, const Plane& plane) {
+std::vector<Ellipse> ellipses_of(const BlockResult& result, const FrameSelection& selected, const Plane& plane,
+                                 const std::function<void()>& after_reading) {
+  constexpr std::int64_t kAtATime = 1 << 13;  // frames
   std::vector<Ellipse> all;
   for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value) {
+    if (f.value % kAtATime == 0) after_reading();
     if (!selected(f) || !oriented(result, f)) continue;
     const Eigen::Matrix3d c = result.frame_covariance[f].bottomRightCorner<3, 3>();
     if (!c.allFinite() || !(c.trace() > 0)) continue;
@@ -153,10 +159,11 @@ std::string coverage_legend() {
   return "<p class=legend>" + keys + "</p>";
 }
 
-FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit_name) {
+FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit_name,
+                           const std::function<void()>& after_reading) {
   const auto plane = plane_of(result, selected, false);
   if (!plane) return {};
-  const std::vector<Ellipse> all = ellipses_of(result, selected, *plane);
+  const std::vector<Ellipse> all = ellipses_of(result, selected, *plane, after_reading);
   if (all.empty()) return {};
   std::vector<double> sizes;
   for (const Ellipse& e : all) sizes.push_back(std::max(e.major, e.up));
@@ -170,7 +177,10 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   const LengthUnit unit = length_unit(typical);
   const std::size_t step = 1 + all.size() / kEllipses;
   std::string body;
-  for (std::size_t i = 0; i < all.size(); i += step) body += draw(all[i], plane->scale * exaggeration, unit);
+  for (std::size_t i = 0; i < all.size(); i += step) {
+    if (i / step % kNamesAtATime == 0) after_reading();
+    body += draw(all[i], plane->scale * exaggeration, unit);
+  }
   FieldDrawing drawing;
   drawing.svg = open_map(*plane, "Error ellipses") + coordinate_grid(*plane, unit_name) + "<g class=ellipses>" + body +
                 "</g>" + scale_bar(*plane, unit_name) + "</svg>";

@@ -1,6 +1,7 @@
 // The parts of the report, in the order of the page. Each is empty when there is nothing to say.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "io/report.h"
@@ -12,14 +13,17 @@ inline constexpr double kGrossRatio = 3;  // differences beyond so many sigma ar
 
 bool alarms(const SeamCheck& seam);
 std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty when unknown
-std::string ellipses_figure(const BlockResult& result, const Figures& figures);  // empty without covariances
+// Empty without covariances; `after_reading` as in ReportContext, here and below.
+std::string ellipses_figure(const BlockResult& result, const Figures& figures,
+                            const std::function<void()>& after_reading);
 
 std::string headline(const BlockResult& result, const Figures& figures);
 std::string assessment(const BlockResult& result, const Figures& figures);  // what is well and what needs a look
 std::string map_section(const BlockResult& result, const Figures& figures);
 std::string coverage_section(const BlockResult& result, const Figures& figures);
 std::string diagnostics_section(const BlockResult& result, const BlockDiagnostics& diagnostics);
-std::string images_section(const BlockResult& result, const Figures& figures);
+std::string images_section(const BlockResult& result, const Figures& figures,
+                           const std::function<void()>& after_reading);
 std::string tie_points_section(const BlockResult& result, const Figures& figures);
 std::string residuals_section(const BlockResult& result, const Figures& figures);
 std::string observations_section(const BlockResult& result, const Figures& figures);
@@ -27,7 +31,8 @@ std::string positions_section(const BlockResult& result, const Figures& figures)
 std::string attitudes_section(const BlockResult& result, const Figures& figures);
 std::string control_section(const BlockResult& result, const Figures& figures);
 std::string cameras_section(const BlockResult& result, const Figures& figures);
-std::string accuracy_section(const BlockResult& result, const Figures& figures);
+std::string accuracy_section(const BlockResult& result, const Figures& figures,
+                             const std::function<void()>& after_reading);
 std::string tiles_section(const BlockResult& result, const Figures& figures);
 std::string failures_section(const BlockResult& result, const Figures& figures);
 std::string stages_section(const BlockResult& result);

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <utility>
 
 #include "io/remarks.h"
 #include "io/report.h"
@@ -62,6 +63,39 @@ TEST_F(TrackBatchesTest, GiveTheSameFile) {
     EXPECT_EQ(streamed.digest, result_.digest);
     EXPECT_TRUE(contents(scratch_.path("streamed.h5")) == contents(scratch_.path("whole.h5")));
   }
+}
+
+// Tables that lie in a file can leave memory one by one, and the report's with them.
+TEST_F(TrackBatchesTest, SayWhenATableHasBeenReadAndGiveTheSame) {
+  std::int64_t tables = 0, readings = 0;
+  write_result(scratch_.path("whole.h5"), result_);
+  BlockResult streamed = without_;
+  write_result(scratch_.path("streamed.h5"), streamed, SlicedTracks(result_, 13), [&] { ++tables; });
+  EXPECT_TRUE(contents(scratch_.path("streamed.h5")) == contents(scratch_.path("whole.h5")));
+  EXPECT_GT(tables, 50);  // datasets
+
+  without_.digest = result_.digest;
+  const auto read = [&] { ++readings; };
+  Report report(without_, SlicedTracks(result_, 29), read);
+  EXPECT_GT(std::exchange(readings, 0), 3);  // passes
+  EXPECT_EQ(std::move(report).html(without_, {"job", 0, nullptr, read}), report_html(result_, {"job", 0}));
+  EXPECT_GT(readings, 18);  // sections, and more than one in some
+}
+
+TEST_F(TrackBatchesTest, ClearedTracksTakeOthers) {
+  TrackResults batch;
+  batch.append(result_, 3, 40);
+  batch.clear();
+  EXPECT_EQ(batch.tracks.track_count(), 0);
+  batch.append(result_, 40, 50);
+  TrackResults fresh;
+  fresh.append(result_, 40, 50);
+  EXPECT_EQ(batch.tracks.begin, fresh.tracks.begin);
+  EXPECT_EQ(batch.tracks.image, fresh.tracks.image);
+  EXPECT_EQ(batch.points, fresh.points);
+  EXPECT_EQ(batch.kept, fresh.kept);
+  EXPECT_EQ(batch.redundancy_y, fresh.redundancy_y);
+  EXPECT_EQ(batch.file_tiles, fresh.file_tiles);
 }
 
 TEST_F(TrackBatchesTest, AreReadBackFromTheFile) {
