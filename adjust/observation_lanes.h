@@ -5,6 +5,7 @@
 // the lane (linearise_in_camera).
 #pragma once
 
+#include <algorithm>
 #include <span>
 
 #include "adjust/lane_kernels.h"
@@ -66,6 +67,11 @@ class ObservationLanes {
     record[3] = x;
     record[4] = y;
     record[5] = inverse_sigma;
+  }
+  // A lane's observation, seen otherwise.
+  void see(std::int64_t lane, const LaneView& view, const Eigen::Vector3d& point) {
+    views_[static_cast<std::size_t>(lane)] = view.values.data();
+    std::copy_n(point.data(), 3, records_.data() + lane_kernels::kRecordSize * lane);
   }
   std::int64_t size() const { return size_; }
   std::int64_t padded_size() const { return lane_kernels::padded(size_); }  // what the kernels work on

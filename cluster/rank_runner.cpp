@@ -9,7 +9,7 @@
 #include "cluster/gather_by_tile.h"
 #include "cluster/progress.h"
 #include "io/error.h"
-#include "merge/point_refinement.h"
+#include "merge/tile_trial.h"
 
 namespace megablock {
 
@@ -353,11 +353,10 @@ DownReport RankRunner::down(const Pass& pass) {
     const RankTile& tile = tiles_.whole(row);
     const TilePlan& plan = tile_plans_[row];
     TileStep& step = steps[row];
-    solve_tile_points(tile.problem, plan, tile.state, pass, step);
-    TileState trial = apply_step(gauge_, motions, tile.tile, tile.problem, plan, tile.state, step);
-    sums[row] = {step.damping_norm, refine_points(tile.problem, plan, trial)};
-    trial_gauges_.push_back(tile_gauge(tile.problem, plan, trial));
-    tiles_.put_trial(row, std::move(trial));
+    TileTrial trial = try_step(gauge_, motions, tile.tile, tile.problem, plan, tile.state, pass, step);
+    sums[row] = {trial.damping_norm, trial.cost};
+    trial_gauges_.push_back(tile_gauge(tile.problem, plan, trial.state));
+    tiles_.put_trial(row, std::move(trial.state));
     step = {};
   }
   DownReport report;

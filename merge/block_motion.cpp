@@ -4,8 +4,6 @@
 
 #include "geometry/decompositions.h"
 #include "geometry/rotation.h"
-#include "geometry/workers.h"
-#include "merge/point_portions.h"
 #include "merge/unknowns.h"
 
 namespace megablock {
@@ -53,40 +51,15 @@ BlockMotion allowed(const BlockComponent& component, const BlockMotion& motion) 
   return result;
 }
 
-// A component's motion, ready to move things.
-class Mover {
- public:
-  explicit Mover(const BlockMotion& motion) : motion_(motion), turn_(rotation_exp<double>(motion.rotation)) {}
-
-  Eigen::Vector3d position(const Eigen::Vector3d& before, const Eigen::Vector3d& increment) const {
-    return moved(before + (increment - motion_.tangent(before)));
-  }
-  Pose pose(const Pose& before, PoseIncrement increment) const {
-    increment.head<3>() += motion_.rotation;
-    increment.tail<3>() -= motion_.tangent(before.centre);
-    Pose after = pose_update(before, increment);
-    after.rotation = (after.rotation * turn_.conjugate()).normalized();
-    after.centre = moved(after.centre);
-    return after;
-  }
-
- private:
-  Eigen::Vector3d moved(const Eigen::Vector3d& position) const {
-    return motion_.centre + motion_.shift + (1 + motion_.scale) * (turn_ * (position - motion_.centre));
-  }
-  BlockMotion motion_;
-  Eigen::Quaterniond turn_;
-};
-
-void move_shared_parameters(const TileProblem& problem, const TilePlan& plan, const TileStep& step, TileState& next) {
+void move_shared_parameters(const TileProblem& problem, const TilePlan& plan, const Step& step, TileState& next) {
   for (std::size_t row = 0; row < problem.cameras.size(); ++row) {
-    const double* x = step.unknowns.find({UnknownKind::kCamera, 0, problem.cameras[row].value});
+    const double* x = step.find({UnknownKind::kCamera, 0, problem.cameras[row].value});
     for (int k = 0; x != nullptr && k < next.cameras[row].size(); ++k)
       if (contains(plan.camera_free[row], k)) next.cameras[row][static_cast<std::size_t>(k)] += *x++;
   }
   for (std::size_t row = 0; row < problem.mounts.size(); ++row) {
     const MountId& id = problem.mounts[row];
-    if (const double* x = step.unknowns.find({UnknownKind::kMount, id.mount, id.rig.value}))
+    if (const double* x = step.find({UnknownKind::kMount, id.mount, id.rig.value}))
       next.mounts[row] = pose_update(next.mounts[row], Eigen::Map<const PoseIncrement>(x));
   }
 }
@@ -139,25 +112,45 @@ std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vecto
   return motions;
 }
 
+TileMotion::TileMotion(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
+                       const TileProblem& problem, const TilePlan& plan)
+    : problem_(problem), plan_(plan) {
+  for (std::int64_t component : gauge.part_component[at(tile)]) {
+    const BlockMotion motion = motions.empty() ? BlockMotion() : motions[at(component)];
+    movers_.push_back({motion, rotation_exp<double>(motion.rotation)});
+  }
+}
+
+Pose TileMotion::Mover::pose(const Pose& before, PoseIncrement increment) const {
+  increment.head<3>() += motion.rotation;
+  increment.tail<3>() -= motion.tangent(before.centre);
+  Pose after = pose_update(before, increment);
+  after.rotation = (after.rotation * turn.conjugate()).normalized();
+  after.centre = moved(after.centre);
+  return after;
+}
+
+TileState TileMotion::unknowns(const TileState& state, const Step& step) const {
+  TileState next = state;
+  for (std::size_t f = 0; f < problem_.frames.size(); ++f)
+    if (plan_.part_of_frame[f] >= 0)
+      next.frames[f] = movers_[at(plan_.part_of_frame[f])].pose(
+          state.frames[f],
+          Eigen::Map<const PoseIncrement>(step.find({UnknownKind::kFrame, 0, problem_.frames[f].value})));
+  move_shared_parameters(problem_, plan_, step, next);
+  return next;
+}
+
+const TileMotion::Mover& TileMotion::mover_of(std::int64_t point) const {
+  return movers_[at(plan_.part_of_frame[at(frame_of_point(problem_, point))])];
+}
+
 TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                      const TileProblem& problem, const TilePlan& plan, const TileState& state, const TileStep& step) {
-  TileState next = state;
-  std::vector<Mover> movers;  // of the tile's parts
-  for (std::int64_t component : gauge.part_component[at(tile)])
-    movers.emplace_back(motions.empty() ? BlockMotion() : motions[at(component)]);
-  for (std::size_t f = 0; f < problem.frames.size(); ++f)
-    if (plan.part_of_frame[f] >= 0)
-      next.frames[f] = movers[at(plan.part_of_frame[f])].pose(
-          state.frames[f],
-          Eigen::Map<const PoseIncrement>(step.unknowns.find({UnknownKind::kFrame, 0, problem.frames[f].value})));
-  const PointPortions portions(plan);
-  visit_in_parallel(portions.size(), [&](std::int64_t portion) {
-    for (const std::int64_t p : portions[portion]) {
-      const Mover& mover = movers[at(plan.part_of_frame[at(frame_of_point(problem, p))])];
-      next.points[at(p)] = mover.position(state.points[at(p)], step.points[at(p)]);
-    }
-  });
-  move_shared_parameters(problem, plan, step, next);
+  const TileMotion motion(gauge, motions, tile, problem, plan);
+  TileState next = motion.unknowns(state, step.unknowns);
+  for (const RowList& cell : plan.points)
+    for (const std::int64_t p : cell.rows()) next.points[at(p)] = motion.point(state, p, step.points[at(p)]);
   return next;
 }
 

@@ -48,7 +48,37 @@ struct BlockMotion {
 // Of every component of the block, from the sums of all tiles, in tile order.
 std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vector<MotionSums>& tiles);
 
-// state (+) step; every tile that holds a frame computes the same bits. Without motions: along straight lines.
+// A step as it is applied to a tile, with the motions of the components of its parts; every tile that holds a frame
+// computes the same bits. Without motions: along straight lines.
+class TileMotion {
+ public:
+  // Problem and plan outlive it.
+  TileMotion(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
+             const TileProblem& problem, const TilePlan& plan);
+  // Everything but the points, which stay where they are.
+  TileState unknowns(const TileState& state, const Step& step) const;
+  Eigen::Vector3d point(const TileState& state, std::int64_t point, const Eigen::Vector3d& step) const {
+    const Mover& mover = movers_.size() == 1 ? movers_.front() : mover_of(point);
+    const Eigen::Vector3d& before = state.points[static_cast<std::size_t>(point)];
+    return mover.moved(before + (step - mover.motion.tangent(before)));
+  }
+
+ private:
+  struct Mover {  // a component's motion, ready to move things
+    BlockMotion motion;
+    Eigen::Quaterniond turn;
+    Eigen::Vector3d moved(const Eigen::Vector3d& position) const {
+      return motion.centre + motion.shift + (1 + motion.scale) * (turn * (position - motion.centre));
+    }
+    Pose pose(const Pose& before, PoseIncrement increment) const;
+  };
+  const Mover& mover_of(std::int64_t point) const;
+  const TileProblem& problem_;
+  const TilePlan& plan_;
+  std::vector<Mover> movers_;  // of the tile's parts
+};
+
+// state (+) step.
 TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                      const TileProblem& problem, const TilePlan& plan, const TileState& state, const TileStep& step);
 

@@ -48,27 +48,35 @@ CellAssembler::CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pai
 
 void CellAssembler::add_points(PointEquations& equations) {
   equations.reduce(frames_);
-  for (std::size_t i = 0; i < equations.points().size(); ++i) add_point(equations, i);
+  const std::vector<PointEquations::Point>& points = equations.points();
+  const std::int64_t lanes = points.back().last;
+  lane_frames_.resize(at(lanes));
+  for (std::int64_t lane = 0; lane < lanes; ++lane)
+    lane_frames_[at(lane)] = numbers_[at(equations.unknowns_of(lane).frame)];
+  equations.kernels().subtract_pairs(std::ssize(points), equations.begin(), equations.y(0), lane_frames_.data(),
+                                     pair_blocks_.pairs());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (points[i].shared_end > points[i].shared_begin) add_shared(equations, i);
+  add_sums(equations);
 }
 
-void CellAssembler::add_point(const PointEquations& equations, std::size_t i) {
-  const PointEquations::Point& point = equations.points()[i];
-  point_frames_.clear();
-  for (std::int64_t lane = point.first; lane < point.last; ++lane)
-    point_frames_.push_back(numbers_[at(equations.unknowns_of(lane).frame)]);
-  equations.kernels().subtract_pairs(point.observation_count(), equations.y(point.first), point_frames_.data(),
-                                     pair_blocks_.pairs());
-  if (point.shared_end > point.shared_begin) add_shared(equations, i);
-
+void CellAssembler::add_sums(const PointEquations& equations) {
+  const std::vector<PointEquations::Point>& points = equations.points();
   SubtreeSums& sums = front_.sums();
-  sums.cost += 0.5 * point.rho;
-  sums.weighted_squares += point.weighted_squares;
-  sums.decrement_squared += equations.z(i).squaredNorm();
-  sums.residuals += point.residual_count;
-  sums.observations += point.observation_count();
-  sums.points += 1;
-  sums.unknowns += 3;
-  sums.held_points += equations.held(i);
+  double cost = sums.cost, weighted_squares = sums.weighted_squares, decrement_squared = sums.decrement_squared;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    cost += 0.5 * points[i].rho;
+    weighted_squares += points[i].weighted_squares;
+    decrement_squared += equations.z(i).squaredNorm();
+    sums.residuals += points[i].residual_count;
+    sums.held_points += equations.held(i);
+  }
+  sums.cost = cost;
+  sums.weighted_squares = weighted_squares;
+  sums.decrement_squared = decrement_squared;
+  sums.observations += points.back().last;
+  sums.points += std::ssize(points);
+  sums.unknowns += 3 * std::ssize(points);
 }
 
 void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {

@@ -35,7 +35,7 @@ class CellAssembler {
     std::vector<double> normal;  // [width x (width + 1)]: lower triangle of J'J, then J'r
   };
 
-  void add_point(const PointEquations& equations, std::size_t i);  // of equations.points()
+  void add_sums(const PointEquations& equations);
   void add_shared(const PointEquations& equations, std::size_t i);
   // Three columns over the rows of an unknown.
   struct Factor {
@@ -58,7 +58,7 @@ class CellAssembler {
   std::vector<std::int64_t> frame_rows_;       // of the cell's frames in the front, ascending
   std::vector<std::int64_t> numbers_;          // [plan.unknowns] of frames among them
   PairBlocks& pair_blocks_;                    // by these numbers
-  std::vector<std::int64_t> point_frames_;     // of the point at hand
+  std::vector<std::int64_t> lane_frames_;      // [lanes] of the points at hand, by these numbers
 };
 
 }  // namespace megablock

@@ -154,32 +154,25 @@ TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, con
   return result;
 }
 
-void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                       TileStep& step) {
-  step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
-  const UnknownMotions motions(plan, step.unknowns.values.data());
-  const PointTables tables(problem, plan, state);
-  PerThread<PointEquations> all_equations([&] { return std::make_unique<PointEquations>(problem, state, tables); });
-  const PointPortions portions(plan);
-  std::vector<double> damping_norms(at(portions.size()), 0);
-  visit_in_parallel(portions.size(), [&](std::int64_t portion) {
-    PointEquations& equations = all_equations.mine();
-    for (std::span<const std::int32_t> rest = portions[portion]; !rest.empty();) {
-      rest = rest.subspan(equations.linearise(rest, pass));
-      equations.steps(motions, step.points);
-      for (std::size_t i = 0; i < equations.points().size(); ++i)
-        damping_norms[at(portion)] +=
-            equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
-    }
-  });
-  for (const double norm : damping_norms) step.damping_norm += norm;
-}
-
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum) {
   TileStep step = solve_tile_unknowns(
       plan, factor.empty() ? condense_tile(problem, plan, state, pass, datum).factor : factor, boundary);
-  solve_tile_points(problem, plan, state, pass, step);
+  step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
+  const UnknownMotions motions(plan, step.unknowns.values.data());
+  const PointTables tables(problem, plan, state);
+  PointEquations equations(problem, state, tables);
+  const PointPortions portions(plan);
+  for (std::int64_t portion = 0; portion < portions.size(); ++portion) {
+    double damping_norm = 0;
+    for (std::span<const std::int32_t> rest = portions[portion]; !rest.empty();) {
+      rest = rest.subspan(equations.linearise(rest, pass));
+      equations.steps(motions, step.points);
+      for (std::size_t i = 0; i < equations.points().size(); ++i)
+        damping_norm += equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());
+    }
+    step.damping_norm += damping_norm;
+  }
   return step;
 }
 

@@ -94,12 +94,9 @@ struct TileStep {
   double damping_norm = 0;              // sum of D x^2 over the tile's own residuals; the predicted decrease of the
                                         // block is 1/2 (decrement^2 + lambda * sum of these)
 };
-// From the boundary's step, in two parts: the unknowns from the factor alone, then the points, which are linearised
-// again.
+// From the boundary's step, the unknowns alone, which the factor gives (tile_trial.h goes on).
 TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, const Step& boundary);
-void solve_tile_points(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                       TileStep& step);
-// Both. `factor` empty: condensed again (same bits).
+// And the points, which are linearised again. `factor` empty: condensed again (same bits).
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum = {});
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "merge/unknowns.h"
@@ -53,24 +52,16 @@ const point_kernels::Kernels& point_kernels_of_processor() {
                                                : point_kernels::kPortable;
 }
 
-// The largest squared norm s with rho(s) = s; -1: none.
-double end_of_squares(const RobustLoss& loss) {
-  if (loss.kind == RobustLoss::Kind::kNone) return std::numeric_limits<double>::max();
-  return loss.has_corner() ? loss.scale * loss.scale : -1;
-}
-
 }  // namespace
 
 using lane_kernels::kResidual;
 using point_kernels::kB;
 using point_kernels::kObservationValueCount;
 using point_kernels::kPointB;
-using point_kernels::kPointHeld;
 using point_kernels::kPointInverse;
 using point_kernels::kPointOwnStep;
 using point_kernels::kPointV;
 using point_kernels::kPointValueCount;
-using point_kernels::kPointZ;
 using point_kernels::kRecordSize;
 using point_kernels::kV;
 using point_kernels::kYSize;
@@ -102,6 +93,7 @@ PointEquations::PointEquations(const TileProblem& problem, const TileState& stat
   shared_rows_.resize(at(room));
   frame_sums_.resize(at(room));
   motions_.resize(at(room));
+  squares_.resize(at(room));
   values_.resize(room * kObservationValueCount);
   point_values_.resize(room * kPointValueCount);
   y_.resize(room * kYSize);
@@ -347,6 +339,34 @@ void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vec
     for (int k = 0; k < 3; ++k) out[at(points_[i].point)][k] = point_value(kPointOwnStep + k, i);
 }
 
+// The measurements still stand in the lanes.
+std::span<const double> PointEquations::squares_of(const SeenImages& images,
+                                                   const std::vector<Eigen::Vector3d>& points) {
+  bool simple = true;
+  for (const Point& point : points_) {
+    const Eigen::Vector3d& position = points[at(point.point)];
+    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+      const LaneView& view = images.lanes[at(problem_.image[at(rows_[at(lane)])].value)];
+      lanes_.see(lane, view, position);
+      simple &= view.simple;
+    }
+  }
+  lanes_.project();
+  const double *x = lanes_.values() + kResidual * lanes_.capacity(), *y = x + lanes_.capacity();
+  for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) squares_[at(lane)] = x[lane] * x[lane] + y[lane] * y[lane];
+  for (const Point& point : points_) {
+    for (std::int64_t lane = point.first; lane < point.last && !simple; ++lane) {
+      const std::size_t row = at(rows_[at(lane)]), image = at(problem_.image[row].value);
+      if (images.lanes[image].simple) continue;
+      squares_[at(lane)] =
+          (problem_.inverse_sigma[row] *
+           images.views[image].difference_px(points[at(point.point)], {problem_.x[row], problem_.y[row]}))
+              .squaredNorm();
+    }
+  }
+  return {squares_.data(), at(lanes_.size())};
+}
+
 Eigen::Matrix3d PointEquations::inverse_factor(std::size_t i) const {
   Eigen::Matrix3d result;
   const auto value = [&](int k) { return point_value(kPointInverse + k, i); };
@@ -354,15 +374,9 @@ Eigen::Matrix3d PointEquations::inverse_factor(std::size_t i) const {
   return result;
 }
 
-Eigen::Vector3d PointEquations::z(std::size_t i) const {
-  return {point_value(kPointZ, i), point_value(kPointZ + 1, i), point_value(kPointZ + 2, i)};
-}
-
 Eigen::Vector3d PointEquations::diagonal(std::size_t i) const {
   return {point_value(kPointV, i), point_value(kPointV + 2, i), point_value(kPointV + 5, i)};
 }
-
-int PointEquations::held(std::size_t i) const { return static_cast<int>(point_value(kPointHeld, i)); }
 
 void PointEquations::blocks(std::size_t i, std::vector<Block>& list) const {
   const Point& point = points_[i];

@@ -106,19 +106,27 @@ class PointEquations {
   // After linearise(), once: the points' steps into `out` [problem.points].
   void steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out);
 
+  // Squared residuals |r|^2 of the lanes in another state, of these images and points; not finite where the camera
+  // cannot project the point. Behind it comes the next linearise().
+  std::span<const double> squares_of(const SeenImages& images, const std::vector<Eigen::Vector3d>& points);
+
   const ImageUnknowns& unknowns_of(std::int64_t lane) const { return *lane_unknowns_[at(lane)]; }
   Eigen::Vector2d residual(std::int64_t lane) const { return lanes_.residual(lane); }      // weighted, as the Jacobians
   Eigen::Vector3d from_frame(std::int64_t lane) const { return lanes_.from_frame(lane); }  // u
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const { return lanes_.by_point(lane); }  // J_p
   const SharedRows& shared(std::int64_t lane) const { return shared_rows_[at(lane)]; }
   const double* y(std::int64_t lane) const { return y_.data() + lane * point_kernels::kYSize; }
+  const std::int64_t* begin() const { return begin_.data(); }  // [points() + 1] lanes
   const point_kernels::Kernels& kernels() const { return *kernels_; }
 
   // Of point number i of points().
   Eigen::Matrix3d inverse_factor(std::size_t i) const;  // C^-1, zero rows where held
-  Eigen::Vector3d z(std::size_t i) const;
+  Eigen::Vector3d z(std::size_t i) const {
+    return {point_value(point_kernels::kPointZ, i), point_value(point_kernels::kPointZ + 1, i),
+            point_value(point_kernels::kPointZ + 2, i)};
+  }
   Eigen::Vector3d diagonal(std::size_t i) const;  // of V with the prior
-  int held(std::size_t i) const;
+  int held(std::size_t i) const { return static_cast<int>(point_value(point_kernels::kPointHeld, i)); }
   // After reduce(): the frames, one of each lane, then the shared unknowns.
   void blocks(std::size_t i, std::vector<Block>& list) const;
   // The point's prior in TileProblem::point_priors (-1).
@@ -177,6 +185,7 @@ class PointEquations {
   std::vector<const double*> step_of_lane_;          // [lanes] in steps_
   std::vector<double*> frame_sums_;                  // [lanes]
   std::vector<const double*> motions_;               // [lanes]
+  std::vector<double> squares_;                      // [lanes]
   std::vector<SharedPart> shared_;
   std::vector<double> store_;  // what the pointers of shared_ and shared_rows_ point to
   std::size_t taken_ = 0;

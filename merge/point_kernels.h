@@ -71,9 +71,10 @@ struct Kernels {
   // C -= A B', three columns each, leading dimensions c_stride, a_stride, b_stride; A has `rows`, B `columns` rows.
   void (*subtract_product)(double* c, std::int64_t c_stride, const double* a, std::int64_t a_stride, std::int64_t rows,
                            const double* b, std::int64_t b_stride, std::int64_t columns);
-  // K_ij -= Y_i Y_j' for all pairs of observations of one point, by the numbers of their frames [count]. On a diagonal
-  // block only the lower triangle counts.
-  void (*subtract_pairs)(std::int64_t count, const double* y, const std::int64_t* frames, const Pairs& pairs);
+  // K_ij -= Y_i Y_j' for all pairs of observations begin[p] to begin[p + 1] of each point p, by the numbers of their
+  // frames (of all observations, as y). On a diagonal block only the lower triangle counts.
+  void (*subtract_pairs)(std::int64_t points, const std::int64_t* begin, const double* y, const std::int64_t* frames,
+                         const Pairs& pairs);
 };
 extern const Kernels kPortable, kAvx2, kAvx512;
 

@@ -328,7 +328,8 @@ void subtract_product(double* c, std::int64_t c_stride, const double* a, std::in
   }
 }
 
-void subtract_pairs(std::int64_t count, const double* y, const std::int64_t* frames, const Pairs& pairs) {
+void subtract_pairs(std::int64_t points, const std::int64_t* begin, const double* y, const std::int64_t* frames,
+                    const Pairs& pairs) {
   constexpr int kRows = kWidth == kPairStride ? kPairStride : 6;  // the longest vectors take the unused rows along
   const auto subtract = [&](std::int64_t i, std::int64_t j) {
     const std::int64_t number = pair_number(frames[i], frames[j]);
@@ -336,11 +337,13 @@ void subtract_pairs(std::int64_t count, const double* y, const std::int64_t* fra
     subtract_block<kRows, 6>(pairs.blocks + number * kPairSize, kPairStride, y + i * kYSize, kYStride, y + j * kYSize,
                              kYStride);
   };
-  for (std::int64_t i = 1; i < count; ++i) {
-    for (std::int64_t j = 0; j < i; ++j) {
-      const bool below = frames[i] >= frames[j];
-      subtract(below ? i : j, below ? j : i);
-      if (frames[i] == frames[j]) subtract(j, i);
+  for (std::int64_t p = 0; p < points; ++p) {
+    for (std::int64_t i = begin[p] + 1; i < begin[p + 1]; ++i) {
+      for (std::int64_t j = begin[p]; j < i; ++j) {
+        const bool below = frames[i] >= frames[j];
+        subtract(below ? i : j, below ? j : i);
+        if (frames[i] == frames[j]) subtract(j, i);
+      }
     }
   }
 }

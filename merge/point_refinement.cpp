@@ -248,39 +248,49 @@ class PointRefiner {
   std::vector<Ray> rays_;
 };
 
-// Observations of points one after the other: their loss, and whether one lies beyond the corner (Cauchy's loss has
-// none: all of it is tail) or behind its camera.
-class LossSums {
- public:
-  explicit LossSums(const RobustLoss& loss) : loss_(loss) {}
-  void add(std::int64_t point, double squares) {
-    if (point != point_) finish();
-    point_ = point;
-    const auto [rho, first, second] = loss_.evaluate(squares);
-    of_point_ += std::isfinite(squares) ? rho : std::numeric_limits<double>::infinity();
-    in_tail_ |= !std::isfinite(squares) || second < 0;
-  }
-  void finish() {
-    if (in_tail_) {
-      tail_.push_back(point_);
-    } else {
-      settled_ += of_point_;
-    }
-    of_point_ = 0;
-    in_tail_ = false;
-  }
-  double settled() const { return settled_; }  // of all other points
-  const std::vector<std::int64_t>& tail() const { return tail_; }
-
- private:
-  RobustLoss loss_;
-  std::int64_t point_ = -1;
-  double of_point_ = 0, settled_ = 0;
-  bool in_tail_ = false;
-  std::vector<std::int64_t> tail_;
-};
-
 }  // namespace
+
+void LossSums::add(std::int64_t point, std::span<const double> squares) {
+  double sum = 0;
+  bool usual = true;
+  for (const double s : squares) {
+    sum += s;
+    usual &= s <= usual_squares_;
+  }
+  if (usual) {  // most: nothing is to be done but to count
+    settled_ += sum;
+    return;
+  }
+  double cost = 0;
+  bool in_tail = false;
+  for (const double s : squares) {
+    const auto [rho, first, second] = loss_.evaluate(s);
+    cost += std::isfinite(s) ? rho : std::numeric_limits<double>::infinity();
+    in_tail |= !std::isfinite(s) || second < 0;
+  }
+  if (in_tail)
+    tail_.push_back(point);
+  else
+    settled_ += cost;
+}
+
+double refine_tail(const TileProblem& problem, TileState& state, const SeenImages& images,
+                   const std::vector<LossSums>& sums, double settled) {
+  double cost = 0;
+  std::vector<std::int64_t> tail;
+  for (const LossSums& part : sums) {
+    cost += 0.5 * part.settled();
+    tail.insert(tail.end(), part.tail().begin(), part.tail().end());
+  }
+  PerThread<PointRefiner> refiners([&] { return std::make_unique<PointRefiner>(problem, state, images, settled); });
+  std::vector<double> costs((tail.size() + kAtOnce - 1) / kAtOnce);
+  visit_in_parallel(std::ssize(costs), [&](std::int64_t chunk) {
+    const auto rest = std::span<const std::int64_t>(tail).subspan(static_cast<std::size_t>(chunk) * kAtOnce);
+    costs[static_cast<std::size_t>(chunk)] = refiners.mine().refine(rest.first(std::min(kAtOnce, rest.size())));
+  });
+  for (const double of_chunk : costs) cost += of_chunk;
+  return cost + other_cost(problem, state);
+}
 
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state, double settled) {
   if (problem.image_loss.kind == RobustLoss::Kind::kNone) return evaluate_cost(problem, state);
@@ -290,24 +300,20 @@ double refine_points(const TileProblem& problem, const TilePlan& plan, TileState
   std::vector<LossSums> of_portions(static_cast<std::size_t>(portions.size()), LossSums(problem.image_loss));
   visit_in_parallel(portions.size(), [&](std::int64_t portion) {
     LossSums& sums = of_portions[static_cast<std::size_t>(portion)];
-    residuals.mine().visit(portions[portion],
-                           [&](std::int64_t point, std::int64_t, double squares) { sums.add(point, squares); });
-    sums.finish();
+    std::int64_t last = -1;
+    std::vector<double> of_point;
+    const auto finish = [&] {
+      if (!of_point.empty()) sums.add(last, of_point);
+      of_point.clear();
+    };
+    residuals.mine().visit(portions[portion], [&](std::int64_t point, std::int64_t, double squares) {
+      if (point != last) finish();
+      last = point;
+      of_point.push_back(squares);
+    });
+    finish();
   });
-  double images = 0;
-  std::vector<std::int64_t> tail;
-  for (const LossSums& sums : of_portions) {
-    images += 0.5 * sums.settled();
-    tail.insert(tail.end(), sums.tail().begin(), sums.tail().end());
-  }
-  PerThread<PointRefiner> refiners([&] { return std::make_unique<PointRefiner>(problem, state, seen, settled); });
-  std::vector<double> costs((tail.size() + kAtOnce - 1) / kAtOnce);
-  visit_in_parallel(std::ssize(costs), [&](std::int64_t chunk) {
-    const auto rest = std::span<const std::int64_t>(tail).subspan(static_cast<std::size_t>(chunk) * kAtOnce);
-    costs[static_cast<std::size_t>(chunk)] = refiners.mine().refine(rest.first(std::min(kAtOnce, rest.size())));
-  });
-  for (const double cost : costs) images += cost;
-  return images + other_cost(problem, state);
+  return refine_tail(problem, state, seen, of_portions, settled);
 }
 
 }  // namespace megablock

@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "adjust/linearise.h"
 #include "io/error.h"
@@ -22,6 +23,12 @@
 namespace megablock {
 
 inline constexpr double kLeastCurvature = 0.1;
+
+// The largest squared norm s with rho(s) = s; -1: none.
+inline double end_of_squares(const RobustLoss& loss) {
+  if (loss.kind == RobustLoss::Kind::kNone) return std::numeric_limits<double>::max();
+  return loss.has_corner() ? loss.scale * loss.scale : -1;
+}
 
 // Weighting of a residual under a loss.
 struct LossWeight {

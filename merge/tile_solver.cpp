@@ -7,10 +7,9 @@
 #include "adjust/linearise.h"
 #include "io/error.h"
 #include "io/held_priors.h"
-#include "merge/block_motion.h"
 #include "merge/gauge.h"
 #include "merge/global_adjustment.h"
-#include "merge/point_refinement.h"
+#include "merge/tile_trial.h"
 
 namespace megablock {
 
@@ -33,12 +32,13 @@ class LoneTile : public TreeRunner {
   }
 
   DownReport down(const Pass& pass) override {
-    const TileStep step = solve_tile_down(problem_, plan_, state_, pass, factor_, Step());
+    const TileStep step = solve_tile_unknowns(plan_, factor_, Step());
     const std::vector<BlockMotion> motions =
         block_motions(gauge_, {motion_sums(gauge_, 0, problem_, plan_, state_, step.unknowns)});
-    trial_ = apply_step(gauge_, motions, 0, problem_, plan_, state_, step);
-    trial_cost_ = refine_points(problem_, plan_, trial_, kSettled);
-    return {step.damping_norm, trial_cost_};
+    TileTrial trial = try_step(gauge_, motions, 0, problem_, plan_, state_, pass, step, kSettled);
+    trial_ = std::move(trial.state);
+    trial_cost_ = trial.cost;
+    return {trial.damping_norm, trial_cost_};
   }
 
   void accept() override {

@@ -81,7 +81,8 @@ struct Worked {
     }
     kernels.reduce(linearised.data(), kStride, kCount, columns, step_of_lane.data(), y.data(), sums.data());
     kernels.move(linearised.data(), kStride, kCount, columns, of_lane.data(), moved.data(), kStride);
-    kernels.subtract_pairs(4, y.data(), kFramesOfPairs.data(), {pairs.data(), used.data()});
+    constexpr std::array<std::int64_t, 2> kOnePoint{0, 4};
+    kernels.subtract_pairs(1, kOnePoint.data(), y.data(), kFramesOfPairs.data(), {pairs.data(), used.data()});
   }
 
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const {
