@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "geometry/angles.h"
 #include "io/held_priors.h"
-#include "io/prior_differences.h"
 #include "io/report/figures.h"
 
 namespace megablock {
@@ -81,9 +79,12 @@ std::string consequence(int defect, const Placing& placing) {
   return "coordinates are not usable as they are; add positions, attitudes or control points";
 }
 
-report::Figures parts_of(const BlockResult& result, const TrackBatches& tracks) {
+// What remarks need of a report's figures; none before anything was oriented.
+report::Figures figures_for_remarks(const BlockResult& result, const TrackBatches& tracks) {
   report::Figures figures;
-  if (result.state.oriented.size() == result.block.frames.size()) report::find_parts(result, tracks, figures);
+  if (result.state.oriented.size() != result.block.frames.size()) return figures;
+  report::find_parts(result, tracks, figures);
+  report::find_prior_residuals(result, figures);
   return figures;
 }
 
@@ -92,19 +93,17 @@ struct Contradiction {
   double sigmas = 0, size = 0;  // of the difference; metres or degrees
 };
 
-// The frames whose observed position or attitude the block contradicts, worst first, as text; empty without any.
-template <typename Prior>
-std::string contradicted_text(const BlockResult& result, std::optional<Prior> Frame::*prior_of,
-                              Eigen::Vector3d Prior::*sigma_of, const char* kind, double unit, const char* unit_name) {
+// Frames whose observed position or attitude the block contradicts, worst first, as text; empty without any.
+template <typename Residual>
+std::string contradicted_text(const BlockResult& result, const std::vector<Residual>& residuals, double held_sigma,
+                              const char* kind, double unit, const char* unit_name) {
   std::vector<Contradiction> wrong;
   std::int64_t observed = 0;
-  for (FrameIndex f(0); f.value < static_cast<std::int64_t>(result.state.oriented.size()); ++f.value) {
-    const std::optional<Prior>& prior = result.block.frames[f].*prior_of;
-    if (!result.state.oriented[f] || !prior || held(*prior)) continue;
+  for (const Residual& r : residuals) {
+    if (r.sigma.minCoeff() <= 2 * held_sigma) continue;  // held: the block was put there
     ++observed;
-    const Eigen::Vector3d off = difference(result.state.frames[f], *prior);
-    const double sigmas = off.cwiseQuotient((*prior).*sigma_of).norm();
-    if (sigmas > kContradicted) wrong.push_back({f, sigmas, off.norm() * unit});
+    const double sigmas = r.difference.cwiseQuotient(r.sigma).norm();
+    if (sigmas > kContradicted) wrong.push_back({r.frame, sigmas, r.difference.norm() * unit});
   }
   if (wrong.empty()) return "";
   std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
@@ -163,7 +162,7 @@ std::string unused_points_text(const BlockResult& result, PointRole role) {
 }
 
 std::vector<std::string> datum_texts(const BlockResult& result) {
-  return datum_texts(result, parts_of(result, WholeTracks(result)));
+  return datum_texts(result, figures_for_remarks(result, WholeTracks(result)));
 }
 
 std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures) {
@@ -212,12 +211,11 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
   return lines;
 }
 
-std::vector<std::string> contradicted_texts(const BlockResult& result) {
+std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines;
   for (const std::string& text :
-       {contradicted_text(result, &Frame::position_prior, &PositionPrior::sigma, "positions", 1, "m"),
-        contradicted_text(result, &Frame::attitude_prior, &AttitudePrior::sigma_rad, "attitudes", kDegreesPerRadian,
-                          "degrees")})
+       {contradicted_text(result, figures.positions, kHeldPositionSigma, "positions", 1, "m"),
+        contradicted_text(result, figures.attitudes, kHeldAttitudeSigma, "attitudes", kDegreesPerRadian, "degrees")})
     if (!text.empty()) lines.push_back(text);
   return lines;
 }
@@ -225,13 +223,13 @@ std::vector<std::string> contradicted_texts(const BlockResult& result) {
 std::vector<std::string> remarks(const BlockResult& result) { return remarks(result, WholeTracks(result)); }
 
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks) {
-  return remarks(result, parts_of(result, tracks));
+  return remarks(result, figures_for_remarks(result, tracks));
 }
 
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines = datum_texts(result, figures);
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
-  for (std::string& text : contradicted_texts(result)) lines.push_back(std::move(text));
+  for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
   return lines;

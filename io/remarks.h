@@ -37,7 +37,7 @@ std::vector<std::string> misstated_texts(const BlockResult& result);
 // Single positions and attitudes that the block contradicts by many times their sigmas, a line for each of the two, the
 // worst by name: "6 of 18 attitudes differ from the block by more than 6 sigmas: DJI_0034.JPG by 178.9 degrees, ...".
 // Robust losses keep them from bending the block, and so from the statistics of their kind.
-std::vector<std::string> contradicted_texts(const BlockResult& result);
+std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures);
 // By how much a factor between shown and stated sigma differs from one by chance: five standard deviations.
 double chance_of_factor(const ObservationStatistics& statistics);
 

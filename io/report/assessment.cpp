@@ -95,11 +95,11 @@ std::string seams_item(const BlockResult& result) {
                   rest);
 }
 
-std::string residuals_item(const BlockResult& result) {
+std::string residuals_item(const BlockResult& result, const Figures& f) {
   std::string list;
   for (const std::string& text : misstated_texts(result))
     list += item("look", escape(text) + ": see <a href=\"#observations\">observations</a>.");
-  for (const std::string& text : contradicted_texts(result)) list += item("look", escape(text) + ".");
+  for (const std::string& text : contradicted_texts(result, f)) list += item("look", escape(text) + ".");
   if (result.degrees_of_freedom <= 0) return list;
   const double s0 = std::sqrt(std::max(0.0, result.variance_factor));
   if (s0 > 1.5)
@@ -186,8 +186,8 @@ std::string headline(const BlockResult& result, const Figures& f) {
 
 std::string assessment(const BlockResult& result, const Figures& f) {
   std::string list = convergence_item(result) + images_item(result, f) + parts_item(f) + seams_item(result) +
-                     unused_points_item(result) + residuals_item(result) + points_item(result, f, PointRole::kCheck) +
-                     points_item(result, f, PointRole::kControl);
+                     unused_points_item(result) + residuals_item(result, f) +
+                     points_item(result, f, PointRole::kCheck) + points_item(result, f, PointRole::kControl);
   for (const std::string& text : datum_texts(result, f)) list += item("look", escape(text) + ".");
   if (!result.gauge.empty()) list += item("plain", "Datum: " + escape(result.gauge) + ".");
   for (const std::string& note : result.notes) list += item("look", escape(note));

@@ -81,7 +81,7 @@ class Gatherer {
     if (sound) observations();
     find_parts(result_, tracks_, f_);
     after_reading_();
-    positions();
+    find_prior_residuals(result_, f_);
     after_reading_();
     points();
     accuracy();
@@ -218,17 +218,6 @@ class Gatherer {
     for (std::size_t i = 0; i < rays.size(); ++i)
       for (std::size_t j = i + 1; j < rays.size(); ++j) least = std::min(least, rays[i].dot(rays[j]));
     if (rays.size() > 1) f_.intersection_deg.add(std::acos(std::clamp(least, -1.0, 1.0)) * kDegreesPerRadian);
-  }
-
-  void positions() {
-    for (FrameIndex frame(0); frame.value < f_.frames; ++frame.value) {
-      if (!oriented(result_, frame)) continue;
-      const Pose& pose = result_.state.frames[frame];
-      if (const auto& prior = block_.frames[frame].position_prior)
-        f_.positions.push_back({frame, difference(pose, *prior), prior->sigma});
-      if (const auto& prior = block_.frames[frame].attitude_prior)
-        f_.attitudes.push_back({frame, difference(pose, *prior), prior->sigma_rad});
-    }
   }
 
   void points() {
@@ -399,6 +388,18 @@ Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values) {
     result[k] = n ? std::sqrt(squares / static_cast<double>(n)) : kUnknown;
   }
   return result;
+}
+
+void find_prior_residuals(const BlockResult& result, Figures& figures) {
+  for (FrameIndex f(0); result.state.oriented.contains(f); ++f.value) {
+    if (!result.state.oriented[f]) continue;
+    const Pose& pose = result.state.frames[f];
+    const Frame& frame = result.block.frames[f];
+    if (const auto& prior = frame.position_prior)
+      figures.positions.push_back({f, difference(pose, *prior), prior->sigma});
+    if (const auto& prior = frame.attitude_prior)
+      figures.attitudes.push_back({f, difference(pose, *prior), prior->sigma_rad});
+  }
 }
 
 Figures figures_of(const BlockResult& result) {

@@ -125,6 +125,9 @@ bool oriented(const BlockResult& result, FrameIndex frame);
 // Fills in parts and part_of_frame.
 void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
 
+// Fills in positions and attitudes.
+void find_prior_residuals(const BlockResult& result, Figures& figures);
+
 // The first `count` oriented images in an order, without a list of all.
 using ImageOrder = std::function<bool(ImageIndex, ImageIndex)>;
 std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before);

@@ -25,7 +25,7 @@ using fixture::Held;
 using fixture::SegmentScene;
 using fixture::urban_scene;
 
-constexpr double kHeights[] = {-100, -1000, -3000, -1e4, -1e5, -1e6};
+constexpr double kHeights[] = {0, -100, -1000, -3000, -1e4, -1e5, -1e6};
 constexpr double kNoises[] = {0.2, 1.0};
 
 // X10: 100 segments of about 200 px that meet at (1504, y).

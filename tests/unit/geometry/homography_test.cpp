@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "geometry/fundamental.h"
 #include "geometry/rotation_pair.h"
 #include "pair_scene.h"
@@ -159,7 +161,11 @@ TEST(RotationPair, NothingForRaysOnOneLine) {
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY();
   EXPECT_FALSE(solve_rotation_pair(x, x, x, y));
   EXPECT_FALSE(solve_rotation_pair(x, y, y, -y));
-  EXPECT_FALSE(solve_rotation_pair(x, y, y, Eigen::Vector3d::Constant(std::nan(""))));
+  for (std::size_t none = 0; none < 4; ++none) {
+    std::array<Eigen::Vector3d, 4> rays = {x, y, y, x};
+    rays[none].setConstant(std::nan(""));
+    EXPECT_FALSE(solve_rotation_pair(rays[0], rays[1], rays[2], rays[3])) << none;
+  }
 }
 
 }  // namespace
