@@ -51,8 +51,8 @@ SimulationOptions aerial() {
 }
 
 TEST(TileTrial, HasTheBitsOfItsParts) {
-  for (const auto kind : {RobustLoss::Kind::kNone, RobustLoss::Kind::kHuber, RobustLoss::Kind::kCauchy})
-    expect_parts(aerial(), {kind, 1.5});
+  using enum RobustLoss::Kind;
+  for (const auto kind : {kNone, kHuber, kCauchy, kCauchyTail}) expect_parts(aerial(), {kind, 1.5});
 }
 
 TEST(TileTrial, KnowsCamerasThatLanesDoNot) {
