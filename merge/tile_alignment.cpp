@@ -16,7 +16,6 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kFewestObservations = 20;
 constexpr int kRounds = 3;
 constexpr double kLeast = 1e-9;  // m and rad: differences of tiles that agree to rounding
 
@@ -131,7 +130,7 @@ class Aligner {
     std::vector<SharedFrame> all;
     for (std::size_t t = 0; t < tiles_.size(); ++t)
       for (std::size_t row = 0; row < tiles_[t].frames.size(); ++row)
-        if (tiles_[t].observations[row] >= kFewestObservations)
+        if (tiles_[t].observations[row] >= kFewestAlignmentObservations)
           all.push_back({tiles_[t].frames[row], tiles_[t].observations[row], t, row});
     std::sort(all.begin(), all.end(), [](const SharedFrame& a, const SharedFrame& b) {
       if (a.frame != b.frame) return a.frame < b.frame;

@@ -19,10 +19,13 @@
 
 namespace megablock {
 
+// Frames with fewer observations say nothing of where a tile is.
+constexpr std::int64_t kFewestAlignmentObservations = 20;
+
 struct AlignmentTile {
   std::vector<FrameIndex> frames;
   std::vector<Pose> poses;                 // [frames]
-  std::vector<std::int64_t> observations;  // [frames] kept ones; frames with fewer than 20 say nothing
+  std::vector<std::int64_t> observations;  // [frames] kept ones
 };
 
 // One similarity per tile, applied as S(pose). Identity for tiles that share no frame.

@@ -11,6 +11,7 @@
 #include "geometry/rotation.h"
 #include "geometry/similarity.h"
 #include "merge/tile_alignment.h"
+#include "merge/tile_assembly.h"
 
 namespace megablock {
 
@@ -26,21 +27,16 @@ bool has_datum(const Job& job) {
   return priors || control >= 3;
 }
 
-// Brings a tile without datum onto the initial orientation of its frames; robust, as single frames may have moved.
-Similarity align(TileAdjustment& tile, const BlockState& oriented) {
-  std::vector<Eigen::Vector3d> from, to;
-  Eigen::AlignedBox3d extent;
-  for (std::size_t i = 0; i < tile.frames.size(); ++i) {
-    from.push_back(tile.poses[i].centre);
-    to.push_back(oriented.frames[tile.frames[i]].centre);
-    extent.extend(to.back());
-  }
-  constexpr double kSigmaShare = 1e-3;  // of the tile's extent: what the initial orientation is good for
-  const std::vector<double> sigma(from.size(), kSigmaShare * extent.diagonal().norm());
-  const std::optional<Similarity> similarity = fit_similarity_robust(from, to, sigma);
-  if (!similarity) return {};
-  for (Pose& pose : tile.poses) pose = (*similarity)(pose);
-  return *similarity;
+// From where each tile was adjusted to where all fit together.
+std::vector<Similarity> motions_of(const Job& job, const BlockState& oriented, const std::vector<AlignmentTile>& tiles) {
+  if (has_datum(job)) return align_tiles(tiles);
+  const std::vector<Similarity> assembled = assemble_tiles(tiles, oriented.frames);
+  std::vector<AlignmentTile> together = tiles;
+  for (std::size_t t = 0; t < tiles.size(); ++t)
+    for (Pose& pose : together[t].poses) pose = assembled[t](pose);
+  std::vector<Similarity> motions = align_tiles(together);
+  for (std::size_t t = 0; t < tiles.size(); ++t) motions[t] = motions[t] * assembled[t];
+  return motions;
 }
 
 // Means of what tiles share, weighted by observations.
@@ -169,7 +165,6 @@ bool any_free(const TileProblem& problem) {
 }  // namespace
 
 MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted) {
-  const bool datum = has_datum(job);
   MergeStart start{oriented, std::vector<Similarity>(adjusted.size()), {}};
   start.tile_of_frame.assign(oriented.frames.size(), TileIndex());
   std::vector<AlignmentTile> tiles;
@@ -178,16 +173,13 @@ MergeStart merge_start(const Job& job, const BlockState& oriented, const std::ve
   for (std::size_t t = 0; t < adjusted.size(); ++t) {
     if (adjusted[t].empty()) continue;
     TileAdjustment tile = read_adjustment(job.store.verified_path(adjusted[t]));
-    if (!datum) start.motions[t] = align(tile, oriented);
     means.add(tile);
     tiles.push_back({std::move(tile.frames), std::move(tile.poses), std::move(tile.observations)});
     numbers.emplace_back(static_cast<std::int64_t>(t));
   }
-  const std::vector<Similarity> similarities = align_tiles(tiles);
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    Similarity& motion = start.motions[static_cast<std::size_t>(numbers[i].value)];
-    motion = similarities[i] * motion;
-  }
+  const std::vector<Similarity> similarities = motions_of(job, oriented, tiles);
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    start.motions[static_cast<std::size_t>(numbers[i].value)] = similarities[i];
   take_richest(tiles, similarities, numbers, start);
   const IndexedVector<FrameIndex, Pose> before = start.state.frames;
   turn_back_stretches(job.block, oriented, start.state);
