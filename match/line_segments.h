@@ -23,7 +23,7 @@ namespace megablock {
 
 struct SegmentOptions {
   double min_length_px = 30;      // at the resolution looked at; shorter ones say nothing of a direction
-  double max_megapixels = 12;     // larger pictures are reduced (lines refer to the full image)
+  double max_megapixels = 4;      // larger pictures are reduced (lines refer to the full image)
   double straightness_px = 0.15;  // at the resolution looked at
   void check() const;             // throws InputError
 };

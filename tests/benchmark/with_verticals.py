@@ -33,6 +33,7 @@ for name, work, without in projects("lund", "berlin", "brighton_beach", "seneca"
     for turn in range(TURNS):
         for project in (without, beside) if turn % 2 == 0 else (beside, without):
             if project is beside:
+                (work / "verticals.csv.found").unlink(missing_ok=True)  # or it would not be looked at pictures again
                 finding.append(call("verticals", without, "-o", work / "verticals.csv")[0])
             job = work / f"{project.stem}{turn}"
             status[project], seconds, of_matching = figures(project, job)
