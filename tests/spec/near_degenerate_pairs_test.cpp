@@ -146,9 +146,10 @@ double compare(double relief, double focal_px, double gain, const std::string& n
               averaged, averaged_alone);
   std::printf("[ reached  ] %s: oriented %.0f and %.0f frames, largest position error %.3f and %.3f m\n", name.c_str(),
               oriented, oriented_alone, adjusted, adjusted_alone);
-  EXPECT_LT(averaged, gain * averaged_alone);
-  EXPECT_GE(oriented, oriented_alone);
-  EXPECT_LT(adjusted, 1.15 * adjusted_alone) << "rotations are free again in the adjustment";
+  expect_at_most(averaged, gain * averaged_alone, name + ": averaged rotations, deg rms");
+  expect_at_least(oriented, oriented_alone, name + ": frames oriented");
+  // Rotations are free again in the adjustment.
+  expect_at_most(adjusted, 1.15 * adjusted_alone, name + ": largest position error, m");
   return ill / pairs;
 }
 

@@ -1,5 +1,6 @@
 // Acceptance tests of the tool-box for polynomial systems (M15 to M18, M39), off-line: an oracle of its own over prime
 // fields (tests/algebra).
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -76,10 +77,10 @@ TEST(Spec, AT01UnivariateRepresentation) {
 // Solutions of random systems over GF(32003): an instance tells the number of almost all.
 TEST(Spec, AT02NumbersOfSolutions) {
   algebra::Systems<kPrime> systems(2);
-  const auto count = [&](const auto& system, int variables, std::size_t expected, const char* what) {
+  const auto count = [&](const auto& system, int variables, double expected, const char* what) {
     const algebra::Ideal<kPrime> ideal(system, variables);
-    std::printf("[ reached  ] %s: %zu solutions, degree %d\n", what, ideal.standard().size(), ideal.degree());
-    EXPECT_EQ(ideal.standard().size(), expected) << what;
+    expect_within(static_cast<double>(ideal.standard().size()), expected, 0,
+                  fmt::format("{} (degree {}), solutions", what, ideal.degree()));
   };
   count(systems.three_points_vertical(), 4, 8, "three points and the vertical");
   count(systems.three_points_vertical(true), 4, 12, "the same as printed, wrong");
@@ -105,8 +106,8 @@ TEST(Spec, M18EliminationTemplates) {
   make([&] { return systems.three_points_vertical(); }, "three points and the vertical");
   make([&] { return systems.three_points_vertical(true); }, "the same as printed, wrong");
   const auto similarity = make([&] { return systems.similarity(); }, "similarity");
-  EXPECT_LE(similarity.rows.size(), 24u);
-  EXPECT_LE(similarity.columns.size(), 28u);
+  expect_at_most(static_cast<double>(similarity.rows.size()), 24, "similarity, rows of the template");
+  expect_at_most(static_cast<double>(similarity.columns.size()), 28, "similarity, columns");
 }
 
 // The template that the thesis prints for the similarity: six multiples of each equation, 28 monomials.
@@ -121,9 +122,9 @@ TEST(Spec, M18PublishedTemplateOfTheSimilarity) {
   std::vector<std::size_t> all(published.rows.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   published.columns = products.columns(all);
-  EXPECT_EQ(published.rows.size(), 24u);
-  EXPECT_EQ(published.columns.size(), 28u);
-  EXPECT_EQ(products.independent().size(), 24u);
+  expect_within(static_cast<double>(published.rows.size()), 24, 0, "rows");
+  expect_within(static_cast<double>(published.columns.size()), 28, 0, "columns");
+  expect_within(static_cast<double>(products.independent().size()), 24, 0, "rank");
   const std::vector<algebra::Monomial> leading = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 2}};
   for (int instance = 0; instance < 5; ++instance)
     EXPECT_TRUE(algebra::eliminates(published, systems.similarity(), leading));

@@ -19,6 +19,11 @@ inline void expect_at_least(double reached, double limit, const std::string& wha
   EXPECT_GE(reached, limit) << what;
 }
 
+inline void expect_within(double reached, double expected, double off, const std::string& what) {
+  std::printf("[ reached  ] %s: %.4g, limit %.4g +- %.4g\n", what.c_str(), reached, expected, off);
+  EXPECT_NEAR(reached, expected, off) << what;
+}
+
 // The larger one, and for good what is not a number, which std::max passes over: EXPECT_LE then fails.
 inline void keep_largest(double& largest, double value) {
   if (std::isnan(value) || value > largest) largest = value;
