@@ -84,15 +84,29 @@ std::int64_t pair_count(const CoplanarityNetwork& network) {
   return rows;
 }
 
-double mean_determinant(const CoplanarityNetwork& network) {
-  double sum = 0;
-  std::int64_t rows = 0;
+// |m| |d_1| |d_2|, which the determinant is of where nothing is coplanar.
+double scale_of_determinant(const CoplanarityNetwork& network, std::size_t a, std::size_t b) {
+  const auto length = [&](std::size_t o) { return std::hypot(1.0, network.image[o].norm() / network.focal_px); };
+  return base_of(network, a, b).norm() * length(a) * length(b);
+}
+
+// Over all pairs of all points.
+struct MeanDeterminant {
+  double value = 0;     // of |F|
+  double rounding = 0;  // bound of what rounding makes of it
+};
+MeanDeterminant mean_determinant(const CoplanarityNetwork& network) {
+  // A ray is rounded in its angles (up to pi), in their sines and cosines and in two products and sums one after the
+  // other, the determinant of two in its own three: some sixteen roundings of half of this.
+  constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
+  MeanDeterminant mean;
+  const auto rows = static_cast<double>(pair_count(network));
   for (std::int64_t j = 0; j < network.point_count(); ++j)
     visit_pairs(network, j, [&](std::size_t a, std::size_t b) {
-      sum += std::abs(determinant(network, a, b).value);
-      ++rows;
+      mean.value += std::abs(determinant(network, a, b).value) / rows;
+      mean.rounding += kRoundings * scale_of_determinant(network, a, b) / rows;
     });
-  return rows > 0 ? sum / static_cast<double>(rows) : 0;
+  return mean;
 }
 
 // The equations of a step. `total`: corrections made so far, which the forcing pulls back to zero.
@@ -238,8 +252,7 @@ PointEquations point_equations(const CoplanarityNetwork& network, const FreeColu
   };
   std::int64_t row = 0;
   visit_pairs(network, point, [&](std::size_t a, std::size_t b) {
-    const auto length = [&](std::size_t o) { return std::hypot(1.0, network.image[o].norm() / network.focal_px); };
-    const double scale = 1 / (base_of(network, a, b).norm() * length(a) * length(b));
+    const double scale = 1 / scale_of_determinant(network, a, b);
     visit_derivatives(network, free, a, b, determinant(network, a, b), [&](std::int64_t column, double value) {
       if (column < free.angles)
         result.by_angles(row, place(result.angles, column)) = scale * value;
@@ -413,7 +426,7 @@ CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, con
   CoplanaritySolution solution;
   solution.diagnosis = diagnose(network);
   solution.network = network;
-  solution.mean_before = mean_determinant(network);
+  solution.mean_before = mean_determinant(network).value;
   const FreeColumns free(network);
   solution.open_directions = open_directions(solution.diagnosis, free, options);
   solution.rank_deficient = solution.open_directions > 0;
@@ -436,7 +449,9 @@ CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, con
     correct(solution.network, free, x);
     total += x;
   }
-  solution.mean_after = mean_determinant(solution.network);
+  const MeanDeterminant after = mean_determinant(solution.network);
+  solution.mean_after = after.value;
+  solution.rounding = after.rounding;
 
   constexpr double kFalseAlarm = 1e-6;
   const double chi2 = total.head(free.angles).squaredNorm() / std::pow(options.angle_sigma_rad, 2) +
@@ -462,7 +477,7 @@ std::vector<std::string> CoplanaritySolution::remarks() const {
         fmt::format("the held angles contradict the images: corrections of {:.3g} times their sigmas; "
                     "estimate the angles too",
                     std::sqrt(chi2_per_freedom)));
-  if (mean_after > mean_before)
+  if (mean_after > mean_before + rounding)
     lines.push_back(
         "the determinants have grown: the step leads away from the solution; begin nearer to it, or take more steps "
         "and more forcing");

@@ -78,6 +78,7 @@ CoplanaritySpectrum spectrum(const CoplanarityNetwork& network);
 struct CoplanaritySolution {
   CoplanarityNetwork network;              // with corrected angles and image coordinates; held ones have the same bits
   double mean_before = 0, mean_after = 0;  // of |F|
+  double rounding = 0;                     // by which rounding alone may change this mean, at most
   std::int64_t iterations = 0;             // of LSQR, all steps
   CoplanarityDiagnosis diagnosis;
   std::int64_t open_directions = 0;          // of the parameters: neither determined nor forced

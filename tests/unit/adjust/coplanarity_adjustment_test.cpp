@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "io/error.h"
 
 namespace megablock {
@@ -81,6 +83,43 @@ TEST(CoplanaritySolution, SaysThatTheDeterminantsHaveGrown) {
   EXPECT_TRUE(found.remarks().empty());
   found.mean_after = 3.1;
   EXPECT_THAT(found.remarks(), testing::ElementsAre(testing::HasSubstr("have grown")));
+  found.rounding = 0.2;
+  EXPECT_TRUE(found.remarks().empty());
+}
+
+// Exact rays: what their determinants are before and after is rounding, one as much as the other.
+TEST(CoplanaritySolution, RoundingIsNoGrowth) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int grown = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    CoplanarityNetwork network;
+    network.focal_px = kFocalPx;
+    for (int i = 0; i < 4; ++i) {
+      const double x = 30 * uniform(random), y = 30 * uniform(random), z = -60 + 10 * uniform(random);
+      network.centres.emplace_back(x, y, z);
+      const double alpha = 0.5 * uniform(random), beta = 0.5 * uniform(random), gamma = 3 * uniform(random);
+      network.angles.push_back({alpha, beta, gamma});
+    }
+    for (int i = 0; i < 12; ++i) {
+      for (std::int32_t camera = 0; camera < 4; ++camera) {
+        const auto c = static_cast<std::size_t>(camera);
+        network.camera.push_back(camera);
+        network.image.emplace_back(
+            kFocalPx * (rotation_from(network.angles[c]) * (ground_point(i) - network.centres[c])).hnormalized());
+      }
+      network.begin.push_back(std::ssize(network.camera));
+    }
+    network.images_held.assign(2 * network.image.size(), 1);
+    CoplanarityOptions options;
+    options.solver = CoplanarityOptions::Solver::kDirect;
+    const CoplanaritySolution found = adjust_by_coplanarity(network, options);
+    EXPECT_LE(found.mean_before, found.rounding);
+    EXPECT_LT(found.rounding, 1e-12) << "m, of bases of up to 85 m";
+    grown += found.mean_after > found.mean_before;
+    EXPECT_THAT(found.remarks(), testing::IsEmpty());
+  }
+  EXPECT_GT(grown, 0);
 }
 
 TEST(CoplanarityDiagnosis, CollinearIsWhatTheCamerasOfEveryPointAre) {
