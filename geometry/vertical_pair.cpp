@@ -1,5 +1,6 @@
 #include "geometry/vertical_pair.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/polynomial.h"
@@ -9,7 +10,8 @@ namespace megablock {
 
 namespace {
 
-constexpr double kSameRay = 1e-20;  // squared distance of unit vectors
+constexpr double kSameRay = 1e-20;   // squared distance of unit vectors
+constexpr double kFulfilled = 1e-6;  // sine of a ray's angle from the plane of the base and its other ray
 
 bool any_same(const std::array<Eigen::Vector3d, 3>& rays) {
   return !((rays[0] - rays[1]).squaredNorm() > kSameRay && (rays[1] - rays[2]).squaredNorm() > kSameRay &&
@@ -63,6 +65,8 @@ Solutions<RelativeOrientation, 4> solve_vertical_pair(const std::array<Eigen::Ve
     // Of the order of the sine of the angle between two epipolar planes times two parallaxes.
     if (!(length > 1e-15)) continue;
     base /= length;
+    // Where all rows are parallel, their cross products are those of their errors.
+    if (!(std::max({std::abs(base.dot(c0)), std::abs(base.dot(c1)), std::abs(base.dot(c2))}) < kFulfilled)) continue;
     int front = 0, behind = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       const ScaledDepths depths = scaled_depths(turn, base, u[i], v[i]);

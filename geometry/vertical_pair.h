@@ -15,8 +15,10 @@
 // thesis, annex C, with twelve solutions, is wrong). Its roots are sought projectively, as a turn by 180 deg is none
 // the worse than another. The base is the longest cross product of two rows, its sign the one with the points in front.
 //
-// Degenerate: the three points and the base in one plane; no base (empty where it is exactly zero; two rays then give
-// the rotation, rotation_pair.h). Where the base is perpendicular to the plane of the points two roots coincide, and
+// Degenerate: the three points and the base in one plane, to whose normal all rows are parallel at the true turn, a
+// double root: any base in the plane fits. Nothing may be found there, or orientations that fulfil the equations and
+// mean nothing; points off the plane by a thousandth of their distance give the truth again. No base (empty where it is
+// exactly zero; two rays then give the rotation, rotation_pair.h). Where the base is perpendicular to the plane of the points two roots coincide, and
 // errors grow as the root of those of the rays.
 #pragma once
 
@@ -29,7 +31,8 @@ namespace megablock {
 
 // `a`, `b`: unit rays of three points in the images' axes; `vertical_a`, `vertical_b`: the same vertical direction in
 // them, both up or both down, unit. Every solution has the three points in front of both images, to rounding where
-// their rays are parallel. Empty for points that coincide, and where something is not a number.
+// their rays are parallel, and their rays in a plane with the base within a microradian. Empty for points that
+// coincide, and where something is not a number.
 Solutions<RelativeOrientation, 4> solve_vertical_pair(const std::array<Eigen::Vector3d, 3>& a,
                                                       const std::array<Eigen::Vector3d, 3>& b,
                                                       const Eigen::Vector3d& vertical_a,

@@ -55,6 +55,42 @@ TEST(VerticalPair, PlaneSeenAlongItsNormalIsADoubleRoot) {
   }
 }
 
+// Any base in the plane fits there: nothing can be said but that what is found is an orientation that fulfils the
+// equations. A hundredth off the plane the truth is found.
+TEST(VerticalPair, PointsAndBaseInOnePlane) {
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::size_t in_plane = 0;
+  for (int trial = 0; trial < 1000; ++trial)
+    for (const double off : {0.0, 0.01}) {
+      const RelativeOrientation truth{rotation_exp<double>(0.5 * uniform(random) * random_direction(random)),
+                                      random_direction(random)};
+      const Eigen::Vector3d vertical = random_direction(random), centre_b = truth.rotation.conjugate() * -truth.base;
+      const Eigen::Vector3d ahead(0.3 * uniform(random), 0.3 * uniform(random), 6);
+      const Eigen::Vector3d normal = ahead.cross(centre_b).normalized();
+      ThreeRays a, b;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const double depth = 1 + 0.3 * uniform(random), across = 5 * uniform(random);
+        const Eigen::Vector3d point = depth * ahead + across * centre_b + 6 * off * uniform(random) * normal;
+        a[i] = point.normalized();
+        b[i] = (truth.rotation * point + truth.base).normalized();
+      }
+      const auto found = solve_vertical_pair(a, b, vertical, truth.rotation * vertical);
+      if (off == 0) in_plane += found.size();
+      for (const RelativeOrientation& o : found) {
+        EXPECT_NEAR(o.rotation.norm(), 1, 1e-12);
+        EXPECT_NEAR(o.base.norm(), 1, 1e-12);
+        EXPECT_LT((o.rotation * vertical - truth.rotation * vertical).norm(), 1e-12);
+        EXPECT_TRUE(all_in_front(o, a, b));
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_LT(std::abs(b[i].dot(essential_from(o) * a[i])), 1e-6 + 1e-12);
+      }
+      if (off > 0) {
+        EXPECT_LT(nearest_error_deg(found, truth), 1e-3);
+      }
+    }
+  EXPECT_GT(in_plane, 0u);
+}
+
 TEST(VerticalPair, NothingForBadPoints) {
   std::mt19937_64 random(3);
   const PairScene scene({}, 3, random);
