@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include "adjust/common_motion.h"
+#include "geometry/angles.h"
 #include "geometry/median.h"
 #include "known_positions_scene.h"
 #include "merge/tile_solver.h"
 #include "reached.h"
 #include "tests/unit/adjust/single_tile.h"
+#include "tests/unit/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {
@@ -109,6 +111,43 @@ TEST(KnownPositions, TKP16WholeTileAdjustmentFindsTheDrone) {
   const Runs runs = adjusted(20, [](std::uint64_t seed) { return KnownPositionsOptions::drone(100, seed); });
   expect_at_least(runs.angle_gain(), 1e4, "drone, angle error divided by");
   expect_at_most(runs.worst_angles, 2e-6, "drone, worst angle error, rad");
+}
+
+// From attitudes far off, where those measured only weigh: every frame turned by its own, and all of them about the
+// line of their positions, which their images do not see. There the mean of six measured attitudes remains.
+TEST(KnownPositions, TKP16FarStartsAreRecovered) {
+  struct Case {
+    const char* name;
+    bool collinear, about_line;
+    double turn_deg;
+  };
+  for (const Case& c : {Case{"spread, each frame turned by 20 deg", false, false, 20},
+                        Case{"collinear, each frame turned by 5 deg", true, false, 5},
+                        Case{"collinear, turned about the line by 20 deg", true, true, 20}}) {
+    Runs runs;
+    double kept = 1;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      KnownPositionsOptions options = KnownPositionsOptions::drone(100, seed);
+      options.collinear = c.collinear;
+      const KnownPositionsScene scene(options);
+      const Eigen::Vector3d line = (scene.centres[1] - scene.centres[0]).normalized();
+      std::mt19937_64 random(seed);
+      SimulatedBlock block = scene.block();
+      for (Frame& frame : block.block.frames) {
+        const Eigen::Vector3d axis = c.about_line ? line : random_direction(random);
+        frame.given_pose->rotation = rotation_update(frame.given_pose->rotation, c.turn_deg * kDegree * axis);
+      }
+      SingleTile tile(std::move(block), adjustment_of(scene));
+      const AdjustSummary summary = adjust_tile(tile.problem, tile.state, tile.options, solve_by_condensation);
+      runs.add(scene, tile, summary);
+      keep_smallest(kept, static_cast<double>(summary.observations) / tile.problem.observation_count());
+    }
+    const std::string what = std::string(c.name) + ": ";
+    const double mean_of_six = KnownPositionsOptions::drone(1, 1).angle_sigma_rad / std::sqrt(6.0);
+    expect_at_most(runs.worst_angles, c.collinear ? 4 * mean_of_six : 2e-6, what + "worst angle error, rad");
+    expect_at_least(kept, 0.95, what + "least share of the observations kept");
+    expect_at_most(std::abs(runs.mean(runs.chi2_per_freedom) - 1), 0.05, what + "chi2/dof off 1 by");
+  }
 }
 
 // Six cameras and 64 points: a common rotation is known from the attitude priors alone to satellites, not to a drone.
