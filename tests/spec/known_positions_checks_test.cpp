@@ -101,6 +101,56 @@ TEST(KnownPositions, TKP16TilesGiveTheSameAsOneProblem) {
   }
 }
 
+// Without attitude priors there is nothing for common_motion to weigh. The rotation about the line of the positions is
+// then free, and the datum says so; a common rotation of satellites is as good as their images tell, which is less than
+// the priors would (the report's adjustment without them: angles 8 times worse), and the attitudes' sigmas say so.
+TEST(KnownPositions, TKP20WithoutAttitudesDatumAndSigmasTell) {
+  for (const bool drone : {true, false})
+    for (const bool collinear : {true, false}) {
+      const std::string what =
+          std::string(drone ? "drone" : "satellite") + (collinear ? ", collinear: " : ", spread: ");
+      constexpr int kRuns = 20;
+      double squares = 0, least_sigma = 1e9;
+      int free = 0, judged = 0;
+      for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+        KnownPositionsOptions options =
+            drone ? KnownPositionsOptions::drone(100, seed) : KnownPositionsOptions::satellite(100, 0.1, seed);
+        options.collinear = collinear;
+        const KnownPositionsScene scene(options);
+        SimulatedBlock block = scene.block();
+        for (std::size_t f = 0; f < scene.centres.size(); ++f) {
+          Frame& frame = block.block.frames[FrameIndex(static_cast<std::int64_t>(f))];
+          frame.attitude_prior.reset();
+          frame.given_pose->rotation = rotation_from(scene.true_angles[f]);  // where it starts is no matter here
+        }
+        SingleTile tile(std::move(block), adjustment_of(scene));
+        const MotionReference reference =
+            motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
+        judged += !judge(common_motion(tile.problem, tile.state, reference), reference).sound();
+        triangulate_points(tile.problem, tile.state, tile.options);
+        ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
+        MergeTree one;
+        one.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
+        SerialRunner runner(one, {tile.problem}, {tile.state});
+        adjust_exactly(runner);
+        runner.final_up();
+        free += runner.gauge().defect == 1;
+        if (collinear) continue;
+        const TileState& state = runner.states()[0];
+        const Eigen::Matrix3d covariance = runner.covariances().at(0).frames[0].topLeftCorner<3, 3>();
+        const Eigen::Vector3d error =
+            rotation_log<double>(rotation_from(scene.true_angles[0]).conjugate() * state.frames[0].rotation);
+        squares += error.dot(covariance.inverse() * error) / (3 * kRuns);
+        keep_smallest(least_sigma, std::sqrt(covariance.trace() / 3));
+      }
+      expect_within(free, collinear ? kRuns : 0, 0, what + "scenes of 20 whose datum has a free direction");
+      expect_at_most(judged, 0, what + "scenes judged by attitudes that there are not");
+      if (collinear) continue;
+      expect_within(squares, 1, 0.6, what + "mean squared error of an attitude over its sigma");
+      if (!drone) expect_at_least(least_sigma, 2 * 1e-5, what + "least sigma of an attitude, rad");
+    }
+}
+
 TEST(KnownPositions, TKP14PointSubsetsAgreeAndSayWhatTheyShare) {
   for (const bool drone : {true, false}) {
     KnownPositionsOptions options =
