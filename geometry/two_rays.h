@@ -23,7 +23,7 @@ struct TwoRayPoint {
 };
 
 // Empty for rays parallel within a microradian (no base and one direction among them), for a point behind an origin,
-// and where something is not a number. Weights are not used.
+// and where something is not a finite number. Weights are not used.
 inline std::optional<TwoRayPoint> intersect_two_rays(const Ray& first, const Ray& second) {
   const Eigen::Vector3d base = second.origin - first.origin, normal = first.direction.cross(second.direction);
   const double square = normal.squaredNorm();
@@ -36,6 +36,7 @@ inline std::optional<TwoRayPoint> intersect_two_rays(const Ray& first, const Ray
   point.position =
       first.origin + 0.5 * (point.distance_first * first.direction + base + point.distance_second * second.direction);
   point.miss = std::abs(base.dot(normal)) / std::sqrt(square);
+  if (!point.position.allFinite()) return std::nullopt;
   return point;
 }
 

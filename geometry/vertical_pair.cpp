@@ -44,7 +44,7 @@ Solutions<RelativeOrientation, 4> solve_vertical_pair(const std::array<Eigen::Ve
                                                       const Eigen::Vector3d& vertical_a,
                                                       const Eigen::Vector3d& vertical_b) {
   Solutions<RelativeOrientation, 4> found;
-  if (any_same(a) || any_same(b)) return found;
+  if (any_same(a) || any_same(b) || !(vertical_a + vertical_b).allFinite()) return found;
   const Eigen::Matrix3d level_a = levelling_rotation(vertical_a), level_b = levelling_rotation(vertical_b);
   std::array<Eigen::Vector3d, 3> u, v;
   for (std::size_t i = 0; i < 3; ++i) {

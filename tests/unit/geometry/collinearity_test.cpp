@@ -41,6 +41,30 @@ TEST(Collinearity, OriginInThePlaneOfTheCentreIsRefused) {
   EXPECT_TRUE(eleven_from(image, origin_before(image, -100)));
 }
 
+TEST(Collinearity, NumbersThatAreNoneAreRefused) {
+  const double nan = std::nan("");
+  const NineParameters good = tilted_image();
+  ASSERT_TRUE(eleven_from(good, {0, 0, 0}));
+  EXPECT_FALSE(eleven_from(good, {0, nan, 0}));
+  NineParameters bad = good;
+  bad.centre.x() = nan;
+  EXPECT_FALSE(eleven_from(bad, {0, 0, 0}));
+  bad = good;
+  bad.rotation(2, 1) = nan;
+  EXPECT_FALSE(eleven_from(bad, {0, 0, 0}));
+  for (double ElevenParameters::*number : {&ElevenParameters::a4, &ElevenParameters::b4}) {
+    ElevenParameters e = eleven_from(good, {0, 0, 0}).value();
+    e.*number = nan;
+    EXPECT_FALSE(nine_from(e));
+  }
+  for (Eigen::Vector3d ElevenParameters::*row : {&ElevenParameters::a, &ElevenParameters::b, &ElevenParameters::c})
+    for (int k = 0; k < 3; ++k) {
+      ElevenParameters e = eleven_from(good, {0, 0, 0}).value();
+      (e.*row)[k] = nan;
+      EXPECT_FALSE(nine_from(e)) << k;
+    }
+}
+
 TEST(Collinearity, DisagreementOfElevenParametersShows) {
   ElevenParameters e = eleven_from(tilted_image(), {0, 0, 0}).value();
   const auto exact = nine_from(e);

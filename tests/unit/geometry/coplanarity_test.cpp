@@ -66,6 +66,7 @@ TEST(TwoRays, NothingForRaysThatDoNotMeetInFront) {
   EXPECT_TRUE(intersect_two_rays({o, z}, {x, slant}));
   EXPECT_FALSE(intersect_two_rays({o, z}, {x, z})) << "parallel";
   EXPECT_FALSE(intersect_two_rays({o, z}, {o, z})) << "no base";
+  EXPECT_FALSE(intersect_two_rays({o, z}, {o, slant})) << "no base";
   EXPECT_FALSE(intersect_two_rays({o, -z}, {x, -slant})) << "behind both";
   EXPECT_FALSE(intersect_two_rays({o, -z}, {x, slant})) << "behind one";
   EXPECT_FALSE(intersect_two_rays({o, z}, {x, Eigen::Vector3d::Constant(std::nan(""))}));

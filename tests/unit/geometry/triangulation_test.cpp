@@ -95,6 +95,7 @@ TEST(Triangulation, RefinementIsStationaryAndBetterThanTheTruth) {
 
 TEST(Triangulation, RefusesWhatHasNoIntersection) {
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ();
+  EXPECT_FALSE(intersect_rays({}));
   EXPECT_FALSE(intersect_rays(std::vector<Ray>{{Eigen::Vector3d::Zero(), x}}));
   EXPECT_FALSE(intersect_rays(std::vector<Ray>{{Eigen::Vector3d::Zero(), x}, {z, x}})) << "parallel";
   const Eigen::Vector3d apart = Eigen::Vector3d(1, 0, 0.1).normalized();
