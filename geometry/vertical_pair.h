@@ -18,8 +18,8 @@
 // Degenerate: the three points and the base in one plane, to whose normal all rows are parallel at the true turn, a
 // double root: any base in the plane fits. Nothing may be found there, or orientations that fulfil the equations and
 // mean nothing; points off the plane by a thousandth of their distance give the truth again. No base (empty where it is
-// exactly zero; two rays then give the rotation, rotation_pair.h). Where the base is perpendicular to the plane of the points two roots coincide, and
-// errors grow as the root of those of the rays.
+// exactly zero; two rays then give the rotation, rotation_pair.h). Where the base is perpendicular to the plane of the
+// points two roots coincide, and errors grow as the root of those of the rays.
 #pragma once
 
 #include <Eigen/Core>
