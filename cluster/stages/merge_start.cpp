@@ -28,7 +28,8 @@ bool has_datum(const Job& job) {
 }
 
 // From where each tile was adjusted to where all fit together.
-std::vector<Similarity> motions_of(const Job& job, const BlockState& oriented, const std::vector<AlignmentTile>& tiles) {
+std::vector<Similarity> motions_of(const Job& job, const BlockState& oriented,
+                                   const std::vector<AlignmentTile>& tiles) {
   if (has_datum(job)) return align_tiles(tiles);
   const std::vector<Similarity> assembled = assemble_tiles(tiles, oriented.frames);
   std::vector<AlignmentTile> together = tiles;
