@@ -124,7 +124,9 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   tables.release();
   Hasher fingerprint;
   fingerprint.add(hash_file(options.project)).add(generations);
-  store.write("block.h5", fingerprint.value(), [&](const std::string& path) { write_block(path, project.block); });
+  store.write("block.h5", fingerprint.value(), [&](const std::string& path) {
+    write_block(path, project.block, [&tables] { tables.release(); });
+  });
 
   Json settings = Json::array();
   for (const auto& e : project.settings.entries) settings.push_back({e.section, e.key, e.value, e.where});
@@ -195,9 +197,12 @@ void run_stages(Job& job, const std::string& tie_points) {
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   update_measurement_index(job, tracks);
   if (last == "match") return;
+  return_freed_memory();  // of the tracks
+  job.tables.release();
   if (orients_by_names(job.block)) restore_names(job);
   BlockState oriented = run_orientation(job, matches);
   release_names(job);
+  job.tables.release();
   if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
     throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
   if (last == "orient") return;

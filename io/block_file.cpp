@@ -153,24 +153,36 @@ void put_frame_priors(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& 
               "rig", "ground frame");
 }
 
-void get_frame_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {
+// Kind by kind, so that the columns of one kind are there at a time.
+void get_position_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {
   const auto count = static_cast<std::int64_t>(frames.size());
-  const auto has_position = file.vector<std::uint8_t>("frames/position_prior/present", count);
+  const auto present = file.vector<std::uint8_t>("frames/position_prior/present", count);
   const auto position = file.matrix<double>("frames/position_prior/position", 3, count);
   const auto sigma = file.matrix<double>("frames/position_prior/sigma", 3, count);
   const auto lever_arm = file.matrix<double>("frames/position_prior/lever_arm", 3, count);
-  const auto has_attitude = file.vector<std::uint8_t>("frames/attitude_prior/present", count);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (present[i])
+      frames[FrameIndex(static_cast<std::int64_t>(i))].position_prior =
+          PositionPrior{vector3(position, i), vector3(sigma, i), vector3(lever_arm, i)};
+}
+
+void get_attitude_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {
+  const auto count = static_cast<std::int64_t>(frames.size());
+  const auto present = file.vector<std::uint8_t>("frames/attitude_prior/present", count);
   const auto attitude = file.matrix<double>("frames/attitude_prior/rotation_wxyz", 4, count);
-  const auto attitude_sigma = file.matrix<double>("frames/attitude_prior/sigma", 3, count);
-  const auto has_given = file.vector<std::uint8_t>("frames/given/present", count);
+  const auto sigma = file.matrix<double>("frames/attitude_prior/sigma", 3, count);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (present[i])
+      frames[FrameIndex(static_cast<std::int64_t>(i))].attitude_prior =
+          AttitudePrior{quaternion(attitude, i), vector3(sigma, i)};
+}
+
+void get_given_poses(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {
+  const auto count = static_cast<std::int64_t>(frames.size());
+  const auto present = file.vector<std::uint8_t>("frames/given/present", count);
   const std::vector<Pose> given = read_poses(file, "frames/given", count);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    Frame& frame = frames[FrameIndex(static_cast<std::int64_t>(i))];
-    if (has_position[i])
-      frame.position_prior = PositionPrior{vector3(position, i), vector3(sigma, i), vector3(lever_arm, i)};
-    if (has_attitude[i]) frame.attitude_prior = AttitudePrior{quaternion(attitude, i), vector3(attitude_sigma, i)};
-    if (has_given[i]) frame.given_pose = given[i];
-  }
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (present[i]) frames[FrameIndex(static_cast<std::int64_t>(i))].given_pose = given[i];
 }
 
 void put_frames(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& frames) {
@@ -198,7 +210,9 @@ IndexedVector<FrameIndex, Frame> get_frames(const Hdf5Reader& file) {
     frame.pass = passes[i];
     frame.time_s = times[i];
   }
-  get_frame_priors(file, frames);
+  get_position_priors(file, frames);
+  get_attitude_priors(file, frames);
+  get_given_poses(file, frames);
   return frames;
 }
 
@@ -292,6 +306,7 @@ std::vector<RelativePose> get_relative_poses(const Hdf5Reader& file) {
   const auto rotation_sigma = file.vector<double>("relative_poses/rotation_sigma", count);
   const auto position_sigma = file.vector<double>("relative_poses/position_sigma", count);
   std::vector<RelativePose> relatives;
+  relatives.reserve(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i)
     relatives.push_back({FrameIndex(from[i]), FrameIndex(to[i]), poses[i], rotation_sigma[i], position_sigma[i]});
   return relatives;
@@ -483,8 +498,9 @@ Block get_block(const Hdf5Reader& file) {
   return block;
 }
 
-void write_block(const std::string& path, const Block& block) {
+void write_block(const std::string& path, const Block& block, std::function<void()> after_table) {
   Hdf5Writer file(path, "block");
+  if (after_table) file.after_datasets(std::move(after_table));
   put_block(file, block);
   file.close();
 }

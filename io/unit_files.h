@@ -2,6 +2,7 @@
 // Writers write a plain HDF5 file at `path` (JobStore::write seals it); readers throw StoreError naming the file.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@
 
 namespace megablock {
 
-void write_block(const std::string& path, const Block& block);
+// `after_table` is called behind every table that is written.
+void write_block(const std::string& path, const Block& block, std::function<void()> after_table = {});
 Block read_block(const std::string& path);
 Block read_block_without_names(const std::string& path);          // all but Block::image_names
 NameTable<ImageIndex> read_image_names(const std::string& path);  // these

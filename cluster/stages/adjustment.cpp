@@ -166,6 +166,7 @@ std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, cons
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
   const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles)};
+  job.tables.release();
   const std::vector<TileMark> marks = tile_marks(job, from, tracks);
   std::vector<Unit> units;
   std::vector<std::string> names;

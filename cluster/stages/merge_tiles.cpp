@@ -13,6 +13,7 @@ void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart&
                     const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
                     TileStore& own) {
   const RowsOfTiles rows = rows_of_tiles(job.block, start.state, inputs.tiles);
+  job.tables.release();
   for (std::size_t t = 0; t < rank_of_tile.size(); ++t) {
     if (rank_of_tile[t] != job.ranks.rank()) continue;
     MergeTile loaded =
