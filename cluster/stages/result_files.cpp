@@ -50,7 +50,7 @@ void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_
     return_freed_memory();
   };
   release_all();  // what the result was put together from
-  const PartTracks tracks(std::move(parts), result.sigma_scaled ? result.variance_factor : 1, release);
+  const PartTracks tracks(std::move(parts), result.sigma_scaled ? result.variance_factor : 1, release_all);
   const auto gather = [&] {
     BlockDiagnostics diagnostics = diagnose_result(result, tracks, options);
     release_all();  // links of frames
