@@ -8,8 +8,10 @@
 
 #include "cluster/gather_by_tile.h"
 #include "cluster/progress.h"
+#include "geometry/rounds.h"
+#include "geometry/workers.h"
 #include "io/error.h"
-#include "merge/tile_trial.h"
+#include "merge/unknowns.h"
 
 namespace megablock {
 
@@ -141,13 +143,15 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
   return update;
 }
 
-UpdateMatrix RankRunner::condense_leaf(std::int64_t node, const Pass& pass) {
-  const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(node)]);
-  const Stopwatch watch(seconds_.tiles);
+std::unique_ptr<TileCondenser> RankRunner::condenser_of(std::int64_t leaf, const Pass& pass) {
+  const std::size_t row = row_of_leaf(leaf);
   const RankTile& tile = tiles_.whole(row);
-  TileCondensation condensed = condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
+  return std::make_unique<TileCondenser>(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
+}
+
+UpdateMatrix RankRunner::keep(std::int64_t leaf, TileCondensation condensed) {
   if (check_seams_) condensed.update.alone = least_squares(condensed.update);
-  factors_.put(node, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
+  factors_.put(leaf, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
                FactorStore::Loss::kRecompute);
   return std::move(condensed.update);
 }
@@ -169,7 +173,12 @@ UpdateMatrix RankRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, U
 
 UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
-  if (plan.leaf >= 0) return condense_leaf(node, pass);
+  if (plan.leaf >= 0) {
+    const Stopwatch watch(seconds_.tiles);
+    const std::unique_ptr<TileCondenser> tile = condenser_of(node, pass);
+    visit_in_parallel(tile->cells(), [&](std::int64_t cell) { tile->condense(cell); });
+    return keep(node, tile->take());
+  }
   UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
   return eliminate_inner(node, std::move(left), std::move(right), pass, false);
 }
@@ -254,6 +263,43 @@ void RankRunner::record(std::int64_t node, const UpdateMatrix& update) {
   recorder_->write(std::move(record));
 }
 
+void RankRunner::hand_on(std::int64_t node, UpdateMatrix update) {
+  record(node, update);
+  pass_up(node, std::move(update));
+}
+
+UpdateMatrix RankRunner::join_children(std::int64_t n, const Pass& pass) {
+  const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+  UpdateMatrix left = child_update(node.left), right = child_update(node.right);
+  const std::int64_t at_work = waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n);
+  peak_front_bytes_ = std::max(peak_front_bytes_, at_work);
+  factors_.leave_room(at_work);
+  return eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
+}
+
+// Records, messages and fronts above the tiles come one after the other, in the order of the nodes; meanwhile other
+// threads are ahead at the next tile.
+void RankRunner::condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const TakeCondensation& take) {
+  std::vector<std::unique_ptr<TileCondenser>> tiles(leaves.size());
+  double elsewhere = 0;
+  const auto prepare = [&](std::int64_t i) {
+    tiles[at(i)] = condenser_of(leaves[at(i)], pass);
+    return tiles[at(i)]->cells();
+  };
+  const auto finish = [&](std::int64_t i) {
+    TileCondensation condensed = std::exchange(tiles[at(i)], nullptr)->take();
+    const Stopwatch watch(elsewhere);
+    take(at(i), std::move(condensed));
+  };
+  {
+    const Stopwatch watch(seconds_.tiles);
+    visit_in_rounds({std::ssize(leaves), prepare,
+                     [&](std::int64_t i, std::int64_t cell) { tiles[at(i)]->condense(cell); }, finish,
+                     [&](std::int64_t i) { return !tiles_.in_scratch(row_of_leaf(leaves[at(i)])); }});
+  }
+  seconds_.tiles -= elsewhere;
+}
+
 UpReport RankRunner::condense_all(const Pass& pass) {
   updates_.clear();
   factors_.clear();
@@ -261,27 +307,28 @@ UpReport RankRunner::condense_all(const Pass& pass) {
   left_.clear();
   const PassRecord before = recorder_ ? recorder_->begin({pass, check_seams_, with_columns_}) : PassRecord();
   const std::vector<bool> done = go_on(before);
-  for (std::int64_t n = 0; n < static_cast<std::int64_t>(plan_.nodes.size()); ++n) {
-    if (!mine(n)) continue;
-    if (done[static_cast<std::size_t>(n)]) {
-      if (std::ranges::binary_search(before.subtrees, n)) pass_up(n, recorder_->read_update(n));
-      continue;
+  std::vector<std::int64_t> leaves;
+  for (std::int64_t n = 0; n < std::ssize(plan_.nodes); ++n)
+    if (mine(n) && plan_.nodes[static_cast<std::size_t>(n)].leaf >= 0 && !done[static_cast<std::size_t>(n)])
+      leaves.push_back(n);
+  leaves.push_back(std::ssize(plan_.nodes));
+  std::int64_t next = 0;  // node
+  // What is between two tiles: nodes above tiles, and those that the record has.
+  const auto go_on_to = [&](std::int64_t leaf) {
+    for (; next < leaf; ++next) {
+      if (!mine(next)) continue;
+      if (!done[static_cast<std::size_t>(next)])
+        hand_on(next, join_children(next, pass));
+      else if (std::ranges::binary_search(before.subtrees, next))
+        pass_up(next, recorder_->read_update(next));
     }
-    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
-    UpdateMatrix update;
-    if (node.leaf >= 0) {
-      factors_.leave_room(waiting_bytes());
-      update = condense_leaf(n, pass);
-    } else {
-      UpdateMatrix left = child_update(node.left), right = child_update(node.right);
-      const std::int64_t at_work = waiting_bytes() + left.byte_count() + right.byte_count() + front_bytes(n);
-      peak_front_bytes_ = std::max(peak_front_bytes_, at_work);
-      factors_.leave_room(at_work);
-      update = eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
-    }
-    record(n, update);
-    pass_up(n, std::move(update));
-  }
+  };
+  go_on_to(leaves.front());
+  condense_tiles(std::span(leaves).first(leaves.size() - 1), pass, [&](std::size_t i, TileCondensation condensed) {
+    factors_.leave_room(waiting_bytes());
+    hand_on(next++, keep(leaves[i], std::move(condensed)));
+    go_on_to(leaves[i + 1]);
+  });
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
   const std::string at_root = mine(root) ? updates_.at(root).to_bytes() : std::string();
@@ -325,11 +372,27 @@ std::vector<TileStep> RankRunner::steps_down(const Pass& pass) {
       pass_down(n, solver_.back_substitute(factors_of(n, pass).front, passed));
       continue;
     }
-    const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
+    const std::size_t row = row_of_leaf(n);
     steps[row] = solve_tile_unknowns(tile_plans_[row], factors_of(n, pass).tile, passed);
   }
   ranks_.flush_sends();
   return steps;
+}
+
+void RankRunner::try_steps(const std::vector<BlockMotion>& motions, const Pass& pass,
+                           const std::vector<TileStep>& steps, const TakeTrial& take) {
+  const Stopwatch watch(seconds_.tiles);
+  std::vector<std::unique_ptr<TileTrialMaker>> trials(tiles_.size());
+  const auto prepare = [&](std::int64_t row) {
+    const RankTile& tile = tiles_.whole(at(row));
+    trials[at(row)] = std::make_unique<TileTrialMaker>(gauge_, motions, tile.tile, tile.problem, tile_plans_[at(row)],
+                                                       tile.state, pass, steps[at(row)]);
+    return trials[at(row)]->portions();
+  };
+  visit_in_rounds({std::ssize(trials), prepare,
+                   [&](std::int64_t row, std::int64_t portion) { trials[at(row)]->visit(portion); },
+                   [&](std::int64_t row) { take(at(row), std::exchange(trials[at(row)], nullptr)->take()); },
+                   [&](std::int64_t row) { return !tiles_.in_scratch(at(row)); }});
 }
 
 DownReport RankRunner::down(const Pass& pass) {
@@ -348,17 +411,12 @@ DownReport RankRunner::down(const Pass& pass) {
       block_motions(gauge_, gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
   std::vector<Sums> sums(tiles_.size());
   trial_gauges_.clear();
-  for (std::size_t row = 0; row < tiles_.size(); ++row) {
-    const Stopwatch tile_watch(seconds_.tiles);
-    const RankTile& tile = tiles_.whole(row);
-    const TilePlan& plan = tile_plans_[row];
-    TileStep& step = steps[row];
-    TileTrial trial = try_step(gauge_, motions, tile.tile, tile.problem, plan, tile.state, pass, step);
+  try_steps(motions, pass, steps, [&](std::size_t row, TileTrial trial) {
     sums[row] = {trial.damping_norm, trial.cost};
-    trial_gauges_.push_back(tile_gauge(tile.problem, plan, trial.state));
+    trial_gauges_.push_back(tile_gauge(tiles_.outline(row).problem, tile_plans_[row], trial.state));
     tiles_.put_trial(row, std::move(trial.state));
-    step = {};
-  }
+    steps[row] = {};
+  });
   DownReport report;
   for (const Sums& tile : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, sums)) {
     report.damping_norm += tile.damping_norm;
@@ -408,7 +466,7 @@ RankRunner::Posterior RankRunner::posterior(const VisitCovariance& visit) {
       pass_down(n, covariance);
       continue;
     }
-    const auto row = static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(n)]);
+    const std::size_t row = row_of_leaf(n);
     const RankTile& tile = tiles_.whole(row);
     const TilePlan& plan = tile_plans_[row];
     const Step& step = steps[row].unknowns;

@@ -10,7 +10,9 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,7 @@
 #include "merge/plan_store.h"
 #include "merge/seam_check.h"
 #include "merge/tile_store.h"
+#include "merge/tile_trial.h"
 
 namespace megablock {
 
@@ -88,7 +91,16 @@ class RankRunner : public TreeRunner {
   void pass_down(std::int64_t node, const Values& front);
   template <typename Values>
   Values from_parent(std::int64_t node);
-  UpdateMatrix condense_leaf(std::int64_t node, const Pass& pass);
+  std::size_t row_of_leaf(std::int64_t leaf) const {  // in tiles_, of a node that is one of this rank's tiles
+    return static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(leaf)]);
+  }
+  std::unique_ptr<TileCondenser> condenser_of(std::int64_t leaf, const Pass& pass);
+  UpdateMatrix keep(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
+  // Tiles of these nodes, ascending; `take` gets one after the other.
+  using TakeCondensation = std::function<void(std::size_t i, TileCondensation)>;
+  void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const TakeCondensation& take);
+  UpdateMatrix join_children(std::int64_t node, const Pass& pass);
+  void hand_on(std::int64_t node, UpdateMatrix update);  // records it, too
   UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
                                bool check_seam_here);
   // Bytes of a node's front at work, whether its unknowns or their covariances; of what waits for a parent or a child.
@@ -115,6 +127,10 @@ class RankRunner : public TreeRunner {
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
   // Down with the current factors: steps of this rank's tiles without those of their points.
   std::vector<TileStep> steps_down(const Pass& pass);
+  // Where they lead to, tile by tile; `take` gets one after the other.
+  using TakeTrial = std::function<void(std::size_t row, TileTrial)>;
+  void try_steps(const std::vector<BlockMotion>& motions, const Pass& pass, const std::vector<TileStep>& steps,
+                 const TakeTrial& take);
 
   Communicator& ranks_;
   TileStore& tiles_;

@@ -73,56 +73,103 @@ TileFactor TileFactor::read(ByteReader& in) {
   return factor;
 }
 
-namespace {
+class TileCondenser::Work {
+ public:
+  Work(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass, TileDatum datum)
+      : problem_(problem),
+        plan_(plan),
+        state_(state),
+        pass_(pass),
+        datum_(std::move(datum)),
+        nodes_(plan.cells.nodes),
+        tree_(nodes_),
+        tables_(problem, plan, state),
+        threads_([this] {
+          return std::unique_ptr<OfThread>(new OfThread{{problem_, state_, tables_}, {}, {}});
+        }),
+        updates_(nodes_.size()),
+        diagonals_(plan.points.size()),
+        factors_(nodes_.size()) {}
+  std::int64_t cells() const { return tree_.leaves(); }
+  void condense(std::int64_t cell) {
+    tree_.ascend(cell, [&](std::int64_t n) { eliminate(n); });
+  }
+  TileCondensation take();
 
-// What a thread works with.
-struct Workspace {
-  PointEquations equations;
-  PairBlocks pair_blocks;
-  FrontMemory memory;
+ private:
+  // What a thread works with.
+  struct OfThread {
+    PointEquations equations;
+    PairBlocks pair_blocks;
+    FrontMemory memory;
+  };
+  void eliminate(std::int64_t node);
+
+  const TileProblem& problem_;
+  const TilePlan& plan_;
+  const TileState& state_;
+  const Pass pass_;
+  const TileDatum datum_;
+  const std::vector<PlanNode>& nodes_;
+  ChildrenFirst tree_;
+  const PointTables tables_;
+  PerThread<OfThread> threads_;
+  std::vector<UpdateMatrix> updates_;           // [nodes]
+  std::vector<std::vector<double>> diagonals_;  // of J'J of each cell
+  std::vector<FrontFactor> factors_;            // [nodes]
 };
 
-}  // namespace
+void TileCondenser::Work::eliminate(std::int64_t number) {
+  const PlanNode& node = nodes_[at(number)];
+  OfThread& mine = threads_.mine();
+  Front front(node.eliminated, node.passed, 1 + datum_.columns.columns, &mine.memory);
+  if (node.leaf >= 0) {
+    std::vector<double>& diagonal = diagonals_[at(node.leaf)];
+    diagonal.assign(at(total_dimension(plan_.unknowns)), 0);
+    fill_cell(problem_, plan_, state_, pass_, node, mine.equations, mine.pair_blocks, diagonal, front);
+  }
+  for (std::int64_t child : {node.left, node.right}) {
+    if (child < 0) continue;
+    front.add(updates_[at(child)]);
+    mine.memory.give(std::move(updates_[at(child)].matrix));
+    updates_[at(child)] = UpdateMatrix();
+  }
+  add_datum(datum_, node.eliminated, front);
+  if (at(number) + 1 == nodes_.size()) add_datum(datum_, node.passed, front);
+  Front::Result eliminated = std::move(front).eliminate(pass_.lambda);
+  updates_[at(number)] = std::move(eliminated.update);
+  factors_[at(number)] = std::move(eliminated.factor);
+}
+
+TileCondensation TileCondenser::Work::take() {
+  tree_.rethrow();
+  TileCondensation result;
+  result.factor.nodes = std::move(factors_);
+  result.factor.diagonal.assign(at(total_dimension(plan_.unknowns)), 0);
+  for (const std::vector<double>& diagonal : diagonals_)
+    for (std::size_t k = 0; k < diagonal.size(); ++k) result.factor.diagonal[k] += diagonal[k];
+  result.update = std::move(updates_.back());
+  result.update.matrix.shrink_to_fit();  // waits for its sibling
+  return result;
+}
+
+TileCondenser::TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                             TileDatum datum)
+    : work_(std::make_unique<Work>(problem, plan, state, pass, std::move(datum))) {}
+
+TileCondenser::~TileCondenser() = default;
+
+std::int64_t TileCondenser::cells() const { return work_->cells(); }
+
+void TileCondenser::condense(std::int64_t cell) { work_->condense(cell); }
+
+TileCondensation TileCondenser::take() { return work_->take(); }
 
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                                const Pass& pass, const TileDatum& datum) {
-  const std::int64_t right_hand_sides = 1 + datum.columns.columns;
-  const std::vector<PlanNode>& nodes = plan.cells.nodes;
-  const PointTables tables(problem, plan, state);
-  PerThread<Workspace> workspaces([&] {
-    return std::unique_ptr<Workspace>(new Workspace{{problem, state, tables}, {}, {}});
-  });
-  std::vector<UpdateMatrix> updates(nodes.size());
-  std::vector<std::vector<double>> diagonals(plan.points.size());  // of J'J of each cell
-  TileCondensation result;
-  result.factor.nodes.resize(nodes.size());
-  visit_children_first(nodes, [&](std::int64_t i) {
-    const PlanNode& node = nodes[at(i)];
-    Workspace& mine = workspaces.mine();
-    Front front(node.eliminated, node.passed, right_hand_sides, &mine.memory);
-    if (node.leaf >= 0) {
-      std::vector<double>& diagonal = diagonals[at(node.leaf)];
-      diagonal.assign(at(total_dimension(plan.unknowns)), 0);
-      fill_cell(problem, plan, state, pass, node, mine.equations, mine.pair_blocks, diagonal, front);
-    }
-    for (std::int64_t child : {node.left, node.right}) {
-      if (child < 0) continue;
-      front.add(updates[at(child)]);
-      mine.memory.give(std::move(updates[at(child)].matrix));
-      updates[at(child)] = UpdateMatrix();
-    }
-    add_datum(datum, node.eliminated, front);
-    if (at(i) + 1 == nodes.size()) add_datum(datum, node.passed, front);
-    Front::Result eliminated = std::move(front).eliminate(pass.lambda);
-    updates[at(i)] = std::move(eliminated.update);
-    result.factor.nodes[at(i)] = std::move(eliminated.factor);
-  });
-  result.factor.diagonal.assign(at(total_dimension(plan.unknowns)), 0);
-  for (const std::vector<double>& diagonal : diagonals)
-    for (std::size_t k = 0; k < diagonal.size(); ++k) result.factor.diagonal[k] += diagonal[k];
-  result.update = std::move(updates.back());
-  result.update.matrix.shrink_to_fit();  // waits for its sibling
-  return result;
+  TileCondenser tile(problem, plan, state, pass, datum);
+  visit_in_parallel(tile.cells(), [&](std::int64_t cell) { tile.condense(cell); });
+  return tile.take();
 }
 
 TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, const Step& boundary) {

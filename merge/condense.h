@@ -11,6 +11,8 @@
 // (tile_linearisation.h); D = diagonal of J'J.
 #pragma once
 
+#include <memory>
+
 #include "adjust/tile_problem.h"
 #include "io/observation_statistics.h"
 #include "merge/front.h"
@@ -86,6 +88,23 @@ struct Pass {
 // Throws ComputeError when a kept observation is behind its camera.
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                                const Pass& pass, const TileDatum& datum = {});
+
+// The same in parts, by threads that may be at work on other tiles, too (geometry/rounds.h).
+class TileCondenser {
+ public:
+  // Problem, plan and state outlive it.
+  TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                TileDatum datum = {});
+  ~TileCondenser();
+  std::int64_t cells() const;
+  // A cell, and the fronts above it that it completes; every cell once.
+  void condense(std::int64_t cell);
+  TileCondensation take();  // once all are done
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
 
 // Step of everything in the tile.
 struct TileStep {

@@ -4,6 +4,8 @@
 // points are kept, and threads meet once.
 #pragma once
 
+#include <memory>
+
 #include "merge/block_motion.h"
 #include "merge/point_refinement.h"
 
@@ -18,5 +20,22 @@ struct TileTrial {
 TileTrial try_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                    const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                    const TileStep& step, double settled = kPointSettled);
+
+// The same in parts, by threads that may be at work on other tiles, too (geometry/rounds.h).
+class TileTrialMaker {
+ public:
+  // All but the pass outlive it.
+  TileTrialMaker(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
+                 const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                 const TileStep& step, double settled = kPointSettled);
+  ~TileTrialMaker();
+  std::int64_t portions() const;
+  void visit(std::int64_t portion);  // every one once
+  TileTrial take();                  // once all are done
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
 
 }  // namespace megablock
