@@ -1,21 +1,23 @@
-// Tiles without a common datum, as independent models (M51, M52): each was adjusted in a frame of its own, and all come
-// into one.
+// Tiles without a common datum, as independent models (M51, M52), brought into one frame.
 //
-// Tiles share frames. They are joined by the similarities between these (adjust/model_assembly.h), and each part that
-// hangs together is brought onto the initial orientation as a whole: so it bends as little as its tiles do, where each
-// tile on its own would follow the bends of the initial orientation.
+// Each was adjusted with the datum of its start values alone, and neighbours differ in place, attitude and scale by
+// what these are good for. What they share are frames: the similarities between these join them
+// (adjust/model_assembly.h). Each part that hangs together is then brought back to where its tiles were, in the mean:
+// its attitude by the turns that the assembly made,
+//
+//     R = mean R_t',     weighted by the frames of tile t,
+//
+// as centres on a line would leave it open, and its size and place by the centres.
 #pragma once
 
 #include <vector>
 
-#include "io/index.h"
 #include "merge/tile_alignment.h"
 
 namespace megablock {
 
-// One similarity per tile, applied as S(pose). A tile that nothing joins, or that does not fit its neighbours, is
-// brought onto the initial orientation on its own; identity where even that is impossible.
-std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles,
-                                       const IndexedVector<FrameIndex, Pose>& oriented);
+// One similarity per tile, applied as S(pose). Identity for a tile that nothing joins, or that does not fit its
+// neighbours, and for all where the assembly fails.
+std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles);
 
 }  // namespace megablock

@@ -27,16 +27,17 @@ bool has_datum(const Job& job) {
   return priors || control >= 3;
 }
 
-// From where each tile was adjusted to where all fit together.
-std::vector<Similarity> motions_of(const Job& job, const BlockState& oriented,
-                                   const std::vector<AlignmentTile>& tiles) {
-  if (has_datum(job)) return align_tiles(tiles);
-  const std::vector<Similarity> assembled = assemble_tiles(tiles, oriented.frames);
-  std::vector<AlignmentTile> together = tiles;
-  for (std::size_t t = 0; t < tiles.size(); ++t)
-    for (Pose& pose : together[t].poses) pose = assembled[t](pose);
-  std::vector<Similarity> motions = align_tiles(together);
-  for (std::size_t t = 0; t < tiles.size(); ++t) motions[t] = motions[t] * assembled[t];
+// From where each tile was adjusted to where all fit together; moves the tiles there.
+std::vector<Similarity> bring_together(const Job& job, std::vector<AlignmentTile>& tiles) {
+  std::vector<Similarity> motions(tiles.size());
+  const auto move = [&](const std::vector<Similarity>& further) {
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+      for (Pose& pose : tiles[t].poses) pose = further[t](pose);
+      motions[t] = further[t] * motions[t];
+    }
+  };
+  if (!has_datum(job)) move(assemble_tiles(tiles));
+  move(align_tiles(tiles));
   return motions;
 }
 
@@ -101,8 +102,7 @@ class SharedMeans {
 constexpr std::int64_t kFewestObservations = 6;
 
 // Poses from the tile that holds most of a frame's observations.
-void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Similarity>& similarities,
-                  const std::vector<TileIndex>& numbers, MergeStart& start) {
+void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<TileIndex>& numbers, MergeStart& start) {
   BlockState& state = start.state;
   IndexedVector<FrameIndex, std::int64_t> richest(state.frames.size(), 0), total(state.frames.size(), 0);
   for (std::size_t t = 0; t < tiles.size(); ++t) {
@@ -111,7 +111,7 @@ void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Sim
       total[frame] += tiles[t].observations[i];
       if (tiles[t].observations[i] <= richest[frame]) continue;
       richest[frame] = tiles[t].observations[i];
-      state.frames[frame] = similarities[t](tiles[t].poses[i]);
+      state.frames[frame] = tiles[t].poses[i];
       start.tile_of_frame[frame] = numbers[t];
     }
   }
@@ -178,10 +178,9 @@ MergeStart merge_start(const Job& job, const BlockState& oriented, const std::ve
     tiles.push_back({std::move(tile.frames), std::move(tile.poses), std::move(tile.observations)});
     numbers.emplace_back(static_cast<std::int64_t>(t));
   }
-  const std::vector<Similarity> similarities = motions_of(job, oriented, tiles);
-  for (std::size_t i = 0; i < tiles.size(); ++i)
-    start.motions[static_cast<std::size_t>(numbers[i].value)] = similarities[i];
-  take_richest(tiles, similarities, numbers, start);
+  const std::vector<Similarity> motions = bring_together(job, tiles);
+  for (std::size_t i = 0; i < tiles.size(); ++i) start.motions[static_cast<std::size_t>(numbers[i].value)] = motions[i];
+  take_richest(tiles, numbers, start);
   const IndexedVector<FrameIndex, Pose> before = start.state.frames;
   turn_back_stretches(job.block, oriented, start.state);
   for (FrameIndex f(0); before.contains(f); ++f.value)

@@ -21,11 +21,11 @@ struct MergeTile {
   TileState state;
 };
 
-// The tiles' adjustments put together: without a common datum (no position priors, few control points) they
-// are assembled first (merge/tile_assembly.h); then all are aligned jointly (merge/tile_alignment.h), a frame takes its
-// pose from the tile that holds most of its observations (ties: lower tile), stretches that contradict their relative
-// poses are turned back (adjust/turned_stretches.h), intrinsics and free mounts are means over the tiles weighted by
-// observations. Frames that no adjusted tile holds lose their orientation.
+// The tiles' adjustments put together: without a common datum (no position priors, fewer than three control points)
+// they are assembled first (merge/tile_assembly.h); then all are aligned jointly (merge/tile_alignment.h), a frame
+// takes its pose from the tile that holds most of its observations (ties: lower tile), stretches that contradict their
+// relative poses are turned back (adjust/turned_stretches.h), intrinsics and free mounts are means over the tiles
+// weighted by observations. Frames that no adjusted tile holds lose their orientation.
 struct MergeStart {
   BlockState state;
   std::vector<Similarity> motions;                     // [tiles] that aligned them; empty: of a checkpoint

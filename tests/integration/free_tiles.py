@@ -1,13 +1,14 @@
 #!/usr/bin/python3
-"""A free street whose given poses bend, in many small tiles that have no common datum: merged in few steps, and as exact
-as one tile. usage: free_tiles.py MEGABLOCK"""
+"""A free street whose given poses bend, in many small tiles that have no common datum: merged in few steps, and as
+exact as one tile. usage: free_tiles.py MEGABLOCK"""
 import json
 import pathlib
 import tempfile
 
 from program import megablock, status
 
-MOST_STEPS = 12  # with each tile put onto the given poses by itself it took 46, and 102 to a wrong place with attitudes
+# With each tile put onto the given poses by itself it took 46, and 102 with attitudes, to a wrong place.
+MOST_STEPS = 12
 
 
 def run(project, job, truth):
