@@ -3,7 +3,7 @@
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
 //                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--ranks 1|2] [--exactness|--speed]
 //
-// Scenes: tests/benchmark/scenes.h. A job of the block on two ranks, merged to a decrement of 1e-7, gives the tiles,
+// Scenes: tests/benchmark/scenes.h. A job of the block on as many ranks, merged to a decrement of 1e-7, gives the tiles,
 // the observations it kept and its solution. How exact this is (cluster/monolithic_comparison.h):
 // max_pose_difference_sigmas, the largest component of the undamped Newton step of one Ceres problem with automatic
 // derivatives at the solution over its posterior sigma; relative_cost_difference, how far Ceres lowers the cost from
@@ -12,9 +12,8 @@
 // How fast: from the same job's observations, points and sigmas, with every component of every pose moved off it by a
 // normal deviate of its sigma, run, each in processes of their own and with the arithmetic that the processor is best
 // at, Ceres on two threads, with SPARSE_SCHUR by automatic and by analytic derivatives and with ITERATIVE_SCHUR
-// (Schur-Jacobi, three steps) by analytic ones, and before each of them three times the merge on two ranks, or on
-// one with two threads (below 1 500 frames). Of Ceres' runs the one with the fastest iterations counts, of ours the
-// middle one.
+// (Schur-Jacobi, three steps) by analytic ones, and before each of them three times the merge on one rank with two
+// threads, or on two. Of Ceres' runs the one with the fastest iterations counts, of ours the middle one.
 //
 // Prints one JSON object as its last line: the two figures above; of the second runs' ends
 // relative_cost_difference_of_runs ((ours - Ceres') / Ceres', of the best SPARSE_SCHUR) and
@@ -94,7 +93,7 @@ struct Options {
   std::string role;  // of a process that this program starts: "exactness", "ours" or the name of Ceres' linear solver
   bool analytic = false;
   bool exactness = true, speed = true;  // what is asked for
-  int ranks = 0;                        // of ours, with a thread each; 1: one with two threads; 0: by the block's size
+  int ranks = 1;                        // of ours: one with two threads, or two with a thread each
   int tile_frames = 120;                // so that ranks have several; 0: as the program chooses
   std::string loss = "huber";
   Options() { scene.frames = 2000; }
@@ -449,8 +448,7 @@ int main(int argc, char** argv) {
   CLI::App app("The merge against Ceres on one simulated block; prints one JSON object");
   add_scene_options(app, options.scene);
   app.add_option("--tile-frames", options.tile_frames, "Frames per tile at most; 0: as the program chooses");
-  app.add_option("--ranks", options.ranks,
-                 "Ranks of ours, with a thread each; 1: one with two threads, as below 1500 frames by default")
+  app.add_option("--ranks", options.ranks, "Ranks of ours: one with two threads, or two with a thread each [1]")
       ->check(CLI::Range(1, 2));
   app.add_option("--calibration", options.scene.calibration, "Calibration held, or shared by all frames and adjusted")
       ->check(CLI::IsMember({"held", "shared"}));
@@ -463,8 +461,6 @@ int main(int argc, char** argv) {
   app.add_flag("--analytic", options.analytic)->group("");
   app.add_option(kArithmeticOption)->group("");  // pin_arithmetic() reads it
   CLI11_PARSE(app, argc, argv);
-  // Ranks are the faster where each has a dozen tiles; with a few they wait for one another, and each is a process.
-  if (options.ranks == 0) options.ranks = options.scene.frames < 1500 ? 1 : 2;
   try {
     const Start start{options.scene.folder, options.ranks};
     if (options.role == "ours") {
