@@ -9,7 +9,6 @@
 #include "cluster/gather_by_tile.h"
 #include "cluster/progress.h"
 #include "geometry/rounds.h"
-#include "geometry/workers.h"
 #include "io/error.h"
 #include "merge/unknowns.h"
 
@@ -143,12 +142,6 @@ UpdateMatrix RankRunner::child_update(std::int64_t child) {
   return update;
 }
 
-std::unique_ptr<TileCondenser> RankRunner::condenser_of(std::int64_t leaf, const Pass& pass) {
-  const std::size_t row = row_of_leaf(leaf);
-  const RankTile& tile = tiles_.whole(row);
-  return std::make_unique<TileCondenser>(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
-}
-
 UpdateMatrix RankRunner::keep(std::int64_t leaf, TileCondensation condensed) {
   if (check_seams_) condensed.update.alone = least_squares(condensed.update);
   factors_.put(leaf, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
@@ -175,9 +168,9 @@ UpdateMatrix RankRunner::condense_again(std::int64_t node, const Pass& pass) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   if (plan.leaf >= 0) {
     const Stopwatch watch(seconds_.tiles);
-    const std::unique_ptr<TileCondenser> tile = condenser_of(node, pass);
-    visit_in_parallel(tile->cells(), [&](std::int64_t cell) { tile->condense(cell); });
-    return keep(node, tile->take());
+    const std::size_t row = row_of_leaf(node);
+    const RankTile& tile = tiles_.whole(row);
+    return keep(node, condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row)));
   }
   UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
   return eliminate_inner(node, std::move(left), std::move(right), pass, false);
@@ -283,7 +276,9 @@ void RankRunner::condense_tiles(std::span<const std::int64_t> leaves, const Pass
   std::vector<std::unique_ptr<TileCondenser>> tiles(leaves.size());
   double elsewhere = 0;
   const auto prepare = [&](std::int64_t i) {
-    tiles[at(i)] = condenser_of(leaves[at(i)], pass);
+    const std::size_t row = row_of_leaf(leaves[at(i)]);
+    const RankTile& tile = tiles_.whole(row);
+    tiles[at(i)] = std::make_unique<TileCondenser>(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
     return tiles[at(i)]->cells();
   };
   const auto finish = [&](std::int64_t i) {

@@ -94,7 +94,6 @@ class RankRunner : public TreeRunner {
   std::size_t row_of_leaf(std::int64_t leaf) const {  // in tiles_, of a node that is one of this rank's tiles
     return static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(leaf)]);
   }
-  std::unique_ptr<TileCondenser> condenser_of(std::int64_t leaf, const Pass& pass);
   UpdateMatrix keep(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
   // Tiles of these nodes, ascending; `take` gets one after the other.
   using TakeCondensation = std::function<void(std::size_t i, TileCondensation)>;

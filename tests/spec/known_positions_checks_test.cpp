@@ -101,6 +101,19 @@ TEST(KnownPositions, TKP16TilesGiveTheSameAsOneProblem) {
   }
 }
 
+// A tile as the only one of its block, from the points' first intersection to the pass that covariances follow from;
+// null where it cannot be solved.
+std::unique_ptr<SerialRunner> adjusted_alone(SingleTile& tile) {
+  triangulate_points(tile.problem, tile.state, tile.options);
+  if (!solve_by_condensation(tile.problem, tile.state, {}).usable) return nullptr;
+  auto runner =
+      std::make_unique<SerialRunner>(single_tile(tile.simulated.block).tree, std::vector<TileProblem>{tile.problem},
+                                     std::vector<TileState>{tile.state});
+  adjust_exactly(*runner);
+  runner->final_up();
+  return runner;
+}
+
 // Without attitude priors there is nothing for common_motion to weigh. The rotation about the line of the positions is
 // then free, and the datum says so; a common rotation of satellites is as good as their images tell, which is less than
 // the priors would (the report's adjustment without them: angles 8 times worse), and the attitudes' sigmas say so.
@@ -127,17 +140,12 @@ TEST(KnownPositions, TKP20WithoutAttitudesDatumAndSigmasTell) {
         const MotionReference reference =
             motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
         judged += !judge(common_motion(tile.problem, tile.state, reference), reference).sound();
-        triangulate_points(tile.problem, tile.state, tile.options);
-        ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
-        MergeTree one;
-        one.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
-        SerialRunner runner(one, {tile.problem}, {tile.state});
-        adjust_exactly(runner);
-        runner.final_up();
-        free += runner.gauge().defect == 1;
+        const std::unique_ptr<SerialRunner> runner = adjusted_alone(tile);
+        ASSERT_TRUE(runner);
+        free += runner->gauge().defect == 1;
         if (collinear) continue;
-        const TileState& state = runner.states()[0];
-        const Eigen::Matrix3d covariance = runner.covariances().at(0).frames[0].topLeftCorner<3, 3>();
+        const TileState& state = runner->states()[0];
+        const Eigen::Matrix3d covariance = runner->covariances().at(0).frames[0].topLeftCorner<3, 3>();
         const Eigen::Vector3d error =
             rotation_log<double>(rotation_from(scene.true_angles[0]).conjugate() * state.frames[0].rotation);
         squares += error.dot(covariance.inverse() * error) / (3 * kRuns);
@@ -253,15 +261,10 @@ TEST(KnownPositions, TKP15TilesAgreeAboutTheCamerasTheyShare) {
       if (p % 2 != t)
         std::fill(tile.problem.kept.begin() + tile.problem.begin[p],
                   tile.problem.kept.begin() + tile.problem.begin[p + 1], 0);
-    triangulate_points(tile.problem, tile.state, tile.options);
-    ASSERT_TRUE(solve_by_condensation(tile.problem, tile.state, {}).usable);
-    MergeTree one;
-    one.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
-    SerialRunner runner(one, {tile.problem}, {tile.state});
-    adjust_exactly(runner);
-    runner.final_up();
-    covariances[t] = runner.covariances().at(0);
-    states[t] = runner.states()[0];
+    const std::unique_ptr<SerialRunner> runner = adjusted_alone(tile);
+    ASSERT_TRUE(runner);
+    covariances[t] = runner->covariances().at(0);
+    states[t] = runner->states()[0];
   }
   double worst = 0;
   for (const std::size_t camera : {4u, 5u}) {
