@@ -57,6 +57,7 @@ class ObservationLanes {
   // Empties it and makes room.
   void reserve(std::int64_t lanes);
   void clear() { size_ = 0; }
+  void clear_from(std::int64_t lane) { size_ = lane; }
   // The view outlives the lanes.
   void add(const LaneView& view, const Eigen::Vector3d& point, double x, double y, double inverse_sigma) {
     views_[static_cast<std::size_t>(size_)] = view.values.data();

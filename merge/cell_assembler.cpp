@@ -49,11 +49,11 @@ CellAssembler::CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pai
 void CellAssembler::add_points(PointEquations& equations) {
   equations.reduce(frames_);
   const std::vector<PointEquations::Point>& points = equations.points();
-  const std::int64_t lanes = points.back().last;
-  lane_frames_.resize(at(lanes));
-  for (std::int64_t lane = 0; lane < lanes; ++lane)
-    lane_frames_[at(lane)] = numbers_[at(equations.unknowns_of(lane).frame)];
-  equations.kernels().subtract_pairs(std::ssize(points), equations.begin(), equations.y(0), lane_frames_.data(),
+  const std::int64_t sights = equations.sight_count();
+  sight_frames_.resize(at(sights));
+  for (std::int64_t sight = 0; sight < sights; ++sight)
+    sight_frames_[at(sight)] = numbers_[at(equations.frame_of(sight))];
+  equations.kernels().subtract_pairs(std::ssize(points), equations.begin(), equations.y(0), sight_frames_.data(),
                                      pair_blocks_.pairs());
   for (std::size_t i = 0; i < points.size(); ++i)
     if (points[i].shared_end > points[i].shared_begin) add_shared(equations, i);
@@ -102,7 +102,7 @@ void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
     if (u.mount >= 0) subtract_outer(kernels, {u.mount, 6, width, shared.by_point + u.camera_width}, frame);
   }
   equations.blocks(i, blocks_);
-  for (std::size_t b = at(point.observation_count()); b < blocks_.size(); ++b) {
+  for (std::size_t b = at(point.sight_count()); b < blocks_.size(); ++b) {
     const PointEquations::Block& block = blocks_[b];
     for (std::size_t a = 0; a <= b; ++a)
       subtract_outer(kernels, {block.unknown, block.dimension, block.dimension, block.y},

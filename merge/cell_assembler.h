@@ -1,11 +1,10 @@
 // Fills the front of a cell with its points, which are eliminated on the way, and its other observations.
 //
 // Per point (point_equations.h) K_ij -= Y_i Y_j' of shared unknowns goes to the front at once, that of two frames to a
-// block apart (pair_blocks.h). Added to the front once per
-// cell are these blocks and what only concerns one frame or the shared unknowns of one camera in one mount, J'J and
-// -J'r: of a frame
-// G'(V_k - T T')G and G'(b_k - T z) of its observations k, T = V_k C^-T. By its blocks, with R = V_k - T T', the first
-// is [u]x R [u]x', -[u]x R and R. Further the diagonal of J'J (point_kernels::FrameValue).
+// block apart (pair_blocks.h). Added to the front once per cell are these blocks and what only concerns one frame or
+// the shared unknowns of one camera in one mount, J'J and -J'r: of a frame G'(V_f - T T')G and G'(b_f - T z) of its
+// sights, T = V_f C^-T. By its blocks, with R = V_f - T T', the first is [u]x R [u]x', -[u]x R and R. Further the
+// diagonal of J'J (point_kernels::FrameValue).
 #pragma once
 
 #include <vector>
@@ -58,7 +57,7 @@ class CellAssembler {
   std::vector<std::int64_t> frame_rows_;       // of the cell's frames in the front, ascending
   std::vector<std::int64_t> numbers_;          // [plan.unknowns] of frames among them
   PairBlocks& pair_blocks_;                    // by these numbers
-  std::vector<std::int64_t> lane_frames_;      // [lanes] of the points at hand, by these numbers
+  std::vector<std::int64_t> sight_frames_;     // [sights] of the points at hand, by these numbers
 };
 
 }  // namespace megablock

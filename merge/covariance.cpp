@@ -85,7 +85,6 @@ class CellCovariances {
 
   void add_image_redundancy(const PointEquations::Point& point, const Eigen::Matrix3d& covariance) {
     ObservationStatistics& sums = (*observations_)[image_kind(problem_.points[at(point.point)].role)];
-    std::int64_t row = problem_.begin[at(point.point)];  // the equations hold the kept ones in their order
     for (std::int64_t lane = point.first; lane < point.last; ++lane) {
       const Eigen::Matrix<double, 2, 3> by_point = equations_.by_point(lane);
       const Eigen::Vector2d residual = equations_.residual(lane);
@@ -104,9 +103,9 @@ class CellCovariances {
         }
       }
       for (int k = 0; k < 2; ++k) sums.add(residual[k] * residual[k], 1 - variance[k]);
-      while (!problem_.kept[at(row)]) ++row;
-      result_.redundancy_x[at(row)] = static_cast<float>(1 - variance[0]);
-      result_.redundancy_y[at(row++)] = static_cast<float>(1 - variance[1]);
+      const std::size_t row = at(equations_.row_of(lane));
+      result_.redundancy_x[row] = static_cast<float>(1 - variance[0]);
+      result_.redundancy_y[row] = static_cast<float>(1 - variance[1]);
     }
   }
 

@@ -11,7 +11,7 @@
 
 namespace megablock {
 
-// Of pairs (i, j), i >= j, of numbered frames: [6 x 6] column by column, point_kernels::kPairStride apart. All zero
+// Of pairs (i, j), i > j, of numbered frames: [6 x 6] column by column, point_kernels::kPairStride apart. All zero
 // when nothing has been added since the last call of take().
 class PairBlocks {
  public:
@@ -26,7 +26,7 @@ class PairBlocks {
   template <typename Add>
   void take(std::int64_t frames, Add add) {
     for (std::int64_t i = 0, number = 0; i < frames; ++i) {
-      for (std::int64_t j = 0; j <= i; ++j, ++number) {
+      for (std::int64_t j = 0; j < i; ++j, ++number) {
         if (!used_[static_cast<std::size_t>(number)]) continue;
         double* block = values_.data() + number * point_kernels::kPairSize;
         add(i, j, block);

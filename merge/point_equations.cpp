@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "merge/unknowns.h"
 
@@ -56,7 +57,6 @@ const point_kernels::Kernels& point_kernels_of_processor() {
 
 using lane_kernels::kResidual;
 using point_kernels::kB;
-using point_kernels::kObservationValueCount;
 using point_kernels::kPointB;
 using point_kernels::kPointInverse;
 using point_kernels::kPointOwnStep;
@@ -67,7 +67,10 @@ using point_kernels::kV;
 using point_kernels::kYSize;
 
 PointTables::PointTables(const TileProblem& problem, const TilePlan& plan, const TileState& state)
-    : images(problem, state), unknowns(image_unknowns(problem, plan, images.lanes)), prior(prior_rows(problem)) {}
+    : images(problem, state), unknowns(image_unknowns(problem, plan, images.lanes)), prior(prior_rows(problem)) {
+  frames.reserve(unknowns.size());
+  for (const ImageUnknowns& u : unknowns) frames.push_back(static_cast<std::int32_t>(u.frame));
+}
 
 PointEquations::PointEquations(const TileProblem& problem, const TileState& state, const PointTables& tables)
     : problem_(problem),
@@ -77,6 +80,7 @@ PointEquations::PointEquations(const TileProblem& problem, const TileState& stat
       views_(tables.images.views),
       lane_views_(tables.images.lanes),
       unknowns_(tables.unknowns),
+      frames_(tables.frames),
       prior_(tables.prior) {
   int widest = 0;
   for (const ImageUnknowns& u : unknowns_) widest = std::max(widest, u.shared_width);
@@ -88,16 +92,17 @@ PointEquations::PointEquations(const TileProblem& problem, const TileState& stat
   room = lanes_.capacity();
   rows_.resize(at(room));
   lane_unknowns_.resize(at(room));
-  begin_.resize(at(room + 1));
-  step_of_lane_.resize(at(room));
   shared_rows_.resize(at(room));
+  squares_.resize(at(room));
+  sight_of_lane_.resize(at(room));
+  sight_frames_.resize(at(room));
+  step_of_sight_.resize(at(room));
   frame_sums_.resize(at(room));
   motions_.resize(at(room));
-  squares_.resize(at(room));
-  values_.resize(room * kObservationValueCount);
-  point_values_.resize(room * kPointValueCount);
+  begin_.resize(at(room + 1));
   y_.resize(room * kYSize);
   moved_.resize(room * 3);
+  point_values_.resize(room * kPointValueCount);
   for (AlignedValues* records : {&records_, &sums_, &steps_}) records->resize(room * kRecordSize);
   store_.resize(at(room * 11 * widest));  // J_s, W_sk, W_s and Y
 }
@@ -116,7 +121,8 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
   }
   lanes_.linearise();
   for (Point& point : points_) weigh(point, pass.curvature);
-  kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(), records_.data());
+  kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), records_.data());
+  if (sights_ < lanes_.size()) kernels_->merge(lanes_.size(), sight_of_lane_.data(), records_.data());
   sum_up();
   kernels_->factorise(padded_points(), pass.lambda, kPivotTolerance * (1 + pass.lambda), sums_.data(),
                       {point_values_.data(), lanes_.capacity()}, steps_.data());
@@ -126,6 +132,7 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
 void PointEquations::clear() {
   points_.clear();
   lanes_.clear();
+  sights_ = 0;
   shared_.clear();
   taken_ = 0;
 }
@@ -152,17 +159,50 @@ void PointEquations::add_observations(std::int64_t point) {
   Point& added = points_.emplace_back();
   added.point = point;
   added.first = lanes_.size();
-  const Eigen::Vector3d& position = state_.points[at(point)];
-  for (std::int64_t row = problem_.begin[at(point)]; row < problem_.begin[at(point + 1)]; ++row) {
-    if (!problem_.kept[at(row)]) continue;
-    const std::int64_t image = problem_.image[at(row)].value;
-    rows_[at(lanes_.size())] = row;
-    lane_unknowns_[at(lanes_.size())] = &unknowns_[at(image)];
-    step_of_lane_[at(lanes_.size())] = steps_.data() + (std::ssize(points_) - 1) * kRecordSize;
-    lanes_.add(lane_views_[at(image)], position, problem_.x[at(row)], problem_.y[at(row)],
-               problem_.inverse_sigma[at(row)]);
+  added.first_sight = sights_;
+  const std::int64_t begin = problem_.begin[at(point)], end = problem_.begin[at(point + 1)];
+  std::int64_t* rows = rows_.data() + added.first;
+  const std::uint8_t* kept = problem_.kept.data();
+  std::int64_t count = 0;
+  for (std::int64_t row = begin; row < end; ++row) {
+    rows[count] = row;
+    count += kept[row];
+  }
+  if (!add_lanes(added.first, count, state_.points[at(point)])) {
+    // Once more, as the images of one frame do not follow each other.
+    std::stable_sort(rows, rows + count, [&](std::int64_t a, std::int64_t b) {
+      return frames_[at(problem_.image[at(a)].value)] < frames_[at(problem_.image[at(b)].value)];
+    });
+    lanes_.clear_from(added.first);
+    sights_ = added.first_sight;
+    add_lanes(added.first, count, state_.points[at(point)]);
   }
   added.last = lanes_.size();
+  added.last_sight = sights_;
+}
+
+// Of the last point, whose rows stand in rows_. Observations of one frame that follow each other are a sight; there is
+// no branch for it, as it cannot be foreseen. Returns whether no frame comes before one with a lower number.
+bool PointEquations::add_lanes(std::int64_t first, std::int64_t count, const Eigen::Vector3d& point) {
+  const double* step = steps_.data() + (std::ssize(points_) - 1) * kRecordSize;
+  std::int64_t sight = sights_ - 1;
+  std::int32_t last = -1;
+  bool ascending = true;
+  for (std::int64_t lane = first; lane < first + count; ++lane) {
+    const std::int64_t row = rows_[at(lane)], image = problem_.image[at(row)].value;
+    const std::int32_t frame = frames_[at(image)];
+    sight += frame != last;
+    ascending &= frame >= last;
+    last = frame;
+    lane_unknowns_[at(lane)] = &unknowns_[at(image)];
+    sight_of_lane_[at(lane)] = sight;
+    sight_frames_[at(sight)] = frame;
+    step_of_sight_[at(sight)] = step;
+    lanes_.add(lane_views_[at(image)], point, problem_.x[at(row)], problem_.y[at(row)],
+               problem_.inverse_sigma[at(row)]);
+  }
+  sights_ = sight + 1;
+  return ascending;
 }
 
 void PointEquations::weigh(Point& point, bool curvature) {
@@ -274,8 +314,8 @@ void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const do
 
 // V and b.
 void PointEquations::sum_up() {
-  for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first;
-  begin_[points_.size()] = lanes_.size();
+  for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first_sight;
+  begin_[points_.size()] = sights_;
   kernels_->sum(std::ssize(points_), begin_.data(), records_.data(), sums_.data());
   std::fill(sums_.data() + std::ssize(points_) * kRecordSize, sums_.data() + padded_points() * kRecordSize, 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i)
@@ -300,12 +340,11 @@ void PointEquations::add_prior(std::size_t i) {
 
 void PointEquations::reduce(std::vector<FrameSum>& sums) {
   FrameSum unused;
-  std::fill(step_of_lane_.begin() + lanes_.size(), step_of_lane_.begin() + lanes_.padded_size(), steps_.data());
-  for (std::int64_t lane = 0; lane < lanes_.padded_size(); ++lane)
-    frame_sums_[at(lane)] =
-        lane < lanes_.size() ? sums[at(unknowns_of(lane).frame)].values.data() : unused.values.data();
-  kernels_->reduce(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(),
-                   step_of_lane_.data(), y_.data(), frame_sums_.data());
+  const std::int64_t padded = lane_kernels::padded(sights_);
+  std::fill(step_of_sight_.begin() + sights_, step_of_sight_.begin() + padded, steps_.data());
+  for (std::int64_t sight = 0; sight < padded; ++sight)
+    frame_sums_[at(sight)] = sight < sights_ ? sums[at(frame_of(sight))].values.data() : unused.values.data();
+  kernels_->reduce(records_.data(), padded, step_of_sight_.data(), y_.data(), frame_sums_.data());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& point = points_[i];
     for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k) {
@@ -317,15 +356,15 @@ void PointEquations::reduce(std::vector<FrameSum>& sums) {
 }
 
 void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out) {
-  for (std::int64_t lane = 0; lane < lanes_.padded_size(); ++lane)
-    motions_[at(lane)] = motions.of_frame(unknowns_of(std::min(lane, lanes_.size() - 1)).frame);
-  kernels_->move(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), observation_columns(), motions_.data(),
-                 moved_.data(), lanes_.capacity());
+  const std::int64_t padded = lane_kernels::padded(sights_);
+  for (std::int64_t sight = 0; sight < padded; ++sight)
+    motions_[at(sight)] = motions.of_frame(frame_of(std::min(sight, sights_ - 1)));
+  kernels_->move(records_.data(), padded, motions_.data(), moved_.data(), lanes_.capacity());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& point = points_[i];
     std::array<double, 3> rest{};
-    for (std::int64_t lane = point.first; lane < point.last; ++lane)  // -G x_f = u x w + t
-      for (int k = 0; k < 3; ++k) rest[at(k)] += moved_.data()[k * lanes_.capacity() + lane];
+    for (std::int64_t sight = point.first_sight; sight < point.last_sight; ++sight)  // -G x_f = u x w + t
+      for (int k = 0; k < 3; ++k) rest[at(k)] += moved_.data()[k * lanes_.capacity() + sight];
     for (std::int64_t s = point.shared_begin; s < point.shared_end; ++s) {
       const SharedPart& part = shared_[at(s)];
       const double* x = motions.of(part.unknown);
@@ -381,8 +420,8 @@ Eigen::Vector3d PointEquations::diagonal(std::size_t i) const {
 void PointEquations::blocks(std::size_t i, std::vector<Block>& list) const {
   const Point& point = points_[i];
   list.clear();
-  for (std::int64_t lane = point.first; lane < point.last; ++lane)
-    list.push_back({unknowns_of(lane).frame, 6, y(lane)});
+  for (std::int64_t sight = point.first_sight; sight < point.last_sight; ++sight)
+    list.push_back({frame_of(sight), 6, y(sight)});
   for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k)
     list.push_back({shared_[at(k)].unknown, shared_[at(k)].dimension, shared_[at(k)].y});
 }

@@ -13,9 +13,9 @@
 //
 // A prior of the point joins V and b.
 //
-// Points are worked on many at once, by kernels over their observations and over the points (point_kernels.h). There
-// every observation stands for itself: of V_f and T the sums above are sums over its k, and two observations of a point
-// in one frame are a pair like any other.
+// Points are worked on many at once, by kernels over their observations, their sights and the points
+// (point_kernels.h). A sight is what a frame observes of a point, in one image or in several of its cameras: V_f, b_f
+// and u, which no mount changes.
 #pragma once
 
 #include <span>
@@ -64,6 +64,7 @@ class UnknownMotions {
 struct PointTables {
   SeenImages images;
   std::vector<ImageUnknowns> unknowns;  // [images]
+  std::vector<std::int32_t> frames;     // [images] of these, what is asked most
   std::vector<std::int64_t> prior;      // [points] (prior_rows)
   PointTables(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 };
@@ -71,16 +72,18 @@ struct PointTables {
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
-  // One of the points at hand, with its observations: lanes first to last, without the latter.
+  // One of the points at hand, with its observations, lanes first to last, and sights, without the latter.
   struct Point {
     std::int64_t point = -1;
     std::int64_t first = 0, last = 0;
+    std::int64_t first_sight = 0, last_sight = 0;
     std::int64_t shared_begin = 0, shared_end = 0;
     double rho = 0, weighted_squares = 0;
     std::int64_t residual_count = 0;
     std::int64_t observation_count() const { return last - first; }
+    std::int64_t sight_count() const { return last_sight - first_sight; }
   };
-  // An unknown that sees the point, once for each of its observations if it is a frame.
+  // An unknown that sees the point.
   struct Block {
     std::int64_t unknown = -1;
     int dimension = 0;
@@ -114,9 +117,12 @@ class PointEquations {
   Eigen::Vector2d residual(std::int64_t lane) const { return lanes_.residual(lane); }      // weighted, as the Jacobians
   Eigen::Vector3d from_frame(std::int64_t lane) const { return lanes_.from_frame(lane); }  // u
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const { return lanes_.by_point(lane); }  // J_p
+  std::int64_t row_of(std::int64_t lane) const { return rows_[at(lane)]; }                         // in the problem
   const SharedRows& shared(std::int64_t lane) const { return shared_rows_[at(lane)]; }
-  const double* y(std::int64_t lane) const { return y_.data() + lane * point_kernels::kYSize; }
-  const std::int64_t* begin() const { return begin_.data(); }  // [points() + 1] lanes
+  const double* y(std::int64_t sight) const { return y_.data() + sight * point_kernels::kYSize; }
+  const std::int64_t* begin() const { return begin_.data(); }  // [points() + 1] sights
+  std::int64_t sight_count() const { return sights_; }
+  std::int64_t frame_of(std::int64_t sight) const { return sight_frames_[at(sight)]; }  // position in plan.unknowns
   const point_kernels::Kernels& kernels() const { return *kernels_; }
 
   // Of point number i of points().
@@ -127,7 +133,7 @@ class PointEquations {
   }
   Eigen::Vector3d diagonal(std::size_t i) const;  // of V with the prior
   int held(std::size_t i) const { return static_cast<int>(point_value(point_kernels::kPointHeld, i)); }
-  // After reduce(): the frames, one of each lane, then the shared unknowns.
+  // After reduce(): the frames, one of each sight, then the shared unknowns.
   void blocks(std::size_t i, std::vector<Block>& list) const;
   // The point's prior in TileProblem::point_priors (-1).
   std::int64_t prior_row(std::int64_t point) const { return prior_[at(point)]; }
@@ -146,6 +152,7 @@ class PointEquations {
   void fetch_ahead(std::int64_t point) const;
   double* take(int count);
   void add_observations(std::int64_t point);
+  bool add_lanes(std::int64_t first, std::int64_t count, const Eigen::Vector3d& point);
   void weigh(Point& point, bool curvature);
   void weigh_each(Point& point, bool curvature);
   void weigh_lane(Point& point, std::int64_t lane, bool curvature);
@@ -162,7 +169,6 @@ class PointEquations {
   double point_value(int v, std::size_t i) const {
     return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];
   }
-  point_kernels::Columns observation_columns() { return {values_.data(), lanes_.capacity()}; }
 
   const TileProblem& problem_;
   const TileState& state_;
@@ -172,6 +178,7 @@ class PointEquations {
   const std::vector<ImageView>& views_;
   const std::vector<LaneView>& lane_views_;
   const std::vector<ImageUnknowns>& unknowns_;
+  const std::vector<std::int32_t>& frames_;
   const std::vector<std::int64_t>& prior_;
   // Of the points at hand.
   std::vector<Point> points_;
@@ -179,13 +186,18 @@ class PointEquations {
   std::vector<std::int64_t> rows_;                   // [lanes] of the problem
   std::vector<const ImageUnknowns*> lane_unknowns_;  // [lanes]
   std::vector<SharedRows> shared_rows_;              // [lanes]
-  AlignedValues values_, point_values_, y_, moved_;  // by ObservationValue, PointValue; [lanes x kYSize]; [3 x lanes]
-  AlignedValues records_, sums_, steps_;             // [lanes x kRecordSize]; [points x kRecordSize] each
-  std::vector<std::int64_t> begin_;                  // [points + 1] lanes
-  std::vector<const double*> step_of_lane_;          // [lanes] in steps_
-  std::vector<double*> frame_sums_;                  // [lanes]
-  std::vector<const double*> motions_;               // [lanes]
   std::vector<double> squares_;                      // [lanes]
+  std::vector<std::int64_t> sight_of_lane_;          // [lanes]
+  std::int64_t sights_ = 0;
+  std::vector<std::int32_t> sight_frames_;    // [sights] positions in plan.unknowns
+  std::vector<const double*> step_of_sight_;  // [sights] in steps_
+  std::vector<double*> frame_sums_;           // [sights]
+  std::vector<const double*> motions_;        // [sights]
+  AlignedValues records_;                     // [lanes, then sights x kRecordSize]
+  AlignedValues y_, moved_;                   // [sights x kYSize]; [3 x sights]
+  std::vector<std::int64_t> begin_;           // [points + 1] sights
+  AlignedValues point_values_;                // by PointValue
+  AlignedValues sums_, steps_;                // [points x kRecordSize] each
   std::vector<SharedPart> shared_;
   std::vector<double> store_;  // what the pointers of shared_ and shared_rows_ point to
   std::size_t taken_ = 0;

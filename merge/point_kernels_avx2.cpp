@@ -2,4 +2,4 @@
 #include "merge/point_kernels_body.h"
 
 const megablock::point_kernels::Kernels megablock::point_kernels::kAvx2{
-    normal, sum, factorise, reduce, move, solve, subtract_product, subtract_pairs};
+    normal, merge, sum, factorise, reduce, move, solve, subtract_product, subtract_pairs};

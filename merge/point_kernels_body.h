@@ -48,21 +48,41 @@ template <int kCount, typename Record, typename Write>
       [](double* to, const Lanes& row) __attribute__((always_inline)) { store(to, row); });
 }
 
-void normal(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& out,
-            double* records) {
+void normal(const double* linearised, std::int64_t linearised_stride, std::int64_t count, double* records) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    Lanes r[2], j[6], values[kRecordSize]{};
+    Lanes r[2], u[3], j[6], values[kRecordSize]{};
     read_rows(linearised + kResidual * linearised_stride + i, linearised_stride, r);
+    read_rows(linearised + kFromFrame * linearised_stride + i, linearised_stride, u);
     read_rows(linearised + kByPoint * linearised_stride + i, linearised_stride, j);
 #pragma GCC unroll 64
     for (int a = 0; a < 3; ++a) {
 #pragma GCC unroll 64
       for (int b = 0; b <= a; ++b) values[kV + lower(a, b)] = j[a] * j[b] + j[3 + a] * j[3 + b];
       values[kB + a] = -(j[a] * r[0] + j[3 + a] * r[1]);
+      values[kU + a] = u[a];
     }
-#pragma GCC unroll 64
-    for (int v = 0; v < kObservationValueCount; ++v) store(out.values + v * out.stride + i, values[v]);
     write_records(values, records + i * kRecordSize);
+  }
+}
+
+// Without branches: which observations share a sight cannot be foreseen.
+void merge(std::int64_t count, const std::int64_t* sight, double* records) {
+  constexpr int kLast = kB + 2;  // of what is summed
+  constexpr int kVectors = kRecordSize / kWidth;
+  Lanes sums[kVectors]{};
+  LaneMask summed[kVectors];
+#pragma GCC unroll 64
+  for (int k = 0; k < kRecordSize; ++k) summed[k / kWidth][k % kWidth] = k <= kLast ? -1 : 0;
+  std::int64_t before = -1;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const LaneMask goes_on = LaneMask{} - (sight[i] == before);
+    before = sight[i];
+#pragma GCC unroll 64
+    for (int k = 0; k < kVectors; ++k) {
+      const LaneMask kept = reinterpret_cast<LaneMask>(sums[k]) & goes_on & summed[k];
+      sums[k] = load(records + i * kRecordSize + k * kWidth) + reinterpret_cast<Lanes>(kept);
+      store(records + sight[i] * kRecordSize + k * kWidth, sums[k]);
+    }
   }
 }
 
@@ -126,13 +146,25 @@ void factorise(std::int64_t count, double lambda, double floor, const double* su
   out[2] = u[0] * m1 - u[1] * m0;
 }
 
-void reduce(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
-            const double* const* steps, double* y, double* const* frames) {
+// V, b and u of one group of sights.
+struct Sights {
+  Lanes values[kRecordSize];
+  const Lanes *v = values + kV, *b = values + kB;
+  Lanes u[3];
+  [[gnu::always_inline]] explicit Sights(const double* records) {
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return records + lane * kRecordSize; }, values);
+#pragma GCC unroll 64
+    for (int k = 0; k < 3; ++k) u[k] = values[kU + k];
+  }
+};
+
+void reduce(const double* records, std::int64_t count, const double* const* steps, double* y, double* const* frames) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    Lanes u[3], v[6], b[3], of_point[kRecordSize];
-    read_rows(linearised + kFromFrame * linearised_stride + i, linearised_stride, u);
-    read_rows(values.values + kV * values.stride + i, values.stride, v);
-    read_rows(values.values + kB * values.stride + i, values.stride, b);
+    const Sights sights(records + i * kRecordSize);
+    const Lanes *v = sights.v, *b = sights.b;
+    const Lanes(&u)[3] = sights.u;
+    Lanes of_point[kRecordSize];
     read_records(
         [&](int lane) __attribute__((always_inline)) { return steps[i + lane]; }, of_point);
     const Lanes *inverse = of_point, *step = of_point + 6;
@@ -193,7 +225,7 @@ void reduce(const double* linearised, std::int64_t linearised_stride, std::int64
           u[m] * u[m] * v[lower(n, n)] - 2 * u[m] * u[n] * v[lower(m, n)] + u[n] * u[n] * v[lower(m, m)];
       sums[kDiagonal + 3 + k] = v[lower(k, k)];
     }
-    Lanes left[3], turned[3];  // b_k - T z
+    Lanes left[3], turned[3];  // b_f - T z
 #pragma GCC unroll 64
     for (int r = 0; r < 3; ++r)
       left[r] = b[r] - (v[lower(r, 0)] * step[0] + v[lower(r, 1)] * step[1] + v[lower(r, 2)] * step[2]);
@@ -209,15 +241,15 @@ void reduce(const double* linearised, std::int64_t linearised_stride, std::int64
   }
 }
 
-void move(const double* linearised, std::int64_t linearised_stride, std::int64_t count, const Columns& values,
-          const double* const* motions, double* out, std::int64_t out_stride) {
+void move(const double* records, std::int64_t count, const double* const* motions, double* out,
+          std::int64_t out_stride) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    Lanes u[3], v[6], motion[8], turned[3];
-    read_rows(linearised + kFromFrame * linearised_stride + i, linearised_stride, u);
-    read_rows(values.values + kV * values.stride + i, values.stride, v);
+    const Sights sights(records + i * kRecordSize);
+    const Lanes* v = sights.v;
+    Lanes motion[8], turned[3];
     read_records(
         [&](int lane) __attribute__((always_inline)) { return motions[i + lane]; }, motion);
-    cross(u, motion[0], motion[1], motion[2], turned);
+    cross(sights.u, motion[0], motion[1], motion[2], turned);
 #pragma GCC unroll 64
     for (int k = 0; k < 3; ++k) turned[k] += motion[3 + k];
 #pragma GCC unroll 64
@@ -340,9 +372,8 @@ void subtract_pairs(std::int64_t points, const std::int64_t* begin, const double
   for (std::int64_t p = 0; p < points; ++p) {
     for (std::int64_t i = begin[p] + 1; i < begin[p + 1]; ++i) {
       for (std::int64_t j = begin[p]; j < i; ++j) {
-        const bool below = frames[i] >= frames[j];
+        const bool below = frames[i] > frames[j];
         subtract(below ? i : j, below ? j : i);
-        if (frames[i] == frames[j]) subtract(j, i);
       }
     }
   }

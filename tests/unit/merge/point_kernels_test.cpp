@@ -18,26 +18,26 @@ using namespace point_kernels;
 
 constexpr std::int64_t kCount = 16, kStride = 24;
 constexpr double kLambda = 0.01, kFloor = 1e-12;
-// Of four observations as if they were one point's: two of them in one frame.
-constexpr std::array<std::int64_t, 4> kFramesOfPairs{1, 0, 2, 1};
+// Of four sights as if they were one point's.
+constexpr std::array<std::int64_t, 4> kFramesOfPairs{1, 0, 3, 2};
+constexpr std::size_t kPairs = pair_number(4, 0);
 
 const Kernels* kernels_of_width(int width) {
   if (lane_kernels_of_width(width) == nullptr) return nullptr;  // not on this processor
   return width == 8 ? &kAvx512 : width == 4 ? &kAvx2 : &kPortable;
 }
 
-// Sixteen observations of eight points, two of each: what the kernels make of them.
+// Sixteen observations of eight points, two sights of each: what the kernels make of them.
 struct Worked {
   std::vector<double> linearised = random(lane_kernels::kValueCount * kStride, 1);
-  std::vector<double> values = std::vector<double>(kObservationValueCount * kStride, 0.0);
   std::vector<double> points = std::vector<double>(kPointValueCount * kStride, 0.0);
   alignas(64) std::array<double, kCount * kRecordSize> records{}, point_sums{}, steps{};
   alignas(64) std::array<double, kCount * kYSize> y{};
   alignas(64) std::array<std::array<double, kFrameSize>, 2> frames{};  // of the even observations, of the odd ones
   alignas(64) std::array<std::array<double, 8>, 2> motions{};
   std::vector<double> moved = std::vector<double>(3 * kStride, 0.0);
-  alignas(64) std::array<double, 6 * kPairSize> pairs = first_pairs();
-  std::array<std::uint8_t, 6> used{};
+  alignas(64) std::array<double, kPairs* kPairSize> pairs = first_pairs();
+  std::array<std::uint8_t, kPairs> used{};
 
   static std::vector<double> random(std::int64_t count, unsigned seed) {
     std::mt19937_64 generator(seed);
@@ -46,14 +46,13 @@ struct Worked {
     for (double& value : list) value = normal(generator);
     return list;
   }
-  // Of three frames.
-  static std::array<double, 6 * kPairSize> first_pairs() {
-    std::array<double, 6 * kPairSize> pairs;
+  static std::array<double, kPairs * kPairSize> first_pairs() {
+    std::array<double, kPairs * kPairSize> pairs;
     std::ranges::copy(random(std::ssize(pairs), 3), pairs.begin());
     return pairs;
   }
-  // Element (row, column) of the matrix of the three frames, lower triangle by blocks.
-  static double element(const std::array<double, 6 * kPairSize>& pairs, std::int64_t row, std::int64_t column) {
+  // Element (row, column) of the matrix of the frames, below the blocks on its diagonal.
+  static double element(const std::array<double, kPairs * kPairSize>& pairs, std::int64_t row, std::int64_t column) {
     return pairs[static_cast<std::size_t>(pair_number(row / 6, column / 6) * kPairSize + column % 6 * kPairStride +
                                           row % 6)];
   }
@@ -62,8 +61,8 @@ struct Worked {
   }
 
   explicit Worked(const Kernels& kernels) {
-    const Columns columns{values.data(), kStride}, of_points{points.data(), kStride};
-    kernels.normal(linearised.data(), kStride, kCount, columns, records.data());
+    const Columns of_points{points.data(), kStride};
+    kernels.normal(linearised.data(), kStride, kCount, records.data());
     std::array<std::int64_t, kCount / 2 + 1> begin;
     for (std::size_t p = 0; p < begin.size(); ++p) begin[p] = 2 * static_cast<std::int64_t>(p);
     kernels.sum(kCount / 2, begin.data(), records.data(), point_sums.data());
@@ -79,8 +78,8 @@ struct Worked {
       sums[lane] = frames[lane % 2].data();
       of_lane[lane] = motions[lane % 2].data();
     }
-    kernels.reduce(linearised.data(), kStride, kCount, columns, step_of_lane.data(), y.data(), sums.data());
-    kernels.move(linearised.data(), kStride, kCount, columns, of_lane.data(), moved.data(), kStride);
+    kernels.reduce(records.data(), kCount, step_of_lane.data(), y.data(), sums.data());
+    kernels.move(records.data(), kCount, of_lane.data(), moved.data(), kStride);
     constexpr std::array<std::int64_t, 2> kOnePoint{0, 4};
     kernels.subtract_pairs(1, kOnePoint.data(), y.data(), kFramesOfPairs.data(), {pairs.data(), used.data()});
   }
@@ -175,29 +174,57 @@ TEST_P(PointKernels, EqualPlainMatrices) {
       EXPECT_NEAR(w.frames[f][static_cast<std::size_t>(kRightHandSide + k)], rhs[f][k], 1e-8);
     }
   }
-  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(18, 18);
-  for (std::size_t a = 0; a < 4; ++a)
-    for (std::size_t b = 0; b < 4; ++b)
-      if (a != b)
-        expected.block<6, 6>(6 * kFramesOfPairs[a], 6 * kFramesOfPairs[b]) -= factors[a] * factors[b].transpose();
-  for (std::int64_t column = 0; column < 18; ++column)
-    for (std::int64_t row = column; row < 18; ++row)
-      EXPECT_NEAR(Worked::element(w.pairs, row, column) - Worked::element(Worked::first_pairs(), row, column),
-                  expected(row, column), 1e-9)
-          << row << " " << column;
-  EXPECT_EQ(w.used, (std::array<std::uint8_t, 6>{0, 1, 1, 1, 1, 0}));
+  for (std::size_t a = 0; a < kFramesOfPairs.size(); ++a) {
+    for (std::size_t b = 0; b < kFramesOfPairs.size(); ++b) {
+      const std::int64_t row = 6 * kFramesOfPairs[a], column = 6 * kFramesOfPairs[b];
+      if (row <= column) continue;
+      const Eigen::Matrix<double, 6, 6> expected = -factors[a] * factors[b].transpose();
+      for (std::int64_t i = 0; i < 36; ++i)
+        EXPECT_NEAR(Worked::element(w.pairs, row + i % 6, column + i / 6) -
+                        Worked::element(Worked::first_pairs(), row + i % 6, column + i / 6),
+                    expected(i % 6, i / 6), 1e-9)
+            << row << " " << column << " " << i;
+    }
+  }
+  EXPECT_EQ(std::ranges::count(w.used, 1), std::ssize(w.used));
+}
+
+// What two cameras of one frame see of a point is one sight.
+TEST_P(PointKernels, MergeWhatAFrameSees) {
+  constexpr std::array<std::int64_t, 6> kSights{0, 0, 0, 1, 2, 2};
+  const auto merged = [&](const Kernels& kernels) {
+    const std::vector<double> linearised = Worked::random(lane_kernels::kValueCount * kStride, 1);
+    alignas(64) std::array<double, kCount * kRecordSize> records{};
+    kernels.normal(linearised.data(), kStride, 8, records.data());
+    const auto single = records;
+    kernels.merge(std::ssize(kSights), kSights.data(), records.data());
+    return std::pair(single, records);
+  };
+  const auto [single, records] = merged(*kernels_of_width(GetParam()));
+  for (std::size_t sight = 0; sight < 3; ++sight) {
+    for (std::size_t v = 0; v < 12; ++v) {
+      double expected = 0;
+      for (std::size_t k = 0; k < kSights.size(); ++k)
+        if (kSights[k] == static_cast<std::int64_t>(sight))
+          expected = single[k * kRecordSize + v] + (v < kU ? expected : 0);  // one's u is all others', too
+      EXPECT_NEAR(records[sight * kRecordSize + v], expected, 1e-15 * (1 + std::abs(expected))) << sight << " " << v;
+    }
+  }
+  EXPECT_EQ(records, merged(kPortable).second);
 }
 
 TEST_P(PointKernels, HaveTheBitsOfThePortableOnes) {
   const Worked narrow(kPortable), wide(*kernels_of_width(GetParam()));
-  EXPECT_EQ(narrow.values, wide.values);
+  EXPECT_EQ(narrow.records, wide.records);
   EXPECT_EQ(narrow.points, wide.points);
   EXPECT_EQ(narrow.y, wide.y);
   EXPECT_EQ(narrow.frames, wide.frames);
   EXPECT_EQ(narrow.moved, wide.moved);
-  for (std::int64_t column = 0; column < 18; ++column)
-    for (std::int64_t row = column; row < 18; ++row)
-      EXPECT_EQ(Worked::element(narrow.pairs, row, column), Worked::element(wide.pairs, row, column));
+  for (std::size_t block = 0; block < kPairs; ++block)  // unused rows differ
+    for (std::size_t i = 0; i < 36; ++i) {
+      const std::size_t place = block * kPairSize + i / 6 * kPairStride + i % 6;
+      EXPECT_EQ(narrow.pairs[place], wide.pairs[place]);
+    }
 }
 
 TEST_P(PointKernels, SolveForThePoints) {

@@ -1,7 +1,9 @@
 // One step of the block-wise compensation equals one solution of the full damped normal equations.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "merge/monolithic.h"
 #include "tests/unit/adjust/known_lines.h"
@@ -18,6 +20,7 @@ struct StepCase {
   bool free_mounts = false;
   bool lines = false;
   bool verticals = false;
+  bool camera_by_camera = false;  // the order of a track's observations
 };
 
 SimulationOptions aerial_steps() {
@@ -64,12 +67,33 @@ std::vector<StepCase> scenes() {
   list.push_back({"StreetVerticals", street_steps(), cauchy, true, false, true});
   SimulationOptions calibrated = street_steps();
   calibrated.calibrate = true;
+  list.push_back({"StreetCameraByCamera", calibrated, cauchy, true, false, false, true});
   list.push_back({"StreetVerticalsCalibrated", calibrated, {}, false, false, true});
   return list;
 }
 
+// What a frame sees of a point then does not follow each other.
+void sort_camera_by_camera(SimulatedBlock& block) {
+  TrackSet& tracks = block.tracks;
+  const TrackSet before = tracks;
+  for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
+    const auto first = static_cast<std::size_t>(tracks.begin[static_cast<std::size_t>(t)]),
+               last = static_cast<std::size_t>(tracks.begin[static_cast<std::size_t>(t) + 1]);
+    std::vector<std::size_t> order(last - first);
+    std::iota(order.begin(), order.end(), first);
+    std::ranges::stable_sort(order, {}, [&](std::size_t o) { return block.block.images[before.image[o]].mount; });
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      tracks.image[first + i] = before.image[order[i]];
+      tracks.x[first + i] = before.x[order[i]];
+      tracks.y[first + i] = before.y[order[i]];
+      tracks.feature[first + i] = before.feature[order[i]];
+    }
+  }
+}
+
 SimulatedBlock simulated(const StepCase& scene) {
   SimulatedBlock block = simulate_block(scene.simulation);
+  if (scene.camera_by_camera) sort_camera_by_camera(block);
   if (scene.lines) add_known_lines(block, 20, 1);
   if (scene.verticals)
     add_seen_verticals(block, {.noise_deg = 0.1, .wrong_share = 0.05, .by_radial = 0.02, .every = 2});
