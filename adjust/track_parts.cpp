@@ -117,6 +117,8 @@ std::vector<std::int64_t> rows_of_split(const TrackSet& tracks, const TrackParts
 TrackSet split_tracks(const TrackSet& tracks, const TrackParts& parts) {
   const std::vector<std::int64_t> rows = rows_of_split(tracks, parts);
   TrackSet split;
+  split.image.reserve(rows.size());
+  for (std::vector<std::int32_t>* column : {&split.x, &split.y, &split.feature}) column->reserve(rows.size());
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
     int part = -1;
     for (std::int64_t i = tracks.begin[t]; i < tracks.begin[t + 1]; ++i) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -60,23 +61,31 @@ TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, 
   return start;
 }
 
-// An adjusted tile, its tracks split; the merge intersects the parts that are put back.
-TileStart with_parts(const TileStart& adjusted, const TrackParts& parts, TileStart split) {
+// An adjusted tile, its tracks split; the merge intersects the parts that are put back. What the tile was made of goes
+// before it is made again: two of them are twice the memory of the stage.
+TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::function<TileStart(TrackSet)>& start) {
   const std::vector<std::int64_t> rows = rows_of_split(adjusted.tracks, parts);
-  split.problem.kept = adjusted.problem.kept;  // control points' rows are behind the tracks'
+  TrackSet tracks = split_tracks(adjusted.tracks, parts);
+  const std::vector<std::uint8_t> kept = std::move(adjusted.problem.kept);
+  const double image_sigma_px = adjusted.problem.image_sigma_px;
+  TileState state = std::move(adjusted.state);
+  adjusted = {};
+
+  TileStart split = start(std::move(tracks));
+  split.problem.kept = kept;  // control points' rows are behind the tracks'
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto row = static_cast<std::size_t>(rows[i]);
-    split.problem.kept[i] = parts[row] > 0 || adjusted.problem.kept[row];
+    split.problem.kept[i] = parts[row] > 0 || kept[row];
   }
-  set_image_sigma(split.problem, adjusted.problem.image_sigma_px);
-  const std::vector<Eigen::Vector3d> unknown = std::exchange(split.state.points, {});
-  split.state = adjusted.state;
-  split.state.points.clear();
+  set_image_sigma(split.problem, image_sigma_px);
+  const std::vector<Eigen::Vector3d> unknown = std::exchange(split.state.points, {}),
+                                     whole_points = std::exchange(state.points, {});
+  split.state = std::move(state);
   const std::vector<TilePoint>& points = split.problem.points;
   for (std::size_t p = 0, whole = 0; p < points.size(); ++p) {
     const bool further = p > 0 && points[p].role == PointRole::kTie && points[p - 1].role == PointRole::kTie &&
                          points[p].index == points[p - 1].index;
-    split.state.points.push_back(further ? unknown[p] : adjusted.state.points[whole++]);
+    split.state.points.push_back(further ? unknown[p] : whole_points[whole++]);
   }
   return split;
 }
@@ -90,7 +99,7 @@ TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex t
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
                                       screening_threshold(adjusted.problem, adjusted.state, options), options);
   const auto restored = parts.size() - static_cast<std::size_t>(std::count(parts.begin(), parts.end(), 0));
-  if (restored > 0) adjusted = with_parts(adjusted, parts, start(split_tracks(adjusted.tracks, parts)));
+  if (restored > 0) adjusted = with_parts(std::move(adjusted), parts, start);
   TileProblem& problem = adjusted.problem;
   TileState& state = adjusted.state;
 
