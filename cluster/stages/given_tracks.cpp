@@ -46,21 +46,26 @@ class TracksOfTiles {
     if (observations_ > most_) write_all();
   }
 
+  // When all are added. Where some wait in scratch all do: a tile is put together without the others' tracks beside it.
+  void finish() {
+    if (file_) write_all();
+  }
+
   // Of the tile, in the order in which they were added.
   TrackSet take(std::size_t tile) {
+    if (runs_[tile].empty()) return std::exchange(held_[tile], {});
     TrackSet tracks = no_tracks();
+    reserve(runs_[tile], tracks);
     for (const Run& run : runs_[tile]) {
       const TrackSet part = read(run);
       append_tracks(part, 0, part.track_count(), tracks);
     }
-    append_tracks(held_[tile], 0, held_[tile].track_count(), tracks);
-    held_[tile] = TrackSet();
     return tracks;
   }
 
  private:
   struct Run {
-    std::int64_t offset = 0, bytes = 0;
+    std::int64_t offset = 0, bytes = 0, tracks = 0, observations = 0;
   };
   struct Close {
     void operator()(std::FILE* file) const { std::fclose(file); }
@@ -90,11 +95,26 @@ class TracksOfTiles {
       writer.values(tracks.feature);
       const Bytes bytes = writer.take();
       if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail("written");
-      runs_[tile].push_back({end_, static_cast<std::int64_t>(bytes.size())});
+      runs_[tile].push_back(
+          {end_, static_cast<std::int64_t>(bytes.size()), tracks.track_count(), tracks.observation_count()});
       end_ += static_cast<std::int64_t>(bytes.size());
       tracks = no_tracks();
     }
     observations_ = 0;
+  }
+
+  // Room for as much as there is: what grows has twice of it at a time.
+  static void reserve(const std::vector<Run>& runs, TrackSet& tracks) {
+    std::int64_t own = 0, observations = 0;
+    for (const Run& run : runs) {
+      own += run.tracks;
+      observations += run.observations;
+    }
+    const auto rows = static_cast<std::size_t>(observations);
+    tracks.id.reserve(static_cast<std::size_t>(own));
+    tracks.begin.reserve(static_cast<std::size_t>(own) + 1);
+    tracks.image.reserve(rows);
+    for (std::vector<std::int32_t>* column : {&tracks.x, &tracks.y, &tracks.feature}) column->reserve(rows);
   }
 
   TrackSet read(const Run& run) {
@@ -152,6 +172,7 @@ void deal_given_tracks(const std::string& tie_points, const Block& block, const 
     }
     if (after_batch) after_batch();
   });
+  dealt.finish();
   for (std::size_t tile = 0; tile < static_cast<std::size_t>(tiles.tile_count); ++tile) take(dealt.take(tile));
 }
 

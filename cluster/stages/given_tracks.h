@@ -22,6 +22,6 @@ TrackSet read_given_tracks(const std::string& tie_points, const Block& block);
 void deal_given_tracks(const std::string& tie_points, const Block& block, const Tiles& tiles,
                        const std::string& scratch_file, const std::function<void(const TrackSet&)>& take,
                        const std::function<void()>& after_batch = {},
-                       std::int64_t observations_at_a_time = std::int64_t{1} << 21);
+                       std::int64_t observations_at_a_time = std::int64_t{1} << 20);
 
 }  // namespace megablock

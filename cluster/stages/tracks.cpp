@@ -12,6 +12,7 @@
 
 #include "adjust/tile_problem.h"
 #include "cluster/collective.h"
+#include "cluster/process_memory.h"
 #include "cluster/stages/block_hash.h"
 #include "cluster/stages/given_tracks.h"
 #include "cluster/stages/growth.h"
@@ -69,6 +70,7 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
       if (!is_current(job.store, names[t], fingerprint))
         job.store.write(names[t], fingerprint, [&](const std::string& p) { write_tracks(p, tracks); });
       out << names[t++] << ' ' << hex(fingerprint) << '\n';
+      return_freed_memory();
     });
   };
   if (job.is_first_rank() && !index_holds(job, unit.name, names)) job.store.remove(unit.name);
@@ -224,8 +226,10 @@ std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& ma
 
 std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles) {
   return run_tracks_unit(job, hash_file(tie_points), tiles, [&](const auto& take) {
-    deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take,
-                      [&job] { job.tables.release(); });
+    deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take, [&job] {
+      job.tables.release();
+      return_freed_memory();  // lists that grow leave holes
+    });
   });
 }
 
