@@ -25,6 +25,7 @@ Tiles grow_tiles(const Job& job, LinkWeights links) {
     const FrameGraph graph = links.graph(frames);
     if (g + 1 == job.generations.size()) {  // makes room for what METIS needs
       links = {};
+      job.tables.release();  // images, whose frames were counted
       return_freed_memory();
     }
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);
