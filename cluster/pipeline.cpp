@@ -268,6 +268,8 @@ using Stages = std::function<void(Job& job, const std::string& tie_points)>;
 
 // Opens the job, runs the stages and returns the exit code.
 int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& stages) {
+  // The block's tables then lie where all of their memory can be given back (page_tables), not among what stays.
+  use_memory_sparingly();
   JobStore store(run_options.directory);
   std::optional<JobLock> lock;
   const std::string text = on_first_rank(ranks, [&] {
@@ -279,9 +281,10 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   });
   const JobJson written(store.path("job.json"), text);
   const auto tie_points = written.at<std::string>("tie_points");
-  // No pictures, so that nothing speaks for keeping what is freed; the block's tables then lie where all of their
-  // memory can be given back (page_tables), not among what stays.
-  if (!tie_points.empty()) use_memory_sparingly();
+  if (tie_points.empty())
+    keep_freed_memory();  // pictures come next
+  else
+    use_memory_sparingly();  // the heap, too, that preparing has left
   Job job{.options = run_options,
           .ranks = ranks,
           .store = store,

@@ -58,6 +58,8 @@ void use_memory_sparingly() {
   return_freed_memory();
 }
 
+void keep_freed_memory() { map_blocks_from(1 << 30); }
+
 void map_blocks_from(int bytes) { mallopt(M_MMAP_THRESHOLD, bytes); }
 
 double host_memory_mib() {

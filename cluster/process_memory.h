@@ -20,6 +20,8 @@ void return_freed_memory();  // to the system: what malloc keeps of it
 // program's malloc keeps such pages for the next image's features (arithmetic.cpp); from the tiles on, among tracks,
 // tiles and thousands of fronts of all sizes, half of the process would lie idle between them.
 void use_memory_sparingly();
+// As the program begins, from now on.
+void keep_freed_memory();
 // Every block of so many bytes and more, from now on.
 void map_blocks_from(int bytes);
 double host_memory_mib();  // MemTotal, or less where a control group (Slurm, container) limits it

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "io/crs.h"
+#include "io/error.h"
 #include "io/project.h"
 #include "tests/unit/io/image_names.h"
 
@@ -63,6 +64,13 @@ TEST(AppendTo, OldIndicesStayNewImagesFollow) {
   }
   EXPECT_EQ(merged.cameras[CameraIndex(2)].name, "a");
   EXPECT_EQ(merged.name_of(merged.control_points[0].measurements[0].image), "c1");
+}
+
+TEST(ImageNames, DifferInWhateverOrder) {
+  const std::vector<std::vector<std::string>> sound = {{"a1"}, {"a1", "a2", "b1"}, {"b1", "a2", "a1"}};
+  for (const auto& names : sound) EXPECT_NO_THROW(check(block_of(names, kHere)));
+  const std::vector<std::vector<std::string>> twice = {{"a1", "a1"}, {"a1", "b1", "a1"}, {"b1", "a1", "a2", "a1"}};
+  for (const auto& names : twice) EXPECT_THROW(check(block_of(names, kHere)), InputError);
 }
 
 TEST(AppendTo, MeasurementsFollowTheirImages) {
