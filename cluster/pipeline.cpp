@@ -78,10 +78,14 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::
   std::vector<std::int64_t> generations;
   if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
     page_tables(*previous, tables);
+    const auto release = [&tables] { tables.release(); };  // of two blocks one table is there at a time
     refuse_another_block(store, *previous, project);
+    release();
     // Images taken away or changed start a new block; growing keeps what is there.
-    if (has_all_images_of(*previous, block)) {
-      block = append_to(*previous, std::move(block));
+    const bool grown = has_all_images_of(*previous, block);
+    release();
+    if (grown) {
+      block = append_to(*previous, std::move(block), release);
       generations = job->at<std::vector<std::int64_t>>("generations");
     }
   }

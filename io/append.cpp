@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -98,9 +99,10 @@ bool same_image_names(const Block& a, const Block& b) {
 }
 
 // Every item has its place already, which is what a job that is resumed finds.
-bool same_places(const Block& a, const Block& b) {
-  return same_names(a.cameras, b.cameras) && same_names(a.rigs, b.rigs) && same_names(a.frames, b.frames) &&
-         same_image_names(a, b);
+bool same_places(const Block& a, const Block& b, const std::function<void()>& after_table) {
+  if (!same_names(a.cameras, b.cameras) || !same_names(a.rigs, b.rigs) || !same_names(a.frames, b.frames)) return false;
+  after_table();
+  return same_image_names(a, b);
 }
 
 void sort_verticals(Block& block) {
@@ -121,13 +123,13 @@ bool has_all_images_of(const Block& previous, const Block& now) {
   return true;
 }
 
-Block append_to(const Block& previous, Block moved) {
+Block append_to(const Block& previous, Block moved, const std::function<void()>& after_table) {
   if (previous.ground.georeferenced && moved.ground.georeferenced && !same_origin(previous.ground, moved.ground)) {
     move(GroundChange(moved.ground, previous.ground), moved);
     keep_former_bits(previous, moved);
   }
   if (previous.ground.georeferenced) moved.ground = previous.ground;
-  if (same_places(previous, moved)) {
+  if (same_places(previous, moved, after_table)) {
     sort_verticals(moved);
     return moved;
   }

@@ -1,6 +1,7 @@
 // The project file (YAML, docs/project-file.md): where the images are, what is known of them, the options of the job.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,7 +43,9 @@ std::string mask_file_name(const std::string& camera);
 // name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
 // `previous` that are gone stay. The ground frame stays the previous one: positions, attitudes and control of `now` are
 // turned into it when it has another origin.
-Block append_to(const Block& previous, Block now);
+// `after_table` is called behind a table of both that was gone through: it may leave memory.
+Block append_to(
+    const Block& previous, Block now, const std::function<void()>& after_table = [] {});
 // By name.
 bool has_all_images_of(const Block& previous, const Block& now);
 

@@ -73,6 +73,14 @@ TEST(ImageNames, DifferInWhateverOrder) {
   for (const auto& names : twice) EXPECT_THROW(check(block_of(names, kHere)), InputError);
 }
 
+TEST(AppendTo, TablesMayLeaveMemoryBehindOneAnother) {
+  int tables = 0;
+  const Block previous = block_of({"b1", "b2"}, kHere);
+  const Block merged = append_to(previous, previous, [&] { ++tables; });
+  EXPECT_GT(tables, 0);
+  EXPECT_THAT(image_names(merged), ::testing::ElementsAre("b1", "b2"));
+}
+
 TEST(AppendTo, MeasurementsFollowTheirImages) {
   const Block now = block_of({"a1", "b1", "b15", "b2"}, kHere);
   const Block merged = append_to(block_of({"b1", "b2", "c1"}, kHere), now);
