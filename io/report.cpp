@@ -64,9 +64,9 @@ std::string page_of(const BlockResult& result, const report::Figures& figures, c
   };
   add(headline(result, figures));
   add(assessment(result, figures));
-  add(map_section(result, figures));
-  add(coverage_section(result, figures));
-  add(tie_points_section(result, figures));
+  add(map_section(result, figures, context.after_reading));
+  add(coverage_section(result, figures, context.after_reading));
+  add(tie_points_section(result, figures, context.after_reading));
   add(residuals_section(result, figures));
   if (context.diagnostics) add(diagnostics_section(result, *context.diagnostics));
   add(images_section(result, figures, context.after_reading));
@@ -130,7 +130,12 @@ std::vector<std::string> Report::remarks(const BlockResult& result) const {
 
 std::string Report::html(BlockResult result, const ReportContext& context) && {
   static_cast<TrackResults&>(result) = std::move(gathered_->drawn);
-  return page_of(result, gathered_->figures, context);
+  std::string page = page_of(result, gathered_->figures, context);
+  // Before the result goes, too, which reads its frames once more.
+  gathered_.reset();
+  static_cast<TrackResults&>(result) = {};
+  context.after_reading();
+  return page;
 }
 
 std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context) {

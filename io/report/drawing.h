@@ -35,16 +35,18 @@ std::string draw_vertical(const std::vector<PositionResidual>& residuals);
 
 // Of the selected frames: coloured by tile, boundary frames ringed, those not oriented; tie points as a background,
 // links between frames; control and check points when the frames are `placed` in the ground frame. Layers carry classes
-// that the page's script shows and hides. `unit`: of lengths.
-std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed);
+// that the page's script shows and hides. `unit`: of lengths. `after_reading` as in ReportContext, here and below.
+std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed,
+                     const std::function<void()>& after_reading);
 std::string map_legend(const BlockResult& result, const Figures& figures);
 
 // Images that see tie points in each cell of the ground, and the mean number of rays to these.
-std::string draw_coverage(const BlockResult& result, const FrameSelection& selected, const char* unit);
+std::string draw_coverage(const BlockResult& result, const FrameSelection& selected, const char* unit,
+                          const std::function<void()>& after_reading);
 std::string coverage_legend();
 
 // Horizontal error ellipses of the frames' positions and bars for the sigma of the height, exaggerated; the caption
-// says how much. Empty without covariances. `after_reading` as in ReportContext.
+// says how much. Empty without covariances.
 FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit,
                            const std::function<void()>& after_reading);
 

@@ -92,8 +92,7 @@ class Gatherer {
  private:
   // A pass over the images goes through their table and that of the frames piece by piece.
   void rest_at(ImageIndex image) const {
-    constexpr std::int64_t kImages = 1 << 16;
-    if (image.value % kImages == 0) after_reading_();
+    if (image.value % kImagesAtATime == 0) after_reading_();
   }
 
   // The state is there for all that the block names.
@@ -348,9 +347,11 @@ bool oriented(const BlockResult& result, FrameIndex frame) {
   return result.state.oriented.contains(frame) && result.state.oriented[frame] != 0;
 }
 
-std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before) {
+std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before,
+                                     const std::function<void()>& after_reading) {
   std::vector<ImageIndex> first;  // a heap, its last on top
   for (ImageIndex image(0); result.block.images.contains(image) && count > 0; ++image.value) {
+    if (image.value % kImagesAtATime == 0) after_reading();
     if (!oriented(result, result.block.images[image].frame)) continue;
     if (first.size() == count) {
       if (!before(image, first.front())) continue;

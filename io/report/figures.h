@@ -14,6 +14,10 @@ namespace megablock::report {
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
+// What a pass goes through before it says so (`after_reading` of ReportContext): rows of the table of images, or tracks,
+// whose images lie all over it.
+inline constexpr std::int64_t kImagesAtATime = 1 << 16, kTracksAtATime = 1 << 13;
+
 // Equal bins from `low`; what lies outside goes to the first or last bin.
 struct Histogram {
   double low = 0, width = 1;
@@ -128,9 +132,10 @@ void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& 
 // Fills in positions and attitudes.
 void find_prior_residuals(const BlockResult& result, Figures& figures);
 
-// The first `count` oriented images in an order, without a list of all.
+// The first `count` oriented images in an order, without a list of all. `after_reading` as in ReportContext.
 using ImageOrder = std::function<bool(ImageIndex, ImageIndex)>;
-std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before);
+std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before,
+                                     const std::function<void()>& after_reading);
 
 double image_rms(const Figures& figures, ImageIndex image);  // px; unknown without observations
 Pose image_pose(const BlockResult& result, ImageIndex image);

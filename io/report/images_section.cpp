@@ -82,22 +82,24 @@ void add_image(const BlockResult& result, const Figures& f, const Columns& colum
 }
 
 // All oriented images in block order; of a huge block those with the largest residuals.
-std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& f) {
+std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& f,
+                                      const std::function<void()>& after_reading) {
   if (f.reprojection.oriented_images <= static_cast<std::int64_t>(kListedImages))
-    return first_images(result, kListedImages, std::less<ImageIndex>());
+    return first_images(result, kListedImages, std::less<ImageIndex>(), after_reading);
   const auto rms = [&](ImageIndex image) {
     const double value = image_rms(f, image);
     return std::isfinite(value) ? value : -1;
   };
-  return first_images(result, kListedImages,
-                      [&](ImageIndex a, ImageIndex b) { return std::pair(-rms(a), a) < std::pair(-rms(b), b); });
+  return first_images(
+      result, kListedImages,
+      [&](ImageIndex a, ImageIndex b) { return std::pair(-rms(a), a) < std::pair(-rms(b), b); }, after_reading);
 }
 
 }  // namespace
 
 std::string images_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   constexpr std::size_t kAtATime = 64;  // images, whose rows lie all over the tables
-  const std::vector<ImageIndex> images = listed_images(result, f);
+  const std::vector<ImageIndex> images = listed_images(result, f, after_reading);
   if (images.empty() || f.reprojection.oriented_images == 0) return "";
   const Columns columns = columns_of(result, f);
   Table table = empty_table(columns);

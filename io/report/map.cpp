@@ -16,25 +16,29 @@ namespace {
 
 constexpr std::size_t kSingleMarks = 3000;  // frames drawn one by one, with their names
 constexpr std::size_t kBackgroundPoints = 6000;
+constexpr std::size_t kSpreadAtATime = 128;  // of these, whose images lie all over their table
 constexpr std::size_t kLinks = 20000;
 constexpr std::size_t kMostMarks = 200000;
 constexpr std::array<const char*, 10> kColours = {"#4e79a7", "#f28e2b", "#59a14f", "#b07aa1", "#76b7b2",
                                                   "#d4a017", "#e15759", "#9c755f", "#ff7f9f", "#7a8b99"};
 
 // Colours such that tiles that share tie points differ, as far as ten colours go.
-std::vector<std::size_t> tile_colours(const BlockResult& result) {
+std::vector<std::size_t> tile_colours(const BlockResult& result, const std::function<void()>& after_reading) {
   std::vector<std::set<std::int64_t>> beside(static_cast<std::size_t>(result.tiles.tile_count));
   const auto tile_at = [&](std::int64_t o) {
     const FrameIndex frame = result.block.images[result.tracks.image[static_cast<std::size_t>(o)]].frame;
     return result.tiles.tile_of_frame.contains(frame) ? result.tiles.tile_of_frame[frame].value : -1;
   };
-  for (std::size_t t = 0; t + 1 < result.tracks.begin.size(); ++t)
+  for (std::size_t t = 0; t + 1 < result.tracks.begin.size(); ++t) {
+    if (t % kTracksAtATime == 0) after_reading();
     for (std::int64_t o = result.tracks.begin[t] + 1; o < result.tracks.begin[t + 1]; ++o) {
       const std::int64_t a = tile_at(o - 1), b = tile_at(o);
       if (a < 0 || b < 0 || a == b || std::max(a, b) >= result.tiles.tile_count) continue;
       beside[static_cast<std::size_t>(a)].insert(b);
       beside[static_cast<std::size_t>(b)].insert(a);
     }
+  }
+  after_reading();
   std::vector<std::size_t> colour(beside.size(), kColours.size());
   for (std::size_t t = 0; t < beside.size(); ++t) {
     std::array<int, kColours.size()> used{};
@@ -52,9 +56,15 @@ std::vector<std::size_t> tile_colours(const BlockResult& result) {
 
 class MapDrawing {
  public:
-  MapDrawing(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed)
-      : result_(result), unit_(unit), placed_(placed), drawn_(plane_of(result, selected, placed)) {
+  MapDrawing(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed,
+             const std::function<void()>& after_reading)
+      : result_(result),
+        unit_(unit),
+        placed_(placed),
+        after_reading_(after_reading),
+        drawn_(plane_of(result, selected, placed, after_reading)) {
     if (drawn_) plane_ = *drawn_;
+    places_.reserve(result.block.frames.size());
     for (FrameIndex f(0); result.block.frames.contains(f); ++f.value)
       places_.push_back(selected(f) ? place_of(result, f) : std::nullopt);
   }
@@ -79,6 +89,7 @@ class MapDrawing {
     std::string path;
     const std::size_t step = 1 + result_.points.size() / kBackgroundPoints;
     for (std::size_t i = 0; i < result_.points.size(); i += step) {
+      if (i / step % kSpreadAtATime == 0) after_reading_();
       if (!result_.points[i].allFinite() || !here(i)) continue;
       const Eigen::Vector2d p = plane_.at(result_.points[i].head<2>());
       if (plane_.shows(p)) path += dot(p);
@@ -114,7 +125,7 @@ class MapDrawing {
 
   // One path per colour: rings of the boundary frames below, dots above.
   std::string frames() const {
-    const std::vector<std::size_t> colour = tile_colours(result_);
+    const std::vector<std::size_t> colour = tile_colours(result_, after_reading_);
     const std::size_t step = 1 + places_.size() / kMostMarks;
     const double size = places_.size() > 20000          ? 2.5
                         : places_.size() > kSingleMarks ? 4
@@ -172,6 +183,7 @@ class MapDrawing {
   const BlockResult& result_;
   const char* unit_;
   bool placed_;
+  const std::function<void()>& after_reading_;
   std::optional<Plane> drawn_;
   Plane plane_;
   IndexedVector<FrameIndex, std::optional<Eigen::Vector2d>> places_;
@@ -179,8 +191,9 @@ class MapDrawing {
 
 }  // namespace
 
-std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed) {
-  return MapDrawing(result, selected, unit, placed).svg();
+std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed,
+                     const std::function<void()>& after_reading) {
+  return MapDrawing(result, selected, unit, placed, after_reading).svg();
 }
 
 std::string map_legend(const BlockResult& result, const Figures& figures) {

@@ -68,7 +68,7 @@ std::string map_controls() {
 
 }  // namespace
 
-std::string map_section(const BlockResult& result, const Figures& f) {
+std::string map_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   std::string body;
   std::size_t drawn = 0, left_out = 0;
   for (const MapSubject& subject : subjects_of(f)) {
@@ -76,7 +76,7 @@ std::string map_section(const BlockResult& result, const Figures& f) {
       ++left_out;
       continue;
     }
-    const std::string drawing = draw_map(result, subject.selected, subject.unit, subject.placed);
+    const std::string drawing = draw_map(result, subject.selected, subject.unit, subject.placed, after_reading);
     if (drawing.find("<svg") == std::string::npos) continue;
     body += figure(drawing, caption_of(result, f, subject));
     ++drawn;
@@ -86,12 +86,13 @@ std::string map_section(const BlockResult& result, const Figures& f) {
   return section("map-section", drawn > 1 ? "Maps" : "Map", map_legend(result, f) + map_controls() + body);
 }
 
-std::string coverage_section(const BlockResult& result, const Figures& f) {
+std::string coverage_section(const BlockResult& result, const Figures& f,
+                             const std::function<void()>& after_reading) {
   if (f.reprojection.observations == 0) return "";
   const std::vector<MapSubject> subjects = subjects_of(f);
   if (subjects.empty()) return "";
   const MapSubject& subject = subjects.front();
-  const std::string drawing = draw_coverage(result, subject.selected, subject.unit);
+  const std::string drawing = draw_coverage(result, subject.selected, subject.unit, after_reading);
   if (drawing.empty()) return "";
   std::string caption =
       "Coverage: from how many images tie points in a cell were measured (kept observations). Places seen by one or "

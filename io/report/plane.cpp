@@ -19,10 +19,12 @@ constexpr double kOutermost = 0.02;             // share of the tie points left 
 constexpr std::size_t kFramingPoints = 100000;  // looked at
 
 // The corners of where the tie points of the selected frames lie.
-std::vector<Eigen::Vector2d> corners_of_tie_points(const BlockResult& result, const FrameSelection& selected) {
+std::vector<Eigen::Vector2d> corners_of_tie_points(const BlockResult& result, const FrameSelection& selected,
+                                                   const std::function<void()>& after_reading) {
   std::array<std::vector<double>, 2> values;
   const std::size_t step = 1 + result.points.size() / kFramingPoints;
   for (std::size_t t = 0; t < result.points.size(); t += step) {
+    if (t / step % kTracksAtATime == 0) after_reading();
     if (!result.points[t].allFinite() || !is_of(result, t, selected)) continue;
     for (int k = 0; k < 2; ++k) values[static_cast<std::size_t>(k)].push_back(result.points[t][k]);
   }
@@ -76,7 +78,8 @@ std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex fr
   return std::nullopt;
 }
 
-std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control) {
+std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control,
+                              const std::function<void()>& after_reading) {
   std::vector<Eigen::Vector2d> with_pose, all;
   for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
     if (!selected(f)) continue;
@@ -90,7 +93,7 @@ std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& s
     for (const ControlPoint& point : result.block.control_points)
       if (point.position.head<2>().allFinite()) shown.emplace_back(point.position.head<2>());
   if (shown.empty()) return std::nullopt;
-  for (const Eigen::Vector2d& corner : corners_of_tie_points(result, selected)) shown.push_back(corner);
+  for (const Eigen::Vector2d& corner : corners_of_tie_points(result, selected, after_reading)) shown.push_back(corner);
   return plane_over(shown);
 }
 

@@ -27,8 +27,9 @@ using FrameSelection = std::function<bool(FrameIndex)>;
 
 // Over the selected frames that are oriented (all, when none is), their tie points but for the outermost 2 % on each
 // side (a facade lies beside the frames, not under them), and the control points with a place, if wanted. Empty when
-// nothing has a place.
-std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control);
+// nothing has a place. `after_reading` as in ReportContext.
+std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control,
+                              const std::function<void()>& after_reading);
 
 // A tie point of the selected frames: its first image tells.
 bool is_of(const BlockResult& result, std::size_t track, const FrameSelection& selected);

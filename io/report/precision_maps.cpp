@@ -41,13 +41,14 @@ double cell_size(const BlockResult& result, const Plane& plane) {
 
 class Coverage {
  public:
-  Coverage(const BlockResult& result, const FrameSelection& selected, const Plane& plane)
+  Coverage(const BlockResult& result, const FrameSelection& selected, const Plane& plane,
+           const std::function<void()>& after_reading)
       : plane_(plane), cell_(cell_size(result, plane)) {
     columns_ = static_cast<int>(std::ceil(kMapWidth / cell_));
     rows_ = static_cast<int>(std::ceil(plane.height / cell_));
     points_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
     rays_ = images_ = points_;
-    gather(result, selected);
+    gather(result, selected, after_reading);
   }
 
   std::string svg() const {
@@ -68,13 +69,14 @@ class Coverage {
   }
 
  private:
-  void gather(const BlockResult& result, const FrameSelection& selected) {
+  void gather(const BlockResult& result, const FrameSelection& selected, const std::function<void()>& after_reading) {
     if (result.kept.size() != result.tracks.image.size()) return;
     const std::size_t step = 1 + result.points.size() / kCoveragePoints;
     std::vector<std::int64_t> seen;  // image + cell * images
     const auto images = std::ssize(result.block.images);
     seen.reserve(result.tracks.image.size() / step);
     for (std::size_t t = 0; t < result.points.size() && t + 1 < result.tracks.begin.size(); t += step) {
+      if (t / step % kTracksAtATime == 0) after_reading();
       if (!result.points[t].allFinite()) continue;
       const Eigen::Vector2d p = plane_.at(result.points[t].head<2>());
       if (!plane_.shows(p)) continue;
@@ -139,10 +141,11 @@ std::string draw(const Ellipse& e, double pixels_per_metre, const LengthUnit& un
 
 }  // namespace
 
-std::string draw_coverage(const BlockResult& result, const FrameSelection& selected, const char* unit) {
-  const auto plane = plane_of(result, selected, false);
+std::string draw_coverage(const BlockResult& result, const FrameSelection& selected, const char* unit,
+                          const std::function<void()>& after_reading) {
+  const auto plane = plane_of(result, selected, false, after_reading);
   if (!plane) return "";
-  return open_map(*plane, "Images that see each place") + Coverage(result, selected, *plane).svg() +
+  return open_map(*plane, "Images that see each place") + Coverage(result, selected, *plane, after_reading).svg() +
          coordinate_grid(*plane, unit) + scale_bar(*plane, unit) + "</svg>";
 }
 
@@ -161,7 +164,7 @@ std::string coverage_legend() {
 
 FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit_name,
                            const std::function<void()>& after_reading) {
-  const auto plane = plane_of(result, selected, false);
+  const auto plane = plane_of(result, selected, false, after_reading);
   if (!plane) return {};
   const std::vector<Ellipse> all = ellipses_of(result, selected, *plane, after_reading);
   if (all.empty()) return {};

@@ -17,7 +17,8 @@ constexpr std::size_t kTilesListed = 60;
 
 }  // namespace
 
-std::string tie_points_section(const BlockResult& result, const Figures& f) {
+std::string tie_points_section(const BlockResult& result, const Figures& f,
+                               const std::function<void()>& after_reading) {
   if (f.reprojection.observations == 0)
     return section("tie-points", "Tie points", paragraph("No tie points.", "muted"));
   std::string charts =
@@ -27,9 +28,10 @@ std::string tie_points_section(const BlockResult& result, const Figures& f) {
              "Intersection angle.") +
       figure(draw(BarChart{f.observations_per_image, "observations", "images", 0, false}),
              "Observations per oriented image.");
-  const std::vector<ImageIndex> weakest = first_images(result, 8, [&](ImageIndex a, ImageIndex b) {
+  const auto fewer = [&](ImageIndex a, ImageIndex b) {
     return std::pair(f.observations[a], a) < std::pair(f.observations[b], b);
-  });
+  };
+  const std::vector<ImageIndex> weakest = first_images(result, 8, fewer, after_reading);
   Table table({"image with fewest", "observations"});
   for (const ImageIndex image : weakest) table.add({escape(result.block.name_of(image)), count(f.observations[image])});
   return section("tie-points", "Tie points",

@@ -19,12 +19,14 @@ std::string ellipses_figure(const BlockResult& result, const Figures& figures,
 
 std::string headline(const BlockResult& result, const Figures& figures);
 std::string assessment(const BlockResult& result, const Figures& figures);  // what is well and what needs a look
-std::string map_section(const BlockResult& result, const Figures& figures);
-std::string coverage_section(const BlockResult& result, const Figures& figures);
+std::string map_section(const BlockResult& result, const Figures& figures, const std::function<void()>& after_reading);
+std::string coverage_section(const BlockResult& result, const Figures& figures,
+                             const std::function<void()>& after_reading);
 std::string diagnostics_section(const BlockResult& result, const BlockDiagnostics& diagnostics);
 std::string images_section(const BlockResult& result, const Figures& figures,
                            const std::function<void()>& after_reading);
-std::string tie_points_section(const BlockResult& result, const Figures& figures);
+std::string tie_points_section(const BlockResult& result, const Figures& figures,
+                               const std::function<void()>& after_reading);
 std::string residuals_section(const BlockResult& result, const Figures& figures);
 std::string observations_section(const BlockResult& result, const Figures& figures);
 std::string positions_section(const BlockResult& result, const Figures& figures);

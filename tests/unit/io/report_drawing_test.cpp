@@ -22,7 +22,7 @@ TEST(ReportDrawing, MapsAreFramedByFramesAndTiePoints) {
   }
   result.points[0].y() = 1e7;
   const auto plane = report::plane_of(
-      result, [](FrameIndex) { return true; }, false);
+      result, [](FrameIndex) { return true; }, false, [] {});
   ASSERT_TRUE(plane);
   EXPECT_GT(plane->high.y(), low + 0.9 * (high - low));
   EXPECT_LT(plane->high.y(), high);
