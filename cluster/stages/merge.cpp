@@ -111,6 +111,7 @@ BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& chec
 Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
   const std::size_t frames = job.block.frames.size();
   const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
+  job.tables.release();  // frames
   const std::vector<int> rank_of_tile =
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();

@@ -8,6 +8,7 @@
 #include "adjust/track_parts.h"
 #include "adjust/turned_stretches.h"
 #include "adjust/vertical_terms.h"
+#include "cluster/process_memory.h"
 #include "geometry/rotation.h"
 #include "geometry/similarity.h"
 #include "merge/tile_alignment.h"
@@ -181,6 +182,7 @@ MergeStart merge_start(const Job& job, const BlockState& oriented, const std::ve
   const std::vector<Similarity> motions = bring_together(job, tiles);
   for (std::size_t i = 0; i < tiles.size(); ++i) start.motions[static_cast<std::size_t>(numbers[i].value)] = motions[i];
   take_richest(tiles, numbers, start);
+  return_freed_memory();  // what else the adjustments hold, beside which all frames are read now
   const IndexedVector<FrameIndex, Pose> before = start.state.frames;
   turn_back_stretches(job.block, oriented, start.state);
   for (FrameIndex f(0); before.contains(f); ++f.value)
