@@ -226,8 +226,11 @@ void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images
   file.vector("images/frame", column(images, [](const Image& i) { return i.frame.value; }), {"", "row in frames"});
   file.vector("images/mount", column(images, [](const Image& i) { return static_cast<std::int32_t>(i.mount); }),
               {"", "mount within the frame's rig"});
+  constexpr std::size_t kImagesAtATime = 1 << 16;
   std::vector<std::int64_t> cameras;
+  cameras.reserve(images.size());
   for (const Image& image : images) {
+    if (cameras.size() % kImagesAtATime == 0) file.rest();
     // A block that was not checked may dangle; its camera is then unknown, and the reader does not use this column.
     const bool sound = block.frames.contains(image.frame) && block.rigs.contains(block.frames[image.frame].rig) &&
                        image.mount >= 0 &&

@@ -90,6 +90,8 @@ class Hdf5Writer {
   void close();
   // From now on behind every dataset that is written whole: what its values were taken from may leave memory.
   void after_datasets(std::function<void()> call) { after_dataset_ = std::move(call); }
+  // The same, asked for while the values of one are taken from two large tables.
+  void rest() const { after_dataset_(); }
 
   // Names are paths in the file, '/' between groups; a group must be made before what is in it.
   void group(const std::string& name, const std::string& description = {});

@@ -61,9 +61,11 @@ MountCovariances get_mount_covariances(const Hdf5Reader& file, const IndexedVect
 }
 
 void put_precision(Hdf5Writer& file, const BlockResult& result) {
+  static_assert(sizeof(BlockResult::Matrix6) == 36 * sizeof(double));  // so these are written as they lie there
   if (!result.frame_covariance.empty())
-    file.array("frames/covariance", flattened<double>(result.frame_covariance), {rows(result.frame_covariance), 6, 6},
-               {"rad, m", "posterior, of (rotation increment about the ground axes, centre)"});
+    file.dataset("frames/covariance", ElementType::kDouble, result.frame_covariance.data(),
+                 {rows(result.frame_covariance), 6, 6},
+                 {"rad, m", "posterior, of (rotation increment about the ground axes, centre)"});
   if (!result.camera_covariance.empty()) put_covariances(file, result.camera_covariance);
   if (!result.mount_covariance.empty()) put_mount_covariances(file, result.mount_covariance);
 }
