@@ -8,6 +8,7 @@
 #include <numeric>
 #include <string_view>
 #include <tuple>
+#include <utility>
 
 #include "geometry/median.h"
 #include "partition/kd_tree.h"
@@ -139,12 +140,15 @@ std::vector<std::vector<ImageIndex>> passes_of(const Block& block, const Before&
   }
   std::vector<std::vector<ImageIndex>> passes;
   for (auto& [key, images] : groups) {
-    const auto time = [&](ImageIndex image) { return block.frames[block.images[image].frame].time_s; };
-    const bool timed = std::all_of(images.begin(), images.end(), [&](ImageIndex i) { return std::isfinite(time(i)); });
-    std::sort(images.begin(), images.end(), [&](ImageIndex a, ImageIndex b) {
-      const double ta = timed ? time(a) : 0, tb = timed ? time(b) : 0;
-      return ta != tb ? ta < tb : before(a, b);
+    // Times beside the images: the block's tables may be read from a file, whose pages leave memory meanwhile.
+    std::vector<std::pair<double, ImageIndex>> order;
+    order.reserve(images.size());
+    for (const ImageIndex image : images) order.emplace_back(block.frames[block.images[image].frame].time_s, image);
+    const bool timed = std::all_of(order.begin(), order.end(), [](const auto& i) { return std::isfinite(i.first); });
+    std::sort(order.begin(), order.end(), [&](const auto& a, const auto& b) {
+      return timed && a.first != b.first ? a.first < b.first : before(a.second, b.second);
     });
+    for (std::size_t i = 0; i < order.size(); ++i) images[i] = order[i].second;
     passes.push_back(std::move(images));
   }
   return passes;
