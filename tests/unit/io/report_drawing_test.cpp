@@ -32,6 +32,18 @@ TEST(ReportDrawing, MapsAreFramedByFramesAndTiePoints) {
   }
 }
 
+TEST(ReportDrawing, TablesMayLeaveMemoryWhileMapsAreDrawn) {
+  const BlockResult result = made_up_result(SimulationOptions{.frames = 60});
+  const auto all = [](FrameIndex) { return true; };
+  int rests = 0;
+  const auto rest = [&] { ++rests; };
+  EXPECT_EQ(report::draw_map(result, all, "m", true, rest), report::draw_map(result, all, "m", true, [] {}));
+  EXPECT_GE(rests, 3);  // what frames it, tie points, colours of tiles
+  rests = 0;
+  EXPECT_EQ(report::draw_coverage(result, all, "m", rest), report::draw_coverage(result, all, "m", [] {}));
+  EXPECT_GE(rests, 2);
+}
+
 TEST(ReportDrawing, TextOfCellsBreaksOnlyWhereItMay) {
   report::Table table({"name", "note"}, 2);
   table.add({"control", "a note of many words that does not fit one line"});
