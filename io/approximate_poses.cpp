@@ -159,6 +159,7 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
                    FrameIndex(static_cast<std::int64_t>(f)));
   for (std::size_t i = 0; i < block.images.size(); ++i)
     images.emplace(block.name_of(ImageIndex(static_cast<std::int64_t>(i))), ImageIndex(static_cast<std::int64_t>(i)));
+  std::set<FrameIndex> placed;  // by an earlier row; what the block had before gives way
   for (const ApproximatePoses::Row& row : poses.rows) {
     const auto image = images.find(row.name);
     const auto frame = frames.find(row.name);
@@ -169,13 +170,16 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
       const Pose camera = to_block(row);
       const Pose& mount = block.mount_of(image->second).pose;
       const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
-      Frame& target = block.frames[block.images[image->second].frame];
+      const FrameIndex index = block.images[image->second].frame;
+      Frame& target = block.frames[index];
       if (row.pass) target.pass = *row.pass;
-      if (!target.given_pose) target.given_pose = Pose{rotation, camera.centre - rotation.conjugate() * mount.centre};
+      if (placed.insert(index).second)
+        target.given_pose = Pose{rotation, camera.centre - rotation.conjugate() * mount.centre};
     } else if (frame != frames.end()) {
       Frame& target = block.frames[frame->second];
       if (row.pass) target.pass = *row.pass;
       target.given_pose = to_block(row);
+      placed.insert(frame->second);
     } else {
       throw InputError(row.where + ": pose of '" + row.name + "', which is no image or frame of the block");
     }

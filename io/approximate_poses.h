@@ -37,7 +37,8 @@ struct ApproximatePoses {
 // InputError with file:line for missing columns, numbers that are none, names that appear twice.
 ApproximatePoses read_approximate_poses(const std::string& path);
 
-// Sets Frame::given_pose, and Frame::pass where the file has it. InputError with file:line for a name the block does
+// Sets Frame::given_pose, in place of what the block has, and Frame::pass where the file has it. Of several images of a
+// frame the first counts, unless the frame itself has a row. InputError with file:line for a name the block does
 // not have (a warning for `left_out`).
 void set_given_poses(const ApproximatePoses& poses, const std::vector<std::string>& left_out, Block& block,
                      std::vector<std::string>& warnings);

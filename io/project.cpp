@@ -62,6 +62,13 @@ void check_tie_points(YamlReader& top, const std::string& file) {
   }
 }
 
+// Sections of stages that have nothing to do.
+void refuse_unused_stages(const YamlReader& top) {
+  for (const std::string& key : top.keys())
+    if (key == "features" || key == "candidates" || key == "matching")
+      refuse_unused(top, key, "with 'tie_points', which are measured and matched already");
+}
+
 // Images that are not in the block for a reason that was told: files that refer to them are not wrong.
 std::vector<std::string> names_left_out(const Project& project) {
   std::vector<std::string> names = project.copies;
@@ -84,6 +91,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (const auto tie_points = top.existing_file("tie_points")) {
     check_tie_points(top, *tie_points);
     project.tie_points = *tie_points;
+    refuse_unused_stages(top);
   }
   if (block_file && project.tie_points.empty())
     throw InputError(top.where("block") + ": 'block' needs 'tie_points' as well: there are no images to measure in");
@@ -98,13 +106,18 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (block_file) read_simulated_block(top, project, *block_file);
 
   auto cameras = top.mapping("cameras");
+  if (cameras && block_file && cameras->node("grouping"))
+    refuse_unused(*cameras, "grouping", "with 'block', which says what its cameras are");
   const CameraGrouping grouping = cameras ? read_camera_grouping(*cameras) : CameraGrouping::kExif;
   if (images) {
     project.block.image_folder = (fs::path(*images) / "").string();
     add_images(scanned, grouping, project.block);
   }
   if (cameras) read_cameras(*cameras, project.block);
-  if (const auto masks = top.existing_folder("masks")) read_masks(*masks, project);
+  if (const auto masks = top.existing_folder("masks")) {
+    if (!has_pictures(project.block)) refuse_unused(top, "masks", kNoPictures);
+    read_masks(*masks, project);
+  }
   read_rigs(top, project);
   read_calibration(top, project);
 
@@ -123,6 +136,10 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
 }
 
 }  // namespace
+
+void refuse_unused(const YamlReader& reader, const std::string& key, const std::string& why) {
+  throw InputError(reader.where(key) + ": '" + key + "' is not used " + why + "; take it out");
+}
 
 Project read_project(const std::string& path) { return read_project(path, std::nullopt); }
 

@@ -95,7 +95,7 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
 
 namespace {
 
-void read_camera(YamlReader& reader, Camera& camera) {
+void read_camera(YamlReader& reader, bool pictures, Camera& camera) {
   read_intrinsics(reader, camera);
   camera.prior_sigma = default_intrinsic_sigmas(camera);
   if (const auto calibrate = reader.node("calibrate")) {
@@ -105,7 +105,10 @@ void read_camera(YamlReader& reader, Camera& camera) {
     else if (!*reader.flag("calibrate"))
       camera.prior_sigma.fill(0);
   }
-  if (const auto mask = reader.existing_file("mask")) camera.mask_path = *mask;
+  if (const auto mask = reader.existing_file("mask")) {
+    if (!pictures) refuse_unused(reader, "mask", kNoPictures);
+    camera.mask_path = *mask;
+  }
   reader.finish();
 }
 
@@ -139,9 +142,10 @@ CameraGrouping read_camera_grouping(YamlReader& cameras) {
 }
 
 void read_cameras(YamlReader& cameras, Block& block) {
+  const bool pictures = has_pictures(block);
   for (Camera& camera : block.cameras) {
-    if (auto reader = cameras.mapping("default")) read_camera(*reader, camera);
-    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, camera);
+    if (auto reader = cameras.mapping("default")) read_camera(*reader, pictures, camera);
+    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, pictures, camera);
     if (!camera.mask_path.empty()) check_mask(camera, cameras.where());
   }
   for (const std::string& key : cameras.keys())

@@ -9,6 +9,7 @@
 #include "io/error.h"
 #include "io/held_priors.h"
 #include "io/project_sections.h"
+#include "io/settings_reader.h"
 
 namespace megablock {
 
@@ -32,13 +33,15 @@ std::optional<double> read_sigma(YamlReader& reader, const std::string& key, dou
   return sigma && *sigma < held ? held : sigma;
 }
 
-GpsOptions read_gps_options(YamlReader& top) {
+GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   GpsOptions options;
   auto reader = top.mapping("gps");
   if (!reader) return options;
   options.use = reader->flag("use").value_or(true);
   options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kHeldPositionSigma);
   options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kHeldPositionSigma);
+  if (!from_images && reader->node("lever_arm_m"))
+    refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have theirs");
   if (const auto arm = reader->numbers("lever_arm_m", 3)) options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
   reader->finish();
   return options;
@@ -96,7 +99,8 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
 void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
                     const std::optional<GroundFrame>& ground, Project& project) {
   Block& block = project.block;
-  const GpsOptions options = read_gps_options(top);
+  const bool from_images = !scanned.empty();  // else a given block with a frame of its own
+  const GpsOptions options = read_gps_options(top, from_images);
   const auto origin = read_origin(top);
   if (!options.use)
     for (Frame& frame : block.frames) frame.position_prior.reset();
@@ -105,7 +109,6 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   std::vector<Geodetic> known;
   for (const auto& position : positions)
     if (position) known.push_back(*position);
-  const bool from_images = !scanned.empty();  // else a given block with a frame of its own
   for (Frame& frame : block.frames) {
     if (!frame.position_prior) continue;
     if (options.sigma_horizontal) frame.position_prior->sigma.head<2>().setConstant(*options.sigma_horizontal);

@@ -8,6 +8,10 @@
 
 namespace megablock {
 
+// InputError for what would be passed over in silence: "block.yaml:4: 'masks' is not used with 'block', ...; take it out".
+inline constexpr const char* kNoPictures = "with a 'block' without pictures";
+[[noreturn]] void refuse_unused(const YamlReader& reader, const std::string& key, const std::string& why);
+
 // cameras: grouping and overrides by camera name ("default" for all of them).
 CameraGrouping read_camera_grouping(YamlReader& cameras);
 void read_cameras(YamlReader& cameras, Block& block);

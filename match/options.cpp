@@ -24,6 +24,7 @@ void MatchOptions::check() const {
   if (!(min_distance_m > 0)) throw InputError("min_distance_m must be positive");
   if (!(max_distance_m > min_distance_m)) throw InputError("max_distance_m must be more than min_distance_m");
   trust.check();
+  if (!filter_model.empty() && !filter) throw InputError("filter_model needs 'filter: true', not false");
   if (min_inliers < 8) throw InputError("min_inliers must be at least 8, not " + std::to_string(min_inliers));
 }
 

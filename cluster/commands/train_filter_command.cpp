@@ -93,7 +93,7 @@ void add_train_filter(CLI::App& app, std::function<int()>& action) {
   command->footer(
       "Example: megablock simulate --scene stereopolis --frames 800 --outliers 0.1 -o street\n"
       "         megablock train-filter street/block.yaml -o filter.yaml\n"
-      "         and in a project: matching: {filter_model: filter.yaml}");
+      "         and in a project: matching: {filter: true, filter_model: filter.yaml}");
   command->add_option("project", options->project, "Project file with tie points")->required();
   command->add_option("-o,--output", options->output, "Model to write (YAML)")->required();
   command->add_option("--labels", options->labels,

@@ -50,6 +50,8 @@ TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("block.yaml:7"));
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("ratio"));
   EXPECT_THAT(message(setting("adjustment", "image_sigma_px", "0.5 mm")), testing::HasSubstr("block.yaml:7"));
+  EXPECT_EQ(message(setting("matching", "filter_model", "filter.yaml")),
+            "block.yaml:7: matching: filter_model needs 'filter: true', not false");
   EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::StartsWith("block.yaml:7: merge: decrement"));
   EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::EndsWith(", not -1"));
   EXPECT_EQ(message(setting("matching", "k_best", "9")), "block.yaml:7: matching: k_best must be 1 to 7, not 9");

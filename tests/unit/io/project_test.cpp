@@ -8,6 +8,9 @@
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/held_priors.h"
+#include "io/pose_csv.h"
+#include "io/simulate/simulate.h"
+#include "io/unit_files.h"
 #include "tests/unit/io/image_names.h"
 #include "tests/unit/io/scratch_directory.h"
 
@@ -302,6 +305,51 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, "just words"), HasSubstr("must be a mapping"));
   EXPECT_THAT(message_of<InputError>([&] { read_project(folder.path("missing.yaml")); }), HasSubstr("cannot be read"));
   EXPECT_THAT(message_of<InputError>([&] { read_project(folder.path()); }), HasSubstr("cannot be read"));
+}
+
+class GivenBlock : public ::testing::Test {
+ protected:
+  GivenBlock() {
+    SimulationOptions options = SimulationOptions::of(SimulationOptions::Scene::kAerial);
+    options.frames = 6;
+    options.start_position_error_m = options.start_rotation_error_deg = 1;
+    write_simulated_block(options, folder_.path());
+  }
+  std::string refusal_of(const std::string& line) {
+    return refusal(folder_, "block: given.h5\ntie_points: tie_points.h5\n" + line);
+  }
+  ScratchDirectory folder_;
+};
+
+TEST_F(GivenBlock, PosesTakeThePlaceOfItsOwn) {
+  const Block given = read_block(folder_.path("given.h5"));
+  PoseTable poses;
+  poses.names = {given.frames[frame(2)].name};
+  poses.poses = {Pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX())), {1, 2, 3}}};
+  write_pose_csv(folder_.path("poses.csv"), poses);
+  const Block block =
+      read_text(folder_, "block: given.h5\ntie_points: tie_points.h5\nposes: poses.csv\n").block;
+  ASSERT_TRUE(given.frames[frame(2)].given_pose && block.frames[frame(2)].given_pose);
+  EXPECT_LT((block.frames[frame(2)].given_pose->centre - Eigen::Vector3d(1, 2, 3)).norm(), 1e-9);
+  EXPECT_LT(rotation_angle(block.frames[frame(2)].given_pose->rotation, poses.poses[0].rotation), 1e-9);
+  EXPECT_EQ(block.frames[frame(1)].given_pose->centre, given.frames[frame(1)].given_pose->centre);
+}
+
+TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
+  EXPECT_EQ(refusal_of("gps: {lever_arm_m: [0, 0, 1]}\n"),
+            "block.yaml:3: 'lever_arm_m' is not used with 'block', whose positions have theirs; take it out");
+  EXPECT_EQ(refusal_of("cameras: {grouping: one}\n"),
+            "block.yaml:3: 'grouping' is not used with 'block', which says what its cameras are; take it out");
+  std::filesystem::create_directories(folder_.path("masks"));
+  EXPECT_EQ(refusal_of("masks: masks\n"),
+            "block.yaml:3: 'masks' is not used with a 'block' without pictures; take it out");
+  EXPECT_EQ(refusal_of("cameras: {default: {mask: given.h5}}\n"),
+            "block.yaml:3: 'mask' is not used with a 'block' without pictures; take it out");
+  for (const std::string section : {"features: {max_features: 10}", "candidates: {neighbours: 3}", "matching: {k_best: 3}"})
+    EXPECT_THAT(refusal_of("gps: {use: true}\n" + section + "\n"),
+                HasSubstr("block.yaml:4: '" + section.substr(0, section.find(':')) +
+                          "' is not used with 'tie_points', which are measured and matched already; take it out"));
+  EXPECT_EQ(refusal_of("tiles: {min_tiles: 2}\n"), "");
 }
 
 TEST(InitProject, WritesWhatTheReaderReads) {
