@@ -76,9 +76,9 @@ ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column
     entry.geodetic = geodetic;
     if (geodetic)
       entry.position = {csv.needed_number(row, "latitude_deg"), csv.needed_number(row, "longitude_deg"),
-                        csv.needed_number(row, "height_m")};
+                        csv.needed_metres(row, "height_m")};
     else
-      entry.pose.centre = {csv.needed_number(row, "x_m"), csv.needed_number(row, "y_m"), csv.needed_number(row, "z_m")};
+      entry.pose.centre = {csv.needed_metres(row, "x_m"), csv.needed_metres(row, "y_m"), csv.needed_metres(row, "z_m")};
     entry.pose.rotation = rotation_of(csv, row, angles);
     entry.pass = pass_of(csv, row);
     poses.rows.push_back(std::move(entry));

@@ -24,6 +24,13 @@ using Json = nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+// A height may be unknown.
+void check_coordinates(const Eigen::Vector3d& coordinates, const std::string& where) {
+  check_on_earth(coordinates.x(), "x", where);
+  check_on_earth(coordinates.y(), "y", where);
+  if (!std::isnan(coordinates.z())) check_on_earth(coordinates.z(), "z", where);
+}
+
 // -- gcp_list.txt --
 
 // Between tabs when the line has any (image names may then hold blanks), else between blanks.
@@ -64,6 +71,7 @@ ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
     const std::string key = fields.size() > 6 ? fields[6] : fields[0] + " " + fields[1] + " " + fields[2];
     const Eigen::Vector3d coordinates(parse_number(fields[0], "x", where), parse_number(fields[1], "y", where),
                                       number_or_nan(fields[2], "z", where));
+    check_coordinates(coordinates, where);
     const auto [found, inserted] = point_of_key.emplace(key, table.points.size());
     if (inserted) {
       ControlTable::Point point;
@@ -126,6 +134,7 @@ ControlTable::Point json_point(const Json& entry, JsonLines& lines) {
     point.coordinates = {json_number(position, "longitude", point.where),
                          json_number(position, "latitude", point.where),
                          position.contains("altitude") ? json_number(position, "altitude", point.where) : kNaN};
+    check_coordinates(point.coordinates, point.where);
   } else {
     point.coordinates.setConstant(kNaN);
   }
@@ -188,6 +197,7 @@ ControlTable::Point csv_point(const CsvTable& csv, std::size_t row) {
   point.where = csv.where(row);
   point.role = role_of(csv.text(row, "role"), point.where);
   point.coordinates = {csv.needed_number(row, "x"), csv.needed_number(row, "y"), csv.number(row, "z").value_or(kNaN)};
+  check_coordinates(point.coordinates, point.where);
   if (const auto sigma = csv.number(row, "sigma_horizontal_m"))
     point.sigma.head<2>().setConstant(positive(*sigma, "sigma_horizontal_m", point.where));
   if (const auto sigma = csv.number(row, "sigma_vertical_m"))

@@ -90,9 +90,15 @@ std::optional<double> CsvTable::number(std::size_t row, const std::string& colum
 }
 
 double CsvTable::needed_number(std::size_t row, const std::string& column) const {
-  const auto value = number(row, column);
-  if (!value) throw InputError(where(row) + ": " + column + " is empty");
-  return *value;
+  const std::string value = text(row, column);
+  if (value.empty()) throw InputError(where(row) + ": " + column + " is empty");
+  return parse_number(value, column, where(row));
+}
+
+double CsvTable::needed_metres(std::size_t row, const std::string& column) const {
+  const double metres = needed_number(row, column);
+  check_on_earth(metres, column, where(row));
+  return metres;
 }
 
 std::string CsvTable::where(std::size_t row) const { return path_ + ":" + std::to_string(lines_[row]); }

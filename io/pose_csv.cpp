@@ -9,12 +9,14 @@
 #include <unordered_set>
 
 #include "io/error.h"
+#include "io/settings_reader.h"
 
 namespace megablock {
 
 namespace {
 
 constexpr std::array<const char*, 8> kColumns = {"name", "qw", "qx", "qy", "qz", "x", "y", "z"};
+constexpr std::size_t kFirstCoordinate = 5;
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> fields;
@@ -94,6 +96,7 @@ class CsvReader {
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
       if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
         fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; take the line out if there is no pose");
+      if (c >= kFirstCoordinate) check_on_earth(value[c], kColumns[c], path_ + ":" + std::to_string(line_));
     }
     Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
     if (std::abs(rotation.norm() - 1) > 1e-3) fail("qw,qx,qy,qz is not a unit quaternion");

@@ -91,6 +91,7 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
   if (std::abs(position.latitude_deg) > 90 || std::abs(position.longitude_deg) > 180)
     throw InputError(fmt::format("{}: origin must be [latitude_deg, longitude_deg, height_m] (WGS84), not {:g}, {:g}",
                                  top.where("origin"), position.latitude_deg, position.longitude_deg));
+  check_on_earth(position.height_m, "origin", top.where("origin"));
   return ground_at(position);
 }
 

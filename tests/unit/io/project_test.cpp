@@ -288,6 +288,7 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "gps: {lever_arm_m: [1, 2]}\n"), HasSubstr("must be a list of 3 numbers"));
   EXPECT_THAT(refusal(folder, images + "gps: {use: maybe}\n"), HasSubstr("neither true nor false"));
   EXPECT_THAT(refusal(folder, images + "origin: [146, 3, 0]\n"), HasSubstr("block.yaml:2: origin must be"));
+  EXPECT_THAT(refusal(folder, images + "origin: [46, 3, 1e300]\n"), HasSubstr("block.yaml:2: origin: 1e+300 m is beyond"));
   EXPECT_THAT(refusal(folder, images + "images: images\n"), HasSubstr("block.yaml:2: key 'images' appears twice"));
   EXPECT_THAT(refusal(folder, images + "cameras: {grouping: colour}\n"), HasSubstr("none of: exif, folder, one"));
   EXPECT_THAT(refusal(folder, images + "cameras: {Nikon: {focal_px: 3}}\n"),
