@@ -19,7 +19,7 @@ class CsvTable {
   std::string text(std::size_t row, const std::string& column) const;  // "" when empty or absent
   std::optional<double> number(std::size_t row, const std::string& column) const;  // none when empty or NaN
   double needed_number(std::size_t row, const std::string& column) const;          // InputError when empty or NaN
-  double needed_metres(std::size_t row, const std::string& column) const;  // and when beyond any place on Earth
+  double needed_metres(std::size_t row, const std::string& column) const;          // and when beyond any place on Earth
   std::string where(std::size_t row) const;
   // Value of a comment line "# key: value"; empty when absent.
   std::string comment(const std::string& key) const;

@@ -138,7 +138,8 @@ TEST(ApproximatePoses, Refusals) {
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,2,1e300,0,0,0\n"), HasSubstr("p.csv:2: z_m: 1e+300" + remedy));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,-1.1e8,2,3,0,0,0\n"), HasSubstr("p.csv:2: x_m: -1.1e+08" + remedy));
   EXPECT_EQ(refusal(local + "frame0/0.jpg,32500000,5500000,3,0,0,0\n"), "");
-  EXPECT_THAT(refusal("name,qw,qx,qy,qz,x,y,z\nframe0/0.jpg,1,0,0,0,1,2e8,3\n"), HasSubstr("p.csv:2: y: 2e+08" + remedy));
+  EXPECT_THAT(refusal("name,qw,qx,qy,qz,x,y,z\nframe0/0.jpg,1,0,0,0,1,2e8,3\n"),
+              HasSubstr("p.csv:2: y: 2e+08" + remedy));
   EXPECT_THAT(refusal(local + "none.jpg,1,2,3,0,0,0\n"), HasSubstr("p.csv:2: pose of 'none.jpg', which is no image"));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,2,3,0,0,0\nframe0/0.jpg,1,2,3,0,0,0\n"), HasSubstr("appears twice"));
   EXPECT_THAT(refusal("image,x_m,y_m,z_m,yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,0,-85,0\n"),

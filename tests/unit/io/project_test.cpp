@@ -288,7 +288,8 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "gps: {lever_arm_m: [1, 2]}\n"), HasSubstr("must be a list of 3 numbers"));
   EXPECT_THAT(refusal(folder, images + "gps: {use: maybe}\n"), HasSubstr("neither true nor false"));
   EXPECT_THAT(refusal(folder, images + "origin: [146, 3, 0]\n"), HasSubstr("block.yaml:2: origin must be"));
-  EXPECT_THAT(refusal(folder, images + "origin: [46, 3, 1e300]\n"), HasSubstr("block.yaml:2: origin: 1e+300 m is beyond"));
+  EXPECT_THAT(refusal(folder, images + "origin: [46, 3, 1e300]\n"),
+              HasSubstr("block.yaml:2: origin: 1e+300 m is beyond"));
   EXPECT_THAT(refusal(folder, images + "images: images\n"), HasSubstr("block.yaml:2: key 'images' appears twice"));
   EXPECT_THAT(refusal(folder, images + "cameras: {grouping: colour}\n"), HasSubstr("none of: exif, folder, one"));
   EXPECT_THAT(refusal(folder, images + "cameras: {Nikon: {focal_px: 3}}\n"),
@@ -328,8 +329,7 @@ TEST_F(GivenBlock, PosesTakeThePlaceOfItsOwn) {
   poses.names = {given.frames[frame(2)].name};
   poses.poses = {Pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX())), {1, 2, 3}}};
   write_pose_csv(folder_.path("poses.csv"), poses);
-  const Block block =
-      read_text(folder_, "block: given.h5\ntie_points: tie_points.h5\nposes: poses.csv\n").block;
+  const Block block = read_text(folder_, "block: given.h5\ntie_points: tie_points.h5\nposes: poses.csv\n").block;
   ASSERT_TRUE(given.frames[frame(2)].given_pose && block.frames[frame(2)].given_pose);
   EXPECT_LT((block.frames[frame(2)].given_pose->centre - Eigen::Vector3d(1, 2, 3)).norm(), 1e-9);
   EXPECT_LT(rotation_angle(block.frames[frame(2)].given_pose->rotation, poses.poses[0].rotation), 1e-9);
@@ -346,7 +346,8 @@ TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
             "block.yaml:3: 'masks' is not used with a 'block' without pictures; take it out");
   EXPECT_EQ(refusal_of("cameras: {default: {mask: given.h5}}\n"),
             "block.yaml:3: 'mask' is not used with a 'block' without pictures; take it out");
-  for (const std::string section : {"features: {max_features: 10}", "candidates: {neighbours: 3}", "matching: {k_best: 3}"})
+  for (const std::string section :
+       {"features: {max_features: 10}", "candidates: {neighbours: 3}", "matching: {k_best: 3}"})
     EXPECT_THAT(refusal_of("gps: {use: true}\n" + section + "\n"),
                 HasSubstr("block.yaml:4: '" + section.substr(0, section.find(':')) +
                           "' is not used with 'tie_points', which are measured and matched already; take it out"));
