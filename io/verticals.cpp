@@ -13,6 +13,7 @@
 #include "geometry/vertical.h"
 #include "io/csv_table.h"
 #include "io/error.h"
+#include "io/image_scan.h"
 
 namespace megablock {
 
@@ -63,6 +64,22 @@ Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen:
   return by_angles * covariance * by_angles.transpose();
 }
 
+// The direction follows a camera that has been calibrated since, but images of another one are other images, whatever
+// their names.
+void check_camera(const std::vector<double>& values, const Camera& camera, const std::string& where) {
+  constexpr double kFarthest = 3;  // of the sigmas of a camera that is not calibrated
+  const IntrinsicSigmas sigma = default_intrinsic_sigmas(camera);
+  for (std::size_t p = 0; p < values.size(); ++p) {
+    const double now = camera.intrinsics[p];
+    if (!(std::abs(values[p] - now) > kFarthest * sigma[p]) || is_fixed(camera.intrinsics.model(), static_cast<int>(p)))
+      continue;
+    throw InputError(fmt::format(
+        "{}: the vertical was found with another camera than '{}': {} {:.6g} there, {:.6g} here; "
+        "name the file of these images, or run 'megablock verticals' again",
+        where, camera.name, parameter_name(camera.intrinsics.model(), static_cast<int>(p)), values[p], now));
+  }
+}
+
 void read_dependence(const CsvTable& csv, std::size_t row, const Camera& camera, SeenVertical& vertical) {
   const std::vector<double> values = numbers_of(csv, row, "camera"),
                             derivatives = numbers_of(csv, row, "down_by_camera");
@@ -71,6 +88,7 @@ void read_dependence(const CsvTable& csv, std::size_t row, const Camera& camera,
   if (!values.empty() && std::ssize(values) != camera.intrinsics.size())
     throw InputError(csv.where(row) + ": the vertical was found with another model of camera '" + camera.name +
                      "'; run 'megablock verticals' again");
+  check_camera(values, camera, csv.where(row));
   vertical.camera = Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
   vertical.by_camera = Eigen::Map<const Eigen::Matrix3Xd>(derivatives.data(), 3, std::ssize(values));
 }

@@ -92,6 +92,27 @@ TEST_F(VerticalsFile, BadRowsAreNamed) {
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 2 3\n"), HasSubstr("another model"));
 }
 
+// Names of images say little: 0001.jpg comes from every camera.
+TEST_F(VerticalsFile, OfAnotherCameraIsRefused) {
+  SeenVertical seen;
+  seen.image = ImageIndex(3);
+  seen.down = {0.1, std::sqrt(0.98), -0.1};
+  seen.covariance = 1e-6 * (Eigen::Matrix3d::Identity() - seen.down * seen.down.transpose());
+  const Camera& camera = block_.cameras[block_.camera_of(seen.image)];
+  seen.by_camera = Eigen::Matrix3Xd::Zero(3, camera.intrinsics.size());
+  const auto refusal = [&](int parameter, double change) {
+    seen.camera = Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(), camera.intrinsics.size());
+    seen.camera[parameter] += change;
+    return message(verticals_header() + "\n" + verticals_row(seen, block_.name_of(seen.image)) + "\n");
+  };
+  const double focal = camera.intrinsics[kFocal];
+  EXPECT_EQ(refusal(kFocal, 0), "");
+  EXPECT_EQ(refusal(kFocal, 0.1 * focal), "") << "calibrated since";
+  EXPECT_THAT(refusal(kFocal, focal),
+              HasSubstr("verticals.csv:2: the vertical was found with another camera than '" + camera.name + "': f "));
+  EXPECT_THAT(refusal(kPrincipalX, 0.1 * camera.width), HasSubstr(": cx "));
+}
+
 // Sigmas of 4 px of focal length and 0.1 of the first radial term.
 TEST_F(VerticalsFile, WholeErrorHasTheCameras) {
   SeenVertical seen;
