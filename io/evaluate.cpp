@@ -13,6 +13,7 @@
 #include "geometry/similarity.h"
 #include "io/crs.h"
 #include "io/error.h"
+#include "io/held_priors.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -149,14 +150,20 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
     const Eigen::Matrix3d rotation_covariance = turn * covariance.topLeftCorner<3, 3>() * turn.transpose(),
                           position_covariance = stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose();
-    normalised_rotation.add(angle, rotation_covariance);
-    normalised_position.add(error, position_covariance);
-    if (result.boundary.empty()) continue;
-    const std::size_t place = result.boundary[m.frame] != 0;
-    rotation_by_place[place].add(angle, rotation_covariance);
-    position_by_place[place].add(error, position_covariance);
+    const Frame& frame = frames[m.frame];
+    const bool by_place = !result.boundary.empty();
+    const std::size_t place = by_place && result.boundary[m.frame] != 0;
+    if (!frame.attitude_prior || !held(*frame.attitude_prior)) {
+      normalised_rotation.add(angle, rotation_covariance);
+      if (by_place) rotation_by_place[place].add(angle, rotation_covariance);
+    }
+    if (!frame.position_prior || !held(*frame.position_prior)) {
+      normalised_position.add(error, position_covariance);
+      if (by_place) position_by_place[place].add(error, position_covariance);
+    }
   }
   evaluation.frames = position.count();
+  evaluation.with_sigmas = !result.frame_covariance.empty();
   evaluation.position_rms_m = position.value();
   evaluation.position_max_m = largest;
   evaluation.rotation_rms_deg = rotation.value() * 180 / std::numbers::pi;
@@ -234,13 +241,15 @@ std::string to_text(const Evaluation& e) {
     text += fmt::format("\ncheck points                {}, rms {:.4f} m horizontal, {:.4f} m vertical", e.check_points,
                         e.check_rms_horizontal_m, e.check_rms_vertical_m);
   std::string ratios;
-  const auto add = [&](const char* name, double ratio) {
-    if (std::isfinite(ratio)) ratios += fmt::format("{}{} {:.3f}", ratios.empty() ? "" : ", ", name, ratio);
+  const auto add = [&](bool known, const char* name, double ratio) {
+    if (!known) return;
+    ratios += fmt::format("{}{} {}", ratios.empty() ? "" : ", ", name,
+                          std::isfinite(ratio) ? fmt::format("{:.3f}", ratio) : "-");
   };
-  add("position", e.normalised_error_position);
-  add("rotation", e.normalised_error_rotation);
-  add("check points", e.normalised_error_check);
-  if (!ratios.empty()) text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true)";
+  add(e.with_sigmas, "position", e.normalised_error_position);
+  add(e.with_sigmas, "rotation", e.normalised_error_rotation);
+  add(std::isfinite(e.normalised_error_check), "check points", e.normalised_error_check);
+  if (!ratios.empty()) text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true; -: held)";
   return text;
 }
 

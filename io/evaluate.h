@@ -32,11 +32,12 @@ struct Evaluation {
   double rotation_rms_deg = kNone;         // root mean square rotation angle
   double relative_position_rms_m = kNone;  // errors of the vectors between successive frames of a pass
   // sqrt of the mean of e'C^-1 e / 3 over the frames, and over those touched by one tile and by several; none without
-  // covariances.
+  // covariances, and over frames that are held, which have no sigma to compare with.
+  bool with_sigmas = false;  // the result has covariances of its frames
   double normalised_error_position = kNone, normalised_error_rotation = kNone;
   double normalised_error_position_interior = kNone, normalised_error_rotation_interior = kNone;
   double normalised_error_position_boundary = kNone, normalised_error_rotation_boundary = kNone;
-  std::int64_t check_points = 0, control_points = 0;                            // with an adjusted position
+  std::int64_t check_points = 0, control_points = 0;  // with an adjusted position
   double check_rms_m = kNone, check_rms_horizontal_m = kNone, check_rms_vertical_m = kNone;
   double control_rms_m = kNone;
   double normalised_error_check = kNone;

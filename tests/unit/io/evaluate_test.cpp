@@ -9,6 +9,7 @@
 #include "geometry/angles.h"
 #include "io/crs.h"
 #include "io/error.h"
+#include "io/held_priors.h"
 #include "io/simulate/random.h"
 #include "io/simulate/simulate.h"
 #include "io/unit_files.h"
@@ -82,6 +83,26 @@ TEST_F(EvaluateTest, StatedSigmasAreTrue) {
   EXPECT_NEAR(e.position_max_m, largest, 1e-12);
   EXPECT_NEAR(e.rotation_rms_deg, std::sqrt(angle / 2000) / kDegree, 1e-9);
   EXPECT_NEAR(e.relative_position_rms_m, std::sqrt(2 * sum), 0.1 * e.position_rms_m);  // independent errors
+}
+
+// Of what is held nothing tells how far it is off.
+TEST_F(EvaluateTest, HeldFramesHaveNoRatio) {
+  result_.boundary.assign(result_.block.frames.size(), 0);
+  for (std::size_t f = 0; f < result_.block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    result_.block.frames[frame].position_prior = PositionPrior{
+        result_.state.frames[frame].centre, Eigen::Vector3d::Constant(kHeldPositionSigma), Eigen::Vector3d::Zero()};
+    result_.frame_covariance[frame].bottomRows<3>().setZero();
+    result_.frame_covariance[frame].rightCols<3>().setZero();
+    result_.frame_covariance[frame].bottomRightCorner<3, 3>().diagonal().setConstant(1e-16);
+  }
+  const Evaluation e = evaluate(result_, simulated_.truth);
+  EXPECT_TRUE(std::isnan(e.normalised_error_position) && std::isnan(e.normalised_error_position_interior));
+  EXPECT_NEAR(e.normalised_error_rotation, 1, 0.04);
+  EXPECT_NE(to_text(e).find("error / stated sigma        position -, rotation 0.99"), std::string::npos) << to_text(e);
+  const auto json = nlohmann::json::parse(to_json(e));
+  EXPECT_TRUE(json["normalised_error_position"].is_null());
+  EXPECT_TRUE(json["normalised_error_rotation"].is_number());
 }
 
 TEST_F(EvaluateTest, BoundaryFramesApart) {
