@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -18,6 +19,8 @@ constexpr std::size_t kParts = 5;           // of a free datum, described
 constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
 constexpr double kMisstated = 2;            // times the stated sigma, beyond what chance explains
 constexpr double kContradicted = 6;         // sigmas; one of 14 million normal deviates in three dimensions is beyond
+
+constexpr const char* kAboutTheVertical = " about the vertical";
 
 // Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
 std::string pixels(double value) {
@@ -71,10 +74,41 @@ std::string undetermined(int defect, const Placing& placing) {
   return fmt::format("{} of the seven parameters of place, direction and scale", defect);
 }
 
-std::string consequence(int defect, const Placing& placing) {
+// Direction of an axis of the ground (east or x, north or y, up), whichever way it points.
+std::string axis_text(Eigen::Vector3d axis) {
+  constexpr double kNear = 20;  // degrees
+  if (axis.z() < 0) axis = -axis;
+  const double rise = std::asin(std::min(1.0, axis.z())) * kDegreesPerRadian;
+  if (rise > 90 - kNear) return kAboutTheVertical;
+  double azimuth = std::atan2(axis.x(), axis.y()) * kDegreesPerRadian;
+  if (rise >= kNear)
+    return fmt::format(" about an axis {:.0f} degrees above azimuth {:.0f}", rise,
+                       azimuth < 0 ? azimuth + 360 : azimuth);
+  azimuth = std::fmod(azimuth + 180, 180);
+  return fmt::format(" about a level axis of azimuth {:.0f} degrees", azimuth);
+}
+
+// Of the ground, where the rotations' sigmas are largest by far; empty where there is no such axis.
+std::string weak_axis(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
+    if (figures.part_of_frame[f] == part) sum += result.frame_covariance[f].topLeftCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sum);
+  constexpr double kByFar = 4;  // variances
+  if (!(eigen.eigenvalues()[2] > kByFar * eigen.eigenvalues()[1])) return "";
+  return axis_text(eigen.eigenvectors().col(2));
+}
+
+// A remedy for rotations about anything but the vertical; the block may have it already.
+std::string or_verticals(const BlockResult& result) {
+  return result.block.verticals.empty() ? ", or verticals where walls are seen ('megablock verticals')" : "";
+}
+
+std::string consequence(const BlockResult& result, int defect, const Placing& placing) {
   if (defect >= 6) return "coordinates are relative; add positions or three control points";
   if (defect == 1 && placing.positions > 1)
-    return "heights and attitudes are not usable; add attitudes, or control points away from that line";
+    return "heights and attitudes are not usable; add attitudes or control points away from that line" +
+           or_verticals(result);
   if (defect == 1 || defect == 4) return "lengths or directions are not usable; add positions or control points";
   return "coordinates are not usable as they are; add positions, attitudes or control points";
 }
@@ -179,12 +213,14 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
       lines.push_back(fmt::format(
           "{} free: nothing determines {}{}; {}",
           whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
-          undetermined(part.defect, placing), rotation_text(rotation_deg), consequence(part.defect, placing)));
+          undetermined(part.defect, placing), rotation_text(rotation_deg), consequence(result, part.defect, placing)));
     } else if (rotation_deg > kUnusableRotationDeg) {
+      const std::string axis = weak_axis(result, figures, static_cast<std::int32_t>(p));
       lines.push_back(
-          fmt::format("The rotations{} are known to {:.0f} degrees only (sigma): heights and attitudes are "
-                      "not usable; add control points or attitudes",
-                      whole ? "" : fmt::format(" of part {}", p + 1), rotation_deg));
+          fmt::format("The rotations{}{} are known to {:.0f} degrees only (sigma): heights and attitudes are "
+                      "not usable; add control points or attitudes{}",
+                      whole ? "" : fmt::format(" of part {}", p + 1), axis, rotation_deg,
+                      axis == kAboutTheVertical ? "" : or_verticals(result)));
     }
   }
   if (free > kParts) lines.push_back(fmt::format("The datum of {} more parts is free", free - kParts));

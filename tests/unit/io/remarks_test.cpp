@@ -38,8 +38,8 @@ TEST(Remarks, SaysInPlainWordsWhatAFreeDatumLeavesOpen) {
   EXPECT_EQ(datum_texts(line),
             std::vector<std::string>{
                 "The datum is free: nothing determines the rotation about the line on which the positions or control "
-                "points lie (sigma of the rotations 28 degrees); heights and attitudes are not usable; add attitudes, "
-                "or control points away from that line"});
+                "points lie (sigma of the rotations 28 degrees); heights and attitudes are not usable; add attitudes "
+                "or control points away from that line, or verticals where walls are seen ('megablock verticals')"});
   EXPECT_THAT(report_html(line),
               HasSubstr("<li class=look>The datum is free: nothing determines the rotation about the line"));
 
@@ -49,8 +49,29 @@ TEST(Remarks, SaysInPlainWordsWhatAFreeDatumLeavesOpen) {
   EXPECT_THAT(first(free_result(4, 1, false)), HasSubstr("nothing determines direction and scale;"));
   EXPECT_THAT(first(free_result(7, 0, false)), HasSubstr("nothing determines place, direction and scale;"));
 
-  line.free_parts.clear();  // just not free
-  EXPECT_THAT(first(line), HasSubstr("known to 28 degrees only"));
+  line.block.verticals.resize(1);
+  EXPECT_THAT(first(line), testing::Not(HasSubstr("megablock verticals")));
+}
+
+TEST(Remarks, NamesTheAxisAboutWhichRotationsAreWeak) {
+  BlockResult result = free_result(0, 3, false);
+  result.free_parts.clear();  // just not free
+  const auto weak_about = [&](const Eigen::Vector3d& axis) {
+    const double sigma = 28 * std::numbers::pi / 180;
+    for (auto& covariance : result.frame_covariance)
+      covariance.topLeftCorner<3, 3>() = 1e-8 * Eigen::Matrix3d::Identity() + sigma * sigma * axis * axis.transpose();
+    return datum_texts(result).at(0);
+  };
+  const std::string end =
+      " are known to 28 degrees only (sigma): heights and attitudes are not usable; add control points or attitudes";
+  const std::string verticals = ", or verticals where walls are seen ('megablock verticals')";
+  EXPECT_EQ(weak_about({0, -1, 0}), "The rotations about a level axis of azimuth 0 degrees" + end + verticals);
+  EXPECT_EQ(weak_about({-1, 0, 0}), "The rotations about a level axis of azimuth 90 degrees" + end + verticals);
+  EXPECT_EQ(weak_about({0, 0, -1}), "The rotations about the vertical" + end);
+  EXPECT_THAT(weak_about(Eigen::Vector3d(-0.5, 0, -std::sqrt(0.75))),
+              testing::StartsWith("The rotations about an axis 60 degrees above azimuth 90 are known to"));
+  for (auto& covariance : result.frame_covariance) covariance.setIdentity();
+  EXPECT_EQ(datum_texts(result).at(0).find("about"), std::string::npos) << "about every axis alike";
 }
 
 TEST(Remarks, KindsThatAreWorseThanStated) {
