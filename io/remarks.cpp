@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "geometry/angles.h"
 #include "io/held_priors.h"
@@ -18,7 +19,10 @@ constexpr std::size_t kNamed = 5;           // points by name
 constexpr std::size_t kParts = 5;           // of a free datum, described
 constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
 constexpr double kMisstated = 2;            // times the stated sigma, beyond what chance explains
-constexpr double kContradicted = 6;         // sigmas; one of 14 million normal deviates in three dimensions is beyond
+// Of tie points. Pairs are verified to 3 px across the epipolar line (matching.max_residual_px), two sigmas of what
+// three times the default lets expect: measuring alone leaves no more.
+constexpr double kMisstatedImage = 3;
+constexpr double kContradicted = 6;  // sigmas; one of 14 million normal deviates in three dimensions is beyond
 
 constexpr const char* kAboutTheVertical = " about the vertical";
 
@@ -150,6 +154,61 @@ std::string contradicted_text(const BlockResult& result, const std::vector<Resid
   return text;
 }
 
+// As the job's options say; empty when they are not known.
+std::string option_of(const BlockResult& result, const std::string& name) {
+  for (const OptionRecord& option : result.provenance.options)
+    if (option.name == name) return option.value;
+  return "";
+}
+
+// "positions are held", "positions are stated to 0.01 m" (median); empty without any.
+std::string stated_text(const char* kind, std::vector<double> sigmas, double held_sigma, const char* unit) {
+  if (sigmas.empty()) return "";
+  const double sigma = report::spread(std::move(sigmas)).median;
+  return sigma <= 2 * held_sigma ? fmt::format("{} are held", kind)
+                                 : fmt::format("{} are stated to {:.2g} {}", kind, sigma, unit);
+}
+
+// What else than tie points places the oriented frames, and how exactly it is stated.
+std::string placing_text(const BlockResult& result) {
+  std::vector<double> positions, attitudes;
+  for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
+    const Frame& frame = result.block.frames[f];
+    if (!result.state.oriented[f]) continue;
+    if (frame.position_prior) positions.push_back(frame.position_prior->sigma.minCoeff());
+    if (frame.attitude_prior) attitudes.push_back(frame.attitude_prior->sigma_rad.minCoeff() * kDegreesPerRadian);
+  }
+  if (option_of(result, "adjustment.use_position_priors") == "false") positions.clear();
+  if (option_of(result, "adjustment.use_attitude_priors") == "false") attitudes.clear();
+  const auto control = std::count_if(result.block.control_points.begin(), result.block.control_points.end(),
+                                     [](const ControlPoint& point) { return point.role == PointRole::kControl; });
+  std::string text;
+  for (const std::string& part :
+       {stated_text("positions", positions, kHeldPositionSigma, "m"),
+        stated_text("attitudes", attitudes, kHeldAttitudeSigma * kDegreesPerRadian, "degrees"),
+        control > 0 ? fmt::format("{} control point{}", control, control == 1 ? "" : "s") : std::string()})
+    if (!part.empty()) text += (text.empty() ? "" : ", ") + part;
+  return text;
+}
+
+// Sigma naught does not show what bends the tie points where their sigma is estimated: it is estimated with them.
+std::string image_sigma_text(const BlockResult& result) {
+  const std::string stated = option_of(result, "adjustment.image_sigma_px");
+  const double factor = result.observation_table[ObservationKind::kTieImage].sigma_factor();
+  const double assumed = std::strtod(stated.c_str(), nullptr);
+  const double shown = result.image_sigma_px * (factor > 1 ? factor : 1);
+  if (!(assumed > 0 && shown > kMisstatedImage * assumed)) return "";
+  const std::string placing = placing_text(result);
+  return fmt::format(
+      "Tie points fit to {:.1f} px only, {:.1f} times the {} px that adjustment.image_sigma_px assumes: {}the camera "
+      "model is wrong, or many matches are{}",
+      shown, shown / assumed, stated,
+      placing.empty() ? "" : "what places the block contradicts the images (" + placing + "), ",
+      placing.empty() ? "; see cameras and images in the report"
+                      : "; state larger sigmas, and run with 'adjustment: {use_position_priors: false, "
+                        "use_attitude_priors: false}' to see how the images alone fit");
+}
+
 std::string rotation_text(double rotation_deg) {
   if (!std::isfinite(rotation_deg) || rotation_deg < 1) return "";
   return fmt::format(" (sigma of the rotations {:.0f} degrees)", rotation_deg);
@@ -232,6 +291,7 @@ double chance_of_factor(const ObservationStatistics& statistics) { return 5 / st
 std::vector<std::string> misstated_texts(const BlockResult& result) {
   using enum ObservationKind;
   std::vector<std::string> lines;
+  if (std::string text = image_sigma_text(result); !text.empty()) lines.push_back(std::move(text));
   for (std::size_t k = 0; k < kObservationKinds; ++k) {
     const auto kind = static_cast<ObservationKind>(k);
     const ObservationStatistics& s = result.observation_table.kinds[k];

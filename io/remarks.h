@@ -27,12 +27,13 @@ std::string unused_points_text(const BlockResult& result, PointRole role);
 
 // What the observations leave undetermined of the datum, a line per part of the block whose datum is free, and whether
 // its rotations are known to several degrees only: "The datum is free: nothing determines the rotation about the line
-// of the positions (sigma of the rotations 28 degrees): ... add control points or attitudes". Empty for a sound datum.
+// of the positions (sigma of the rotations 28 degrees): ... add attitudes or control points ...". Empty for a sound datum.
 std::vector<std::string> datum_texts(const BlockResult& result);
 std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures);  // parts are enough
 
 // Kinds of observations whose residuals are several times what their stated sigmas let expect, a line each, with what
-// can be done. Sigma naught does not show them: it is that of the tie points, which are many.
+// can be done. Sigma naught does not show them: it is that of the tie points, which are many. Of tie points: several
+// times what the job's options assume, however their sigma was estimated.
 std::vector<std::string> misstated_texts(const BlockResult& result);
 // Single positions and attitudes that the block contradicts by many times their sigmas, a line for each of the two, the
 // worst by name: "6 of 18 attitudes differ from the block by more than 6 sigmas: DJI_0034.JPG by 178.9 degrees, ...".

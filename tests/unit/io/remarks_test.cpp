@@ -74,6 +74,40 @@ TEST(Remarks, NamesTheAxisAboutWhichRotationsAreWeak) {
   EXPECT_EQ(datum_texts(result).at(0).find("about"), std::string::npos) << "about every axis alike";
 }
 
+TEST(Remarks, TiePointsThatFitFarWorseThanAssumed) {
+  BlockResult result = made_up_result(small_block());
+  const auto remark = [&] { return misstated_texts(result); };
+  result.image_sigma_px = 3.9;
+  EXPECT_TRUE(remark().empty()) << "what was assumed is not known";
+  result.provenance.options.push_back({"adjustment.image_sigma_px", "0.5", "0.5"});
+  const std::string start =
+      "Tie points fit to 3.9 px only, 7.8 times the 0.5 px that adjustment.image_sigma_px assumes: ";
+  result.block.control_points.clear();
+  for (Frame& frame : result.block.frames) {
+    frame.position_prior =
+        PositionPrior{Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(1e-8), Eigen::Vector3d::Zero()};
+    frame.attitude_prior->sigma_rad.setConstant(0.5 * std::numbers::pi / 180);
+  }
+  ASSERT_EQ(remark().size(), 1u);
+  EXPECT_EQ(remark()[0],
+            start +
+                "what places the block contradicts the images (positions are held, attitudes are stated to 0.5 "
+                "degrees), the camera model is wrong, or many matches are; state larger sigmas, and run with "
+                "'adjustment: {use_position_priors: false, use_attitude_priors: false}' to see how the images "
+                "alone fit");
+  EXPECT_THAT(report_html(result), testing::AllOf(HasSubstr("<li class=look>Tie points fit to 3.9 px only"),
+                                                  testing::Not(HasSubstr("Residuals agree with the stated sigmas"))));
+  for (Frame& frame : result.block.frames) frame.position_prior.reset(), frame.attitude_prior.reset();
+  EXPECT_EQ(remark()[0],
+            start + "the camera model is wrong, or many matches are; see cameras and images in the report");
+  result.image_sigma_px = 1.4;  // blurred pictures
+  EXPECT_TRUE(remark().empty());
+  result.image_sigma_px = 0.5;  // held, and the residuals say otherwise
+  result.observation_table[ObservationKind::kTieImage] = {1000, 9 * 900, 900, 1};
+  result.provenance.options.back().value = "0.4";
+  EXPECT_THAT(remark().at(0), testing::StartsWith("Tie points fit to 1.5 px only, 3.8 times the 0.4 px"));
+}
+
 TEST(Remarks, KindsThatAreWorseThanStated) {
   BlockResult result = made_up_result(small_block());
   result.observation_table = {};
