@@ -97,4 +97,15 @@ std::string result_figures(const JobStore& store) {
   return to_json({reprojection_statistics(result, tracks), remarks(result, tracks)}, result);
 }
 
+std::vector<std::string> result_remarks(const JobStore& store) {
+  if (!store.seal(kResult)) return {};
+  return Json::parse(result_figures(store)).at("remarks");
+}
+
+std::string look_text(const std::vector<std::string>& remarks) {
+  std::string text;
+  for (const std::string& remark : remarks) text += "  look: " + remark + "\n";
+  return text;
+}
+
 }  // namespace megablock

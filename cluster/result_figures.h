@@ -23,4 +23,9 @@ std::string to_json(const ResultFigures& figures, const BlockResult& result);
 // Of the job's result, which is there: as they were written with it, else found anew.
 std::string result_figures(const JobStore& store);
 
+// The remarks among them: what a reader must not overlook. None without a result.
+std::vector<std::string> result_remarks(const JobStore& store);
+// A line "  look: ..." each, wherever they are printed.
+std::string look_text(const std::vector<std::string>& remarks);
+
 }  // namespace megablock

@@ -153,8 +153,7 @@ std::string status_text(const JobStore& store) {
             (holder ? "" : ": run it to the end again") + "\n";
   text += figures_text(json);
   text += interest_points_text(json["interest_points"]);
-  for (const std::string remark : json["remarks"]) text += "  look: " + remark + "\n";
-  return text;
+  return text + look_text(json["remarks"]);
 }
 
 bool job_is_done(const JobStore& store) {

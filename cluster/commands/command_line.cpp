@@ -21,6 +21,7 @@
 #include "cluster/commands/option_checks.h"
 #include "cluster/commands/register_command.h"
 #include "cluster/commands/simulate_command.h"
+#include "cluster/commands/terminal_text.h"
 #include "cluster/commands/train_filter_command.h"
 #include "cluster/commands/verticals_command.h"
 #include "cluster/communicator.h"
@@ -76,7 +77,7 @@ void add_init(CLI::App& app, Action& action) {
 
 void print_result(const RunOptions& options) {
   const JobStore store(options.directory);
-  std::printf("%s", status_text(store).c_str());
+  std::printf("%s", for_terminal(status_text(store)).c_str());
   if (store.seal(kResult)) std::printf("report: %s\n", store.path("result/report.html").c_str());
 }
 
@@ -132,7 +133,7 @@ int watch(const JobStore& store) {
   const bool terminal = isatty(STDOUT_FILENO) != 0;
   for (;;) {
     const bool done = job_is_done(store);  // before the text, which then shows the end
-    std::printf("%s%s", terminal ? "\033[H\033[J" : "", status_text(store).c_str());
+    std::printf("%s%s", terminal ? "\033[H\033[J" : "", for_terminal(status_text(store)).c_str());
     std::fflush(stdout);
     if (done) return kExitDone;
     if (!holder_of(store)) {
@@ -161,7 +162,7 @@ void add_status(CLI::App& app, Action& action) {
       if (options->watch) return watch(store);
       const std::string text = options->digest ? status_digest(store) + "\n"
                                : options->json ? status_json(store) + "\n"
-                                               : status_text(store);
+                                               : for_terminal(status_text(store));
       std::printf("%s", text.c_str());
       return kExitDone;
     };

@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "cluster/block_checks.h"
+#include "cluster/commands/terminal_text.h"
 #include "cluster/diagnostics.h"
 #include "cluster/exit_codes.h"
+#include "cluster/result_figures.h"
 
 namespace megablock {
 
@@ -26,10 +28,11 @@ std::vector<std::vector<std::string>> split(const std::vector<std::string>& list
   return names;
 }
 
-// One object: the diagnostics and the key 'checks'.
-std::string with_checks(const std::string& diagnostics, const std::string& checks) {
+// One object: the diagnostics and the keys 'checks' and 'remarks'.
+std::string joined(const std::string& diagnostics, const std::string& checks, const std::vector<std::string>& remarks) {
   auto json = nlohmann::ordered_json::parse(diagnostics);
   json["checks"] = nlohmann::ordered_json::parse(checks);
+  json["remarks"] = remarks;
   return json.dump(1) + "\n";
 }
 
@@ -56,11 +59,13 @@ void add_diagnose(CLI::App& app, std::function<int()>& action) {
     action = [options] {
       const JobDiagnostics job = diagnose_job(JobStore(options->job));
       const BlockChecks checks = check_job(JobStore(options->job), job.found.aerial, split(options->subsets));
+      const std::vector<std::string> remarks = result_remarks(JobStore(options->job));
       if (options->json)
-        std::printf("%s", with_checks(to_json(job.found, job.block), to_json(checks, job.block)).c_str());
+        std::printf("%s", joined(to_json(job.found, job.block), to_json(checks, job.block), remarks).c_str());
       else
-        std::printf("of %s:\n%s%s", job.source.c_str(), to_text(job.found, job.block).c_str(),
-                    to_text(checks, job.block).c_str());
+        std::printf("%s", for_terminal("of " + job.source + ":\n" + look_text(remarks) + to_text(job.found, job.block) +
+                                       to_text(checks, job.block))
+                              .c_str());
       return kExitDone;
     };
   });

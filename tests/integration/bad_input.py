@@ -90,6 +90,29 @@ class BadInput(CopyOfTheBlock):
             self.assertEqual("".join(narrow.split()), "".join(wide.split()))
         self.assertIn("of the\n" + 30 * " " + "merge, MiB", help_of(80, "run"))  # below the description
 
+    def test_status_and_diagnose_are_as_wide_as_the_terminal(self):
+        for command in ("status", "diagnose"):
+            whole = megablock(command, work / "clean_job")  # as a program reads them
+            narrow = megablock(command, work / "clean_job", env=dict(os.environ, COLUMNS="60"))
+            self.assertGreater(max(map(len, whole.splitlines())), 60)
+            # What has no blank, as a path, cannot be broken.
+            self.assertFalse([line for line in narrow.splitlines() if len(line) > 60 and " " in line.strip()[:60]], narrow)
+            self.assertEqual("".join(narrow.split()), "".join(whole.split()))
+
+    def test_held_positions_that_contradict_the_images(self):
+        megablock("simulate", "--frames", 40, "--gps-sigma", 0.5, "-o", self.folder / "aerial")
+        project = self.folder / "aerial/block.yaml"
+        megablock("run", project, "-j", self.job, "-q")
+        self.assertNotIn("look: Tie points", megablock("status", self.job))
+        with project.open("a") as f:
+            f.write("gps: {sigma_horizontal_m: 0, sigma_vertical_m: 0}\n")
+        megablock("run", project, "-j", self.job, "-q")
+        for command in ("status", "diagnose"):
+            said = megablock(command, self.job)
+            self.assertRegex(said, "\n  look: Tie points fit to [0-9.]+ px only, .*[(]positions are held[,)].*use_position_priors")
+        self.assertEqual(json.loads(megablock("diagnose", self.job, "--json"))["remarks"], status(self.job)["remarks"])
+        self.assert_reported("<li class=look>Tie points fit to")
+
     def test_job_among_photographs(self):
         before = sorted(self.images.iterdir())
         line = one_line(megablock("run", self.project, "-j", self.images, "-q", expect=BAD_INPUT))

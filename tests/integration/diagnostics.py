@@ -7,7 +7,7 @@ import pathlib
 import subprocess
 import tempfile
 
-from program import BAD_INPUT, MEGABLOCK, megablock, one_line
+from program import BAD_INPUT, MEGABLOCK, megablock, one_line, status
 
 
 def diagnosed(job):
@@ -79,6 +79,7 @@ def main():
         after = json.loads((job / "result/diagnostics.json").read_text())
         printed = diagnosed(job)
         del printed["checks"]
+        assert printed.pop("remarks") == status(job)["remarks"] == []
         assert after == printed
         assert after["links_known"] and after["part_frames"] == [30] and after["gaps"] == [], after
         assert after["pair_count"] == 30 - after["flight_lines"] and after["pairs"] == [], after["pairs"]
