@@ -1,5 +1,7 @@
 #include "cluster/status.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -9,6 +11,7 @@
 #include "cluster/progress.h"
 #include "cluster/result_figures.h"
 #include "cluster/stage_record.h"
+#include "io/counted.h"
 #include "io/error.h"
 #include "io/events.h"
 #include "io/result.h"
@@ -86,7 +89,7 @@ std::string stage_line(const Json& stage) {
   const auto expected = stage["units_expected"].get<std::int64_t>();
   std::string line = "  " + name + stage["state"].get<std::string>();
   if (expected > 0)
-    line += ", " + std::to_string(stage["units"].get<std::int64_t>()) + " of " + std::to_string(expected) + " units";
+    line += ", " + std::to_string(stage["units"].get<std::int64_t>()) + " of " + counted(expected, "unit");
   if (const double seconds = stage["seconds"]; seconds > 0) line += ", " + duration_text(seconds);
   if (const auto failed = stage["failed"].get<std::int64_t>(); failed > 0)
     line += ", " + std::to_string(failed) + " failed";
@@ -105,28 +108,25 @@ std::string failure_lines(const Json& failures) {
 }
 
 std::string figures_text(const Json& json) {
-  char line[512];
-  std::snprintf(line, sizeof line,
-                "  %lld of %lld images oriented, %lld points, %lld observations, mean residual %.3f px\n"
-                "  sigma0 squared %.4f with %.3f px per tie point measurement, %lld tiles, %lld boundary frames, %lld "
-                "global iterations\n  digest %s\n",
-                json["oriented"].get<long long>(), json["images"].get<long long>(), json["points"].get<long long>(),
-                json["observations"].get<long long>(), json["mean_reprojection_px"].get<double>(),
-                json["chi2_per_dof"].get<double>(), json["image_sigma_px"].get<double>(),
-                json["tiles"].get<long long>(), json["boundary_frames"].get<long long>(),
-                json["global_iterations"].get<long long>(), json["digest"].get<std::string>().c_str());
-  return line;
+  const auto number = [&](const char* key) { return json[key].get<std::int64_t>(); };
+  return fmt::format(
+      "  {} of {} oriented, {}, {}, mean residual {:.3f} px\n"
+      "  sigma0 squared {:.4f} with {:.3f} px per tie point measurement, {}, {}, {}\n  digest {}\n",
+      number("oriented"), counted(number("images"), "image"), counted(number("points"), "point"),
+      counted(number("observations"), "observation"), json["mean_reprojection_px"].get<double>(),
+      json["chi2_per_dof"].get<double>(), json["image_sigma_px"].get<double>(), counted(number("tiles"), "tile"),
+      counted(number("boundary_frames"), "boundary frame"), counted(number("global_iterations"), "global iteration"),
+      json["digest"].get<std::string>());
 }
 
 std::string interest_points_text(const Json& list) {
   std::string text;
   constexpr std::size_t kShown = 20;
   for (std::size_t i = 0; i < std::min(kShown, list.size()); ++i) {
-    char line[128];
-    std::snprintf(line, sizeof line, ": %lld to %lld interest points per image, mean %.0f, %lld in %lld images\n",
-                  list[i]["least"].get<long long>(), list[i]["most"].get<long long>(), list[i]["mean"].get<double>(),
-                  list[i]["total"].get<long long>(), list[i]["images"].get<long long>());
-    text += "  " + list[i]["camera"].get<std::string>() + line;
+    const auto number = [&](const char* key) { return list[i][key].get<std::int64_t>(); };
+    text += fmt::format("  {}: {} to {} per image, mean {:.0f}, {} in {}\n", list[i]["camera"].get<std::string>(),
+                        number("least"), counted(number("most"), "interest point"), list[i]["mean"].get<double>(),
+                        number("total"), counted(number("images"), "image"));
   }
   if (list.size() > kShown) text += "  ... all cameras in 'megablock status --json'\n";
   return text;

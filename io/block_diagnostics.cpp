@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "io/counted.h"
 #include "io/crs.h"
 #include "io/error.h"
 
@@ -145,9 +146,9 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
     return "'" + block.frames[a].name + "' and '" + block.frames[b].name + "'";
   };
   for (const auto& gap : d.gaps)
-    text += gap.line ? fmt::format("{} flight line(s) missing beside {}, {:.6g} m wide\n", gap.missing,
+    text += gap.line ? fmt::format("{} missing beside {}, {:.6g} m wide\n", counted(gap.missing, "flight line"),
                                    between(gap.before, gap.after), gap.distance_m)
-                     : fmt::format("{} exposure(s) missing between {}, {:.6g} m apart\n", gap.missing,
+                     : fmt::format("{} missing between {}, {:.6g} m apart\n", counted(gap.missing, "exposure"),
                                    between(gap.before, gap.after), gap.distance_m);
   for (const auto& ground : d.thin_ground)
     text += fmt::format("ground seen by fewer than {} images about {:.6g}, {:.6g}: {:.4g} m2\n", d.requested.min_images,
@@ -161,10 +162,14 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
   if (d.part_frames.size() > 1)
     text += fmt::format("{} parts without a good link between them\n", d.part_frames.size());
   for (const auto& link : d.weak_links)
-    text += fmt::format("weak link of {} points between {}\n", link.points, between(link.a, link.b));
+    text += fmt::format("weak link of {} between {}\n", counted(link.points, "point"), between(link.a, link.b));
   for (const auto& link : d.single_links)
-    text += fmt::format("{} frames hang on the link between {}\n", link.frames, between(link.a, link.b));
-  if (!d.proposals.empty()) text += fmt::format("{} exposures are proposed\n", d.proposals.size());
+    text +=
+        fmt::format("{} on the link between {}\n",
+                    counted(link.frames, "frame") + (link.frames == 1 ? " hangs" : " hang"), between(link.a, link.b));
+  if (!d.proposals.empty())
+    text += fmt::format("{} proposed\n", d.proposals.size() == 1 ? "1 exposure is"
+                                                                 : fmt::format("{} exposures are", d.proposals.size()));
   if (text.empty()) text = "nothing of what was looked for is missing\n";
   if (!d.aerial) text += "not looked for, as the images do not look down: flight lines, ground, bases, overlaps\n";
   if (!d.links_known) text += "not looked for, as there are no matches or tie points yet: links\n";

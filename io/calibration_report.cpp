@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geometry/angles.h"
+#include "io/counted.h"
 
 namespace megablock {
 
@@ -79,10 +80,11 @@ std::string calibration_text(const RigCalibration& c) {
                       "px", "ul ur ll lr");
   for (const MountCalibration& mount : c.mounts) text += mount_line(mount);
   text += fmt::format(
-      "\n{}: {} frames, {} points, {} control points; redundancy {:.0f} of {} residuals, sigma0 {:.3f}, {} steps, "
+      "\n{}: {} frames, {} points, {} control points; redundancy {:.0f} of {} residuals, sigma0 {:.3f}, {}, "
       "{:.1f} "
       "s\n",
-      c.mode, c.frames, c.points, c.control_points, c.redundancy, c.residuals, c.sigma0, c.iterations, c.seconds);
+      c.mode, c.frames, c.points, c.control_points, c.redundancy, c.residuals, c.sigma0, counted(c.iterations, "step"),
+      c.seconds);
   const auto images = [](const ImageFit& fit) {
     if (fit.observations == 0) return std::string("-");
     return fmt::format("{} ({:.2f} px mean length, {:.2f} px deviation)", px(fit.rms_px()), fit.mean_px(),

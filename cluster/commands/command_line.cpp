@@ -307,6 +307,21 @@ std::string unknown_command_message(const CLI::App& app, const std::string& name
          (nearest.empty() ? "see 'megablock --help'" : "did you mean '" + nearest + "'?");
 }
 
+// A misspelled option is named first: one that is missing may be what was meant by it.
+std::string usage_message(const CLI::App& command, const std::string& name, const CLI::Error& error) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options([](const CLI::Option* o) { return o->nonpositional(); }))
+    for (const std::string& word : option->get_lnames()) known.push_back("--" + word);
+  for (const std::string& argument : command.remaining()) {
+    if (!argument.starts_with("-")) continue;
+    const std::string option = argument.substr(0, argument.find('='));
+    const std::string nearest = option.starts_with("--") ? nearest_name(option, known) : "";
+    return "megablock: argument '" + option + "' was not expected; " +
+           (nearest.empty() ? "" : "did you mean '" + nearest + "'? ") + "see '" + name + " --help'\n";
+  }
+  return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
+}
+
 // 'help', no command at all, or an unknown one: the exit code, the same on every rank; one of them says why.
 std::optional<int> answer_without_command(const CLI::App& app, int argc, char** argv, bool speaks) {
   const std::string name = argc > 1 ? argv[1] : "";
@@ -372,16 +387,9 @@ int command_line(int argc, char** argv) {
   app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + arithmetic_level() + ")");
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* command, const CLI::Error& error) {
-    std::string name = command->get_name();
-    for (const CLI::App* chosen : command->get_subcommands()) {
-      name += " " + chosen->get_name();
-      if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::ExtrasError)) continue;
-      const std::string words = error.what();  // "...: value --option": the first argument comes last
-      const std::size_t option = words.rfind(" -");
-      if (option != std::string::npos)
-        return "megablock: argument '" + words.substr(option + 1) + "' was not expected; see '" + name + " --help'\n";
-    }
-    return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
+    for (const CLI::App* chosen : command->get_subcommands())
+      return usage_message(*chosen, "megablock " + chosen->get_name(), error);
+    return usage_message(*command, command->get_name(), error);
   });
   app.footer(
       "Exit codes: 0 done, 1 finished with failed units, 2 usage or bad input,\n"

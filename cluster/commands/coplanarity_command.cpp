@@ -16,6 +16,7 @@
 #include "cluster/job_options.h"
 #include "cluster/job_so_far.h"
 #include "geometry/angles.h"
+#include "io/counted.h"
 #include "io/error.h"
 #include "io/pose_csv.h"
 
@@ -107,8 +108,8 @@ std::string figures_text(const CoplanarityBlock& block, const CoplanaritySolutio
                   block.frames_left_out, block.network.point_count(), block.points_left_out, d.rows);
   text += fmt::format("they determine {} of {} parameters; condition of the angles {:.3g}\n", d.rank, d.columns,
                       d.angle_condition());
-  text += fmt::format("mean |F| {:.4g} m before, {:.4g} m after; {} iterations\n", found.mean_before, found.mean_after,
-                      found.iterations);
+  text += fmt::format("mean |F| {:.4g} m before, {:.4g} m after; {}\n", found.mean_before, found.mean_after,
+                      counted(found.iterations, "iteration"));
   text +=
       fmt::format("attitudes turned by {:.4g} degrees, images moved by {:.3g} px (rms)\n",
                   rms_turn(block.network, found.network) * kDegreesPerRadian, rms_shift(block.network, found.network));

@@ -191,7 +191,8 @@ int write_verticals(VerticalsOptions options) {
   store.write_text(output.filename().string(), table);
   std::printf("%d of %zu images show the vertical: %s\n", found, pictures.size(), options.output.c_str());
   std::printf("%s%s", edgeless_text(block, pictures).c_str(), remark_on(pictures).c_str());
-  std::printf("To use them, give 'verticals: FILE' in the project file.\n");
+  std::printf("To use them, give 'verticals: %s' in the project file.\n",
+              output.lexically_proximate(fs::path(project.file).parent_path()).c_str());
   return failed > 0 ? kExitFailedUnits : kExitDone;
 }
 

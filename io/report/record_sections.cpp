@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "io/counted.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
 
@@ -125,8 +126,8 @@ std::string provenance_section(const BlockResult& result, const ReportContext& c
   add("datum", escape(result.gauge));
   if (result.global_iterations > 0)
     add("convergence",
-        fmt::format("Newton decrement {} after {} steps{}", significant(result.newton_decrement, 2),
-                    count(result.global_iterations),
+        fmt::format("Newton decrement {} after {}{}", significant(result.newton_decrement, 2),
+                    counted(result.global_iterations, "step"),
                     result.decrement_limit > 0 ? ", limit " + significant(result.decrement_limit, 2) : ""));
   add("digest", result.digest.empty() ? "" : "<code>" + escape(result.digest) + "</code>");
   if (table.empty() && provenance.options.empty()) return "";

@@ -44,7 +44,11 @@ class BadInput(CopyOfTheBlock):
         said = megablock("run", self.project, "-j", self.job, "--threads", "two", expect=BAD_INPUT)
         self.assertIn("'two' is not a number of 0 or more; see 'megablock run --help'", said)
         said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
-        self.assertIn("argument '--thread' was not expected; see 'megablock run --help'", said)
+        self.assertIn("argument '--thread' was not expected; did you mean '--threads'? see 'megablock run --help'", said)
+        said = megablock("run", self.project, "--jobs=" + str(self.job), expect=BAD_INPUT)  # not: --job is required
+        self.assertIn("argument '--jobs' was not expected; did you mean '--job'? see 'megablock run --help'", said)
+        said = megablock("run", self.project, "-j", self.job, "--colour", expect=BAD_INPUT)
+        self.assertIn("argument '--colour' was not expected; see 'megablock run --help'", said)
 
     def test_rig_to_calibrate_is_missed_before_any_picture_is_read(self):
         calibration = self.folder / "calibration"

@@ -123,6 +123,7 @@ def main():
             table = folder / "verticals.csv"
             said = megablock("verticals", folder / "block.yaml", "-o", table)
             assert frames > 2 or "8 of 8 images show the vertical" in said, said
+            assert "give 'verticals: verticals.csv' in the project file" in said, said
             rms, normalised = errors(folder, table)
             # The sigma of an unknown lens is far larger than what it does to most pictures.
             assert (0.3 if calibrated else 0) < normalised < 3, normalised

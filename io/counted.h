@@ -1,0 +1,14 @@
+// Numbers with what is counted.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace megablock {
+
+// "1 tile", "4 tiles".
+inline std::string counted(std::int64_t number, const std::string& noun) {
+  return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
+}
+
+}  // namespace megablock
