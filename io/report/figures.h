@@ -14,8 +14,8 @@ namespace megablock::report {
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-// What a pass goes through before it says so (`after_reading` of ReportContext): rows of the table of images, or tracks,
-// whose images lie all over it.
+// What a pass goes through before it says so (`after_reading` of ReportContext): rows of the table of images, or
+// tracks, whose images lie all over it.
 inline constexpr std::int64_t kImagesAtATime = 1 << 16, kTracksAtATime = 1 << 13;
 
 // Equal bins from `low`; what lies outside goes to the first or last bin.

@@ -91,8 +91,8 @@ std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& 
     return std::isfinite(value) ? value : -1;
   };
   return first_images(
-      result, kListedImages,
-      [&](ImageIndex a, ImageIndex b) { return std::pair(-rms(a), a) < std::pair(-rms(b), b); }, after_reading);
+      result, kListedImages, [&](ImageIndex a, ImageIndex b) { return std::pair(-rms(a), a) < std::pair(-rms(b), b); },
+      after_reading);
 }
 
 }  // namespace

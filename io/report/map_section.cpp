@@ -86,8 +86,7 @@ std::string map_section(const BlockResult& result, const Figures& f, const std::
   return section("map-section", drawn > 1 ? "Maps" : "Map", map_legend(result, f) + map_controls() + body);
 }
 
-std::string coverage_section(const BlockResult& result, const Figures& f,
-                             const std::function<void()>& after_reading) {
+std::string coverage_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   if (f.reprojection.observations == 0) return "";
   const std::vector<MapSubject> subjects = subjects_of(f);
   if (subjects.empty()) return "";
