@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "adjust/tile_problem.h"
+#include "cluster/process_memory.h"
 #include "io/error.h"
 #include "io/track_reader.h"
 #include "io/track_rows.h"
@@ -101,6 +102,7 @@ class TracksOfTiles {
       tracks = no_tracks();
     }
     observations_ = 0;
+    return_freed_memory();  // lists that grow leave holes
   }
 
   // Room for as much as there is: what grows has twice of it at a time.

@@ -226,10 +226,8 @@ std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& ma
 
 std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles) {
   return run_tracks_unit(job, hash_file(tie_points), tiles, [&](const auto& take) {
-    deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take, [&job] {
-      job.tables.release();
-      return_freed_memory();  // lists that grow leave holes
-    });
+    deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take,
+                      [&job] { job.tables.release(); });
   });
 }
 
