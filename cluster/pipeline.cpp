@@ -77,8 +77,12 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::
   Block& block = project.block;
   std::vector<std::int64_t> generations;
   if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
-    page_tables(*previous, tables);
-    const auto release = [&tables] { tables.release(); };  // of two blocks one table is there at a time
+    PagedTables older(store.directory());
+    page_tables(*previous, older);
+    const auto release = [&] {  // of two blocks one table is there at a time
+      tables.release();
+      older.release();
+    };
     refuse_another_block(store, *previous, project);
     release();
     // Images taken away or changed start a new block; growing keeps what is there.
@@ -128,9 +132,8 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   tables.release();
   Hasher fingerprint;
   fingerprint.add(hash_file(options.project)).add(generations);
-  store.write("block.h5", fingerprint.value(), [&](const std::string& path) {
-    write_block(path, project.block, [&tables] { tables.release(); });
-  });
+  store.write("block.h5", fingerprint.value(),
+              [&](const std::string& path) { write_block(path, project.block, [&tables] { tables.release(); }); });
 
   Json settings = Json::array();
   for (const auto& e : project.settings.entries) settings.push_back({e.section, e.key, e.value, e.where});

@@ -20,7 +20,7 @@ void return_freed_memory();  // to the system: what malloc keeps of it
 // program's malloc keeps such pages for the next image's features (arithmetic.cpp); from the tiles on, among tracks,
 // tiles and thousands of fronts of all sizes, half of the process would lie idle between them.
 void use_memory_sparingly();
-// As the program begins, from now on.
+// Undoes it: what is freed from now on is kept, as from the beginning of the program.
 void keep_freed_memory();
 // Every block of so many bytes and more, from now on.
 void map_blocks_from(int bytes);

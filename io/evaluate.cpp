@@ -14,6 +14,7 @@
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/held_priors.h"
+#include "io/result_option.h"
 #include "io/unit_files.h"
 
 namespace megablock {
@@ -129,6 +130,8 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   NormalisedError normalised_position, normalised_rotation;
   std::array<NormalisedError, 2> position_by_place, rotation_by_place;  // interior, boundary
   double largest = 0;
+  const bool positions_used = option_of(result, "adjustment.use_position_priors") != "false",
+             attitudes_used = option_of(result, "adjustment.use_attitude_priors") != "false";
   const Eigen::Matrix3d turn = similarity.rotation.toRotationMatrix();
   const Eigen::Matrix3d stretch = similarity.scale * turn;
   Eigen::Vector3d previous_error = Eigen::Vector3d::Zero();
@@ -153,11 +156,11 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     const Frame& frame = frames[m.frame];
     const bool by_place = !result.boundary.empty();
     const std::size_t place = by_place && result.boundary[m.frame] != 0;
-    if (!frame.attitude_prior || !held(*frame.attitude_prior)) {
+    if (!(attitudes_used && frame.attitude_prior && held(*frame.attitude_prior))) {
       normalised_rotation.add(angle, rotation_covariance);
       if (by_place) rotation_by_place[place].add(angle, rotation_covariance);
     }
-    if (!frame.position_prior || !held(*frame.position_prior)) {
+    if (!(positions_used && frame.position_prior && held(*frame.position_prior))) {
       normalised_position.add(error, position_covariance);
       if (by_place) position_by_place[place].add(error, position_covariance);
     }
@@ -241,15 +244,18 @@ std::string to_text(const Evaluation& e) {
     text += fmt::format("\ncheck points                {}, rms {:.4f} m horizontal, {:.4f} m vertical", e.check_points,
                         e.check_rms_horizontal_m, e.check_rms_vertical_m);
   std::string ratios;
+  bool some_held = false;
   const auto add = [&](bool known, const char* name, double ratio) {
     if (!known) return;
+    some_held = some_held || !std::isfinite(ratio);
     ratios += fmt::format("{}{} {}", ratios.empty() ? "" : ", ", name,
                           std::isfinite(ratio) ? fmt::format("{:.3f}", ratio) : "-");
   };
   add(e.with_sigmas, "position", e.normalised_error_position);
   add(e.with_sigmas, "rotation", e.normalised_error_rotation);
   add(std::isfinite(e.normalised_error_check), "check points", e.normalised_error_check);
-  if (!ratios.empty()) text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true; -: held)";
+  if (!ratios.empty())
+    text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
   return text;
 }
 

@@ -31,9 +31,10 @@ struct Evaluation {
   double position_max_m = kNone;
   double rotation_rms_deg = kNone;         // root mean square rotation angle
   double relative_position_rms_m = kNone;  // errors of the vectors between successive frames of a pass
-  // sqrt of the mean of e'C^-1 e / 3 over the frames, and over those touched by one tile and by several; none without
-  // covariances, and over frames that are held, which have no sigma to compare with.
-  bool with_sigmas = false;  // the result has covariances of its frames
+  bool with_sigmas = false;                // the result has covariances of its frames
+  // sqrt of the mean of e'C^-1 e / 3 over the frames, and over those touched by one tile and by several. Without those
+  // whose position or attitude is held, which have no sigma to compare with; none where that are all, or without
+  // covariances.
   double normalised_error_position = kNone, normalised_error_rotation = kNone;
   double normalised_error_position_interior = kNone, normalised_error_rotation_interior = kNone;
   double normalised_error_position_boundary = kNone, normalised_error_rotation_boundary = kNone;

@@ -8,7 +8,8 @@
 
 namespace megablock {
 
-// InputError for what would be passed over in silence: "block.yaml:4: 'masks' is not used with 'block', ...; take it out".
+// InputError for what would be passed over in silence: "block.yaml:4: 'masks' is not used with 'block', ...; take it
+// out".
 inline constexpr const char* kNoPictures = "with a 'block' without pictures";
 [[noreturn]] void refuse_unused(const YamlReader& reader, const std::string& key, const std::string& why);
 
@@ -41,7 +42,8 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
 // attitude: attitude priors from the images' angles, turned to the block's vertical.
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);
 
-// A warning for the origin and for each control point more than 50 km (or a tenth of the block's extent) from the images.
+// A warning for the origin and for each control point more than 50 km (or a tenth of the block's extent) from the
+// images.
 void warn_of_distant_places(Project& project);
 
 }  // namespace megablock

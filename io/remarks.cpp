@@ -8,8 +8,10 @@
 #include <cstdlib>
 
 #include "geometry/angles.h"
+#include "io/counted.h"
 #include "io/held_priors.h"
 #include "io/report/figures.h"
+#include "io/result_option.h"
 
 namespace megablock {
 
@@ -154,13 +156,6 @@ std::string contradicted_text(const BlockResult& result, const std::vector<Resid
   return text;
 }
 
-// As the job's options say; empty when they are not known.
-std::string option_of(const BlockResult& result, const std::string& name) {
-  for (const OptionRecord& option : result.provenance.options)
-    if (option.name == name) return option.value;
-  return "";
-}
-
 // "positions are held", "positions are stated to 0.01 m" (median); empty without any.
 std::string stated_text(const char* kind, std::vector<double> sigmas, double held_sigma, const char* unit) {
   if (sigmas.empty()) return "";
@@ -186,7 +181,7 @@ std::string placing_text(const BlockResult& result) {
   for (const std::string& part :
        {stated_text("positions", positions, kHeldPositionSigma, "m"),
         stated_text("attitudes", attitudes, kHeldAttitudeSigma * kDegreesPerRadian, "degrees"),
-        control > 0 ? fmt::format("{} control point{}", control, control == 1 ? "" : "s") : std::string()})
+        control > 0 ? counted(control, "control point") : std::string()})
     if (!part.empty()) text += (text.empty() ? "" : ", ") + part;
   return text;
 }

@@ -27,7 +27,8 @@ std::string unused_points_text(const BlockResult& result, PointRole role);
 
 // What the observations leave undetermined of the datum, a line per part of the block whose datum is free, and whether
 // its rotations are known to several degrees only: "The datum is free: nothing determines the rotation about the line
-// of the positions (sigma of the rotations 28 degrees): ... add attitudes or control points ...". Empty for a sound datum.
+// of the positions (sigma of the rotations 28 degrees): ... add attitudes or control points ...". Empty for a sound
+// datum.
 std::vector<std::string> datum_texts(const BlockResult& result);
 std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures);  // parts are enough
 

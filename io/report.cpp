@@ -131,7 +131,7 @@ std::vector<std::string> Report::remarks(const BlockResult& result) const {
 std::string Report::html(BlockResult result, const ReportContext& context) && {
   static_cast<TrackResults&>(result) = std::move(gathered_->drawn);
   std::string page = page_of(result, gathered_->figures, context);
-  // Before the result goes, too, which reads its frames once more.
+  // What was read leaves memory before the result is destroyed, which touches all of its frames once more.
   gathered_.reset();
   static_cast<TrackResults&>(result) = {};
   context.after_reading();

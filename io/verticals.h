@@ -19,8 +19,8 @@
 namespace megablock {
 
 // Replaces those of the block. Images named in `left_out` are passed over. InputError naming file:line for unknown and
-// repeated images, sigmas that are not positive, numbers that are none, a camera that has another model by now, or parameters that lie
-// three sigmas of an uncalibrated one from those in the file.
+// repeated images, sigmas that are not positive, numbers that are none, a camera that has another model by now, or
+// parameters that lie three sigmas of an uncalibrated one from those in the file.
 void read_verticals(const std::string& path, const std::vector<std::string>& left_out, Block& block);
 
 // The columns that are read, with roll and pitch (degrees); no line ends.

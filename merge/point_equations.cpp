@@ -169,9 +169,10 @@ void PointEquations::add_observations(std::int64_t point) {
     count += kept[row];
   }
   if (!add_lanes(added.first, count, state_.points[at(point)])) {
-    // Once more, as the images of one frame do not follow each other.
-    std::stable_sort(rows, rows + count, [&](std::int64_t a, std::int64_t b) {
-      return frames_[at(problem_.image[at(a)].value)] < frames_[at(problem_.image[at(b)].value)];
+    // Once more in the order of frames, so that the images of one follow each other.
+    const auto frame_of_row = [&](std::int64_t row) { return frames_[at(problem_.image[at(row)].value)]; };
+    std::sort(rows, rows + count, [&](std::int64_t a, std::int64_t b) {
+      return std::pair(frame_of_row(a), a) < std::pair(frame_of_row(b), b);
     });
     lanes_.clear_from(added.first);
     sights_ = added.first_sight;

@@ -72,7 +72,7 @@ struct PointTables {
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
-  // One of the points at hand, with its observations, lanes first to last, and sights, without the latter.
+  // One of the points at hand, with its observations, lanes [first, last), and sights [first_sight, last_sight).
   struct Point {
     std::int64_t point = -1;
     std::int64_t first = 0, last = 0;

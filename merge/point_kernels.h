@@ -15,7 +15,7 @@ struct Columns {
 
 // Values of an observation, of a sight or of a point side by side: V, b and, but for points, u.
 enum RecordValue : int { kV = 0, kB = 6, kU = 9 };
-constexpr int kRecordSize = 16;  // the rest is 0
+constexpr int kRecordSize = 16;  // the rest is 0; of a sum over sights u means nothing
 // Of a point.
 enum PointValue : int {
   kPointV = 0,  // with its prior

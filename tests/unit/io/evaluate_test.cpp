@@ -103,6 +103,12 @@ TEST_F(EvaluateTest, HeldFramesHaveNoRatio) {
   const auto json = nlohmann::json::parse(to_json(e));
   EXPECT_TRUE(json["normalised_error_position"].is_null());
   EXPECT_TRUE(json["normalised_error_rotation"].is_number());
+
+  // They are not held where the job does not use them.
+  result_.provenance.options = {{"adjustment.use_position_priors", "false", "true"}};
+  const Evaluation unused = evaluate(result_, simulated_.truth);
+  EXPECT_TRUE(std::isfinite(unused.normalised_error_position));
+  EXPECT_EQ(to_text(unused).find("held"), std::string::npos) << to_text(unused);
 }
 
 TEST_F(EvaluateTest, BoundaryFramesApart) {

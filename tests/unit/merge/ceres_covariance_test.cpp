@@ -13,6 +13,7 @@ struct CovarianceCase {
   const char* name;
   SimulationOptions::Scene kind;
   bool calibrate = true, free_mounts = false;
+  int rig_cameras = 2;
 };
 
 class CeresCovariance : public testing::TestWithParam<CovarianceCase> {
@@ -52,7 +53,7 @@ TEST_P(CeresCovariance, EqualsOurs) {
   options.scene = GetParam().kind;
   options.frames = 24;
   options.points_per_frame = 30;
-  options.rig_cameras = 2;
+  options.rig_cameras = GetParam().rig_cameras;
   options.control_points = 3;
   options.calibrate = GetParam().calibrate;
   if (options.scene == SimulationOptions::Scene::kStreet) options.relative_position_sigma_m = 0.02;
@@ -116,13 +117,14 @@ TEST_P(CeresCovariance, EqualsOurs) {
   RecordProperty("largest_relative_difference", std::to_string(largest_));
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, CeresCovariance,
-                         testing::Values(CovarianceCase{"AerialSharedCamera", SimulationOptions::Scene::kAerial},
-                                         CovarianceCase{"AerialHeldCamera", SimulationOptions::Scene::kAerial, false},
-                                         CovarianceCase{"StreetSharedCameras", SimulationOptions::Scene::kStreet},
-                                         CovarianceCase{"StreetFreeMounts", SimulationOptions::Scene::kStreet, true,
-                                                        true}),
-                         [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, CeresCovariance,
+    testing::Values(CovarianceCase{"AerialSharedCamera", SimulationOptions::Scene::kAerial},
+                    CovarianceCase{"AerialHeldCamera", SimulationOptions::Scene::kAerial, false},
+                    CovarianceCase{"StreetSharedCameras", SimulationOptions::Scene::kStreet},
+                    CovarianceCase{"StreetFreeMounts", SimulationOptions::Scene::kStreet, true, true},
+                    CovarianceCase{"StreetTenCameras", SimulationOptions::Scene::kStreet, true, true, 10}),
+    [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
 }  // namespace megablock

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "merge/monolithic.h"
@@ -67,13 +68,18 @@ std::vector<StepCase> scenes() {
   list.push_back({"StreetVerticals", street_steps(), cauchy, true, false, true});
   SimulationOptions calibrated = street_steps();
   calibrated.calibrate = true;
-  list.push_back({"StreetCameraByCamera", calibrated, cauchy, true, false, false, true});
+  // Cameras that see the same points: most tracks have frames with two observations.
+  SimulationOptions overlapping = calibrated;
+  overlapping.rig_cameras = 10;
+  list.push_back({"StreetTenCameras", overlapping, cauchy, true});
+  list.push_back({"StreetCameraByCamera", overlapping, cauchy, true, false, false, true});
   list.push_back({"StreetVerticalsCalibrated", calibrated, {}, false, false, true});
   return list;
 }
 
-// What a frame sees of a point then does not follow each other.
-void sort_camera_by_camera(SimulatedBlock& block) {
+// What a frame sees of a point then does not follow each other. Returns the number of such tracks.
+std::int64_t sort_camera_by_camera(SimulatedBlock& block) {
+  std::int64_t scattered = 0;
   TrackSet& tracks = block.tracks;
   const TrackSet before = tracks;
   for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
@@ -88,12 +94,23 @@ void sort_camera_by_camera(SimulatedBlock& block) {
       tracks.y[first + i] = before.y[order[i]];
       tracks.feature[first + i] = before.feature[order[i]];
     }
+    std::map<FrameIndex, std::size_t> last_of_frame;
+    bool apart = false;
+    for (std::size_t o = first; o < last; ++o) {
+      const auto [seen, is_new] = last_of_frame.try_emplace(block.block.images[tracks.image[o]].frame, o);
+      apart = apart || (!is_new && seen->second + 1 < o);
+      seen->second = o;
+    }
+    scattered += apart;
   }
+  return scattered;
 }
 
 SimulatedBlock simulated(const StepCase& scene) {
   SimulatedBlock block = simulate_block(scene.simulation);
-  if (scene.camera_by_camera) sort_camera_by_camera(block);
+  if (scene.camera_by_camera) {
+    EXPECT_GT(sort_camera_by_camera(block), 100);
+  }
   if (scene.lines) add_known_lines(block, 20, 1);
   if (scene.verticals)
     add_seen_verticals(block, {.noise_deg = 0.1, .wrong_share = 0.05, .by_radial = 0.02, .every = 2});
