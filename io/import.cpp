@@ -1,6 +1,8 @@
 #include "io/import.h"
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "io/error.h"
 #include "io/format_list.h"
@@ -28,6 +30,19 @@ const std::vector<ImportFormat>& readers() {
   return all;
 }
 
+constexpr const char* kProject =
+    "# Imported block; keys: docs/project-file.md\nblock: given.h5\ntie_points: tie_points.h5\n";
+
+// Of another block, or of this one with options that were set since.
+void refuse_other_project(const fs::path& path) {
+  if (!fs::exists(path)) return;
+  std::ifstream file(path);
+  if (std::string(std::istreambuf_iterator<char>(file), {}) != kProject)
+    throw InputError(path.string() +
+                     ": is there and differs from what an import writes: it was edited, or is of another block; name "
+                     "another folder with -o, or move it away");
+}
+
 }  // namespace
 
 const std::vector<std::string>& import_formats() {
@@ -45,10 +60,11 @@ void write_imported(const ImportedBlock& imported, const std::string& folder) {
   if (!fs::is_directory(folder))
     throw InputError(folder + ": the folder cannot be made; check the path and its permissions");
   const fs::path root(folder);
+  refuse_other_project(root / "block.yaml");
   write_block((root / "given.h5").string(), imported.block);
   write_tracks((root / "tie_points.h5").string(), imported.tracks);
   TextWriter project((root / "block.yaml").string());
-  project.print("# Imported block; keys: docs/project-file.md\nblock: given.h5\ntie_points: tie_points.h5\n");
+  project.print("{}", kProject);
   project.close();
 }
 

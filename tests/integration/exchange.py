@@ -41,6 +41,18 @@ class Exchange(unittest.TestCase):
                 self.assertLess(after["mean_reprojection_px"], 1.02 * before["mean_reprojection_px"])
                 megablock("export", job, "--format", form, "-o", work / f"{form}-again")
 
+    def test_an_edited_project_is_not_overwritten(self):
+        megablock("export", work / "job", "--format", "bal", "-o", work / "model.txt")
+        project = work / "edited-project"
+        for _ in range(2):  # the same once more
+            megablock("import", "bal", work / "model.txt", "-o", project)
+        with open(project / "block.yaml", "a") as file:
+            file.write("merge: {decrement: 1e-6}\n")
+        edited = (project / "block.yaml").read_text(), (project / "given.h5").read_bytes()
+        line = one_line(megablock("import", "bal", work / "model.txt", "-o", project, expect=BAD_INPUT))
+        self.assertIn("block.yaml: is there and differs", line)
+        self.assertEqual(((project / "block.yaml").read_text(), (project / "given.h5").read_bytes()), edited)
+
     def test_a_broken_model_gets_one_line(self):
         megablock("export", work / "job", "--format", "bal", "-o", work / "whole.txt")
         broken, project = work / "broken.txt", work / "broken-project"
