@@ -271,9 +271,10 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
     } else if (rotation_deg > kUnusableRotationDeg) {
       const std::string axis = weak_axis(result, figures, static_cast<std::int32_t>(p));
       lines.push_back(
-          fmt::format("The rotations{}{} are known to {:.0f} degrees only (sigma): heights and attitudes are "
-                      "not usable; add control points or attitudes{}",
+          fmt::format("The rotations{}{} are known to {:.0f} degrees only (sigma): {} are not usable; add control "
+                      "points or attitudes{}",
                       whole ? "" : fmt::format(" of part {}", p + 1), axis, rotation_deg,
+                      axis == kAboutTheVertical ? "directions in plan" : "heights and attitudes",
                       axis == kAboutTheVertical ? "" : or_verticals(result)));
     }
   }

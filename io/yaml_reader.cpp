@@ -50,7 +50,7 @@ std::vector<std::string> YamlReader::keys() const {
 }
 
 std::optional<YAML::Node> YamlReader::node(const std::string& key) {
-  known_.push_back(key);
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   for (const auto& item : node_)
     if (item.first.Scalar() == key) return YAML::Node(item.second);
   return std::nullopt;

@@ -339,6 +339,8 @@ TEST_F(GivenBlock, PosesTakeThePlaceOfItsOwn) {
 TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
   EXPECT_EQ(refusal_of("gps: {lever_arm_m: [0, 0, 1]}\n"),
             "block.yaml:3: 'lever_arm_m' is not used with 'block', whose positions have theirs; take it out");
+  EXPECT_THAT(refusal_of("gps: {lever_arm: [0, 0, 1]}\n"),
+              testing::AllOf(HasSubstr("lever_arm_m"), testing::Not(HasSubstr("lever_arm_m, lever_arm_m"))));
   EXPECT_EQ(refusal_of("cameras: {grouping: one}\n"),
             "block.yaml:3: 'grouping' is not used with 'block', which says what its cameras are; take it out");
   std::filesystem::create_directories(folder_.path("masks"));

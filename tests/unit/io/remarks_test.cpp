@@ -67,7 +67,10 @@ TEST(Remarks, NamesTheAxisAboutWhichRotationsAreWeak) {
   const std::string verticals = ", or verticals where walls are seen ('megablock verticals')";
   EXPECT_EQ(weak_about({0, -1, 0}), "The rotations about a level axis of azimuth 0 degrees" + end + verticals);
   EXPECT_EQ(weak_about({-1, 0, 0}), "The rotations about a level axis of azimuth 90 degrees" + end + verticals);
-  EXPECT_EQ(weak_about({0, 0, -1}), "The rotations about the vertical" + end);
+  EXPECT_EQ(
+      weak_about({0, 0, -1}),
+      "The rotations about the vertical are known to 28 degrees only (sigma): directions in plan are not usable; add "
+      "control points or attitudes");
   EXPECT_THAT(weak_about(Eigen::Vector3d(-0.5, 0, -std::sqrt(0.75))),
               testing::StartsWith("The rotations about an axis 60 degrees above azimuth 90 are known to"));
   for (auto& covariance : result.frame_covariance) covariance.setIdentity();
