@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What the documents name is there: links and their headings, paths, ctest patterns. usage: docs_test.py SOURCE_FOLDER"""
+"""What the documents name is there: links and their headings, paths, ctest patterns; and keys that a command prints stand
+in the documents. usage: docs_test.py SOURCE_FOLDER"""
 import pathlib
 import re
 import sys
@@ -65,6 +66,17 @@ for path in documents:
             pattern = re.compile((quoted or plain).replace("\\|", "|"))  # in a table a bar is written \|
             if not any(pattern.search(name) for name in (names if kind == "R" else labels)):
                 complain(path, number, f"ctest -{kind} {pattern.pattern} finds no test")
+
+# (where a command's JSON is made, what its keys look like there, document, heading above their table)
+for code, key, document, heading in [("io/evaluate.cpp", r'json\["(\w+)"\]', "docs/simulate.md", "Figures of `evaluate`")]:
+    section = re.split(r"^## ", (source / document).read_text().split(f"## {heading}\n")[1], flags=re.MULTILINE)[0]
+    keys = re.findall(key, (source / code).read_text())
+    checked += len(keys)
+    for name in keys:
+        if f"`{name}`" not in section:
+            problems.append(f"{document}: the key '{name}' ({code}) is missing under '{heading}'")
+    if not keys:
+        problems.append(f"{code}: no keys found")
 
 print("\n".join(problems) or f"{checked} names of the documents are there")
 sys.exit(1 if problems or checked < 40 else 0)
