@@ -5,8 +5,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "io/evaluate.h"
 #include "io/feature_statistics.h"
 #include "io/remarks.h"
+#include "io/report/sections.h"
 #include "io/track_batches.h"
 #include "io/unit_files.h"
 
@@ -45,6 +47,38 @@ Json interest_points(const BlockResult& result) {
   return list;
 }
 
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json check_points(const BlockResult& result) {
+  const Evaluation evaluation = evaluate_control(result);
+  return {{"compared", evaluation.check_points},
+          {"rms_horizontal_m", number_or_null(evaluation.check_rms_horizontal_m)},
+          {"rms_vertical_m", number_or_null(evaluation.check_rms_vertical_m)},
+          {"normalised_error", number_or_null(evaluation.normalised_error_check)}};
+}
+
+Json seams(const BlockResult& result) {
+  std::int64_t tested = 0, alarms = 0;
+  double largest = 0;
+  for (const SeamCheck& seam : result.seams) {
+    tested += seam.degrees > 0;
+    if (!report::alarms(seam)) continue;
+    ++alarms;
+    largest = std::max(largest, report::sigmas_apart(seam));
+  }
+  return {{"tested", tested}, {"alarms", alarms}, {"largest_sigmas", largest}};
+}
+
+// Without those that seams and failures tell.
+Json notes(const BlockResult& result) {
+  Json list = Json::array();
+  for (const std::string& note : result.notes)
+    if (std::ranges::find(result.seams, note, &SeamCheck::note) == result.seams.end() &&
+        std::ranges::find(result.failures, note, &FailedUnit::reason) == result.failures.end())
+      list.push_back(note);
+  return list;
+}
+
 Json failures(const BlockResult& result) {
   Json list = Json::array();
   for (const FailedUnit& failure : result.failures)
@@ -57,7 +91,8 @@ std::string written_figures(const JobStore& store) {
   std::ifstream file(store.path(kResultFigures));
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const Json json = Json::parse(text, nullptr, false);
-  const bool of_result = json.is_object() && json.value("digest", "") == read_result_digest(store.path(kResult));
+  const bool complete = json.is_object() && json.contains("notes");  // programs before did not tell notes
+  const bool of_result = complete && json.value("digest", "") == read_result_digest(store.path(kResult));
   return of_result ? text : std::string();
 }
 
@@ -83,7 +118,10 @@ std::string to_json(const ResultFigures& figures, const BlockResult& result) {
                      {"control_points_unused", unused_points(result, PointRole::kControl).size()},
                      {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
                      {"interest_points", interest_points(result)},
+                     {"check_points", check_points(result)},
+                     {"seams", seams(result)},
                      {"remarks", figures.remarks},
+                     {"notes", notes(result)},
                      {"failures", failures(result)},
                      {"digest", result.digest}};
   return json.dump(1, ' ', false, Json::error_handler_t::replace);

@@ -64,10 +64,28 @@ Json status(const JobStore& store) {
   Json json{{"job", store.directory()},
             {"in_use_by", holder ? Json(holder->who) : Json()},
             {"stages", stages_json(store, stages)}};
-  for (const char* key : {"oriented", "points", "observations", "mean_track_length", "mean_reprojection_px",
-                          "rms_reprojection_px", "chi2_per_dof", "degrees_of_freedom", "observation_kinds", "tiles",
-                          "boundary_frames", "global_iterations", "newton_decrement", "gauge", "digest",
-                          "control_points_unused", "check_points_unused", "interest_points", "remarks"})
+  for (const char* key : {"oriented",
+                          "points",
+                          "observations",
+                          "mean_track_length",
+                          "mean_reprojection_px",
+                          "rms_reprojection_px",
+                          "chi2_per_dof",
+                          "degrees_of_freedom",
+                          "observation_kinds",
+                          "tiles",
+                          "boundary_frames",
+                          "global_iterations",
+                          "newton_decrement",
+                          "gauge",
+                          "digest",
+                          "control_points_unused",
+                          "check_points_unused",
+                          "check_points",
+                          "seams",
+                          "interest_points",
+                          "remarks",
+                          "notes"})
     json[key] = nullptr;
   const bool only_block = !has_result && store.seal("block.h5");
   json["images"] = only_block ? read_block(store.verified_path("block.h5")).images.size() : 0;
@@ -119,6 +137,33 @@ std::string figures_text(const Json& json) {
       json["digest"].get<std::string>());
 }
 
+std::string check_points_text(const Json& check) {
+  if (check["compared"] == 0) return "";
+  const Json& ratio = check["normalised_error"];
+  return fmt::format("  {}: rms of adjusted - given {:.4f} m horizontal, {:.4f} m vertical{}\n",
+                     counted(check["compared"].get<std::int64_t>(), "check point"),
+                     check["rms_horizontal_m"].get<double>(), check["rms_vertical_m"].get<double>(),
+                     ratio.is_null() ? "" : fmt::format(", {:.2f} of their sigmas", ratio.get<double>()));
+}
+
+std::string seams_text(const Json& seams) {
+  const auto alarms = seams["alarms"].get<std::int64_t>();
+  if (alarms == 0) return "";
+  return fmt::format(
+      "  seams: {} of {} {} an alarm, the sides differ up to {:.1f} times what their sigmas explain; see the report\n",
+      alarms, counted(seams["tested"].get<std::int64_t>(), "joint"), alarms == 1 ? "raises" : "raise",
+      seams["largest_sigmas"].get<double>());
+}
+
+std::string notes_text(const Json& notes) {
+  constexpr std::size_t kShown = 10;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kShown, notes.size()); ++i)
+    text += "  note: " + notes[i].get<std::string>() + "\n";
+  if (notes.size() > kShown) text += fmt::format("  ... and {} more in the report\n", notes.size() - kShown);
+  return text;
+}
+
 std::string interest_points_text(const Json& list) {
   std::string text;
   constexpr std::size_t kShown = 20;
@@ -153,7 +198,8 @@ std::string status_text(const JobStore& store) {
             (holder ? "" : ": run it to the end again") + "\n";
   text += figures_text(json);
   text += interest_points_text(json["interest_points"]);
-  return text + look_text(json["remarks"]);
+  text += check_points_text(json["check_points"]) + seams_text(json["seams"]);
+  return text + look_text(json["remarks"]) + notes_text(json["notes"]);
 }
 
 bool job_is_done(const JobStore& store) {

@@ -218,6 +218,12 @@ Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const Eva
   return evaluation;
 }
 
+Evaluation evaluate_control(const BlockResult& result) {
+  Evaluation evaluation;
+  if (!is_free(result)) evaluate_control(result, 1, evaluation);
+  return evaluation;
+}
+
 Evaluation evaluate(const BlockResult& result, const BlockState& truth, const EvaluateOptions& options) {
   if (truth.frames.size() != result.block.frames.size())
     throw InputError("the truth has " + std::to_string(truth.frames.size()) + " frames, the result " +

@@ -53,6 +53,9 @@ Evaluation evaluate(const BlockResult& result, const BlockState& truth, const Ev
 // `path`: a pose CSV, a truth.h5 (write_state) of the same frames, or a folder with truth.csv.
 Evaluation evaluate(const BlockResult& result, const std::string& path, const EvaluateOptions& options = {});
 
+// Control and check points alone, which need no truth. Nothing of a block whose datum is free.
+Evaluation evaluate_control(const BlockResult& result);
+
 std::string to_text(
     const Evaluation& evaluation);  // lines for the terminal, the last one open; without unknown figures
 std::string to_json(const Evaluation& evaluation);  // one object; figures that do not exist are null

@@ -66,7 +66,7 @@ std::string seams_item(const BlockResult& result) {
     tested += seam.degrees > 0;
     if (!alarms(seam)) continue;
     ++alarmed;
-    largest = std::max(largest, std::sqrt(seam.statistic / static_cast<double>(seam.degrees)));
+    largest = std::max(largest, sigmas_apart(seam));
   }
   const auto untested = static_cast<std::int64_t>(result.seams.size()) - tested;
   const std::string rest = untested == 0 ? ""
@@ -144,6 +144,10 @@ std::string points_item(const BlockResult& result, const Figures& f, PointRole r
 }  // namespace
 
 bool alarms(const SeamCheck& seam) { return seam.degrees > 0 && seam.statistic > seam.threshold; }
+
+double sigmas_apart(const SeamCheck& seam) {
+  return std::sqrt(std::max(0.0, seam.statistic) / static_cast<double>(seam.degrees));
+}
 
 std::string headline(const BlockResult& result, const Figures& f) {
   const ReprojectionStatistics& r = f.reprojection;

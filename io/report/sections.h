@@ -12,6 +12,7 @@ namespace megablock::report {
 inline constexpr double kGrossRatio = 3;  // differences beyond so many sigma are marked
 
 bool alarms(const SeamCheck& seam);
+double sigmas_apart(const SeamCheck& seam);  // how far its sides differ, over what their sigmas explain
 std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty when unknown
 // Empty without covariances; `after_reading` as in ReportContext, here and below.
 std::string ellipses_figure(const BlockResult& result, const Figures& figures,

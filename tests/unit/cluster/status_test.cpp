@@ -55,6 +55,27 @@ TEST_F(StatusTest, NamesControlPointsThatTakeNoPart) {
   EXPECT_THAT(status_text(store_), HasSubstr("\n  look: 3 control points take no part: "));
 }
 
+// What the report has besides the figures, a line each, where there is any.
+TEST_F(StatusTest, TellsCheckPointsSeamsAndNotes) {
+  result_.notes = {result_.seams[1].note, "3 of 40 verticals take no part: 3 contradicted by most others (a, b, c)"};
+  write();
+  EXPECT_THAT(
+      status_text(store_),
+      testing::AllOf(testing::ContainsRegex("\n  2 check points: rms of adjusted - given 0\\.0[0-9]+ m "
+                                            "horizontal, 0\\.0[0-9]+ m vertical, [0-9.]+ of their sigmas\n"),
+                     HasSubstr("\n  seams: 1 of 2 joints raises an alarm, the sides differ up to 1.5 times what"),
+                     HasSubstr("\n  note: 3 of 40 verticals take no part: 3 contradicted"),
+                     Not(HasSubstr("tile 2 disagrees"))));
+  EXPECT_EQ(json()["check_points"]["compared"], 2);
+  EXPECT_EQ(json()["notes"].size(), 1u);
+  result_.seams.pop_back();
+  result_.notes.clear();
+  result_.gauge = "free, inner constraints";
+  write();
+  EXPECT_THAT(status_text(store_),
+              Not(testing::AnyOf(HasSubstr("note:"), HasSubstr("seams:"), HasSubstr("check point"))));
+}
+
 TEST_F(StatusTest, SaysWhenTheDatumIsFree) {
   result_.free_parts = {{FrameIndex(0), 7}};
   write();
