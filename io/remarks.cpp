@@ -110,6 +110,25 @@ std::string or_verticals(const BlockResult& result) {
   return result.block.verticals.empty() ? ", or verticals where walls are seen ('megablock verticals')" : "";
 }
 
+// Of a part with positions most of which the block contradicts: these have hardly any weight, so its datum seems free
+// although it is observed. Empty for others.
+std::string positions_without_hold(const report::Figures& figures, std::int32_t part) {
+  std::vector<double> distances;
+  std::size_t positions = 0;
+  for (const report::PositionResidual& r : figures.positions) {
+    if (figures.part_of_frame[r.frame] != part) continue;
+    ++positions;
+    if (r.difference.cwiseQuotient(r.sigma).norm() > kContradicted) distances.push_back(r.difference.norm());
+  }
+  if (2 * distances.size() <= positions) return "";
+  const std::size_t wrong = distances.size();
+  const double median = report::spread(std::move(distances)).median;
+  return fmt::format(
+      "{} of its {} positions are given but do not hold it, as they differ from the block by {:.{}f} m (median): start "
+      "values ('poses') that are far off, or positions in another coordinate system; correct these and run again",
+      wrong, positions, median, median < 10 ? 2 : 0);
+}
+
 std::string consequence(const BlockResult& result, int defect, const Placing& placing) {
   if (defect >= 6) return "coordinates are relative; add positions or three control points";
   if (defect == 1 && placing.positions > 1)
@@ -264,10 +283,12 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
     if (part.defect > 0) {
       if (++free > kParts) continue;
       const Placing placing = placing_of(result, figures, static_cast<std::int32_t>(p));
-      lines.push_back(fmt::format(
-          "{} free: nothing determines {}{}; {}",
-          whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
-          undetermined(part.defect, placing), rotation_text(rotation_deg), consequence(result, part.defect, placing)));
+      const std::string wrong_positions = positions_without_hold(figures, static_cast<std::int32_t>(p));
+      lines.push_back(
+          fmt::format("{} free: nothing determines {}{}; {}",
+                      whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
+                      undetermined(part.defect, placing), rotation_text(rotation_deg),
+                      wrong_positions.empty() ? consequence(result, part.defect, placing) : wrong_positions));
     } else if (rotation_deg > kUnusableRotationDeg) {
       const std::string axis = weak_axis(result, figures, static_cast<std::int32_t>(p));
       lines.push_back(

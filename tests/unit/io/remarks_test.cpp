@@ -53,6 +53,19 @@ TEST(Remarks, SaysInPlainWordsWhatAFreeDatumLeavesOpen) {
   EXPECT_THAT(first(line), testing::Not(HasSubstr("megablock verticals")));
 }
 
+// Starts that are a kilometre off: positions have no weight, and adding some is no remedy.
+TEST(Remarks, NamesPositionsThatDoNotHoldTheDatum) {
+  BlockResult result = made_up_result(small_block());
+  result.free_parts = {{FrameIndex(0), 4}};
+  EXPECT_THAT(datum_texts(result).at(0), testing::Not(HasSubstr("do not hold it")));
+  for (Frame& frame : result.block.frames) frame.position_prior->position.x() += 1000;
+  EXPECT_THAT(datum_texts(result).at(0),
+              testing::AllOf(HasSubstr("The datum is free: nothing determines "),
+                             HasSubstr("; 59 of its 59 positions are given but do not hold it, as they differ from the "
+                                       "block by 1000 m (median): start values ('poses') that are far off"),
+                             testing::Not(HasSubstr("add positions"))));
+}
+
 TEST(Remarks, NamesTheAxisAboutWhichRotationsAreWeak) {
   BlockResult result = free_result(0, 3, false);
   result.free_parts.clear();  // just not free
