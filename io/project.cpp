@@ -23,8 +23,21 @@ namespace fs = std::filesystem;
 
 namespace {
 
+// "true", "[0, 0.1, -0.2]": whatever is wrong with it is said where the block is read.
+std::string text_of(const YAML::Node& node) {
+  if (!node.IsSequence()) return node.IsScalar() ? node.Scalar() : "";
+  std::string list;
+  for (const YAML::Node& value : node) list += (list.empty() ? "" : ", ") + text_of(value);
+  return "[" + list + "]";
+}
+
+// The options of the stages, and those of the block's priors, which are kept for the report alone.
 StageSettings read_stage_settings(YamlReader& top) {
   StageSettings settings;
+  for (const char* section : {"gps", "attitude"})
+    if (auto reader = top.mapping(section))
+      for (const std::string& key : reader->keys())
+        settings.entries.push_back({section, key, text_of(*reader->node(key)), reader->where(key)});
   for (const std::string& section : stage_sections()) {
     auto reader = top.mapping(section);
     if (!reader) continue;

@@ -1,5 +1,7 @@
 // The merge: exact block-wise compensation of all tiles over all ranks (design: merge.md), then the result.
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -82,9 +84,14 @@ GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool
   return options;
 }
 
-void say_iteration(const Job& job, const GlobalState& state) {
+// Where a round before the last one ends by its own, looser limit, the line says so: "converged" alone would promise
+// that of the options.
+void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions& options) {
   if (!job.is_first_rank() || job.options.quiet) return;
-  std::fprintf(stderr, "merge        %s\n", describe(state).c_str());
+  std::string line = describe(state);
+  if (state.outcome == GlobalOutcome::kConverged && options.max_decrement > job.settings.merge.decrement)
+    line += fmt::format(" (limit {:.1e} of a round before the last)", options.max_decrement);
+  std::fprintf(stderr, "merge        %s\n", line.c_str());
 }
 
 // This rank's tiles from their own adjustments, or from the checkpoint that was found, and the block's state.
@@ -140,7 +147,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
     if (last) runner.expect_posterior();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       return_freed_memory();
-      say_iteration(job, state);
+      say_iteration(job, state, options);
       if (state.accepted != saved) {
         saved = state.accepted;
         position.global = state;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <tuple>
 
 #include "cluster/arithmetic.h"
+#include "cluster/job_json.h"
 #include "cluster/stages/stages.h"
 #include "cluster/version.h"
 #include "io/unit_files.h"
@@ -23,11 +25,26 @@ std::vector<std::string> units_of(const Job& job, const std::string& stage) {
 
 }  // namespace
 
+// What a project file says of positions and attitudes is in the block's priors; here it is told as it was asked.
+void add_prior_options(const StageSettings& settings, std::vector<OptionRecord>& options) {
+  constexpr const char* kOwn = "of the images";
+  for (const auto& [section, key, otherwise] :
+       {std::tuple("gps", "use", "true"), std::tuple("gps", "sigma_horizontal_m", kOwn),
+        std::tuple("gps", "sigma_vertical_m", kOwn), std::tuple("gps", "lever_arm_m", "[0, 0, 0]"),
+        std::tuple("attitude", "use", "true"), std::tuple("attitude", "sigma_deg", kOwn)}) {
+    const auto given = std::ranges::find_if(
+        settings.entries, [&](const StageSettings::Entry& e) { return e.section == section && e.key == key; });
+    options.push_back(
+        {std::string(section) + "." + key, given == settings.entries.end() ? otherwise : given->value, otherwise});
+  }
+}
+
 Provenance provenance_of(const Job& job) {
   Provenance provenance;
   provenance.project = std::filesystem::path(job.options.project).filename().string();
   provenance.program = kProgram;
   provenance.arithmetic = arithmetic_level();
+  add_prior_options(JobJson::of_job(job.store).settings(), provenance.options);
   const std::vector<OptionValue> values = option_values(job.settings), defaults = option_values({});
   for (std::size_t i = 0; i < values.size(); ++i)
     provenance.options.push_back({values[i].section + "." + values[i].key, values[i].value, defaults[i].value});

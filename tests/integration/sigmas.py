@@ -2,9 +2,12 @@
 """What the options on sigmas do to a whole run. usage: sigmas.py MEGABLOCK"""
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
+
+import h5py
 
 NOISE_PX = 0.2
 
@@ -26,6 +29,25 @@ def run(folder, name, settings):
             json.loads(megablock("evaluate", job, truth, "--json", "--scale-sigma")))
 
 
+def check_what_is_said(folder):
+    """Rounds before the last end by a limit of their own and say so; options of positions are in the result."""
+    project, job = os.path.join(folder, "said.yaml"), os.path.join(folder, "said")
+    with open(os.path.join(folder, "block.yaml")) as block, open(project, "w") as out:
+        out.write(block.read() + "gps: {sigma_horizontal_m: 0.07}\n")
+    done = subprocess.run([sys.argv[1], "run", project, "-j", job], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    ends = [line for line in done.stderr.splitlines() if "global adjustment converged" in line]
+    assert len(ends) > 1 and "limit" not in ends[-1], done.stderr
+    for line in ends[:-1]:
+        assert re.search(r"\(limit 9\.8e-02 of a round before the last\)$", line), line  # 0.01 sqrt(6 * 16)
+    for text in (done.stdout + done.stderr, megablock("status", job)):
+        assert re.search(r"  4 check points: rms of adjusted - given 0\.\d+ m horizontal", text), text
+    with h5py.File(os.path.join(job, "result/block.h5")) as result:
+        options = dict(zip(result["options/name"].asstr()[:], zip(*(result[f"options/{k}"].asstr()[:] for k in ("value", "default")))))
+    assert options["gps.sigma_horizontal_m"] == ("0.07", "of the images"), options
+    assert options["gps.use"] == ("true", "true") and "attitude.sigma_deg" in options, options
+
+
 def near(value, expected, tolerance):
     assert abs(value - expected) <= tolerance, (value, expected, tolerance)
 
@@ -34,6 +56,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         megablock("simulate", "--frames", 16, "--noise", NOISE_PX, "--control-points", 3, "--check-points", 4, "-o", folder)
 
+        check_what_is_said(folder)
         status, plain, scaled = run(folder, "estimated", "")
         near(status["image_sigma_px"], NOISE_PX, 0.05 * NOISE_PX)
         near(status["chi2_per_dof"], 1, 0.05)

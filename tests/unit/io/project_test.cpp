@@ -9,6 +9,7 @@
 #include "io/hash.h"
 #include "io/held_priors.h"
 #include "io/pose_csv.h"
+#include "io/project_sections.h"
 #include "io/simulate/simulate.h"
 #include "io/unit_files.h"
 #include "tests/unit/io/image_names.h"
@@ -264,6 +265,45 @@ TEST(Project, StageSectionsKeepFileAndLine) {
   EXPECT_EQ(entry.section + "." + entry.key + "=" + entry.value, "features.max_features=4000");
   EXPECT_EQ(entry.where, folder.path("block.yaml") + std::string(":3"));
   EXPECT_EQ(project.settings.entries[1].where, folder.path("block.yaml") + std::string(":4"));
+}
+
+// For the report's list of options: as they were written.
+TEST(Project, KeepsWhatIsSaidOfPositionsAndAttitudes) {
+  ScratchDirectory folder;
+  write_line(folder, 1);
+  const Project project = read_text(
+      folder, "images: images\ngps: {sigma_horizontal_m: 1.50, lever_arm_m: [0, 0.1, -0.2]}\nattitude: {use: false}\n");
+  std::vector<std::string> said;
+  for (const auto& entry : project.settings.entries)
+    said.push_back(entry.section + "." + entry.key + "=" + entry.value);
+  EXPECT_THAT(said, ElementsAre("gps.sigma_horizontal_m=1.50", "gps.lever_arm_m=[0, 0.1, -0.2]", "attitude.use=false"));
+}
+
+// Far-off start values end in a block that seems to have no datum: said before.
+TEST(Project, WarnsOfPosesFarFromThePositions) {
+  ScratchDirectory folder;
+  Project project;
+  Block& block = project.block;
+  block = simulate_block(SimulationOptions{.frames = 30}).block;
+  warn_of_distant_places(project);
+  EXPECT_THAT(project.warnings, IsEmpty());
+  const auto move = [&](double metres) {
+    for (Frame& frame : block.frames) {
+      if (!frame.given_pose) frame.given_pose = Pose{{1, 0, 0, 0}, frame.position_prior->position};
+      frame.given_pose->centre.y() += metres;
+    }
+    project.warnings.clear();
+    warn_of_distant_places(project);
+  };
+  move(200);  // drift of an inertial system
+  EXPECT_THAT(project.warnings, IsEmpty());
+  move(800);
+  EXPECT_THAT(project.warnings, ElementsAre(testing::ContainsRegex(
+                                    "^given poses lie 1000 m \\(median\\) from the positions of the same 30 "
+                                    "frames: .*correct the poses")));
+  for (Frame& frame : block.frames) frame.position_prior->sigma.setConstant(100);  // as good as these are
+  move(0);
+  EXPECT_THAT(project.warnings, IsEmpty());
 }
 
 TEST(Project, RefusalsNameFileAndLine) {
