@@ -58,6 +58,7 @@ struct Tests {
     const auto larger = [](const TestedMeasurement& a, const TestedMeasurement& b) {
       return a.normalised > b.normalised;
     };
+    if (test.redundancy < Reliability::kListedRedundancy) return;
     auto& largest = sums.largest;
     if (largest.size() == kListed && !larger(test, largest.back())) return;
     largest.insert(std::upper_bound(largest.begin(), largest.end(), test, larger), test);

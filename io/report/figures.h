@@ -75,6 +75,8 @@ struct TestedMeasurement {
 };
 struct Reliability {
   static constexpr double kPoorRedundancy = 0.1;
+  // Below it |w| is not listed: redundancy numbers are stored in 1 / 255, so that |w| would be off by 5 % and more.
+  static constexpr double kListedRedundancy = 0.02;
   std::int64_t tested = 0;          // with redundancy
   std::int64_t unchecked = 0;       // kept, but no other observation checks them
   std::int64_t poorly_checked = 0;  // redundancy below kPoorRedundancy

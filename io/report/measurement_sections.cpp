@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "geometry/angles.h"
+#include "io/held_priors.h"
 #include "io/report/drawing.h"
 #include "io/report/html.h"
 #include "io/report/sections.h"
@@ -33,17 +35,31 @@ std::vector<std::size_t> largest_rows(const std::vector<Eigen::Vector3d>& values
   return order;
 }
 
+// What is held has residuals of zero, which say nothing.
+template <typename Residual>
+std::vector<Residual> not_held(const std::vector<Residual>& residuals, double held_sigma) {
+  std::vector<Residual> rest;
+  std::ranges::copy_if(residuals, std::back_inserter(rest),
+                       [&](const Residual& r) { return r.sigma.minCoeff() > 2 * held_sigma; });
+  return rest;
+}
+
+std::string but_held(std::size_t held) {
+  return held > 0 ? fmt::format(" that is not held ({} more are held)", count(static_cast<std::int64_t>(held))) : "";
+}
+
 }  // namespace
 
 std::string positions_section(const BlockResult& result, const Figures& f) {
-  if (f.positions.empty()) return "";
+  const std::vector<PositionResidual> positions = not_held(f.positions, kHeldPositionSigma);
+  if (positions.empty()) return "";
   std::vector<Eigen::Vector3d> differences, sigmas, normalised;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero(), extreme = Eigen::Vector3d::Zero();
-  for (const PositionResidual& r : f.positions) {
+  for (const PositionResidual& r : positions) {
     differences.push_back(r.difference);
     sigmas.push_back(r.sigma);
     normalised.push_back(r.difference.cwiseQuotient(r.sigma));
-    mean += r.difference / static_cast<double>(f.positions.size());
+    mean += r.difference / static_cast<double>(positions.size());
     extreme = extreme.cwiseMax(r.difference.cwiseAbs());
   }
   const Eigen::Vector3d rms = root_mean_square(differences), relative = root_mean_square(normalised);
@@ -57,26 +73,27 @@ std::string positions_section(const BlockResult& result, const Figures& f) {
 
   Table worst({"worst frames", in_unit("east", unit), in_unit("north", unit), in_unit("up", unit), "÷ sigma"});
   for (const std::size_t i : largest_rows(normalised, kWorst)) {
-    const PositionResidual& r = f.positions[i];
+    const PositionResidual& r = positions[i];
     const double ratio = normalised[i].cwiseAbs().maxCoeff();
     std::vector<std::string> cells = {escape(result.block.frames[r.frame].name)};
     axes_cells(r.difference, unit, true, cells);
     cells.push_back(fixed(ratio, 1));
     worst.add(std::move(cells), ratio > kGrossRatio ? "look" : "");
   }
-  std::string body =
-      paragraph(fmt::format("{} of {} oriented frames carry a GNSS position. Lever arms are applied.",
-                            count(static_cast<std::int64_t>(f.positions.size())), count(f.oriented_frames)));
+  std::string body = paragraph(fmt::format("{} of {} oriented frames carry a GNSS position{}. Lever arms are applied.",
+                                           count(static_cast<std::int64_t>(positions.size())), count(f.oriented_frames),
+                                           but_held(f.positions.size() - positions.size())));
   body += "<div class=row><div class=aside>" + table.html() + "</div><div class=aside>" + worst.html() + "</div>" +
-          figure(draw_horizontal(f.positions), "Horizontal residuals.") +
-          figure(draw_vertical(f.positions), "Vertical residuals, frame by frame.") + "</div>";
+          figure(draw_horizontal(positions), "Horizontal residuals.") +
+          figure(draw_vertical(positions), "Vertical residuals, frame by frame.") + "</div>";
   return section("positions", "GNSS residuals", body);
 }
 
 std::string attitudes_section(const BlockResult& result, const Figures& f) {
-  if (f.attitudes.empty()) return "";
+  const std::vector<AttitudeResidual> attitudes = not_held(f.attitudes, kHeldAttitudeSigma);
+  if (attitudes.empty()) return "";
   std::vector<Eigen::Vector3d> differences, sigmas, normalised;
-  for (const AttitudeResidual& r : f.attitudes) {
+  for (const AttitudeResidual& r : attitudes) {
     differences.push_back(r.difference * kDegreesPerRadian);
     sigmas.push_back(r.sigma * kDegreesPerRadian);
     normalised.push_back(r.difference.cwiseQuotient(r.sigma));
@@ -95,7 +112,7 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
   add_row(table, "rms of residual ÷ sigma", root_mean_square(normalised), {1, "", 2}, false);
   Table worst({"worst frames", "about x [°]", "about y [°]", "about z [°]", "÷ sigma"});
   for (const std::size_t i : largest_rows(normalised, kWorst)) {
-    std::vector<std::string> cells = {escape(result.block.frames[f.attitudes[i].frame].name)};
+    std::vector<std::string> cells = {escape(result.block.frames[attitudes[i].frame].name)};
     axes_cells(differences[i], degrees, true, cells);
     const double ratio = normalised[i].cwiseAbs().maxCoeff();
     cells.push_back(fixed(ratio, 1));
@@ -103,9 +120,10 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
   }
   return section(
       "attitudes", "Attitude residuals",
-      paragraph(fmt::format("{} of {} oriented frames carry observed angles. Rotation from the observed to the "
+      paragraph(fmt::format("{} of {} oriented frames carry observed angles{}. Rotation from the observed to the "
                             "adjusted attitude about the camera's or rig's axes: x right, y down, z forward.",
-                            count(static_cast<std::int64_t>(f.attitudes.size())), count(f.oriented_frames))) +
+                            count(static_cast<std::int64_t>(attitudes.size())), count(f.oriented_frames),
+                            but_held(f.attitudes.size() - attitudes.size()))) +
           "<div class=row><div class=aside>" + table.html() + "</div><div class=aside>" + worst.html() +
           "</div></div>");
 }

@@ -62,7 +62,10 @@ std::string reliability_part(const BlockResult& result, const Reliability& r) {
       100 * kDetectionProbability, 1 / kFalseAlarmProbability, significant(r.detectable_px.median, 2),
       significant(r.detectable_px.p95, 2), count(r.poorly_checked), count(r.tested),
       fixed(Reliability::kPoorRedundancy, 1), count(r.unchecked), significant(r.worst_external, 2));
-  return tests.html("compact") + paragraph(verdict(r)) + paragraph(reliability) + largest.html("compact");
+  const std::string listed = fmt::format("Listed are the largest |w| of measurements with a redundancy of {} and more.",
+                                         fixed(Reliability::kListedRedundancy, 2));
+  return tests.html("compact") + paragraph(verdict(r)) + paragraph(reliability) +
+         (largest.empty() ? "" : paragraph(listed, "muted") + largest.html("compact"));
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ svg .title{fill:var(--ink);font-size:12px}
 .map .dots,.map .boundary{stroke-linecap:round;fill:none}
 .map .boundary{stroke:#1c2733}
 .map .meridian{stroke:#e3e9ee;fill:none}
-.map .coordinate text{fill:#7b8894}
+.map .coordinate text{fill:#1c2733;font-size:14px;paint-order:stroke;stroke:#fff;stroke-width:3.5px;stroke-linejoin:round}
 .map .ellipses{fill:none;stroke:#1c2733;stroke-width:1.1}
 .map .ellipses path{stroke:#b26a00}
 .map .within{stroke:#8b98a5;stroke-width:.7;fill:none;opacity:.7}

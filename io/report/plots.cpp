@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "io/counted.h"
 #include "io/report/drawing.h"
 #include "io/report/html.h"
 
@@ -181,6 +183,14 @@ ResidualField coarser(const ResidualField& fine) {
 
 }  // namespace
 
+// How many times as long an arrow from `foot` along `d` may be to end inside the frame.
+double room_in_frame(const Eigen::Vector2d& foot, const Eigen::Vector2d& d, const Eigen::Vector2d& frame) {
+  double room = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 2; ++k)
+    if (d[k] != 0) room = std::min(room, (d[k] > 0 ? frame[k] - foot[k] : foot[k]) / std::abs(d[k]));
+  return room;
+}
+
 FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   constexpr double width = 480;
   constexpr std::int64_t enough = 40;  // observations a cell in the mean, so that its mean rises above the noise
@@ -189,19 +199,26 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   constexpr std::int64_t few = 3;  // observations of a cell; fewer say nothing of the mean
   const double scale = width / camera.width, height = camera.height * scale;
   const double cell_width = width / field.columns, cell_height = height / field.rows;
+  const auto foot_of = [&](int r, int c) { return Eigen::Vector2d((c + 0.5) * cell_width, (r + 0.5) * cell_height); };
   std::vector<double> lengths;
+  double room = std::numeric_limits<double>::infinity();  // exaggeration at which all arrows stay inside
   std::int64_t most = 1;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.columns; ++c) {
       const std::int64_t n = field.count[static_cast<std::size_t>(r * field.columns + c)];
       most = std::max(most, n);
-      if (n >= few) lengths.push_back(field.mean(r, c).norm());
+      if (n < few) continue;
+      lengths.push_back(field.mean(r, c).norm());
+      room = std::min(room, room_in_frame(foot_of(r, c), field.mean(r, c) * scale, {width, height}));
     }
-  // The 95 % arrow is as long as a cell; exaggeration rounded so that it can be told.
+  // The 95 % arrow is as long as a cell, or shorter, so that all arrows end inside the frame; but a single long one
+  // must not hide the others. Exaggeration rounded so that it can be told.
   const double typical = spread(lengths).p95;
-  const double wanted = typical > 0 ? cell_width / (typical * scale) : 1;
+  const double cell_long = typical > 0 ? cell_width / (typical * scale) : 1;
+  const double wanted = std::clamp(room, 0.25 * cell_long, cell_long);
   const double exaggeration = step_below(wanted);
   std::string shades, arrows, feet;
+  std::int64_t cut = 0;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.columns; ++c) {
       const std::int64_t n = field.count[static_cast<std::size_t>(r * field.columns + c)];
@@ -215,11 +232,12 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
           x, y, cell_width, cell_height, 0.05 + 0.3 * std::sqrt(static_cast<double>(n) / static_cast<double>(most)),
           count(n), with_sign(mean.x(), 2), with_sign(mean.y(), 2));
       if (n < few) continue;
+      const Eigen::Vector2d foot = foot_of(r, c);
       Eigen::Vector2d d = mean * scale * exaggeration;
-      const double limit = 1.5 * cell_width;
-      if (d.norm() > limit) d *= limit / d.norm();
-      feet += fmt::format("M{:.1f} {:.1f}h0", x + cell_width / 2, y + cell_height / 2);
-      arrows += fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}", x + cell_width / 2, y + cell_height / 2, d.x(), d.y());
+      const double allowed = std::min(1.5 * cell_width / d.norm(), room_in_frame(foot, d, {width, height}));
+      if (allowed < 1) d *= allowed, ++cut;
+      feet += fmt::format("M{:.1f} {:.1f}h0", foot.x(), foot.y());
+      arrows += fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}", foot.x(), foot.y(), d.x(), d.y());
     }
   const double reference = round_step(cell_width / scale / exaggeration, 1);
   const double bar = reference * scale * exaggeration;
@@ -232,9 +250,9 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
                fmt::format("<path d=\"M4 {0:.1f}h{1:.1f}\" class=arrow />", height + 15, bar) +
                text(bar + 12, height + 19, "start", significant(reference, 2) + " px in the image") + "</svg>";
   result.caption = fmt::format(
-      "Mean residual (adjusted − measured) per part of the sensor, from the dot, {}; darker = more "
+      "Mean residual (adjusted − measured) per part of the sensor, from the dot, {}{}; darker = more "
       "observations (up to {} a part). Single residuals: {} px rms.",
-      exaggeration_text(exaggeration), count(most),
+      exaggeration_text(exaggeration), cut > 0 ? fmt::format(", {} cut short", counted(cut, "arrow")) : "", count(most),
       field.observations ? fixed(std::sqrt(field.squares / static_cast<double>(field.observations)), 3) : kMissing);
   return result;
 }

@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <regex>
 
+#include "io/report.h"
 #include "io/report/drawing.h"
 #include "io/report/html.h"
 #include "tests/unit/io/made_up_result.h"
@@ -51,6 +53,47 @@ TEST(ReportDrawing, TextOfCellsBreaksOnlyWhereItMay) {
   const std::string html = table.html();
   EXPECT_THAT(html, HasSubstr("<td class=t>control</td><td class=\"t note\">"));
   EXPECT_THAT(html, HasSubstr("<td class=\"t long\">xxx"));
+}
+
+// Residuals that point outwards everywhere, those at the border most; and one that would reach across the picture.
+TEST(ReportDrawing, ArrowsOfResidualsEndInsideTheFrame) {
+  const BlockResult result = made_up_result(small_block());
+  const Camera& camera = result.block.cameras.front();
+  for (const double longest : {1.0, 300.0}) {
+    ResidualField field(camera);
+    for (int r = 0; r < field.rows; ++r)
+      for (int c = 0; c < field.columns; ++c)
+        for (int i = 0; i < 50; ++i) {
+          const Eigen::Vector2d pixel((c + 0.5) * camera.width / field.columns, (r + 0.5) * camera.height / field.rows);
+          const Eigen::Vector2d out = (pixel - Eigen::Vector2d(0.5 * camera.width, 0.5 * camera.height)) / camera.width;
+          field.add(camera, pixel, r == 0 && c == 0 ? longest * out : out);
+        }
+    const report::FieldDrawing drawing = report::draw(field, camera);
+    const double height = 480.0 * camera.height / camera.width;
+    const std::regex arrow("M([0-9.-]+) ([0-9.-]+)l([0-9.-]+) ([0-9.-]+)");
+    int arrows = 0;
+    for (std::sregex_iterator a(drawing.svg.begin(), drawing.svg.end(), arrow), end; a != end; ++a, ++arrows) {
+      const double x = std::stod((*a)[1]) + std::stod((*a)[3]), y = std::stod((*a)[2]) + std::stod((*a)[4]);
+      EXPECT_TRUE(x > -0.2 && x < 480.2 && y > -0.2 && y < height + 0.2) << (*a)[0];
+    }
+    EXPECT_GT(arrows, 20);
+    EXPECT_EQ(drawing.caption.find("cut short") != std::string::npos, longest > 1) << drawing.caption;
+  }
+}
+
+TEST(ReportDrawing, LeavesOutWhatIsHeld) {
+  BlockResult result = made_up_result(small_block());
+  EXPECT_THAT(report_html(result), testing::AllOf(HasSubstr("GNSS residuals"), HasSubstr("Attitude residuals"),
+                                                  HasSubstr("59 of 59 oriented frames carry a GNSS position. ")));
+  result.block.frames[FrameIndex(0)].position_prior->sigma.setConstant(1e-8);
+  EXPECT_THAT(report_html(result),
+              HasSubstr("58 of 59 oriented frames carry a GNSS position that is not held (1 more are held). "));
+  for (Frame& frame : result.block.frames) {
+    frame.position_prior->sigma.setConstant(1e-8);
+    frame.attitude_prior->sigma_rad.setConstant(1e-11);
+  }
+  EXPECT_THAT(report_html(result),
+              testing::Not(testing::AnyOf(HasSubstr("GNSS residuals"), HasSubstr("Attitude residuals"))));
 }
 
 TEST(ReportNumbers, ReadWell) {
