@@ -100,6 +100,7 @@ std::string residuals_item(const BlockResult& result, const Figures& f) {
   for (const std::string& text : misstated_texts(result))
     list += item("look", escape(text) + ": see <a href=\"#observations\">observations</a>.");
   for (const std::string& text : contradicted_texts(result, f)) list += item("look", escape(text) + ".");
+  if (const std::string text = near_limit_text(result, f); !text.empty()) list += item("look", escape(text) + ".");
   if (result.degrees_of_freedom <= 0) return list;
   const double s0 = std::sqrt(std::max(0.0, result.variance_factor));
   if (s0 > 1.5)

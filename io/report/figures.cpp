@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <set>
 
 #include "geometry/angles.h"
 #include "io/prior_differences.h"
 #include "io/reliability.h"
+#include "io/result_option.h"
 
 namespace megablock::report {
 
@@ -64,6 +66,31 @@ struct Tests {
     largest.insert(std::upper_bound(largest.begin(), largest.end(), test, larger), test);
     if (largest.size() > kListed) largest.pop_back();
   }
+};
+
+// Counts what is near the limit of screening, a length of max_residual_sigmas sigmas.
+class LimitCounter {
+ public:
+  explicit LimitCounter(const BlockResult& result) {
+    const double sigmas = std::strtod(option_of(result, "adjustment.max_residual_sigmas").c_str(), nullptr);
+    limit_px_ = sigmas * result.image_sigma_px;
+    const auto beyond = [&](double factor) { return std::exp(-0.5 * factor * factor * sigmas * sigmas); };
+    found_.expected = beyond(1 - NearLimit::kNear) - beyond(1 + NearLimit::kNear);
+  }
+  void add(const TrackResults& batch) {
+    if (!(limit_px_ > 0)) return;
+    for (std::size_t o = 0; o < batch.residual_x.size(); ++o) {
+      const double length = std::hypot(batch.residual_x[o], batch.residual_y[o]);
+      if (!std::isfinite(length)) continue;
+      ++found_.tested;
+      found_.near += std::abs(length - limit_px_) < NearLimit::kNear * limit_px_;
+    }
+  }
+  const NearLimit& found() const { return found_; }
+
+ private:
+  double limit_px_ = 0;
+  NearLimit found_;
 };
 
 class Gatherer {
@@ -152,7 +179,9 @@ class Gatherer {
     const auto step = static_cast<std::size_t>(1 + tracks_.track_count() / kSampleLimit);
     std::vector<double> resolution;
     std::size_t before = 0;  // tracks of the batches before
+    LimitCounter near_limit(result_);
     tracks_.visit([&](const TrackResults& batch) {
+      near_limit.add(batch);
       for (const ImageIndex image : batch.tracks.image) ++f_.measured[image];
       for (std::size_t row = 0; row < batch.points.size(); ++row) {
         if (!batch.points[row].allFinite()) continue;
@@ -170,6 +199,7 @@ class Gatherer {
       }
       before += batch.points.size();
     });
+    f_.near_limit = near_limit.found();
     f_.reliability.detectable_px = spread(std::move(detectable_px_));
     if (f_.reliability.tested > 0)
       f_.reliability.worst_external = external_reliability(least_redundancy_, tests_.shift);
@@ -390,6 +420,12 @@ Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values) {
     result[k] = n ? std::sqrt(squares / static_cast<double>(n)) : kUnknown;
   }
   return result;
+}
+
+void find_near_limit(const BlockResult& result, const TrackBatches& tracks, Figures& figures) {
+  LimitCounter counter(result);
+  tracks.visit([&](const TrackResults& batch) { counter.add(batch); });
+  figures.near_limit = counter.found();
 }
 
 void find_prior_residuals(const BlockResult& result, Figures& figures) {

@@ -88,6 +88,15 @@ struct Reliability {
   double worst_external = kUnknown;        // largest external reliability of the tested, sigmas
 };
 
+// Tie point measurements whose residuals are near the limit of screening, kept or not: whether they take part hangs on
+// what else does.
+struct NearLimit {
+  static constexpr double kNear = 0.1;  // of the limit, to both sides
+  std::int64_t tested = 0, near = 0;
+  double expected = 0;  // share that normally distributed errors of the sigma leave there, at most
+  double share() const { return tested > 0 ? static_cast<double>(near) / static_cast<double>(tested) : 0; }
+};
+
 // What hangs together by kept observations and relative poses.
 struct BlockPart {
   std::int64_t frames = 0, images = 0;  // oriented
@@ -112,6 +121,7 @@ struct Figures {
   IndexedVector<ImageIndex, double> image_squares;           // sum of squared kept residuals, px^2
   IndexedVector<ImageIndex, std::int32_t> measured;          // observations in tracks, rejected ones included
   Reliability reliability;                                   // tested = 0: redundancy numbers are not known
+  NearLimit near_limit;                                      // tested = 0: there is no limit, or it is not known
   std::vector<BlockPart> parts;                              // largest first
   IndexedVector<FrameIndex, std::int32_t> part_of_frame;     // row of parts; -1: not oriented
   Spread sigma_east, sigma_north, sigma_up, sigma_rotation;  // frames; metres, radians (largest of the three axes)
@@ -130,6 +140,9 @@ bool oriented(const BlockResult& result, FrameIndex frame);
 
 // Fills in parts and part_of_frame.
 void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
+
+// Fills in near_limit.
+void find_near_limit(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
 
 // Fills in positions and attitudes.
 void find_prior_residuals(const BlockResult& result, Figures& figures);

@@ -60,6 +60,7 @@ def main():
         status, plain, scaled = run(folder, "estimated", "")
         near(status["image_sigma_px"], NOISE_PX, 0.05 * NOISE_PX)
         near(status["chi2_per_dof"], 1, 0.05)
+        assert not status["remarks"], status["remarks"]
         near(scaled["normalised_error_position"],
              plain["normalised_error_position"] / status["chi2_per_dof"] ** 0.5, 1e-9)
 
@@ -75,6 +76,14 @@ def main():
             near(once[key], scaled[key], 1e-6 * scaled[key])
             assert twice[key] == once[key], key
         assert once["normalised_error_rotation"] > 2 * plain["normalised_error_rotation"]
+
+    # Of a block without a datum: at half of the true sigma a tenth of all measurements is near the limit of screening.
+    with tempfile.TemporaryDirectory() as folder:
+        megablock("simulate", "--frames", 16, "--noise", NOISE_PX, "--gps-sigma", 0, "-o", folder)
+        half = f"adjustment: {{image_sigma_px: {NOISE_PX / 2}, estimate_image_sigma: false}}\n"
+        for settings, many in ("", False), (half, True):
+            status, _, _ = run(folder, "many" if many else "clean", settings)
+            assert any("of the limit of screening" in line for line in status["remarks"]) == many, status["remarks"]
 
     # Redundancy numbers add up to the degrees of freedom, whatever the datum.
     with tempfile.TemporaryDirectory() as folder:

@@ -124,6 +124,40 @@ TEST(Remarks, TiePointsThatFitFarWorseThanAssumed) {
   EXPECT_THAT(remark().at(0), testing::StartsWith("Tie points fit to 1.5 px only, 3.8 times the 0.4 px"));
 }
 
+TEST(Remarks, ManyMeasurementsNearTheLimitOfScreening) {
+  BlockResult result = made_up_result(small_block());
+  result.image_sigma_px = 0.45;
+  const auto said = [&] {
+    for (const std::string& line : remarks(result))
+      if (line.find("limit of screening") != std::string::npos) return line;
+    return std::string();
+  };
+  result.free_parts = {{FrameIndex(0), 7}};
+  EXPECT_EQ(said(), "") << "the limit is not known";
+  result.provenance.options.push_back({"adjustment.max_residual_sigmas", "4", "4"});  // 1.8 px
+  EXPECT_EQ(said(), "") << "normal errors";
+  std::int64_t near = 0, all = 0;
+  for (std::size_t o = 0; o < result.kept.size(); ++o) {
+    if (!std::isfinite(result.residual_x[o])) continue;
+    if (++all % 200 != 0) continue;
+    ++near;
+    result.kept[o] = o % 2;  // kept or not
+    result.residual_x[o] = 0;
+    result.residual_y[o] = near % 2 ? -1.65F : 1.95F;
+  }
+  EXPECT_THAT(said(), testing::AllOf(testing::ContainsRegex("^[0-9]+ of " + std::to_string(all) +
+                                                            " tie point measurements "
+                                                            "\\(0\\.[45][0-9] %\\) lie within 10 % of the limit"),
+                                     HasSubstr("'adjustment: {image_sigma_px: 0.45, estimate_image_sigma: false, "
+                                               "max_residual_sigmas: 1000}'")));
+  EXPECT_THAT(report_html(result), HasSubstr("lie within 10 % of the limit of screening"));
+  result.provenance.options.back().value = "1000";
+  EXPECT_EQ(said(), "") << "nothing is screened";
+  result.provenance.options.back().value = "4";
+  result.free_parts.clear();
+  EXPECT_EQ(said(), "") << "positions of frames hide it";
+}
+
 TEST(Remarks, KindsThatAreWorseThanStated) {
   BlockResult result = made_up_result(small_block());
   result.observation_table = {};
