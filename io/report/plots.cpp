@@ -201,7 +201,7 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   const double cell_width = width / field.columns, cell_height = height / field.rows;
   const auto foot_of = [&](int r, int c) { return Eigen::Vector2d((c + 0.5) * cell_width, (r + 0.5) * cell_height); };
   std::vector<double> lengths;
-  double room = std::numeric_limits<double>::infinity();  // exaggeration at which all arrows stay inside
+  std::vector<double> rooms;  // exaggerations at which the arrows just stay inside
   std::int64_t most = 1;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.columns; ++c) {
@@ -209,12 +209,14 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
       most = std::max(most, n);
       if (n < few) continue;
       lengths.push_back(field.mean(r, c).norm());
-      room = std::min(room, room_in_frame(foot_of(r, c), field.mean(r, c) * scale, {width, height}));
+      rooms.push_back(room_in_frame(foot_of(r, c), field.mean(r, c) * scale, {width, height}));
     }
-  // The 95 % arrow is as long as a cell, or shorter, so that all arrows end inside the frame; but a single long one
+  // The 95 % arrow is as long as a cell, or shorter, so that nearly all arrows end inside the frame: single long ones
   // must not hide the others. Exaggeration rounded so that it can be told.
   const double typical = spread(lengths).p95;
   const double cell_long = typical > 0 ? cell_width / (typical * scale) : 1;
+  std::sort(rooms.begin(), rooms.end());
+  const double room = rooms.empty() ? cell_long : rooms[rooms.size() / 50];  // some may be cut short
   const double wanted = std::clamp(room, 0.25 * cell_long, cell_long);
   const double exaggeration = step_below(wanted);
   std::string shades, arrows, feet;
