@@ -27,7 +27,7 @@ std::vector<std::string> units_of(const Job& job, const std::string& stage) {
 
 // What a project file says of positions and attitudes is in the block's priors; here it is told as it was asked.
 void add_prior_options(const StageSettings& settings, std::vector<OptionRecord>& options) {
-  constexpr const char* kOwn = "of the images";
+  constexpr const char* kOwn = "as given";  // by the images or the block
   for (const auto& [section, key, otherwise] :
        {std::tuple("gps", "use", "true"), std::tuple("gps", "sigma_horizontal_m", kOwn),
         std::tuple("gps", "sigma_vertical_m", kOwn), std::tuple("gps", "lever_arm_m", "[0, 0, 0]"),

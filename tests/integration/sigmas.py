@@ -44,7 +44,7 @@ def check_what_is_said(folder):
         assert re.search(r"  4 check points: rms of adjusted - given 0\.\d+ m horizontal", text), text
     with h5py.File(os.path.join(job, "result/block.h5")) as result:
         options = dict(zip(result["options/name"].asstr()[:], zip(*(result[f"options/{k}"].asstr()[:] for k in ("value", "default")))))
-    assert options["gps.sigma_horizontal_m"] == ("0.07", "of the images"), options
+    assert options["gps.sigma_horizontal_m"] == ("0.07", "as given"), options
     assert options["gps.use"] == ("true", "true") and "attitude.sigma_deg" in options, options
 
 
