@@ -347,8 +347,7 @@ std::string near_limit_text(const BlockResult& result, const report::Figures& fi
   if (!(near > std::max(kMany * expected, expected + kChance * std::sqrt(expected + 1)))) return "";
   return fmt::format(
       "{} of {} tie point measurements ({:.2f} %) lie within {:.0f} % of the limit of screening, {:.1f} times as many "
-      "as "
-      "normal errors would: which of them are kept, and with them poses and estimated sigmas, by a sigma and more, "
+      "as normal errors would: which of them are kept, and with them poses and estimated sigmas, by a sigma and more, "
       "depend on how the block is tiled; "
       "'adjustment: {{image_sigma_px: {:.2g}, estimate_image_sigma: false, max_residual_sigmas: 1000}}' leaves them to "
       "the loss alone, which does not",

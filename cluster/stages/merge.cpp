@@ -224,6 +224,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
     job.notes.push_back(line);
   event.figures["seam_alarms"] = static_cast<double>(job.notes.size() - notes_before);
+  for (const std::string& line : judge_kept(parts)) job.notes.push_back(line);
   for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
     job.notes.push_back(line);
     if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());

@@ -1,10 +1,14 @@
 #include "cluster/stages/merge_outcome.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <ranges>
 
 #include "cluster/gather_by_tile.h"
 #include "cluster/matrix_bytes.h"
@@ -126,6 +130,34 @@ std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, c
   for (std::size_t c = 0; c < references.size(); ++c)
     for (const std::string& line : describe(judge(motions[c], references[c])))
       lines.push_back((references.size() > 1 ? "part " + std::to_string(c + 1) + ": " : "") + line);
+  return lines;
+}
+
+std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
+  constexpr std::int64_t kFewest = 100;  // measurements by which a tile is judged
+  constexpr std::size_t kLines = 3;
+  double measured = 0, kept = 0;
+  for (const TilePart& part : parts)
+    measured += static_cast<double>(part.measured), kept += static_cast<double>(part.kept);
+  const auto share = [](const TilePart& part) {
+    return static_cast<double>(part.kept) / static_cast<double>(part.measured);
+  };
+  const auto share_of_others = [&](const TilePart& part) {
+    const double others = measured - static_cast<double>(part.measured);
+    return others > 0 ? (kept - static_cast<double>(part.kept)) / others : 0;
+  };
+  std::vector<const TilePart*> poor;
+  for (const TilePart& part : parts)
+    if (part.measured >= kFewest && share(part) < 0.5 * share_of_others(part)) poor.push_back(&part);
+  std::ranges::stable_sort(poor, {}, [&](const TilePart* part) { return share(*part); });
+  std::vector<std::string> lines;
+  for (const TilePart* part : poor | std::views::take(kLines))
+    lines.push_back(
+        fmt::format("tile {} keeps {} of {} tie point measurements ({:.0f} %), the others {:.0f} %: little of "
+                    "what it was given holds, and what is left may agree by chance",
+                    part->tile, part->kept, part->measured, 100 * share(*part), 100 * share_of_others(*part)));
+  if (poor.size() > kLines)
+    lines.push_back(std::to_string(poor.size() - kLines) + " more tiles that keep less than half of what others do");
   return lines;
 }
 

@@ -56,6 +56,11 @@ std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size
 // What attitude priors alone tell of the orientation (common_motion.h), a line per case and part of the block.
 std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts);
 
+// Tiles of which most tie point measurements were rejected, less than half the share kept of all others', the worst
+// first: what is left of them may agree by chance, with itself and with other tiles, and then no test of residuals or
+// seams (merge/seam_check.h) tells them. A line each, of three at most.
+std::vector<std::string> judge_kept(const std::vector<TilePart>& parts);
+
 // When all ranks have written their tiles' files, of which covariances are read: takes the state over.
 MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles);
 

@@ -47,6 +47,14 @@ std::vector<std::uint8_t> verdicts(const TileProblem& problem) {
   return kept;
 }
 
+void count_measurements(const TileProblem& problem, const std::vector<std::uint8_t>& kept, TilePart& part) {
+  for (std::size_t p = 0; p < problem.points.size(); ++p) {
+    if (problem.points[p].role != PointRole::kTie) continue;
+    part.measured += problem.begin[p + 1] - problem.begin[p];
+    part.kept += std::accumulate(kept.begin() + problem.begin[p], kept.begin() + problem.begin[p + 1], std::int64_t{0});
+  }
+}
+
 // In 1 / 255 (TrackResults); what takes no part is NaN.
 std::uint8_t stored_redundancy(float value) {
   return value > 0 ? static_cast<std::uint8_t>(std::lround(255 * std::min(value, 1.f))) : 0;
@@ -201,6 +209,8 @@ Bytes TilePart::to_bytes() const {
   ByteWriter writer;
   writer.value(tile);
   writer.value(track_count);
+  writer.value(measured);
+  writer.value(kept);
   writer.values(frames);
   writer.values(control_rows);
   for (const BlockResult::ControlResult& point : control) {
@@ -209,7 +219,7 @@ Bytes TilePart::to_bytes() const {
     write_matrices(writer, point.residual_px);
     writer.values(point.kept);
   }
-  for (const std::vector<Eigen::Vector2d>& measured : control_measured) write_matrices(writer, measured);
+  for (const std::vector<Eigen::Vector2d>& positions : control_measured) write_matrices(writer, positions);
   writer.value(component);
   writer.values(motion.to_values());
   return writer.take();
@@ -220,6 +230,8 @@ TilePart TilePart::from_bytes(const Bytes& bytes) {
   TilePart part;
   part.tile = reader.value<std::int64_t>();
   part.track_count = reader.value<std::int64_t>();
+  part.measured = reader.value<std::int64_t>();
+  part.kept = reader.value<std::int64_t>();
   part.frames = reader.values<FrameIndex>();
   part.control_rows = reader.values<std::int64_t>();
   for (std::size_t i = 0; i < part.control_rows.size(); ++i) {
@@ -243,6 +255,7 @@ TilePart write_part(const std::string& path, const RankTile& tile, const TrackSe
   TilePart part;
   part.tile = tile.tile;
   part.track_count = tracks.track_count();
+  count_measurements(tile.problem, kept, part);
   part.frames = touched_frames(tile.problem, kept);
   add_control(tile, kept, covariance.points, part);
 

@@ -18,6 +18,7 @@ namespace megablock {
 struct TilePart {
   std::int64_t tile = -1;
   std::int64_t track_count = 0;
+  std::int64_t measured = 0, kept = 0;     // tie point measurements; those that take part
   std::vector<FrameIndex> frames;          // touched by observations that take part
   std::vector<std::int64_t> control_rows;  // in block.control_points
   std::vector<BlockResult::ControlResult> control;

@@ -1,12 +1,14 @@
 // The tracks of a result from the parts of its tiles, against one sort of all of them.
 #include "cluster/stages/result_parts.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 #include <tuple>
 
+#include "cluster/stages/merge_outcome.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
@@ -152,6 +154,29 @@ TEST(ResultPartsTest, RestTravelsAsBytes) {
   EXPECT_EQ(back.control[0].covariance, Eigen::Matrix3d::Identity());
   EXPECT_EQ(back.control[0].residual_px.size(), 1u);
   EXPECT_EQ(back.control[0].kept, std::vector<std::uint8_t>{0});
+}
+
+TEST(ResultParts, TilesThatKeepFarLessThanOthersAreNamed) {
+  const auto part = [](std::int64_t tile, std::int64_t measured, std::int64_t kept) {
+    TilePart made;
+    made.tile = tile;
+    made.measured = measured;
+    made.kept = kept;
+    return TilePart::from_bytes(made.to_bytes());
+  };
+  EXPECT_TRUE(judge_kept({}).empty());
+  EXPECT_TRUE(judge_kept({part(0, 1000, 20)}).empty()) << "nothing to compare with";
+  EXPECT_TRUE(judge_kept({part(0, 1000, 600), part(1, 1000, 990), part(2, 0, 0)}).empty()) << "as photographs are";
+  EXPECT_TRUE(judge_kept({part(0, 90, 0), part(1, 1000, 990)}).empty()) << "too few to judge by";
+  const std::vector<std::string> lines = judge_kept({part(0, 1000, 950), part(1, 757, 46), part(2, 1000, 930)});
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_THAT(lines[0], testing::StartsWith("tile 1 keeps 46 of 757 tie point measurements (6 %), the others 94 %:"));
+  std::vector<TilePart> many{part(9, 100000, 99000)};
+  for (std::int64_t t = 0; t < 5; ++t) many.push_back(part(t, 1000, 100 - t));
+  const std::vector<std::string> worst = judge_kept(many);
+  ASSERT_EQ(worst.size(), 4U);
+  EXPECT_THAT(worst[0], testing::HasSubstr("tile 4 keeps 96 of 1000"));
+  EXPECT_THAT(worst[3], testing::StartsWith("2 more tiles"));
 }
 
 }  // namespace
