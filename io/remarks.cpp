@@ -340,7 +340,6 @@ std::vector<std::string> contradicted_texts(const BlockResult& result, const rep
 // rotations (BAL) and by 1.1 (167 photographs without their positions; 0.1 with positions of metres, which hide it).
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures) {
   constexpr double kMany = 2.5, kChance = 5;  // times as many as expected; standard deviations
-  if (result.free_parts.empty()) return "";
   const report::NearLimit& found = figures.near_limit;
   const double expected = found.expected * static_cast<double>(found.tested);
   const auto near = static_cast<double>(found.near);

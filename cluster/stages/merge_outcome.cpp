@@ -153,7 +153,8 @@ std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
   std::vector<std::string> lines;
   for (const TilePart* part : poor | std::views::take(kLines))
     lines.push_back(
-        fmt::format("tile {} keeps {} of {} tie point measurements ({:.0f} %), the others {:.0f} %: little of "
+        fmt::format("tile {} disagrees with itself: it keeps {} of {} tie point measurements ({:.0f} %), the others "
+                    "{:.0f} %: little of "
                     "what it was given holds, and what is left may agree by chance",
                     part->tile, part->kept, part->measured, 100 * share(*part), 100 * share_of_others(*part)));
   if (poor.size() > kLines)

@@ -68,17 +68,19 @@ struct Tests {
   }
 };
 
-// Counts what is near the limit of screening, a length of max_residual_sigmas sigmas.
+// Counts what is near the limit of screening, a length of max_residual_sigmas sigmas, of a block whose datum is free:
+// of others nobody asks, and they have up to 10^9 measurements.
 class LimitCounter {
  public:
   explicit LimitCounter(const BlockResult& result) {
+    if (result.free_parts.empty()) return;
     const double sigmas = std::strtod(option_of(result, "adjustment.max_residual_sigmas").c_str(), nullptr);
     limit_px_ = sigmas * result.image_sigma_px;
     const auto beyond = [&](double factor) { return std::exp(-0.5 * factor * factor * sigmas * sigmas); };
     found_.expected = beyond(1 - NearLimit::kNear) - beyond(1 + NearLimit::kNear);
   }
   void add(const TrackResults& batch) {
-    if (!(limit_px_ > 0)) return;
+    if (!counts()) return;
     for (std::size_t o = 0; o < batch.residual_x.size(); ++o) {
       const double length = std::hypot(batch.residual_x[o], batch.residual_y[o]);
       if (!std::isfinite(length)) continue;
@@ -86,6 +88,7 @@ class LimitCounter {
       found_.near += std::abs(length - limit_px_) < NearLimit::kNear * limit_px_;
     }
   }
+  bool counts() const { return limit_px_ > 0; }
   const NearLimit& found() const { return found_; }
 
  private:
@@ -424,7 +427,7 @@ Eigen::Vector3d root_mean_square(const std::vector<Eigen::Vector3d>& values) {
 
 void find_near_limit(const BlockResult& result, const TrackBatches& tracks, Figures& figures) {
   LimitCounter counter(result);
-  tracks.visit([&](const TrackResults& batch) { counter.add(batch); });
+  if (counter.counts()) tracks.visit([&](const TrackResults& batch) { counter.add(batch); });
   figures.near_limit = counter.found();
 }
 

@@ -121,7 +121,7 @@ struct Figures {
   IndexedVector<ImageIndex, double> image_squares;           // sum of squared kept residuals, px^2
   IndexedVector<ImageIndex, std::int32_t> measured;          // observations in tracks, rejected ones included
   Reliability reliability;                                   // tested = 0: redundancy numbers are not known
-  NearLimit near_limit;                                      // tested = 0: there is no limit, or it is not known
+  NearLimit near_limit;                                      // tested = 0: no limit is known, or the datum is not free
   std::vector<BlockPart> parts;                              // largest first
   IndexedVector<FrameIndex, std::int32_t> part_of_frame;     // row of parts; -1: not oriented
   Spread sigma_east, sigma_north, sigma_up, sigma_rotation;  // frames; metres, radians (largest of the three axes)

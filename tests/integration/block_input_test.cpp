@@ -110,7 +110,7 @@ TEST_F(BlockInput, SoundBlock) {
   const BlockResult result = adjust(s);
   EXPECT_GE(result.tiles.tile_count, 4);
   EXPECT_LT(error_m(s, result, 0, 60), kGood);
-  EXPECT_THAT(said(result), testing::Not(HasSubstr(" keeps ")));
+  EXPECT_THAT(said(result), testing::Not(HasSubstr("disagrees")));
 }
 
 // All tie points of one tile's images are noise: what is kept of them agrees by chance, and the tile is named, whether
@@ -130,7 +130,7 @@ TEST_F(BlockInput, TileWithoutOneGoodObservation) {
   ASSERT_LT(std::ranges::count(touched, true), 50);
   ASSERT_GT(std::ranges::count_if(good.tracks.image, in_wrong), 500);
 
-  int disagrees = 0;
+  int by_fit = 0;  // cases in which seams or residuals tell
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
     SimulatedBlock s = good;
     std::mt19937_64 random(seed);
@@ -142,12 +142,14 @@ TEST_F(BlockInput, TileWithoutOneGoodObservation) {
     const int code = folder_.run();
     const BlockResult result = read_result(folder_.job("result/block.h5"));
     EXPECT_EQ(code, said(result).find("did not converge") == std::string::npos ? kExitDone : kExitFailedUnits) << seed;
-    // By what it keeps, always. By its seams or residuals too, but that hangs on what the merge makes of the noise: of
-    // 46 measurements kept of 1 240 it finds poses with which all agree, or not, as arithmetic rounds
-    // (docs/benchmarks.md).
+    // With the rest of the block, or with itself: by residuals of what is kept of the noise or, always, by how little.
     const std::string tile = "tile " + std::to_string(wrong.value);
-    EXPECT_THAT(said(result), testing::ContainsRegex(tile + " keeps [0-9]+ of [0-9]+ tie point measurements")) << seed;
-    disagrees += testing::Matches(testing::ContainsRegex(tile + " disagrees (most )?with"))(said(result));
+    EXPECT_THAT(said(result), testing::ContainsRegex(tile + " disagrees (most )?with")) << seed;
+    EXPECT_THAT(said(result), testing::ContainsRegex(tile + " disagrees with itself: it keeps [0-9]+ of [0-9]+ tie"))
+        << seed;
+    // Poses with which all agree may be found for 46 measurements of 1 240, as arithmetic rounds (docs/benchmarks.md).
+    by_fit +=
+        testing::Matches(testing::ContainsRegex(tile + " disagrees (most with|with itself: residuals)"))(said(result));
     for (FrameIndex f(0); f.value < 60; ++f.value) {
       ASSERT_TRUE(result.state.frames[f].centre.allFinite()) << seed;
       ASSERT_TRUE(result.frame_covariance[f].allFinite()) << seed;
@@ -157,7 +159,7 @@ TEST_F(BlockInput, TileWithoutOneGoodObservation) {
       EXPECT_LT(error_m(s, result, f, f + 1), 3 * kGood) << f << ", " << seed;  // as good as ever
     }
   }
-  EXPECT_GE(disagrees, 4);  // of six; all or five, as far as seen
+  EXPECT_GE(by_fit, 5);
 }
 
 // No tie point reaches fifteen of the images.

@@ -43,7 +43,8 @@ def check_what_is_said(folder):
     for text in (done.stdout + done.stderr, megablock("status", job)):
         assert re.search(r"  4 check points: rms of adjusted - given 0\.\d+ m horizontal", text), text
     with h5py.File(os.path.join(job, "result/block.h5")) as result:
-        options = dict(zip(result["options/name"].asstr()[:], zip(*(result[f"options/{k}"].asstr()[:] for k in ("value", "default")))))
+        names, values, defaults = (result[f"options/{k}"].asstr()[:] for k in ("name", "value", "default"))
+        options = dict(zip(names, zip(values, defaults)))
     assert options["gps.sigma_horizontal_m"] == ("0.07", "as given"), options
     assert options["gps.use"] == ("true", "true") and "attitude.sigma_deg" in options, options
 
