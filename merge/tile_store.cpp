@@ -1,9 +1,11 @@
 #include "merge/tile_store.h"
 
+#include <filesystem>
 #include <fstream>
 #include <utility>
 
 #include "io/error.h"
+#include "merge/packed_columns.h"
 #include "merge/scratch_file.h"
 
 namespace megablock {
@@ -38,20 +40,10 @@ std::int64_t byte_count(const RankTile& tile) {
   return bytes;
 }
 
-// One table behind the other, each with its length before it. Positions are three doubles each.
-template <typename T>
-void write_table(std::ofstream& file, const std::vector<T>& values) {
-  const auto count = static_cast<std::uint64_t>(values.size());
-  file.write(reinterpret_cast<const char*>(&count), sizeof count);
-  file.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
-}
-
-template <typename T>
-void read_table(std::ifstream& file, std::vector<T>& values) {
-  std::uint64_t count = 0;
-  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return;
-  values.resize(count);
-  file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
+std::int64_t file_bytes(const std::string& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  return error ? 0 : static_cast<std::int64_t>(size);
 }
 
 template <typename ReadTables>
@@ -62,7 +54,7 @@ void read_file(const std::string& path, ReadTables&& read_tables) {
 }
 
 bool write_points(const std::string& path, const std::vector<Eigen::Vector3d>& points) {
-  return write_scratch_file(path, [&](std::ofstream& file) { write_table(file, points); });
+  return write_scratch_file(path, [&](std::ofstream& file) { write_column(file, points); });
 }
 
 }  // namespace
@@ -98,16 +90,20 @@ void TileStore::add(RankTile tile) {
     return;
   }
   slot.in_scratch = true;
-  scratch_bytes_ += bytes;
   ++spilled_;
   forget(slot);
 }
 
 bool TileStore::spill(Slot& slot) {
   const bool whole = write_scratch_file(path(slot, "measurements"), [&](std::ofstream& file) {
-    visit_tables([&](const auto& table) { write_table(file, table); }, slot.tile.problem);
+    visit_tables([&](const auto& table) { write_column(file, table); }, slot.tile.problem);
   });
-  if (whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points)) return true;
+  scratch_bytes_ -= std::exchange(slot.scratch_bytes, 0);
+  if (whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points)) {
+    slot.scratch_bytes = file_bytes(path(slot, "measurements")) + 2 * byte_count(slot.tile.state.points);
+    scratch_bytes_ += slot.scratch_bytes;
+    return true;
+  }
   remove_scratch_file(path(slot, "measurements"));  // room for others
   return false;
 }
@@ -127,11 +123,11 @@ RankTile& TileStore::load(std::size_t row) {
     forget(before);
   }
   read_file(path(slot, "measurements"), [&](std::ifstream& file) {
-    visit_tables([&](auto& table) { read_table(file, table); }, slot.tile.problem);
+    visit_tables([&](auto& table) { read_column(file, table); }, slot.tile.problem);
   });
   if (!slot.points_here)
     read_file(points_path(slot, slot.points_file),
-              [&](std::ifstream& file) { read_table(file, slot.tile.state.points); });
+              [&](std::ifstream& file) { read_column(file, slot.tile.state.points); });
   loaded_ = static_cast<std::int64_t>(row);
   return slot.tile;
 }
@@ -149,7 +145,6 @@ void TileStore::save(std::size_t row) {
   loaded_ = -1;
   --spilled_;
   kept_bytes_ += byte_count(slot.tile);
-  scratch_bytes_ -= byte_count(slot.tile);
 }
 
 void TileStore::put_trial(std::size_t row, TileState trial) {

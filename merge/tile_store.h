@@ -1,6 +1,8 @@
 // The tiles of one rank, out of core: whole in memory while they fit a byte budget; of the others the measurements and
 // points lie in the rank's scratch directory and are read when the tile's turn comes, one tile at a time.
 //
+// Those in scratch are packed (packed_columns.h): about 15 bytes a measurement of a street instead of 39.
+//
 // Which tiles stay is decided once, in the order in which they are added: passes go over all tiles again and again, now
 // upwards, now downwards, and with a fixed choice each of them reads the others exactly once. A scratch disk that is
 // full keeps a tile in memory: it costs memory, never the tile. The choice never changes bits.
@@ -65,6 +67,7 @@ class TileStore {
     RankTile tile;
     TileState trial;
     bool in_scratch = false;
+    std::int64_t scratch_bytes = 0;                // of its files, with the trial's
     bool points_here = false, trial_here = false;  // of a tile in scratch whose points did not fit there
     int points_file = 0;                           // of two: the present ones; the other has the trial's
   };
@@ -74,7 +77,7 @@ class TileStore {
   RankTile& load(std::size_t row);
   void save(std::size_t row);
   void forget(Slot& slot);  // its measurements and points, which are in scratch
-  bool spill(Slot& slot);   // false: the disk is full
+  bool spill(Slot& slot);   // its files; false: the disk is full
   void remove_files(const Slot& slot) const;
 
   MemoryOptions options_;

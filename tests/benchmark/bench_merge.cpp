@@ -4,7 +4,8 @@
 //   scene 2  500 aerial images, overlaps of 80 and 60 %, 300 observations each; the camera's eight intrinsics shared
 // Parts: condense (linearise, eliminate points, factorise the cells), down (back-substitute), evaluate (points in the
 // tail of the loss, cost of the new state); iteration: all of them as the merge runs them, with the datum and the new
-// state. The counter is observations per second of processor time.
+// state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold stands beside
+// it). The counter is observations per second of processor time.
 //
 //     bench_merge --benchmark_repetitions=5
 #include <benchmark/benchmark.h>
@@ -18,6 +19,8 @@
 #include "io/simulate/simulate.h"
 #include "merge/point_refinement.h"
 #include "merge/serial_runner.h"
+#include "merge/tile_store.h"
+#include "tests/unit/io/scratch_directory.h"
 
 extern "C" void openblas_set_num_threads(int threads);
 
@@ -120,6 +123,26 @@ void iteration(benchmark::State& state) {
   count_observations(state, tile);
 }
 
+// More than caches hold, as in a large block.
+void from_scratch(benchmark::State& state) {
+  constexpr std::int64_t kTiles = 16;
+  const WholeTile& tile = tile_of(state);
+  const ScratchDirectory scratch;
+  MemoryOptions memory;
+  memory.scratch_directory = scratch.path("rank-0");
+  memory.tile_bytes = 0;
+  TileStore tiles(memory);
+  for (std::int64_t number = 0; number < kTiles; ++number) tiles.add({number, tile.problem, tile.state});
+  std::size_t row = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(tiles.whole(row).problem.x.data());
+    row = (row + 1) % kTiles;
+  }
+  count_observations(state, tile);
+  state.counters["bytes_per_observation"] =
+      static_cast<double>(tiles.scratch_bytes()) / kTiles / static_cast<double>(tile.problem.observation_count());
+}
+
 void scenes(benchmark::internal::Benchmark* part) {
   part->ArgName("scene")->DenseRange(kStreetHeld, kAerial)->Unit(benchmark::kMillisecond);
 }
@@ -127,6 +150,7 @@ BENCHMARK(condense)->Apply(scenes);
 BENCHMARK(down)->Apply(scenes);
 BENCHMARK(evaluate)->Apply(scenes);
 BENCHMARK(iteration)->Apply(scenes);
+BENCHMARK(from_scratch)->Apply(scenes);
 
 }  // namespace
 }  // namespace megablock
