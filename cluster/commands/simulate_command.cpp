@@ -3,11 +3,13 @@
 #include <omp.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <map>
 
 #include "cluster/commands/option_checks.h"
 #include "cluster/exit_codes.h"
+#include "io/error.h"
 #include "io/simulate/simulate.h"
 
 namespace megablock {
@@ -33,28 +35,49 @@ std::vector<std::string> names_in(const std::map<std::string, Value>& map) {
   return names;
 }
 
-// The options of the command line. What is not given has the default of the scene, which is known after parsing.
+// What an option has an effect on: scenes (none named: all of them), and what is made of them.
+struct Effect {
+  std::vector<std::string> scenes;
+  enum class On { kBoth, kTiePoints, kPictures } on = On::kBoth;
+};
+
+const Effect kEverything, kTiePoints{{}, Effect::On::kTiePoints};
+const Effect kAerial{{"aerial"}}, kStereopolis{{"stereopolis"}}, kTargetField{{"target-field"}},
+    kPanorama{{"panorama"}};
+const Effect kStreets{{"street", "stereopolis"}}, kTerrain{{"aerial", "street", "stereopolis"}};
+const Effect kVehicle{{"stereopolis", "target-field"}}, kRigs{{"street", "stereopolis", "target-field"}};
+const Effect kAnyCamera{{"aerial", "street", "panorama"}};                     // the vehicle's are of one model
+const Effect kNoTrajectory{{"aerial", "street", "target-field", "panorama"}};  // priors are white noise
+
+// The options of the command line. What is not given has the default of the scene, which is known after parsing; what
+// is given without an effect is refused.
 class SimulateOptions {
  public:
   explicit SimulateOptions(CLI::App* command) : command_(command) {}
 
   template <typename Value>
-  void add(const std::string& name, Value SimulationOptions::*member, const std::string& help) {
+  void add(const std::string& name, Value SimulationOptions::*member, const std::string& help,
+           const Effect& effect = kEverything) {
     const CLI::Option* option = command_->add_option(name, given_.*member, help);
+    has_effect(option, effect);
     settle_.push_back([this, option, member](SimulationOptions& options) {
       if (option->count() > 0) options.*member = given_.*member;
     });
   }
   void add_switch(const std::string& name, bool SimulationOptions::*member, const std::string& help,
-                  bool value = false) {
-    command_->add_flag_callback(
-        name, [this, member, value] { switched_.emplace_back(member, value); }, help);
+                  const Effect& effect = kEverything, bool value = false) {
+    has_effect(command_->add_flag_callback(
+                   name, [this, member, value] { switched_.emplace_back(member, value); }, help),
+               effect);
   }
+  void has_effect(const CLI::Option* option, const Effect& effect) { effects_.emplace_back(option, effect); }
   SimulationOptions settled() const {
+    for (const auto& [option, effect] : effects_)
+      if (option->count() > 0) refuse_without_effect(option->get_name(), effect);
     SimulationOptions options = SimulationOptions::of(kScenes.at(scene), kPaths.at(path));
     for (const auto& settle : settle_) settle(options);
     for (const auto& [member, value] : switched_) options.*member = value;
-    if (options.published_camera != 0) options.use_published_camera(options.published_camera);
+    if (options.published_camera != 0) use_published_camera(options);
     return options;
   }
 
@@ -63,8 +86,27 @@ class SimulateOptions {
   int threads = 0;
 
  private:
+  void refuse_without_effect(const std::string& name, const Effect& effect) const {
+    std::string scenes;
+    for (const std::string& known : effect.scenes) scenes += (scenes.empty() ? "" : ", ") + known;
+    if (!scenes.empty() && std::find(effect.scenes.begin(), effect.scenes.end(), scene) == effect.scenes.end())
+      throw InputError(name + " has no effect on the scene '" + scene + "', only on: " + scenes +
+                       "; leave it out, or choose another --scene");
+    if (effect.on == Effect::On::kPictures && !rendered)
+      throw InputError(name + " has no effect without --rendered; leave it out, or add that");
+    if (effect.on == Effect::On::kTiePoints && rendered)
+      throw InputError(name + " has no effect with --rendered; leave one of them out");
+  }
+  void use_published_camera(SimulationOptions& options) const {
+    for (const char* name : {"--width", "--image-height", "--focal"})
+      if (command_->count(name) > 0)
+        throw InputError(std::string(name) + " has no effect with --published-camera, which has its own; leave it out");
+    options.use_published_camera(options.published_camera);
+  }
+
   CLI::App* command_;
   SimulationOptions given_;
+  std::vector<std::pair<const CLI::Option*, Effect>> effects_;
   std::vector<std::function<void(SimulationOptions&)>> settle_;
   std::vector<std::pair<bool SimulationOptions::*, bool>> switched_;
 };
@@ -73,70 +115,83 @@ void add_scene_options(SimulateOptions& s) {
   using O = SimulationOptions;
   s.add("--frames", &O::frames, "Frames [100; stereopolis 800, target-field 30, panorama 42]");
   s.add("--seed", &O::seed, "Seed [1]");
-  s.add("--forward-overlap", &O::forward_overlap, "Aerial: along the row, 0..1 [0.8]");
-  s.add("--side-overlap", &O::side_overlap, "Aerial: between rows, 0..1 [0.6]");
-  s.add("--height", &O::height_m, "Aerial: above mean terrain, m [100]");
-  s.add("--relief", &O::terrain_relief_m, "Terrain relief, m [15]");
-  s.add("--street-spacing", &O::street_spacing_m, "Street, stereopolis: between streets, m [100]");
-  s.add("--frame-distance", &O::frame_distance_m, "Street, stereopolis: between frames, m [4]");
-  s.add("--rig-cameras", &O::rig_cameras, "Cameras of the rig [street 4, stereopolis and target-field 10]");
-  s.add("--drives", &O::drives, "Stereopolis: drives over every street [2]");
-  s.add("--days", &O::days, "Stereopolis: days of the drives [2]");
-  s.add_switch("--no-bridge", &O::bridge, "Stereopolis: no street passes over another");
-  s.add("--vehicle-seed", &O::vehicle_seed, "Stereopolis, target field: seed of cameras and mounts [that of --seed]");
-  s.add("--panorama-radius", &O::panorama_radius_m, "Panorama: mean distance of the points, m [10]");
-  s.add("--depth-spread", &O::depth_spread, "Panorama: distances are that, times 1 +- this [0]");
-  s.add("--off-centre", &O::off_centre_m, "Panorama: projection centre ahead of the point it turns about, m [0]");
-  s.add_switch("--vehicle", &O::vehicle, "Stereopolis, rendered: parts of the vehicle are in the pictures", true);
+  s.add("--forward-overlap", &O::forward_overlap, "Aerial: along the row, 0..1 [0.8]", kAerial);
+  s.add("--side-overlap", &O::side_overlap, "Aerial: between rows, 0..1 [0.6]", kAerial);
+  s.add("--height", &O::height_m, "Aerial: above mean terrain, m [100]", kAerial);
+  s.add("--relief", &O::terrain_relief_m, "Terrain relief, m [15]", kTerrain);
+  s.add("--street-spacing", &O::street_spacing_m, "Street, stereopolis: between streets, m [100]", kStreets);
+  s.add("--frame-distance", &O::frame_distance_m, "Street, stereopolis: between frames, m [4]", kStreets);
+  s.add("--rig-cameras", &O::rig_cameras, "Cameras of the rig [street 4, stereopolis and target-field 10]", kRigs);
+  s.add("--drives", &O::drives, "Stereopolis: drives over every street [2]", kStereopolis);
+  s.add("--days", &O::days, "Stereopolis: days of the drives [2]", kStereopolis);
+  s.add_switch("--no-bridge", &O::bridge, "Stereopolis: no street passes over another",
+               {{"stereopolis"}, Effect::On::kTiePoints});
+  s.add("--vehicle-seed", &O::vehicle_seed, "Stereopolis, target field: seed of cameras and mounts [that of --seed]",
+        kVehicle);
+  s.add("--panorama-radius", &O::panorama_radius_m, "Panorama: mean distance of the points, m [10]", kPanorama);
+  s.add("--depth-spread", &O::depth_spread, "Panorama: distances are that, times 1 +- this [0]", kPanorama);
+  s.add("--off-centre", &O::off_centre_m, "Panorama: projection centre ahead of the point it turns about, m [0]",
+        kPanorama);
+  s.add_switch("--vehicle", &O::vehicle, "Stereopolis, rendered: parts of the vehicle are in the pictures",
+               {{"stereopolis"}, Effect::On::kPictures}, true);
   s.add("--repeated-facades", &O::repeated_facades,
-        "Street, stereopolis, rendered: share of houses with repeated facades, 0..1 [0]");
+        "Street, stereopolis, rendered: share of houses with repeated facades, 0..1 [0]",
+        {kStreets.scenes, Effect::On::kPictures});
   s.add("--mount-position-error", &O::mount_position_error_m,
-        "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]");
-  s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]");
+        "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]", kVehicle);
+  s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]", kVehicle);
 }
 
 void add_observation_options(SimulateOptions& s) {
   using O = SimulationOptions;
   s.add("--points-per-frame", &O::points_per_frame,
-        "Observations per frame [300; stereopolis, panorama 200, target-field 350]");
-  s.add("--mean-track", &O::mean_track, "Observations per point [5]");
+        "Observations per frame [300; stereopolis, panorama 200, target-field 350]", kTiePoints);
+  s.add("--mean-track", &O::mean_track, "Observations per point [5]", kTiePoints);
   s.add("--noise", &O::image_noise_px, "Image noise per axis, px [0.5]");
-  s.add("--outliers", &O::outlier_share, "Share of wrong observations, 0..1 [0; stereopolis 0.03]");
+  s.add("--outliers", &O::outlier_share, "Share of wrong observations, 0..1 [0; stereopolis 0.03]", kTiePoints);
   s.add("--width", &O::image_width, "Image width, px [1920]");
   s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
   s.add("--focal", &O::focal_px, "Focal length, px [1400]");
-  s.add("--camera-model", &O::camera_model, "Camera model, as in a project file [brown]");
+  s.add("--camera-model", &O::camera_model, "Camera model, as in a project file [brown]", kAnyCamera);
   s.add("--published-camera", &O::published_camera,
-        "True camera of the published simulations, 1 to 4, with its size; aerial, street, panorama");
-  s.add("--start-focal", &O::start_focal, "Focal length that the block starts from, over the nominal one [1]");
+        "True camera of the published simulations, 1 to 4, with its size; aerial, street, panorama", kAnyCamera);
+  s.add("--start-focal", &O::start_focal, "Focal length that the block starts from, over the nominal one [1]",
+        kAnyCamera);
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--known-cameras", &O::free_cameras,
-               "Stereopolis, target field: cameras are known and held at the truth, mounts are not");
+               "Stereopolis, target field: cameras are known and held at the truth, mounts are not", kVehicle);
   s.add_switch("--no-calibration", &O::calibrate, "Hold cameras and mounts at the truth");
 }
 
 void add_prior_options(SimulateOptions& s) {
   using O = SimulationOptions;
   s.add("--gps-sigma", &O::gps_sigma_m, "Position priors, m; 0 = none [0.05; stereopolis 0.02, target-field 0]");
-  s.add("--gps-share", &O::gps_share, "Share of frames with a position prior [1]");
-  s.add("--masked-share", &O::gnss_masked_share, "Stereopolis: share of frames with masked satellites [0.5]");
-  s.add("--absent-share", &O::gnss_absent_share, "Stereopolis: share of them without any [0.04]");
-  s.add("--masked-frames", &O::gnss_masked_frames, "Stereopolis: mean length of a masked stretch, frames [1500]");
-  s.add("--drift", &O::drift_m, "Stereopolis: mean largest drift of a masked stretch, m [3]");
-  s.add(
-      "--drift-per-frame", &O::drift_per_frame_m,
-      "Stereopolis: largest change of the drift between successive frames, m [0.007]; more makes a short block drift");
-  s.add("--attitude-sigma", &O::attitude_sigma_deg, "Attitude priors, degrees; 0 = none [0; stereopolis 0.03]");
+  s.add("--gps-share", &O::gps_share, "Share of frames with a position prior [1]", kNoTrajectory);
+  s.add("--masked-share", &O::gnss_masked_share, "Stereopolis: share of frames with masked satellites [0.5]",
+        kStereopolis);
+  s.add("--absent-share", &O::gnss_absent_share, "Stereopolis: share of them without any [0.04]", kStereopolis);
+  s.add("--masked-frames", &O::gnss_masked_frames, "Stereopolis: mean length of a masked stretch, frames [1500]",
+        kStereopolis);
+  s.add("--drift", &O::drift_m, "Stereopolis: mean largest drift of a masked stretch, m [3]", kStereopolis);
+  s.add("--drift-per-frame", &O::drift_per_frame_m,
+        "Stereopolis: largest change of the drift between successive frames, m [0.007]; more makes a short block drift",
+        kStereopolis);
+  s.add("--attitude-sigma", &O::attitude_sigma_deg, "Attitude priors, degrees; 0 = none [0; stereopolis 0.03]",
+        kTiePoints);
   s.add("--relative-position-sigma", &O::relative_position_sigma_m,
         "Relative poses, m; 0 = none [0; stereopolis 0.005]");
   s.add("--relative-rotation-sigma", &O::relative_rotation_sigma_deg, "Relative poses, degrees [0.01]");
   s.add("--start-offset", &O::start_offset_m,
-        "Start from the integrated relative poses, every stretch of them off by up to this, m; 0 = other start [0]");
-  s.add("--start-chain", &O::start_chain_frames, "Length of these stretches, frames; 0: whole passes [0]");
+        "Start from the integrated relative poses, every stretch of them off by up to this, m; 0 = other start [0]",
+        kNoTrajectory);
+  s.add("--start-chain", &O::start_chain_frames, "Length of these stretches, frames; 0: whole passes [0]",
+        kNoTrajectory);
   s.add("--control-points", &O::control_points, "Control points [0; target-field 154]");
   s.add("--check-points", &O::check_points, "Check points [0; target-field 77]");
-  s.add("--control-zones", &O::control_zones, "Stereopolis: crossings with 8 to 40 control and check points [0]");
-  s.add("--held-out-zone", &O::held_out_zone, "Stereopolis: zone whose points are all check points, from 0");
+  s.add("--control-zones", &O::control_zones, "Stereopolis: crossings with 8 to 40 control and check points [0]",
+        kStereopolis);
+  s.add("--held-out-zone", &O::held_out_zone, "Stereopolis: zone whose points are all check points, from 0",
+        kStereopolis);
   s.add("--control-sigma", &O::control_sigma_m,
         "Sigma of control points, m [0.01; stereopolis 0.015, target-field 0.002]");
 }
@@ -153,9 +208,10 @@ void add_simulate(CLI::App& app, Action& action) {
   command->add_option("--scene", options->scene, "Scene")
       ->check(CLI::IsMember(names_in(kScenes)))
       ->capture_default_str();
-  command->add_option("--path", options->path, "Target field: way of the vehicle")
-      ->check(CLI::IsMember(names_in(kPaths)))
-      ->capture_default_str();
+  options->has_effect(command->add_option("--path", options->path, "Target field: way of the vehicle")
+                          ->check(CLI::IsMember(names_in(kPaths)))
+                          ->capture_default_str(),
+                      kTargetField);
   command->add_flag("--rendered", options->rendered, "Render pictures (small blocks) instead of tie points");
   add_scene_options(*options);
   add_observation_options(*options);

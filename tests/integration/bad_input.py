@@ -67,17 +67,32 @@ class BadInput(CopyOfTheBlock):
 
     def test_refused_values_are_named(self):
         for option, value, words in (("--frames", 1, "frames must be at least 2"),
-                                     ("--outliers", 1.5, "the share of outliers must lie in"),
+                                     ("--outliers", 1.5, "the share of outliers in this scene must lie in"),
+                                     ("--gps-sigma", 1e300, "gps_sigma_m must be at most"),
                                      ("--image-height", 8, "image_height must be at least 64"),
-                                     ("--drift-per-frame", -1, "drift_per_frame_m must be positive")):
-            said = one_line(megablock("simulate", "--drift", 3, option, value, "-o", self.folder / "x", expect=BAD_INPUT))
-            self.assertRegex(said, f"^megablock: {option} {value}: .*{words}")
+                                     ("--drift-per-frame", -1, "drift_per_frame_m must lie in")):
+            said = one_line(megablock("simulate", "--scene", "stereopolis", "--drift", 3, option, value, "-o", self.folder / "x",
+                                      expect=BAD_INPUT))
+            self.assertIn(f"megablock: {option} {value}: simulation: {words}", said)
         said = one_line(megablock("register", self.project, "-j", self.job, "--min-frames", 9, expect=BAD_INPUT))
         self.assertIn("--min-frames 9: ", said)
         self.assertFalse(self.job.exists())
         with self.project.open("a") as f:
             f.write("tiles: {min_tiles: 0}\n")
         self.assertRegex(one_line(self.run_job(BAD_INPUT)), "block.yaml:[0-9]+: tiles: min_tiles must be at least 1, not 0")
+
+    def test_simulate_refuses_options_without_effect(self):
+        for options, said in (
+                (["--scene", "street", "--height", 50], "--height has no effect on the scene 'street', only on: aerial; "
+                 "leave it out, or choose another --scene"),
+                (["--path", "loop"], "--path has no effect on the scene 'aerial', only on: target-field"),
+                (["--no-bridge"], "--no-bridge has no effect on the scene 'aerial', only on: stereopolis"),
+                (["--scene", "stereopolis", "--camera-model", "opencv-fisheye"], "only on: aerial, street, panorama"),
+                (["--scene", "street", "--repeated-facades", 1], "--repeated-facades has no effect without --rendered"),
+                (["--rendered", "--outliers", 0.1], "--outliers has no effect with --rendered; leave one of them out"),
+                (["--published-camera", 3, "--width", 640], "--width has no effect with --published-camera")):
+            self.assertIn(said, one_line(megablock("simulate", *options, "-o", self.folder / "x", expect=BAD_INPUT)))
+            self.assertFalse((self.folder / "x").exists())
 
     def test_help_is_as_wide_as_the_terminal(self):
         def help_of(columns, *command):

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "geometry/angles.h"
@@ -330,6 +331,28 @@ TEST(SimulateOptions, NonsenseIsRefused) {
   options = {};
   options.terrain_relief_m = 1000;
   EXPECT_THROW(simulate_block(options), InputError);
+}
+
+TEST(SimulateOptions, NumbersBeyondAnyBlockAreRefused) {
+  using O = SimulationOptions;
+  for (double O::*number :
+       {&O::height_m, &O::street_spacing_m, &O::drift_m, &O::drift_per_frame_m, &O::mount_position_error_m,
+        &O::panorama_radius_m, &O::gps_sigma_m, &O::attitude_sigma_deg, &O::relative_position_sigma_m,
+        &O::relative_rotation_sigma_deg, &O::start_offset_m, &O::control_sigma_m, &O::focal_px}) {
+    for (const double value : {1e300, std::numeric_limits<double>::quiet_NaN()}) {
+      O options;
+      options.*number = value;
+      EXPECT_THROW(options.check(), InputError) << value;
+    }
+  }
+  for (int O::*number : {&O::control_points, &O::check_points, &O::points_per_frame, &O::image_width}) {
+    O options;
+    options.*number = 2'000'000'000;
+    EXPECT_THROW(options.check(), InputError);
+  }
+  O options;
+  options.frames = std::int64_t{1} << 60;
+  EXPECT_THROW(options.check(), InputError);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, SimulateTest, testing::Values(aerial_options(), street_options()),
