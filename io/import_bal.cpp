@@ -88,19 +88,22 @@ BalProblem read_bal(const std::string& path) {
     BalObservation o;
     o.camera = reader.integer("camera of an observation", 0, cameras - 1);
     o.point = reader.integer("point of an observation", 0, points - 1);
-    o.position.x() = reader.number("x of an observation");
-    o.position.y() = reader.number("y of an observation");
+    o.position.x() = reader.number("x of an observation", kFarthestPixel);
+    o.position.y() = reader.number("y of an observation", kFarthestPixel);
     problem.observations.push_back(o);
   }
   for (std::int64_t c = 0; c < cameras; ++c) {
-    double v[9];
-    for (double& value : v) value = reader.number("a camera's parameters");
-    if (!(v[6] > 0)) reader.fail("focal length of camera " + std::to_string(c) + " is not positive");
-    problem.cameras.push_back({rotation_exp<double>({v[0], v[1], v[2]}).normalized().toRotationMatrix(),
-                               {v[3], v[4], v[5]},
-                               v[6],
-                               v[7],
-                               v[8]});
+    constexpr const char* kParameters = "a camera's parameters";
+    BalCamera camera;
+    Eigen::Vector3d rotation;
+    for (double& value : rotation) value = reader.number(kParameters);
+    camera.rotation = rotation_exp<double>(rotation).normalized().toRotationMatrix();
+    for (double& value : camera.translation) value = reader.number(kParameters);
+    camera.focal = reader.number(kParameters);
+    if (!(camera.focal > 0)) reader.fail("focal length of camera " + std::to_string(c) + " is not positive");
+    camera.k1 = reader.number(kParameters);
+    camera.k2 = reader.number(kParameters);
+    problem.cameras.push_back(camera);
   }
   for (std::int64_t p = 0; p < points; ++p) {
     Eigen::Vector3d point;
@@ -132,19 +135,23 @@ std::vector<std::string> read_list(const std::string& path, std::size_t count) {
   return names;
 }
 
-BalCamera read_bundler_camera(NumberReader& reader) {
-  BalCamera camera;
-  camera.focal = reader.number("a camera's focal length");
-  camera.k1 = reader.number("a camera's k1");
-  camera.k2 = reader.number("a camera's k2");
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) camera.rotation(r, c) = reader.number("a camera's rotation");
-  for (double& value : camera.translation) value = reader.number("a camera's translation");
-  return camera;
-}
-
 bool is_rotation(const Eigen::Matrix3d& r) {
   return (r * r.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && r.determinant() > 0;
+}
+
+// One of focal length 0 has no rotation.
+BalCamera read_bundler_camera(NumberReader& reader, std::int64_t c) {
+  BalCamera camera;
+  camera.focal = reader.number("a camera's focal length");
+  if (camera.focal < 0) reader.fail("focal length of camera " + std::to_string(c) + " is negative");
+  camera.k1 = reader.number("a camera's k1");
+  camera.k2 = reader.number("a camera's k2");
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) camera.rotation(row, column) = reader.number("a camera's rotation");
+  if (camera.focal > 0 && !is_rotation(camera.rotation))
+    reader.fail("camera " + std::to_string(c) + " has no rotation matrix");
+  for (double& value : camera.translation) value = reader.number("a camera's translation");
+  return camera;
 }
 
 }  // namespace
@@ -161,10 +168,8 @@ ImportedBlock import_bundler(const std::string& path) {
   BalProblem problem;
   std::vector<std::int64_t> place(static_cast<std::size_t>(cameras), -1);
   for (std::int64_t c = 0; c < cameras; ++c) {
-    const BalCamera camera = read_bundler_camera(reader);
+    const BalCamera camera = read_bundler_camera(reader, c);
     if (camera.focal == 0) continue;
-    if (!(camera.focal > 0)) reader.fail("focal length of camera " + std::to_string(c) + " is negative");
-    if (!is_rotation(camera.rotation)) reader.fail("camera " + std::to_string(c) + " has no rotation matrix");
     place[static_cast<std::size_t>(c)] = static_cast<std::int64_t>(problem.cameras.size());
     kept_names.push_back(names.empty() ? numbered("image", c) : names[static_cast<std::size_t>(c)]);
     problem.cameras.push_back(camera);
@@ -180,8 +185,8 @@ ImportedBlock import_bundler(const std::string& path) {
       o.point = p;
       o.camera = place[static_cast<std::size_t>(reader.integer("camera of a view", 0, cameras - 1))];
       reader.number("key of a view");
-      o.position.x() = reader.number("x of a view");
-      o.position.y() = reader.number("y of a view");
+      o.position.x() = reader.number("x of a view", kFarthestPixel);
+      o.position.y() = reader.number("y of a view", kFarthestPixel);
       if (o.camera >= 0) problem.observations.push_back(o);
     }
   }

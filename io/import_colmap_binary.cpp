@@ -1,4 +1,6 @@
 // Binary models: little-endian, without padding. Counts are 64 bits, ids of cameras and images 32, of points 64.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,6 +10,7 @@
 
 #include "io/error.h"
 #include "io/import_colmap.h"
+#include "io/number_reader.h"
 
 namespace megablock {
 
@@ -36,9 +39,10 @@ class Bytes {
     at_ += sizeof value;
     return value;
   }
-  double number(const char* what) {
+  double number(const char* what, double largest = kLargestNumber) {
     const double number = value<double>(what);
     if (!std::isfinite(number)) fail(std::string(what) + " is not a number");
+    if (std::abs(number) > largest) fail(fmt::format("{}: {:g} is too large to be right", what, number));
     return number;
   }
   std::string text(const char* what) {
@@ -117,7 +121,8 @@ class BinaryReader {
     builder_.add_image(id, q, translation, camera, bytes.text("an image's name"));
     const auto observations = bytes.value<std::uint64_t>("an image's observations");
     for (std::uint64_t i = 0; i < observations; ++i) {
-      const double x = bytes.number("x of an observation"), y = bytes.number("y of an observation");
+      const double x = bytes.number("x of an observation", kFarthestPixel),
+                   y = bytes.number("y of an observation", kFarthestPixel);
       builder_.add_observation(x, y, static_cast<std::int64_t>(bytes.value<std::uint64_t>("point of an observation")));
     }
   }

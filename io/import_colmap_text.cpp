@@ -70,7 +70,8 @@ class TextReader {
     const std::int64_t camera = reader.integer("an image's camera", 0, kMany);
     builder_.add_image(id, q, translation, camera, std::string(reader.rest_of_line()));
     while (reader.line_has_more()) {
-      const double x = reader.number("x of an observation"), y = reader.number("y of an observation");
+      const double x = reader.number("x of an observation", kFarthestPixel),
+                   y = reader.number("y of an observation", kFarthestPixel);
       builder_.add_observation(x, y, reader.integer("point of an observation", -1, kMany));
     }
     reader.rest_of_line();

@@ -25,7 +25,7 @@ NumberReader::NumberReader(const std::string& path) : path_(path) {
 }
 
 void NumberReader::fail(const std::string& message) const {
-  throw InputError(path_ + ":" + std::to_string(line_) + ": " + message);
+  throw InputError(path_ + ":" + std::to_string(last_line_) + ": " + message);
 }
 
 bool NumberReader::line_has_more() {
@@ -38,6 +38,7 @@ bool NumberReader::at_end() {
     ++at_;
     ++line_;
   }
+  last_line_ = line_;
   return at_ == text_.size();
 }
 
@@ -48,13 +49,14 @@ std::string_view NumberReader::word(const char* what) {
   return std::string_view(text_).substr(begin, at_ - begin);
 }
 
-double NumberReader::number(const char* what) {
+double NumberReader::number(const char* what, double largest) {
   const std::string_view text = word(what);
   const char* begin = text.data() + (text.size() > 1 && text[0] == '+' ? 1 : 0);
   double value = 0;
   const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
     fail(std::string(what) + ": '" + std::string(text) + "' is not a number");
+  if (std::abs(value) > largest) fail(std::string(what) + ": " + std::string(text) + " is too large to be right");
   return value;
 }
 
@@ -72,6 +74,7 @@ std::int64_t NumberReader::integer(const char* what, std::int64_t low, std::int6
 
 std::string_view NumberReader::rest_of_line() {
   line_has_more();
+  last_line_ = line_;
   const std::size_t begin = at_;
   while (at_ < text_.size() && text_[at_] != '\n') ++at_;
   std::string_view rest = std::string_view(text_).substr(begin, at_ - begin);

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cstring>
+
 #include "image_files.h"
 #include "io/error.h"
 #include "io/export.h"
@@ -156,6 +158,11 @@ TEST(Import, BadBinaryModelsAreRefusedByByte) {
   }
   EXPECT_THAT(refusal("cameras.bin", [](std::string& content) { content[12] = 10; }),
               HasSubstr("camera model 'number 10' is not supported"));
+  const auto far_away = [](std::string& content) {
+    const double x = 1e300;
+    std::memcpy(&content[16], &x, sizeof x);  // behind the count and the id
+  };
+  EXPECT_THAT(refusal("points3D.bin", far_away), HasSubstr("a point's coordinates: 1e+300 is too large to be right"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-bin", folder.path("none")); }),
               HasSubstr("cannot be read"));
 }
@@ -190,11 +197,20 @@ TEST(Import, BadFilesAreRefusedByLine) {
   EXPECT_THAT(refusal("bal", "1 1 1\n1 0 1 1\n"), HasSubstr("f:2: camera of an observation: 1 is outside 0..0"));
   EXPECT_THAT(refusal("bal", "1 1 1\n0 0 1 1\n1\n2\n"), HasSubstr("ends before a camera's parameters"));
   EXPECT_THAT(refusal("bal", "1 0 0\n0 0 0 0 0 0 -5 0 0\n"), HasSubstr("focal length of camera 0"));
+  EXPECT_THAT(refusal("bal", "1 0 0\n0\n0\n0\n0\n0\n0\n-5\n0\n0\n"), HasSubstr("f:8: focal length of camera 0"));
+  EXPECT_THAT(refusal("bal", "1 0 0\n0\n0\n0\n1e300\n0\n0\n5\n0\n0\n"),
+              HasSubstr("f:5: a camera's parameters: 1e300 is too large to be right"));
+  EXPECT_THAT(refusal("bal", "1 1 1\n0 0 1 1e300\n"), HasSubstr("f:2: y of an observation: 1e300 is too large"));
   EXPECT_THAT(refusal("bal", "1 0 0\n0 0 0 0 0 0 5 0 0 7\n"), HasSubstr("more numbers"));
   EXPECT_THAT(refusal("bal", ""), HasSubstr("ends before number of cameras"));
   EXPECT_THAT(refusal("bundler", "1 1\n"), HasSubstr("no Bundler file"));
   EXPECT_THAT(refusal("bundler", "# Bundle file v0.3\n1 0\n5 0 0 2 0 0 0 1 0 0 0 1 0 0 0\n"),
               HasSubstr("no rotation matrix"));
+  EXPECT_THAT(refusal("bundler", "# Bundle file v0.3\n1 0\n5 0 0\n2 0 0\n0 1 0\n0 0 1\n0 0 0\n"),
+              HasSubstr("f:6: camera 0 has no rotation matrix"));
+  EXPECT_THAT(refusal("bundler", "# Bundle file v0.3\n1 0\n-5 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n"),
+              HasSubstr("f:3: focal length of camera 0 is negative"));
+  EXPECT_THAT(refusal("bundler", "Bundle\n1 0\n"), HasSubstr("f:1: is no Bundler file"));
   EXPECT_THAT(refusal("nvm", ""), HasSubstr("'nvm' is no import format"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("bal", folder.path("none")); }), HasSubstr("cannot be read"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-text", folder.path()); }), HasSubstr("cannot be read"));
