@@ -13,6 +13,7 @@
 
 #include "io/csv_table.h"
 #include "io/error.h"
+#include "io/plausible.h"
 #include "io/settings_reader.h"
 #include "io/text_writer.h"
 

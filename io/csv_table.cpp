@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "io/error.h"
+#include "io/plausible.h"
 #include "io/settings_reader.h"
 
 namespace megablock {

@@ -9,7 +9,7 @@
 #include <unordered_set>
 
 #include "io/error.h"
-#include "io/settings_reader.h"
+#include "io/plausible.h"
 
 namespace megablock {
 

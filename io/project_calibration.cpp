@@ -5,6 +5,7 @@
 #include "geometry/angles.h"
 #include "io/calibration.h"
 #include "io/error.h"
+#include "io/plausible.h"
 #include "io/project_sections.h"
 
 namespace megablock {
@@ -60,8 +61,11 @@ Eigen::Vector3d vector_of(YamlReader& reader, const std::string& key) {
 MountCalibration read_mount(YamlReader& reader, const std::string& name) {
   MountCalibration mount;
   mount.name = name;
-  mount.pose.rotation = rotation_exp<double>(vector_of(reader, "rotation")).normalized();
-  mount.pose.centre = -(mount.pose.rotation.conjugate() * vector_of(reader, "translation"));
+  const Eigen::Vector3d turn = vector_of(reader, "rotation"), translation = vector_of(reader, "translation");
+  check_rotation_vector(turn, "rotation", reader.where("rotation"));
+  check_on_vehicle(translation, "translation", reader.where("translation"));
+  mount.pose.rotation = rotation_exp<double>(turn).normalized();
+  mount.pose.centre = -(mount.pose.rotation.conjugate() * translation);
   const double rotation = kDegree * reader.number("sigma_rotation_deg").value_or(0);
   const double position = reader.number("sigma_position_m").value_or(0);
   if (!(rotation >= 0 && position >= 0)) throw InputError(reader.where() + ": sigmas must not be negative");

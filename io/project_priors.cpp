@@ -8,8 +8,8 @@
 #include "io/crs.h"
 #include "io/error.h"
 #include "io/held_priors.h"
+#include "io/plausible.h"
 #include "io/project_sections.h"
-#include "io/settings_reader.h"
 
 namespace megablock {
 
@@ -42,7 +42,10 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kHeldPositionSigma);
   if (!from_images && reader->node("lever_arm_m"))
     refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have theirs");
-  if (const auto arm = reader->numbers("lever_arm_m", 3)) options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
+  if (const auto arm = reader->numbers("lever_arm_m", 3)) {
+    options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
+    check_on_vehicle(options.lever_arm, "gps.lever_arm_m", reader->where("lever_arm_m"));
+  }
   reader->finish();
   return options;
 }

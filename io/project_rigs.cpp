@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "io/error.h"
+#include "io/plausible.h"
 #include "io/project_sections.h"
 
 namespace megablock {
@@ -55,8 +56,11 @@ std::vector<RigCamera> read_rig_cameras(const std::string& path) {
   std::vector<RigCamera> cameras;
   for (const auto& [name, value] : json.items()) {
     const std::string where = path + ": rig camera '" + name + "'";
-    const Eigen::Quaterniond rotation = rotation_exp<double>(vector_of(value, "rotation", where)).normalized();
+    const Eigen::Vector3d turn = vector_of(value, "rotation", where);
+    check_rotation_vector(turn, "rotation", where);
+    const Eigen::Quaterniond rotation = rotation_exp<double>(turn).normalized();
     const Eigen::Vector3d translation = vector_of(value, "translation", where);
+    check_on_vehicle(translation, "translation", where);
     cameras.push_back({name, {rotation, -(rotation.conjugate() * translation)}});
   }
   return cameras;

@@ -1,7 +1,5 @@
 #include "io/settings_reader.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -53,13 +51,6 @@ double parse_number(const std::string& text, const std::string& what, const std:
   if (!std::isfinite(value))
     throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a finite number");
   return value;
-}
-
-void check_on_earth(double metres, const std::string& what, const std::string& where) {
-  constexpr double kFarthest_m = 1e8;  // northings reach 1e7, eastings with the zone in front 6e7
-  if (!(std::abs(metres) <= kFarthest_m))
-    throw InputError(where + ": " + what + ": " + fmt::format("{:g}", metres) +
-                     " m is beyond any place on Earth; correct the number or its unit, or take the line out");
 }
 
 std::int64_t parse_integer(const std::string& text, const std::string& what, const std::string& where) {

@@ -46,8 +46,6 @@ const std::vector<std::string>& stage_sections();
 // Parsers of one scalar, shared with the rest of the project file; `what` is the key, `where` file:line.
 double parse_number(const std::string& text, const std::string& what, const std::string& where);
 std::int64_t parse_integer(const std::string& text, const std::string& what, const std::string& where);
-// InputError for a coordinate in metres that no place on Earth has, in any system.
-void check_on_earth(double metres, const std::string& what, const std::string& where);
 bool parse_flag(const std::string& text, const std::string& what, const std::string& where);
 
 // The known name nearest to a misspelled one; empty when none is near.

@@ -134,7 +134,7 @@ TEST(ApproximatePoses, Refusals) {
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,,3,0,0,0\n"), HasSubstr("p.csv:2: y_m is empty"));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,NaN,3,0,0,0\n"), HasSubstr("p.csv:2: y_m: 'NaN' is not a finite number"));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,-inf,3,0,0,0\n"), HasSubstr("y_m: '-inf' is not a finite number"));
-  const std::string remedy = " m is beyond any place on Earth; correct the number or its unit, or take the line out";
+  const std::string remedy = " is beyond any place on Earth; correct the number or its unit, or take the line out";
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,2,1e300,0,0,0\n"), HasSubstr("p.csv:2: z_m: 1e+300" + remedy));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,-1.1e8,2,3,0,0,0\n"), HasSubstr("p.csv:2: x_m: -1.1e+08" + remedy));
   EXPECT_EQ(refusal(local + "frame0/0.jpg,32500000,5500000,3,0,0,0\n"), "");

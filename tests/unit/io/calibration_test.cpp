@@ -107,6 +107,10 @@ TEST_F(CalibrationFile, MistakesAreRefusedWithTheirPlace) {
   EXPECT_THAT(refusal("mount:\n  c22: {}\n"), HasSubstr("did you mean 'mounts'?"));
   EXPECT_THAT(refusal("mounts:\n  c22: {rotation: [0, 0, 0], translation: [0, 0, 0], sigma_position_m: -1}\n"),
               HasSubstr("must not be negative"));
+  EXPECT_THAT(refusal("mounts:\n  c22: {rotation: [0, 0, 0], translation: [0, 0, 1e300]}\n"),
+              HasSubstr("calibration.yaml:2: translation: [0, 0, 1e+300] m is no place on a vehicle"));
+  EXPECT_THAT(refusal("mounts:\n  c22: {rotation: [0, -90, 0], translation: [0, 0, 0]}\n"),
+              HasSubstr("calibration.yaml:2: rotation: [0, -90, 0] is more than a full turn"));
   EXPECT_THAT(message_of<InputError>([&] { read("calibration: {hold: true}\n"); }), HasSubstr("key 'file' is missing"));
   EXPECT_THAT(message_of<InputError>([&] { read("calibration: nowhere.yaml\n"); }), HasSubstr("nowhere.yaml"));
 }

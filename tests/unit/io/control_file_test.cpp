@@ -94,7 +94,7 @@ TEST_F(ControlFile, GcpListRefusals) {
   EXPECT_THAT(refusal("gcp_list.txt", "EPSG:123456\n" + good), HasSubstr("not known to PROJ"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n52.52 113.4 40 5 6 sub/0.jpg a\n"), HasSubstr("gcp_list.txt:2"));
   EXPECT_THAT(refusal("gcp_list.txt", "EPSG:25832\n1e300 5 40 5 6 sub/0.jpg a\n"),
-              HasSubstr("gcp_list.txt:2: x: 1e+300 m is beyond any place on Earth"));
+              HasSubstr("gcp_list.txt:2: x: 1e+300 is beyond any place on Earth"));
   EXPECT_THAT(refusal("gcp_list.txt", ""), HasSubstr("gcp_list.txt: is empty"));
   EXPECT_THAT(message_of<InputError>([&] { read_control_table(folder_.path("none.txt")); }),
               HasSubstr("cannot be read"));
@@ -167,7 +167,7 @@ TEST_F(ControlFile, CsvRefusals) {
   EXPECT_THAT(refusal("c.csv", header + "a,,2,3,sub/0.jpg,3,4\n"), HasSubstr("c.csv:2: x is empty"));
   EXPECT_THAT(refusal("c.csv", header + "a,nan,2,3,sub/0.jpg,3,4\n"),
               HasSubstr("c.csv:2: x: 'nan' is not a finite number"));
-  EXPECT_THAT(refusal("c.csv", header + "a,1,2,1e9,sub/0.jpg,3,4\n"), HasSubstr("c.csv:2: z: 1e+09 m is beyond"));
+  EXPECT_THAT(refusal("c.csv", header + "a,1,2,1e9,sub/0.jpg,3,4\n"), HasSubstr("c.csv:2: z: 1e+09 is beyond"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4\na,9,,,sub/1.jpg,3,4\n"), HasSubstr("another x"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4,5\n"), HasSubstr("8 fields, the header has 7"));
   EXPECT_THAT(refusal("c.csv", "# crs: EPSG:32633\n" + header + "a,1e9,2,3,sub/0.jpg,3,4\n"), HasSubstr("c.csv:3"));

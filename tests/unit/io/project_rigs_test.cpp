@@ -118,6 +118,10 @@ TEST_F(ProjectRigs, Refusals) {
   EXPECT_THAT(refusal("{", kAssignments), HasSubstr("rig_cameras.json: not valid JSON"));
   EXPECT_THAT(refusal("[]", kAssignments), HasSubstr("expected an object of rig cameras"));
   EXPECT_THAT(refusal(R"({"left": {"rotation": [0, 0]}})", kAssignments), HasSubstr("'rotation' must be a list of 3"));
+  EXPECT_THAT(refusal(R"({"left": {"rotation": [0, 0, 0], "translation": [0, 1e300, 0]}})", kAssignments),
+              HasSubstr("rig camera 'left': translation: [0, 1e+300, 0] m is no place on a vehicle"));
+  EXPECT_THAT(refusal(R"({"left": {"rotation": [0, 90, 0], "translation": [0, 0, 0]}})", kAssignments),
+              HasSubstr("rig camera 'left': rotation: [0, 90, 0] is more than a full turn"));
   EXPECT_THAT(refusal(kCameras, "[[1]]"), HasSubstr("exposure 1 must be a list of [image, rig camera]"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "top"]]])"), HasSubstr("rig camera 'top', which"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/9.jpg", "left"]]])"),

@@ -326,10 +326,12 @@ TEST(Project, RefusalsNameFileAndLine) {
               HasSubstr("unknown key 'sigma_horizontal_cm' in 'gps'; did you mean 'sigma_horizontal_m'?"));
   EXPECT_THAT(refusal(folder, images + "gps: 3\n"), HasSubstr("block.yaml:2: 'gps' must be a mapping"));
   EXPECT_THAT(refusal(folder, images + "gps: {lever_arm_m: [1, 2]}\n"), HasSubstr("must be a list of 3 numbers"));
+  EXPECT_THAT(refusal(folder, images + "gps: {lever_arm_m: [0, 0, 1e300]}\n"),
+              HasSubstr("block.yaml:2: gps.lever_arm_m: [0, 0, 1e+300] m is no place on a vehicle"));
   EXPECT_THAT(refusal(folder, images + "gps: {use: maybe}\n"), HasSubstr("neither true nor false"));
   EXPECT_THAT(refusal(folder, images + "origin: [146, 3, 0]\n"), HasSubstr("block.yaml:2: origin must be"));
   EXPECT_THAT(refusal(folder, images + "origin: [46, 3, 1e300]\n"),
-              HasSubstr("block.yaml:2: origin: 1e+300 m is beyond"));
+              HasSubstr("block.yaml:2: origin: 1e+300 is beyond"));
   EXPECT_THAT(refusal(folder, images + "images: images\n"), HasSubstr("block.yaml:2: key 'images' appears twice"));
   EXPECT_THAT(refusal(folder, images + "cameras: {grouping: colour}\n"), HasSubstr("none of: exif, folder, one"));
   EXPECT_THAT(refusal(folder, images + "cameras: {Nikon: {focal_px: 3}}\n"),
