@@ -59,7 +59,7 @@ std::string wrapped(const std::string& text, std::size_t columns, std::size_t de
 }
 
 std::string for_terminal(const std::string& text) {
-  const auto columns = terminal_columns();
+  const auto columns = ::isatty(STDOUT_FILENO) ? terminal_columns() : std::nullopt;
   return columns ? wrapped(text, *columns, 0, 2) : text;
 }
 

@@ -14,7 +14,7 @@ std::optional<std::size_t> terminal_columns();
 // description, which begins at column `description`; of any other `hanging` columns right of the line's own beginning.
 std::string wrapped(const std::string& text, std::size_t columns, std::size_t description, std::size_t hanging = 0);
 
-// What a person reads; a program that reads it gets whole lines, unless it sets COLUMNS.
+// What a person reads on a terminal; a program or a file gets whole lines, whatever COLUMNS says.
 std::string for_terminal(const std::string& text);
 
 }  // namespace megablock

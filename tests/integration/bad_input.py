@@ -7,6 +7,7 @@ Works on a small rendered block; needs nothing but the program and the standard 
 """
 import json
 import os
+import pty
 import random
 import re
 import shutil
@@ -16,6 +17,23 @@ import unittest
 import pictures
 from program import BAD_INPUT, FAILED_UNITS, MEGABLOCK, megablock, one_line, status
 from small_block import CopyOfTheBlock, setUpModule, simulate, tearDownModule, work
+
+
+def on_terminal(columns, *arguments):
+    """What the program writes to a terminal of so many columns."""
+    terminal, end = pty.openpty()
+    program = subprocess.Popen([MEGABLOCK, *map(str, arguments)], stdout=end, stderr=subprocess.DEVNULL,
+                               env=dict(os.environ, COLUMNS=str(columns)))
+    os.close(end)
+    text = b""
+    try:
+        while part := os.read(terminal, 1 << 16):
+            text += part
+    except OSError:  # the other end is closed
+        pass
+    os.close(terminal)
+    assert program.wait() == 0
+    return text.decode().replace("\r\n", "\n")
 
 
 class BadInput(CopyOfTheBlock):
@@ -109,8 +127,9 @@ class BadInput(CopyOfTheBlock):
 
     def test_status_and_diagnose_are_as_wide_as_the_terminal(self):
         for command in ("status", "diagnose"):
-            whole = megablock(command, work / "clean_job")  # as a program reads them
-            narrow = megablock(command, work / "clean_job", env=dict(os.environ, COLUMNS="60"))
+            whole = megablock(command, work / "clean_job")
+            self.assertEqual(megablock(command, work / "clean_job", env=dict(os.environ, COLUMNS="60")), whole)  # a pipe
+            narrow = on_terminal(60, command, work / "clean_job")
             self.assertGreater(max(map(len, whole.splitlines())), 60)
             # What has no blank, as a path, cannot be broken.
             self.assertFalse([line for line in narrow.splitlines() if len(line) > 60 and " " in line.strip()[:60]], narrow)
