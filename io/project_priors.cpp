@@ -19,7 +19,7 @@ constexpr double kDefaultHorizontalSigma = 3, kDefaultVerticalSigma = 6;  // met
 constexpr double kTiltSigmaDeg = 3, kYawSigmaDeg = 10;                    // of a gimbal
 
 struct GpsOptions {
-  bool use = true;
+  bool given = false, use = true;  // given: there is such a section
   std::optional<double> sigma_horizontal, sigma_vertical;
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
 };
@@ -37,6 +37,7 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   GpsOptions options;
   auto reader = top.mapping("gps");
   if (!reader) return options;
+  options.given = true;
   options.use = reader->flag("use").value_or(true);
   options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kHeldPositionSigma);
   options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kHeldPositionSigma);
@@ -83,6 +84,17 @@ void set_position_priors(const std::vector<ScannedImage>& scanned,
   }
 }
 
+// A section that acts on nothing: refused with a block, which stays what it is; told of images, which may be others.
+void check_effect(const YamlReader& top, const std::string& section, const std::string& what, bool from_images,
+                  bool has_effect, std::vector<std::string>& warnings) {
+  if (has_effect) return;
+  if (!from_images) refuse_unused(top, section, "with a 'block' without " + what);
+  warnings.push_back(top.where(section) + ": '" + section + "' has no effect: the images have no " + what);
+}
+
+bool has_position(const Frame& frame) { return frame.position_prior.has_value(); }
+bool has_attitude(const Frame& frame) { return frame.attitude_prior.has_value(); }
+
 GroundFrame ground_at(const Geodetic& origin) {
   return {true, origin.latitude_deg, origin.longitude_deg, origin.height_m, "EPSG:4979"};
 }
@@ -113,6 +125,10 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   std::vector<Geodetic> known;
   for (const auto& position : positions)
     if (position) known.push_back(*position);
+  if (options.given && options.use) {
+    const bool has_effect = from_images ? !known.empty() : std::ranges::any_of(block.frames, has_position);
+    check_effect(top, "gps", "positions", from_images, has_effect, project.warnings);
+  }
   for (Frame& frame : block.frames) {
     if (!frame.position_prior) continue;
     if (options.sigma_horizontal) frame.position_prior->sigma.head<2>().setConstant(*options.sigma_horizontal);
@@ -136,19 +152,27 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
 }
 
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project) {
-  bool use = true;
+  const bool from_images = !scanned.empty();
+  bool given = false, use = true;
   std::optional<double> sigma_deg;
   if (auto reader = top.mapping("attitude")) {
+    given = true;
     use = reader->flag("use").value_or(true);
     sigma_deg = read_sigma(*reader, "sigma_deg", kHeldAttitudeSigma * kDegreesPerRadian);
     reader->finish();
   }
   Block& block = project.block;
+  if (given && use) {
+    const auto tells = [](const ScannedImage& image) { return image.header.attitude.has_value(); };
+    const bool has_effect =
+        from_images ? std::ranges::any_of(scanned, tells) : std::ranges::any_of(block.frames, has_attitude);
+    check_effect(top, "attitude", "attitudes", from_images, has_effect, project.warnings);
+  }
   if (!use)
     for (Frame& frame : block.frames) frame.attitude_prior.reset();
   for (Frame& frame : block.frames)
     if (frame.attitude_prior && sigma_deg) frame.attitude_prior->sigma_rad.setConstant(*sigma_deg * kDegree);
-  if (!use || scanned.empty() || !block.ground.georeferenced) return;
+  if (!use || !from_images || !block.ground.georeferenced) return;
   const Georeference georeference(block.ground);
   const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kDegree;
   const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kDegree;

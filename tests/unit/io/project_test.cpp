@@ -280,6 +280,17 @@ TEST(Project, KeepsWhatIsSaidOfPositionsAndAttitudes) {
 }
 
 // Far-off start values end in a block that seems to have no datum: said before.
+TEST(Project, WarnsOfSectionsThatActOnNothing) {
+  ScratchDirectory folder;
+  write_picture(folder.path("images/a.jpg"), 64, 48, 1);
+  EXPECT_THAT(
+      read_text(folder, "images: images\ngps: {sigma_horizontal_m: 1}\nattitude: {sigma_deg: 1}\n").warnings,
+      testing::AllOf(
+          testing::Contains(testing::EndsWith("block.yaml:2: 'gps' has no effect: the images have no positions")),
+          testing::Contains(
+              testing::EndsWith("block.yaml:3: 'attitude' has no effect: the images have no attitudes"))));
+}
+
 TEST(Project, WarnsOfPosesFarFromThePositions) {
   ScratchDirectory folder;
   Project project;
@@ -385,6 +396,9 @@ TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
               testing::AllOf(HasSubstr("lever_arm_m"), testing::Not(HasSubstr("lever_arm_m, lever_arm_m"))));
   EXPECT_EQ(refusal_of("cameras: {grouping: one}\n"),
             "block.yaml:3: 'grouping' is not used with 'block', which says what its cameras are; take it out");
+  EXPECT_EQ(refusal_of("attitude: {sigma_deg: 1}\n"),
+            "block.yaml:3: 'attitude' is not used with a 'block' without attitudes; take it out");
+  EXPECT_EQ(refusal_of("attitude: {use: false}\n"), "") << "is what the block is";
   std::filesystem::create_directories(folder_.path("masks"));
   EXPECT_EQ(refusal_of("masks: masks\n"),
             "block.yaml:3: 'masks' is not used with a 'block' without pictures; take it out");
@@ -396,6 +410,15 @@ TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
                 HasSubstr("block.yaml:4: '" + section.substr(0, section.find(':')) +
                           "' is not used with 'tie_points', which are measured and matched already; take it out"));
   EXPECT_EQ(refusal_of("tiles: {min_tiles: 2}\n"), "");
+}
+
+TEST_F(GivenBlock, PositionsThatItHasNotAreNotWeighed) {
+  Block given = read_block(folder_.path("given.h5"));
+  for (Frame& f : given.frames) f.position_prior.reset();
+  write_block(folder_.path("given.h5"), given);
+  EXPECT_EQ(refusal_of("gps: {sigma_horizontal_m: 1}\n"),
+            "block.yaml:3: 'gps' is not used with a 'block' without positions; take it out");
+  EXPECT_EQ(refusal_of("gps: {use: false}\n"), "");
 }
 
 TEST(InitProject, WritesWhatTheReaderReads) {
