@@ -412,6 +412,21 @@ TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
   EXPECT_EQ(refusal_of("tiles: {min_tiles: 2}\n"), "");
 }
 
+TEST_F(GivenBlock, ControlIsAddedToItsOwn) {
+  const std::string header = "name,x,y,z,image,column_px,row_px\n", control = "control: control.csv\n";
+  Block given = read_block(folder_.path("given.h5"));
+  given.control_points.push_back({"own", PointRole::kCheck, {0, 0, 0}, {1, 1, 1}, {}});
+  write_block(folder_.path("given.h5"), given);
+  write_file(folder_.path("control.csv"), header + "new,1,2,3," + given.name_of(ImageIndex(1)) + ",100,200\n");
+  const Block block = read_text(folder_, "block: given.h5\ntie_points: tie_points.h5\n" + control).block;
+  ASSERT_THAT(block.control_points, SizeIs(2));
+  EXPECT_EQ(block.control_points[0].name, "own");
+  EXPECT_EQ(block.control_points[1].position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(block.control_points[1].measurements.at(0).image, ImageIndex(1));
+  write_file(folder_.path("control.csv"), header + "own,1,2,3,,,\n");
+  EXPECT_EQ(refusal_of(control), "block.yaml: control point 'own' appears twice; names must differ");
+}
+
 TEST_F(GivenBlock, PositionsThatItHasNotAreNotWeighed) {
   Block given = read_block(folder_.path("given.h5"));
   for (Frame& f : given.frames) f.position_prior.reset();
