@@ -20,6 +20,7 @@
 #include "cluster/stages/given_tracks.h"
 #include "cluster/stages/stages.h"
 #include "cluster/version.h"
+#include "io/check.h"
 #include "io/error.h"
 #include "io/hash.h"
 #include "io/measurement_index.h"
@@ -113,8 +114,7 @@ void refuse_other_folders(const JobStore& store) {
   const std::filesystem::path folder(store.directory());
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error) || std::filesystem::is_empty(folder, error)) return;
-  for (const char* own : {"job.json", "lock", "events"})
-    if (std::filesystem::exists(folder / own, error)) return;
+  if (holds_job(store)) return;
   throw InputError(store.directory() + ": the folder holds other files and no job; name a new folder with -j");
 }
 

@@ -1,5 +1,6 @@
 #include "io/check.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -26,8 +27,10 @@ class Check {
   explicit Check(const JobStore& store) : store_(store) {}
 
   std::vector<std::string> run() {
-    if (!std::filesystem::is_directory(store_.directory()))
+    if (!std::filesystem::exists(store_.directory()))
       throw InputError(store_.directory() + ": no such job directory; check the path");
+    if (!holds_job(store_))
+      throw InputError(store_.directory() + ": is no job directory; name the folder given to 'run -j'");
     attempt([&] { check_text(); });
     for (const std::string& name : units()) attempt([&] { check_unit(name); });
     attempt([&] { check_tile_files(); });
@@ -122,6 +125,12 @@ class Check {
 };
 
 }  // namespace
+
+bool holds_job(const JobStore& store) {
+  std::error_code error;
+  return std::ranges::any_of(std::vector{"job.json", "lock", "events"},
+                             [&](const char* own) { return std::filesystem::exists(store.path(own), error); });
+}
 
 std::vector<std::string> check_job(const JobStore& store) { return Check(store).run(); }
 

@@ -12,6 +12,7 @@
 #include "io/result.h"
 #include "io/unit_files.h"
 #include "tests/unit/io/example_block.h"
+#include "tests/unit/io/image_files.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
@@ -103,7 +104,16 @@ TEST_F(CheckJob, BadJobFileIsNamed) {
   EXPECT_THAT(problems(), ElementsAre(HasSubstr("job.json: is missing")));
 }
 
-TEST_F(CheckJob, NoJobIsBadInput) { EXPECT_THROW(check_job(JobStore(scratch_.path("nowhere"))), InputError); }
+TEST_F(CheckJob, NoJobIsBadInput) {
+  const auto refusal = [&](const std::string& path) {
+    return fixture::message_of<InputError>([&] { check_job(JobStore(scratch_.path(path))); });
+  };
+  EXPECT_THAT(refusal("nowhere"), HasSubstr("nowhere: no such job directory; check the path"));
+  std::filesystem::create_directories(scratch_.path("project"));
+  std::ofstream(scratch_.path("project/block.yaml")) << "images: images\n";
+  for (const std::string what : {"project", "project/block.yaml"})
+    EXPECT_THAT(refusal(what), HasSubstr(what + ": is no job directory; name the folder given to 'run -j'"));
+}
 
 }  // namespace
 }  // namespace megablock
