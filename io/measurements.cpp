@@ -231,6 +231,18 @@ std::vector<std::int64_t> MeasurementStore::points_near(const GroundPlace& place
   return points;
 }
 
+Eigen::AlignedBox3d MeasurementStore::extent() const {
+  Eigen::AlignedBox3d extent;
+  const std::vector<float> districts =
+      result().rows<float>("points/district", {{0, result().shape("points/district").front()}});
+  for (auto box = districts.begin(); box != districts.end(); box += 6) {
+    if (std::isnan(box[0])) continue;  // no point with a position
+    extent.extend(Eigen::Vector3d(box[0], box[1], box[2]));
+    extent.extend(Eigen::Vector3d(box[3], box[4], box[5]));
+  }
+  return extent;
+}
+
 Measurements MeasurementStore::near(const GroundPlace& place) const {
   if (!place.centre.head<2>().allFinite() || !std::isfinite(place.radius_m) || place.radius_m < 0)
     throw InputError("a place needs finite east and north, and a radius of 0 m or more");

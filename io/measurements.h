@@ -10,6 +10,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <vector>
@@ -52,6 +53,8 @@ class MeasurementStore {
   Measurements of_images(std::vector<ImageIndex> images) const;
   // Of the points of the result within the radius, in the order of its points; rejected ones too.
   Measurements near(const GroundPlace& place) const;
+  // Where the points of the result lie, ground frame, m, to the digits of a float; empty: none has a position.
+  Eigen::AlignedBox3d extent() const;
 
  private:
   std::vector<TileIndex> tiles_of(const std::vector<ImageIndex>& images) const;

@@ -41,6 +41,18 @@ void check(const MeasurementsOptions& options) {
     if (!std::isfinite(coordinate)) throw InputError("measurements: --near takes finite numbers, in metres");
 }
 
+// That nothing lies about a place, and where it would.
+void tell_of_nothing(const MeasurementStore& store, const MeasurementsOptions& options) {
+  const Eigen::AlignedBox3d extent = store.extent();
+  std::string where = "no point has a position";
+  if (!extent.isEmpty())
+    where = fmt::format("points lie from {:.1f} to {:.1f} m east, {:.1f} to {:.1f} m north, {:.1f} to {:.1f} m up",
+                        extent.min().x(), extent.max().x(), extent.min().y(), extent.max().y(), extent.min().z(),
+                        extent.max().z());
+  std::fprintf(stderr, "megablock: warning: %s: no point lies within %g m of the place; %s\n", options.job.c_str(),
+               options.radius_m, where.c_str());
+}
+
 Measurements ask(const MeasurementStore& store, const MeasurementsOptions& options) {
   if (!options.near.empty()) {
     const double up = options.near.size() == 3 ? options.near[2] : std::nan("");
@@ -48,6 +60,7 @@ Measurements ask(const MeasurementStore& store, const MeasurementsOptions& optio
     if (const std::vector<std::string> stale = unfinished_stages(JobStore(options.job)); !stale.empty())
       std::fprintf(stderr, "megablock: warning: %s: places are those of an older result; %s\n", options.job.c_str(),
                    stale.front().c_str());
+    if (found.size() == 0) tell_of_nothing(store, options);
     return found;
   }
   std::vector<ImageIndex> images = store.find_images(options.images);

@@ -113,9 +113,16 @@ class BadInputJob(CopyOfTheBlock):
     def test_measurements_about_an_empty_place_have_all_columns(self):
         header = "image,track,x_px,y_px,feature,tile,kept,residual_x_px,residual_y_px"
         for place in ("0,0", "90000,0"):
-            rows = megablock("measurements", work / "clean_job", "--near", place, "--radius", 30).splitlines()
+            asked = subprocess.run([MEGABLOCK, "measurements", work / "clean_job", "--near", place, "--radius", "30"],
+                                   capture_output=True, text=True, check=True)
+            rows = asked.stdout.splitlines()
             self.assertEqual(rows[0], header)
             self.assertEqual(len(rows) > 1, place == "0,0")
+            if place != "0,0":
+                self.assertRegex(asked.stderr, "clean_job: no point lies within 30 m of the place; points lie from "
+                                               "-[0-9.]+ to [0-9.]+ m east, -[0-9.]+ to [0-9.]+ m north, .* m up")
+            else:
+                self.assertEqual(asked.stderr, "")
 
     def test_measurements_without_their_index(self):
         shutil.copytree(work / "clean_job", self.job)

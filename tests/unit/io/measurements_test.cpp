@@ -302,6 +302,10 @@ TEST_F(MeasurementsByPlace, EqualASearchThroughAllPoints) {
     total += found.size();
   }
   EXPECT_GT(total, 35000);  // the whole street among them
+  Eigen::AlignedBox3d extent;
+  for (const Eigen::Vector3d& point : result.points)
+    if (point.allFinite()) extent.extend(point);
+  EXPECT_LT((store.extent().min() - extent.min()).norm() + (store.extent().max() - extent.max()).norm(), 0.01);
   EXPECT_THROW(store.near({{0, std::nan(""), 0}, 1}), InputError);
   EXPECT_THROW(store.near({{0, 0, 0}, -1}), InputError);
 }
