@@ -82,8 +82,17 @@ class Diagnosis {
   double slope_down(ImageIndex image) const {
     return -(camera_of(image).rotation.conjugate() * Eigen::Vector3d::UnitZ()).z();
   }
+  // Else the frame is one of images alone, in which "up" is a guess: across the plane of the exposures, be it a facade.
+  bool vertical_is_known() const {
+    const auto tells = [](const Frame& frame) {
+      return frame.position_prior || frame.attitude_prior || frame.given_pose;
+    };
+    return !block_.control_points.empty() || !block_.lines.empty() || !block_.verticals.empty() ||
+           std::ranges::any_of(block_.frames, tells);
+  }
   // Whether most oriented images do.
   bool looks_down() const {
+    if (!vertical_is_known()) return false;
     std::int64_t down = 0, all = 0;
     for (ImageIndex i(0); block_.images.contains(i); ++i.value) {
       if (!state_.oriented[block_.images[i].frame]) continue;

@@ -209,8 +209,8 @@ class DiagnosticsText {
   std::string scope() const {
     if (!d_.aerial)
       return paragraph(
-          "Most images look sideways: passes are searched for interruptions and the links for weak ones. Footprints, "
-          "bases, flight lines and proposals are for images that look down.",
+          "Most images look sideways, or nothing tells where down is: passes are searched for interruptions and the "
+          "links for weak ones. Footprints, bases, flight lines and proposals are for images that look down.",
           "muted");
     return paragraph(
         fmt::format("{} flight {}; {} m between exposures, {} m between lines, {} m above ground (medians). "

@@ -295,6 +295,19 @@ TEST(BlockDiagnostics, SingleLinksAreThoseWithoutWhichFramesAreApart) {
   EXPECT_GT(bridges, 300u);
 }
 
+TEST(BlockDiagnostics, OfImagesAloneNobodyKnowsWhereDownIs) {
+  Survey survey;
+  for (int i = 0; i < 6; ++i) survey.add(20 * i, 0);
+  EXPECT_TRUE(survey.found().aerial);
+  survey.state = initial_state(survey.block);
+  for (Frame& frame : survey.block.frames) frame.given_pose.reset();
+  const auto found = [&] { return diagnose(survey.block, survey.state, [](bool) { return TieEvidence(); }, {}); };
+  EXPECT_FALSE(found().aerial);
+  EXPECT_TRUE(found().pairs.empty() && found().footprints.empty());
+  survey.block.control_points.emplace_back();
+  EXPECT_TRUE(found().aerial);
+}
+
 TEST(BlockDiagnostics, NothingPlacedAndBadOptions) {
   Survey survey;
   const BlockDiagnostics empty = survey.found();
