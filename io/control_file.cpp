@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 
 #include "io/csv_table.h"
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/plausible.h"
 #include "io/settings_reader.h"
 #include "io/text_writer.h"
@@ -63,6 +63,7 @@ ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
     if (line.empty() || line.front() == '#') continue;
     if (table.crs.empty()) {
       table.crs = line;
+      table.crs_where = where;
       continue;
     }
     const std::vector<std::string> fields = fields_of(line);
@@ -166,6 +167,7 @@ ControlTable read_json(const std::string& text, const std::string& path) {
     throw InputError(path + ":1: expected an object with a list 'points'");
   ControlTable table;
   table.crs = "WGS84";
+  table.crs_where = path;
   table.pixels = ControlTable::Pixels::kNormalised;
   JsonLines lines(text, path);
   for (const Json& entry : json["points"]) {
@@ -223,6 +225,7 @@ ControlTable read_csv(const std::string& path) {
                      "sigma_vertical_m", "sigma_px"});
   ControlTable table;
   if (!csv.comment("crs").empty()) table.crs = csv.comment("crs");
+  table.crs_where = path;
   std::map<std::string, std::size_t> point_of_name;
   for (std::size_t row = 0; row < csv.row_count(); ++row) {
     const std::string name = csv.text(row, "name"), where = csv.where(row);
@@ -245,8 +248,7 @@ ControlTable read_csv(const std::string& path) {
 ControlTable read_control_table(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension == ".csv") return read_csv(path);
-  std::ifstream stream(path);
-  if (!stream || std::filesystem::is_directory(path)) throw InputError(path + ": cannot be read; check the name");
+  std::ifstream stream = open_input(path);
   if (extension != ".json") return read_gcp_list(stream, path);
   std::ostringstream text;
   text << stream.rdbuf();

@@ -42,7 +42,7 @@ struct ControlTable {
     std::string where;
   };
   enum class Pixels { kCentresAtHalf, kCentresAtInteger, kNormalised } pixels = Pixels::kCentresAtHalf;
-  std::string crs = "local";
+  std::string crs = "local", crs_where;  // crs_where: file, and line where it is named
   std::vector<Point> points;
   std::vector<std::string> warnings;  // points left out
 };

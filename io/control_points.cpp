@@ -42,12 +42,20 @@ void check_pixel(const ControlTable::Measurement& m, const Eigen::Vector2d& pixe
                    " x " + std::to_string(camera.height) + " pixels)");
 }
 
+CrsToWgs84 crs_of(const ControlTable& table) {
+  try {
+    return CrsToWgs84(table.crs);
+  } catch (const InputError& error) {
+    throw InputError(table.crs_where + ": " + error.what());
+  }
+}
+
 // Coordinates of the file's system in the ground frame of the block.
 class ToGround {
  public:
   ToGround(const ControlTable& table, const GroundFrame& ground) : ground_(ground) {
     if (table.crs == "local") return;
-    crs_.emplace(table.crs);
+    crs_.emplace(crs_of(table));
     if (!ground.georeferenced)
       throw InputError((table.points.empty() ? "control" : table.points[0].where) + ": control in '" + table.crs +
                        "' needs a georeferenced block; give 'origin' in the project file");
@@ -76,7 +84,7 @@ class ToGround {
 std::vector<Geodetic> geodetic_positions(const ControlTable& table) {
   std::vector<Geodetic> positions;
   if (table.crs == "local") return positions;
-  const CrsToWgs84 crs(table.crs);
+  const CrsToWgs84 crs = crs_of(table);
   for (const ControlTable::Point& point : table.points) {
     Eigen::Vector3d xyz = point.coordinates;
     const bool flat = std::isnan(xyz.z());

@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/plausible.h"
 #include "io/settings_reader.h"
 
@@ -36,8 +35,7 @@ std::vector<std::string> split(const std::string& line) {
 }  // namespace
 
 CsvTable::CsvTable(const std::string& path) : path_(path) {
-  std::ifstream stream(path);
-  if (!stream || std::filesystem::is_directory(path)) throw InputError(path + ": cannot be read; check the name");
+  std::ifstream stream = open_input(path);
   std::int64_t number = 0;
   for (std::string line; std::getline(stream, line);) {
     ++number;

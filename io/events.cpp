@@ -37,10 +37,7 @@ std::string path_for(const JobStore& store, int rank) {
 
 // Makes the folder on the way, so that the file can be opened in the constructor's list.
 std::string with_folder(const std::string& path) {
-  std::error_code error;
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::filesystem::create_directories(folder, error);
-  if (error) throw_file_error(folder.string(), "created as a directory", error.value());
+  make_folder(std::filesystem::path(path).parent_path().string());
   return path;
 }
 

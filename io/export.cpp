@@ -1,16 +1,12 @@
 #include "io/export.h"
 
-#include <filesystem>
-
-#include "io/error.h"
 #include "io/export_bal.h"
 #include "io/export_colmap.h"
 #include "io/export_tables.h"
+#include "io/file_error.h"
 #include "io/format_list.h"
 
 namespace megablock {
-
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -43,11 +39,8 @@ const std::vector<std::string>& export_formats() {
 
 void export_result(const BlockResult& result, const std::string& format, const std::string& out) {
   const ExportFormat& found = format_named(writers(), format, "export");
-  const fs::path folder = found.folder ? fs::path(out) : fs::absolute(out).parent_path();
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string() + ": the folder cannot be made; check the path and its permissions");
+  check_parent(out);
+  if (found.folder) make_folder(out);
   found.write(result, out);
 }
 

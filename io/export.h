@@ -17,7 +17,8 @@ namespace megablock {
 // h5:              one self-contained file (write_result)
 const std::vector<std::string>& export_formats();
 
-// Makes folders as needed. InputError for an unknown format, or when it cannot be written.
+// Makes the folder of a format that is one, in a folder that is there. InputError for an unknown format, or when it
+// cannot be written.
 void export_result(const BlockResult& result, const std::string& format, const std::string& out);
 
 }  // namespace megablock

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/format_list.h"
 #include "io/import_bal.h"
 #include "io/import_colmap.h"
@@ -55,10 +56,7 @@ ImportedBlock import_block(const std::string& format, const std::string& path) {
 }
 
 void write_imported(const ImportedBlock& imported, const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder))
-    throw InputError(folder + ": the folder cannot be made; check the path and its permissions");
+  make_folder(folder);
   const fs::path root(folder);
   refuse_other_project(root / "block.yaml");
   write_block((root / "given.h5").string(), imported.block);

@@ -6,9 +6,8 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
-#include "io/error.h"
+#include "io/file_error.h"
 #include "io/import_colmap.h"
 #include "io/number_reader.h"
 
@@ -22,8 +21,7 @@ static_assert(std::endian::native == std::endian::little);
 class Bytes {
  public:
   explicit Bytes(const std::string& path) : path_(path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in || !std::filesystem::is_regular_file(path)) throw InputError(path + ": cannot be read; check the path");
+    std::ifstream in = open_input(path);
     content_.assign(std::istreambuf_iterator<char>(in), {});
   }
 

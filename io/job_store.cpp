@@ -136,18 +136,11 @@ bool belongs_to_living_process(const fs::path& path) {
   return host == host_name() && !start.empty() && process_start(pid) == start;
 }
 
-void make_directory(const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) throw_file_error(path.string(), "created as a directory", error.value());
-  if (!fs::is_directory(path, error)) throw_file_error(path.string(), "used as a directory", ENOTDIR);
-}
-
 // Removes the temporary when the writing did not come to its end.
 class Temporary {
  public:
   explicit Temporary(const std::string& target) : target_(target), path_(temporary_path(target)) {
-    make_directory(fs::path(target).parent_path());
+    make_folder(fs::path(target).parent_path().string());
   }
   ~Temporary() {
     if (!done_) ::unlink(path_.c_str());
@@ -197,7 +190,7 @@ std::string JobStore::path(const std::string& unit) const { return (fs::path(dir
 
 void JobStore::create() const {
   for (const char* folder : {"", "features", "matches", "tracks", "adjust", "merge", "result", "events"})
-    make_directory(fs::absolute(path(folder)));
+    make_folder(fs::absolute(path(folder)).string());
 }
 
 std::optional<UnitSeal> JobStore::seal(const std::string& unit) const {

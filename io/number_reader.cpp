@@ -2,11 +2,10 @@
 
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include "io/error.h"
+#include "io/file_error.h"
 
 namespace megablock {
 
@@ -17,8 +16,7 @@ bool blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 }  // namespace
 
 NumberReader::NumberReader(const std::string& path) : path_(path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(path)) throw InputError(path + ": cannot be read; check the name");
+  const std::ifstream stream = open_input(path);
   std::ostringstream text;
   text << stream.rdbuf();
   text_ = std::move(text).str();

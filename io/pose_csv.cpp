@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -9,6 +10,7 @@
 #include <unordered_set>
 
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/plausible.h"
 
 namespace megablock {
@@ -30,9 +32,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 
 class CsvReader {
  public:
-  explicit CsvReader(const std::string& path) : path_(path), stream_(path) {
-    if (!stream_) throw InputError(path + ": cannot be read; give a CSV file of poses");
-  }
+  explicit CsvReader(const std::string& path) : path_(path), stream_(open_input(path)) {}
 
   PoseTable read() {
     std::string line;
@@ -148,7 +148,7 @@ void write_pose_csv(const std::string& path, const PoseTable& table) {
     stream << '\n';
   }
   stream.close();
-  if (!stream) throw InputError(path + ": cannot be written");
+  if (!stream) throw_file_error(path, "written", errno);
 }
 
 PoseTable read_pose_csv(const std::string& path) { return CsvReader(path).read(); }

@@ -1,10 +1,12 @@
 // `megablock init`: scans the images once and writes a project file that says what was found.
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/project.h"
 
 namespace megablock {
@@ -82,7 +84,7 @@ void write_file(const fs::path& path, const std::string& text) {
   std::ofstream stream(path, std::ios::trunc);
   stream << text;
   stream.close();
-  if (!stream) throw InputError(path.string() + ": cannot be written; check the folder and its permissions");
+  if (!stream) throw_file_error(path.string(), "written", errno);
 }
 
 }  // namespace

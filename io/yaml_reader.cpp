@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <sstream>
 
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/settings_reader.h"
 
 namespace megablock {
@@ -145,9 +145,7 @@ void YamlReader::finish() const {
 }
 
 YamlReader read_yaml(const std::string& path) {
-  std::ifstream stream(path);
-  if (!stream || fs::is_directory(path))
-    throw InputError(path + ": the project file cannot be read; check the name and its permissions");
+  const std::ifstream stream = open_input(path);
   std::ostringstream text;
   text << stream.rdbuf();
   try {

@@ -18,16 +18,14 @@
 #include "cluster/version.h"
 #include "io/calibration.h"
 #include "io/error.h"
+#include "io/file_error.h"
 
 namespace megablock {
 
 namespace {
 
 JobStore output_folder(const RunOptions& run) {
-  std::error_code error;
-  std::filesystem::create_directories(run.directory, error);
-  if (!std::filesystem::is_directory(run.directory))
-    throw InputError(run.directory + ": the folder cannot be made; check the path and its permissions");
+  make_folder(run.directory);
   return JobStore(std::filesystem::absolute(run.directory).string());
 }
 

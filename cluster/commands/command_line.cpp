@@ -35,6 +35,7 @@
 #include "io/error.h"
 #include "io/evaluate.h"
 #include "io/export.h"
+#include "io/file_error.h"
 #include "io/import.h"
 #include "io/project.h"
 #include "io/report.h"
@@ -199,6 +200,7 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("-o,--output", options->output, "File or folder to write")->required();
   command->callback([=, &action] {
     action = [options] {
+      check_parent(options->output);
       export_result(read_result(finished_result(options->job)), options->format, options->output);
       return kExitDone;
     };
@@ -241,6 +243,7 @@ void add_report(CLI::App& app, Action& action) {
   command->add_option("-o,--output", options->output, "Page to write; default: result/report.html of the job");
   command->callback([=, &action] {
     action = [options] {
+      if (!options->output.empty()) check_parent(options->output);
       const JobStore store(options->job);
       const std::string result = finished_result(options->job);
       const auto written =

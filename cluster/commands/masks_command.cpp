@@ -14,6 +14,7 @@
 
 #include "cluster/exit_codes.h"
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/job_store.h"
 #include "io/picture_codec.h"
 #include "io/project.h"
@@ -204,9 +205,7 @@ int propose_masks(MasksOptions options) {
   if (!has_pictures(block))
     throw InputError(options.project + ": the project has no pictures; masks are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "mask_proposals").string();
-  std::error_code error;
-  fs::create_directories(options.output, error);
-  if (error) throw InputError(options.output + ": cannot be created: " + error.message());
+  make_folder(options.output);
   const auto images = images_to_look_at(block, options.regions);
   std::vector<Proposal> proposals;
   int written = 0;

@@ -13,6 +13,7 @@
 #include "cluster/exit_codes.h"
 #include "cluster/status.h"
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/measurements.h"
 
 namespace megablock {
@@ -110,6 +111,7 @@ std::string table(const MeasurementStore& store, const Measurements& rows, bool 
 
 int measurements(const MeasurementsOptions& options) {
   check(options);
+  if (!options.output.empty()) check_parent(options.output);
   const MeasurementStore store(options.job);
   const std::string text = table(store, ask(store, options), !options.near.empty(), options.json);
   if (options.output.empty()) {

@@ -1,10 +1,12 @@
 #include "io/simulate/project_text.h"
 
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "io/error.h"
+#include "io/file_error.h"
 
 namespace megablock {
 
@@ -22,7 +24,7 @@ void write_text(const std::string& path, const std::string& text) {
   std::ofstream stream(path);
   stream << text;
   stream.close();
-  if (!stream) throw InputError(path + ": cannot be written");
+  if (!stream) throw_file_error(path, "written", errno);
 }
 
 }  // namespace megablock

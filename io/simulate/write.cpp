@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/hdf5_tables.h"
 #include "io/pose_csv.h"
 #include "io/simulate/project_text.h"
@@ -33,9 +34,7 @@ void write_simulated_block(const SimulationOptions& options, const std::string& 
                            std::int64_t batch_observations) {
   options.check();
   refuse_edited_project(folder, kProject, edited);
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw InputError(folder + ": cannot be created: " + error.message());
+  make_folder(folder);
   const fs::path root(folder);
 
   TrackWriter tie_points((root / "tie_points.h5").string());

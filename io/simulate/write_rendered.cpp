@@ -1,5 +1,6 @@
 // A simulated block as pictures with the project files around them.
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
@@ -10,6 +11,7 @@
 #include "io/control_file.h"
 #include "io/crs.h"
 #include "io/error.h"
+#include "io/file_error.h"
 #include "io/picture_codec.h"
 #include "io/pose_csv.h"
 #include "io/project.h"
@@ -134,7 +136,7 @@ void write_gcp_list(const Block& block, const fs::path& path) {
              << block.name_of(m.image) << ' ' << point.name << '\n';
   }
   stream.close();
-  if (!stream) throw InputError(path.string() + ": cannot be written");
+  if (!stream) throw_file_error(path.string(), "written", errno);
 }
 
 // "    distortion: {k1: -0.03, ...}", a line of all parameters behind the principal point.
@@ -212,9 +214,7 @@ void write_rendered_block(const SimulationOptions& asked, const std::string& fol
   SimulationOptions options = asked;
   options.bridge = false;  // the renderer knows houses only
   const fs::path root(folder);
-  std::error_code error;
-  fs::create_directories(root / "images", error);
-  if (error) throw InputError(folder + ": cannot be created: " + error.message());
+  make_folder((root / "images").string());
   Layout layout = make_city_layout(options);
   {
     const Observer observer(layout, image_margin(options));

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
+
 #include "image_files.h"
 #include "io/error.h"
 #include "io/project.h"
@@ -91,13 +93,17 @@ TEST_F(ControlFile, GcpListRefusals) {
               HasSubstr("gcp_list.txt:3: point 'a' is measured twice"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n" + good + "13.5 52.52 40 5 6 sub/1.jpg a\n"),
               HasSubstr("gcp_list.txt:3: point 'a' has other coordinates than in gcp_list.txt:2"));
-  EXPECT_THAT(refusal("gcp_list.txt", "EPSG:123456\n" + good), HasSubstr("not known to PROJ"));
+  EXPECT_THAT(refusal("gcp_list.txt", "# a comment\nEPSG:123456\n" + good),
+              HasSubstr("gcp_list.txt:2: coordinate reference system 'EPSG:123456' is not known to PROJ"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n52.52 113.4 40 5 6 sub/0.jpg a\n"), HasSubstr("gcp_list.txt:2"));
   EXPECT_THAT(refusal("gcp_list.txt", "EPSG:25832\n1e300 5 40 5 6 sub/0.jpg a\n"),
               HasSubstr("gcp_list.txt:2: x: 1e+300 is beyond any place on Earth"));
   EXPECT_THAT(refusal("gcp_list.txt", ""), HasSubstr("gcp_list.txt: is empty"));
   EXPECT_THAT(message_of<InputError>([&] { read_control_table(folder_.path("none.txt")); }),
-              HasSubstr("cannot be read"));
+              HasSubstr("none.txt: cannot be read: no such file or directory; check the path"));
+  std::filesystem::create_directories(folder_.path("folder.csv"));
+  EXPECT_THAT(message_of<InputError>([&] { read_control_table(folder_.path("folder.csv")); }),
+              HasSubstr("folder.csv: cannot be read: a directory is where a file is needed"));
 }
 
 TEST_F(ControlFile, OpenSfmJson) {
@@ -158,6 +164,7 @@ TEST_F(ControlFile, CsvInTheBlocksFrameAndItsWriterReturn) {
 
 TEST_F(ControlFile, CsvRefusals) {
   const std::string header = "name,x,y,z,image,column_px,row_px\n";
+  EXPECT_THAT(refusal("c.csv", "# crs: EPSG:123456\n" + header), HasSubstr("c.csv: coordinate reference system 'EPSG"));
   EXPECT_THAT(refusal("c.csv", "name,x,y\n"), HasSubstr("c.csv:1: column 'z' is missing"));
   EXPECT_THAT(refusal("c.csv", "name,x,y,z,image,column_px,row_px,sigma_mm\n"), HasSubstr("unknown key 'sigma_mm'"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,x,4\n"),

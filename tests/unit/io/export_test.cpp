@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -240,8 +241,8 @@ Eigen::Vector2d bal_project(const double* c, const Eigen::Vector3d& X) {
 TEST(Export, BalProjectsAsWeDo) {
   ScratchDirectory folder;
   const BlockResult result = small_result(false);
-  export_result(result, "bal", folder.path("sub/problem.txt"));
-  std::istringstream stream(read_file(folder.path("sub/problem.txt")));
+  export_result(result, "bal", folder.path("problem.txt"));
+  std::istringstream stream(read_file(folder.path("problem.txt")));
   std::size_t cameras, points, observations;
   stream >> cameras >> points >> observations;
   const ExportView view = make_export_view(result);
@@ -479,7 +480,14 @@ TEST(Export, RefusesUnknownFormatsAndPlacesItCannotWrite) {
   const BlockResult result = small_result();
   EXPECT_THAT(message_of<InputError>([&] { export_result(result, "kml", folder.path("x")); }),
               HasSubstr("'kml' is no export format; they are colmap-text, "));
+  for (const std::string& format : export_formats())  // a place that is mistyped
+    EXPECT_THAT(
+        message_of<InputError>([&] { export_result(result, format, folder.path("nowhere/out/")); }),
+        HasSubstr("nowhere/out/: the folder '" + folder.path("nowhere") + "' does not exist; make it, or check"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("nowhere")));
   write_file(folder.path("file"), "in the way");
+  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "csv", folder.path("file")); }),
+              HasSubstr("file: cannot be created as a directory: a file is where a directory is needed; move it away"));
   for (const std::string& format : export_formats())
     EXPECT_NE(message_of<Error>([&] { export_result(result, format, folder.path("file/out")); }), "") << format;
   EXPECT_NE(message_of<InputError>([&] { export_result(result, "bal", "/dev/full"); }), "");

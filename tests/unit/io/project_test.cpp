@@ -468,6 +468,10 @@ TEST(InitProject, LeavesNothingBehindWhenItFails) {
   EXPECT_THROW(init_project(options), InputError);
   EXPECT_FALSE(std::filesystem::exists(options.output));
   EXPECT_FALSE(std::filesystem::exists(options.output + ".draft"));
+  write_line(folder, 1);
+  options.output = folder.path("absent/block.yaml");
+  EXPECT_THAT(message_of<InputError>([&] { init_project(options); }),
+              HasSubstr("cannot be written: no such file or directory; check the path"));
   options.images = folder.path("absent");
   EXPECT_THAT(message_of<InputError>([&] { init_project(options); }), HasSubstr("is not a folder"));
 }
