@@ -118,7 +118,7 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--forward-overlap", &O::forward_overlap, "Aerial: along the row, 0..1 [0.8]", kAerial);
   s.add("--side-overlap", &O::side_overlap, "Aerial: between rows, 0..1 [0.6]", kAerial);
   s.add("--height", &O::height_m, "Aerial: above mean terrain, m [100]", kAerial);
-  s.add("--relief", &O::terrain_relief_m, "Terrain relief, m [15]", kTerrain);
+  s.add("--relief", &O::terrain_relief_m, "Aerial, street, stereopolis: terrain relief, m [15]", kTerrain);
   s.add("--street-spacing", &O::street_spacing_m, "Street, stereopolis: between streets, m [100]", kStreets);
   s.add("--frame-distance", &O::frame_distance_m, "Street, stereopolis: between frames, m [4]", kStreets);
   s.add("--rig-cameras", &O::rig_cameras, "Cameras of the rig [street 4, stereopolis and target-field 10]", kRigs);
@@ -145,18 +145,20 @@ void add_scene_options(SimulateOptions& s) {
 void add_observation_options(SimulateOptions& s) {
   using O = SimulationOptions;
   s.add("--points-per-frame", &O::points_per_frame,
-        "Observations per frame [300; stereopolis, panorama 200, target-field 350]", kTiePoints);
-  s.add("--mean-track", &O::mean_track, "Observations per point [5]", kTiePoints);
+        "Tie points: observations per frame [300; stereopolis, panorama 200, target-field 350]", kTiePoints);
+  s.add("--mean-track", &O::mean_track, "Tie points: observations per point [5]", kTiePoints);
   s.add("--noise", &O::image_noise_px, "Image noise per axis, px [0.5]");
-  s.add("--outliers", &O::outlier_share, "Share of wrong observations, 0..1 [0; stereopolis 0.03]", kTiePoints);
+  s.add("--outliers", &O::outlier_share, "Tie points: share of wrong observations, 0..1 [0; stereopolis 0.03]",
+        kTiePoints);
   s.add("--width", &O::image_width, "Image width, px [1920]");
   s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
   s.add("--focal", &O::focal_px, "Focal length, px [1400]");
-  s.add("--camera-model", &O::camera_model, "Camera model, as in a project file [brown]", kAnyCamera);
-  s.add("--published-camera", &O::published_camera,
-        "True camera of the published simulations, 1 to 4, with its size; aerial, street, panorama", kAnyCamera);
-  s.add("--start-focal", &O::start_focal, "Focal length that the block starts from, over the nominal one [1]",
+  s.add("--camera-model", &O::camera_model, "Aerial, street, panorama: camera model, as in a project file [brown]",
         kAnyCamera);
+  s.add("--published-camera", &O::published_camera,
+        "Aerial, street, panorama: true camera of the published simulations, 1 to 4, with its size", kAnyCamera);
+  s.add("--start-focal", &O::start_focal,
+        "Aerial, street, panorama: focal length that the block starts from, over the nominal one [1]", kAnyCamera);
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--known-cameras", &O::free_cameras,
                "Stereopolis, target field: cameras are known and held at the truth, mounts are not", kVehicle);
@@ -166,7 +168,7 @@ void add_observation_options(SimulateOptions& s) {
 void add_prior_options(SimulateOptions& s) {
   using O = SimulationOptions;
   s.add("--gps-sigma", &O::gps_sigma_m, "Position priors, m; 0 = none [0.05; stereopolis 0.02, target-field 0]");
-  s.add("--gps-share", &O::gps_share, "Share of frames with a position prior [1]", kNoTrajectory);
+  s.add("--gps-share", &O::gps_share, "All but stereopolis: share of frames with a position prior [1]", kNoTrajectory);
   s.add("--masked-share", &O::gnss_masked_share, "Stereopolis: share of frames with masked satellites [0.5]",
         kStereopolis);
   s.add("--absent-share", &O::gnss_absent_share, "Stereopolis: share of them without any [0.04]", kStereopolis);
@@ -176,16 +178,17 @@ void add_prior_options(SimulateOptions& s) {
   s.add("--drift-per-frame", &O::drift_per_frame_m,
         "Stereopolis: largest change of the drift between successive frames, m [0.007]; more makes a short block drift",
         kStereopolis);
-  s.add("--attitude-sigma", &O::attitude_sigma_deg, "Attitude priors, degrees; 0 = none [0; stereopolis 0.03]",
-        kTiePoints);
+  s.add("--attitude-sigma", &O::attitude_sigma_deg,
+        "Tie points: attitude priors, degrees; 0 = none [0; stereopolis 0.03]", kTiePoints);
   s.add("--relative-position-sigma", &O::relative_position_sigma_m,
         "Relative poses, m; 0 = none [0; stereopolis 0.005]");
   s.add("--relative-rotation-sigma", &O::relative_rotation_sigma_deg, "Relative poses, degrees [0.01]");
   s.add("--start-offset", &O::start_offset_m,
-        "Start from the integrated relative poses, every stretch of them off by up to this, m; 0 = other start [0]",
+        "All but stereopolis: start from the integrated relative poses, every stretch of them off by up to this, m; 0 "
+        "= other start [0]",
         kNoTrajectory);
-  s.add("--start-chain", &O::start_chain_frames, "Length of these stretches, frames; 0: whole passes [0]",
-        kNoTrajectory);
+  s.add("--start-chain", &O::start_chain_frames,
+        "Of --start-offset: length of these stretches, frames; 0: whole passes [0]", kNoTrajectory);
   s.add("--control-points", &O::control_points, "Control points [0; target-field 154]");
   s.add("--check-points", &O::check_points, "Check points [0; target-field 77]");
   s.add("--control-zones", &O::control_zones, "Stereopolis: crossings with 8 to 40 control and check points [0]",
