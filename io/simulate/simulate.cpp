@@ -139,6 +139,8 @@ void SimulationOptions::check() const {
       "than stereopolis");
   require_option(start_chain_frames == 0 || start_chain_frames >= 2,
                  "start_chain_frames (--start-chain) must be at least 2, or 0 for whole passes");
+  require_option(start_chain_frames == 0 || start_offset_m > 0,
+                 "start_chain_frames (--start-chain) has no effect without start_offset_m (--start-offset)");
   require_option(control_points >= 0 && control_points <= kMostPoints, "control_points must lie in [0, 1e6]");
   require_option(check_points >= 0 && check_points <= kMostPoints, "check_points must lie in [0, 1e6]");
   require_option(control_sigma_m > 0 && control_sigma_m <= kFarthest_m, "control_sigma_m must lie in (0, 1e5]");

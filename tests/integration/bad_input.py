@@ -107,6 +107,7 @@ class BadInput(CopyOfTheBlock):
                 (["--no-bridge"], "--no-bridge has no effect on the scene 'aerial', only on: stereopolis"),
                 (["--scene", "stereopolis", "--camera-model", "opencv-fisheye"], "only on: aerial, street, panorama"),
                 (["--scene", "street", "--repeated-facades", 1], "--repeated-facades has no effect without --rendered"),
+                (["--start-chain", 3], "(--start-chain) has no effect without start_offset_m (--start-offset)"),
                 (["--rendered", "--outliers", 0.1], "--outliers has no effect with --rendered; leave one of them out"),
                 (["--published-camera", 3, "--width", 640], "--width has no effect with --published-camera")):
             self.assertIn(said, one_line(megablock("simulate", *options, "-o", self.folder / "x", expect=BAD_INPUT)))
