@@ -171,7 +171,10 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
     text += fmt::format("{} proposed\n", d.proposals.size() == 1 ? "1 exposure is"
                                                                  : fmt::format("{} exposures are", d.proposals.size()));
   if (text.empty()) text = "nothing of what was looked for is missing\n";
-  if (!d.aerial) text += "not looked for, as the images do not look down, or nothing tells where down is: flight lines, ground, bases, overlaps\n";
+  if (!d.aerial)
+    text +=
+        "not looked for, as the images do not look down, or nothing tells where down is: flight lines, ground, bases, "
+        "overlaps\n";
   if (!d.links_known) text += "not looked for, as there are no matches or tie points yet: links\n";
   return text;
 }

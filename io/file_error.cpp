@@ -68,6 +68,7 @@ void make_folder(const std::string& path) {
 }
 
 void check_parent(const std::string& path) {
+  if (path.empty()) throw InputError("the output has no name; name a file or folder");
   const fs::path written = (fs::absolute(path) / "").lexically_normal().parent_path();  // without a slash at its end
   std::error_code error;
   if (!fs::is_directory(written.parent_path(), error))

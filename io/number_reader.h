@@ -9,8 +9,9 @@ namespace megablock {
 
 // More than a file can count.
 inline constexpr std::int64_t kMany = std::int64_t{1} << 40;
-// Beyond these no coordinate or parameter can be meant, and no image coordinate has its place in fixed-point pixels.
-inline constexpr double kLargestNumber = 1e12, kFarthestPixel = 1 << 20;
+// Beyond these no coordinate or parameter can be meant, and no image coordinate, be it about the middle of an image as
+// wide, has its place in fixed-point pixels (less than 2^21).
+inline constexpr double kLargestNumber = 1e12, kFarthestPixel = (1 << 20) - 1;
 
 class NumberReader {
  public:

@@ -28,7 +28,7 @@ void check_on_vehicle(const Eigen::Vector3d& place_m, const std::string& what, c
 
 void check_rotation_vector(const Eigen::Vector3d& vector, const std::string& what, const std::string& where) {
   constexpr double kFullTurn = 2 * std::numbers::pi + 1e-6;
-  if (!(vector.cwiseAbs().maxCoeff() <= kFullTurn))
+  if (!(vector.norm() <= kFullTurn))
     throw InputError(
         fmt::format("{}: {}: [{:g}, {:g}, {:g}] is more than a full turn; write the rotation vector in radians", where,
                     what, vector.x(), vector.y(), vector.z()));

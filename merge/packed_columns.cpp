@@ -20,14 +20,18 @@ void write(std::ostream& file, const T* first, std::size_t count) {
   file.write(reinterpret_cast<const char*>(first), static_cast<std::streamsize>(count * sizeof(T)));
 }
 template <typename T>
-void write(std::ostream& file, const T& value) { write(file, &value, 1); }
+void write(std::ostream& file, const T& value) {
+  write(file, &value, 1);
+}
 
 template <typename T>
 bool read(std::istream& file, T* first, std::size_t count) {
   return !!file.read(reinterpret_cast<char*>(first), static_cast<std::streamsize>(count * sizeof(T)));
 }
 template <typename T>
-bool read(std::istream& file, T& value) { return read(file, &value, 1); }
+bool read(std::istream& file, T& value) {
+  return read(file, &value, 1);
+}
 
 // Calls visit(first, size) for each chunk of `count` values, until it returns false.
 template <typename Visit>
@@ -76,13 +80,14 @@ struct Integers {
   Integers() = default;
 };
 
-// Calls visit(zero of the unsigned type of this width).
+// Calls visit(zero of the unsigned type of this width); false: there is none, nor no width at all.
 template <typename Visit>
-void with_width(std::uint8_t width, Visit&& visit) {
+bool with_width(std::uint8_t width, Visit&& visit) {
   if (width == 1) visit(std::uint8_t{0});
   if (width == 2) visit(std::uint16_t{0});
   if (width == 4) visit(std::uint32_t{0});
   if (width == 8) visit(std::uint64_t{0});
+  return width <= 8 && (width == 0 || std::has_single_bit(width));
 }
 
 template <typename Value>
@@ -103,17 +108,23 @@ void read_integers(std::istream& file, std::size_t count, Take&& take) {
   if (!read(file, form.least) || !read(file, form.width)) return;
   if (form.width == 0)
     for (std::size_t i = 0; i < count; ++i) take(i, static_cast<std::int64_t>(form.least));
-  with_width(form.width, [&]<typename Stored>(Stored) {
+  const bool known = with_width(form.width, [&]<typename Stored>(Stored) {
     read_as<Stored>(file, count,
                     [&](std::size_t i, Stored stored) { take(i, static_cast<std::int64_t>(form.least + stored)); });
   });
+  if (!known) file.setstate(std::ios::failbit);
+}
+
+// Wraps around where it is too large, as the sum does that undoes it.
+std::int64_t difference(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
 }
 
 template <typename Value>
 void write_steps(std::ostream& file, std::size_t count, Value&& value) {
   const std::int64_t first = count > 0 ? value(0) : 0;
   write(file, first);
-  if (count > 1) write_integers(file, count - 1, [&](std::size_t i) { return value(i + 1) - value(i); });
+  if (count > 1) write_integers(file, count - 1, [&](std::size_t i) { return difference(value(i + 1), value(i)); });
 }
 
 template <typename Take>
@@ -121,7 +132,11 @@ void read_steps(std::istream& file, std::size_t count, Take&& take) {
   std::int64_t last = 0;
   if (!read(file, last) || count == 0) return;
   take(0, last);
-  if (count > 1) read_integers(file, count - 1, [&](std::size_t i, std::int64_t step) { take(i + 1, last += step); });
+  if (count > 1)
+    read_integers(file, count - 1, [&](std::size_t i, std::int64_t step) {
+      last = difference(last, difference(0, step));
+      take(i + 1, last);
+    });
 }
 
 // What counts is bits: -0 is not 0.
@@ -164,7 +179,7 @@ void read_runs(std::istream& file, std::size_t count, Take&& take) {
   }
 }
 
-enum class Form : std::uint8_t { kRuns, kPixels, kWhole };
+enum class Form : std::uint8_t { kRuns, kEach };
 
 // In 4 bytes, if so many units are what the value is.
 bool is_pixels(double value) {
@@ -175,7 +190,7 @@ bool is_pixels(double value) {
 template <typename Value>
 void write_bytes(std::ostream& file, std::size_t count, Value&& value) {
   const bool runs = count_runs<std::uint8_t>(count, value) * kRunBytes<std::uint8_t> <= count;
-  write(file, runs ? Form::kRuns : Form::kWhole);
+  write(file, runs ? Form::kRuns : Form::kEach);
   if (runs)
     write_runs<std::uint8_t>(file, count, value);
   else
@@ -186,10 +201,9 @@ template <typename Take>
 void read_bytes(std::istream& file, std::size_t count, Take&& take) {
   Form form;
   if (!read(file, form)) return;
-  if (form == Form::kRuns)
-    read_runs<std::uint8_t>(file, count, take);
-  else
-    read_as<std::uint8_t>(file, count, take);
+  if (form == Form::kRuns) return read_runs<std::uint8_t>(file, count, take);
+  if (form == Form::kEach) return read_as<std::uint8_t>(file, count, take);
+  file.setstate(std::ios::failbit);
 }
 
 void write_count(std::ostream& file, std::size_t count) { write(file, static_cast<std::uint64_t>(count)); }
@@ -208,28 +222,29 @@ void write_column(std::ostream& file, const std::vector<double>& values) {
   const std::size_t count = values.size();
   const auto value = [&](std::size_t i) { return values[i]; };
   write_count(file, count);
-  Form form = Form::kWhole;
-  if (count_runs<double>(count, value) * kRunBytes<double> <= count * sizeof(std::int32_t))
-    form = Form::kRuns;
-  else if (std::ranges::all_of(values, is_pixels))
-    form = Form::kPixels;
-  write(file, form);
-  if (form == Form::kRuns) write_runs<double>(file, count, value);
-  if (form == Form::kPixels)
-    write_as<std::int32_t>(file, count,
-                           [&](std::size_t i) { return static_cast<std::int32_t>(values[i] / kPixelUnit); });
-  if (form == Form::kWhole) write(file, values.data(), count);
+  if (count_runs<double>(count, value) * kRunBytes<double> <= count * sizeof(std::int32_t)) {
+    write(file, Form::kRuns);
+    return write_runs<double>(file, count, value);
+  }
+  write(file, Form::kEach);
+  const auto pixels = static_cast<std::size_t>(std::ranges::find_if_not(values, is_pixels) - values.begin());
+  write_count(file, pixels);
+  write_as<std::int32_t>(file, pixels,
+                         [&](std::size_t i) { return static_cast<std::int32_t>(values[i] / kPixelUnit); });
+  write(file, values.data() + pixels, count - pixels);
 }
 
 void read_column(std::istream& file, std::vector<double>& values) {
   const std::size_t count = read_count(file, values);
+  double* out = values.data();
   Form form;
   if (!read(file, form)) return;
-  double* out = values.data();
-  if (form == Form::kRuns) read_runs<double>(file, count, [&](std::size_t i, double value) { out[i] = value; });
-  if (form == Form::kPixels)
-    read_as<std::int32_t>(file, count, [&](std::size_t i, std::int32_t units) { out[i] = units * kPixelUnit; });
-  if (form == Form::kWhole) read(file, out, count);
+  if (form == Form::kRuns) return read_runs<double>(file, count, [&](std::size_t i, double value) { out[i] = value; });
+  std::uint64_t pixels = 0;
+  if (!read(file, pixels)) return;
+  if (form != Form::kEach || pixels > count) return file.setstate(std::ios::failbit);
+  read_as<std::int32_t>(file, pixels, [&](std::size_t i, std::int32_t units) { out[i] = units * kPixelUnit; });
+  if (file) read(file, out + pixels, count - pixels);
 }
 
 void write_column(std::ostream& file, const std::vector<std::uint8_t>& values) {

@@ -1,9 +1,10 @@
-// Columns of a tile on their way to scratch and back, in the narrowest of a few forms that gives every bit back: a tile
+// Columns of a tile on their way to scratch and back, in a narrow one of a few forms that give every bit back: a tile
 // is read twice a step, and what it is read from is most of what a large block moves through memory.
 //
 //   integers   less their least one, in 0, 1, 2, 4 or 8 bytes each
 //   steps      the first integer, and the others less the one before as integers (what ascends: ranges, indices)
-//   doubles    runs of one value (sigmas), or multiples of kPixelUnit in 4 bytes (measurements), or as they are
+//   doubles    runs of one value (sigmas), or multiples of kPixelUnit in 4 bytes (measurements of tie points) up to the
+//              first value that is none (those of control points, which come last), and from there as they are
 //   bytes      runs of one value (flags), or as they are
 //   others     as they are; of plain values, and of positions of three doubles each
 //

@@ -1,7 +1,8 @@
 // The tiles of one rank, out of core: whole in memory while they fit a byte budget; of the others the measurements and
 // points lie in the rank's scratch directory and are read when the tile's turn comes, one tile at a time.
 //
-// Those in scratch are packed (packed_columns.h): about 15 bytes a measurement of a street instead of 39.
+// Those in scratch are packed (packed_columns.h): about 15 bytes a measurement of a street instead of 39. Whether one
+// has room there is asked with its unpacked size and once; what is screened later may lengthen its flags' runs.
 //
 // Which tiles stay is decided once, in the order in which they are added: passes go over all tiles again and again, now
 // upwards, now downwards, and with a fixed choice each of them reads the others exactly once. A scratch disk that is

@@ -87,7 +87,8 @@ class Diagnosis {
     const auto tells = [](const Frame& frame) {
       return frame.position_prior || frame.attitude_prior || frame.given_pose;
     };
-    return !block_.control_points.empty() || !block_.lines.empty() || !block_.verticals.empty() ||
+    const auto holds = [](const ControlPoint& point) { return point.role == PointRole::kControl; };
+    return std::ranges::any_of(block_.control_points, holds) || !block_.lines.empty() || !block_.verticals.empty() ||
            std::ranges::any_of(block_.frames, tells);
   }
   // Whether most oriented images do.

@@ -16,7 +16,7 @@ namespace {
 
 // Beyond these no block is meant, and numbers lose their digits.
 constexpr std::int64_t kMostFrames = 100'000'000;
-constexpr double kFarthest_m = 100e3;
+constexpr double kFarthest_m = 100e3, kHighestRelief_m = 10e3;
 constexpr int kMostPixels = 100'000;  // per side
 constexpr int kMostPoints = 1'000'000;
 
@@ -87,7 +87,9 @@ void SimulationOptions::check() const {
   require_option(forward_overlap >= 0.3 && forward_overlap < 0.99, "forward_overlap must lie in [0.3, 0.99)");
   require_option(side_overlap >= 0 && side_overlap < 0.99, "side_overlap must lie in [0, 0.99)");
   require_option(height_m > 0 && height_m <= kFarthest_m, "height_m must lie in (0, 1e5]");
-  require_option(terrain_relief_m >= 0 && terrain_relief_m <= height_m, "terrain_relief_m must lie in [0, height_m]");
+  require_option(terrain_relief_m >= 0 && terrain_relief_m <= kHighestRelief_m,
+                 "terrain_relief_m must lie in [0, 1e4]");
+  require_option(scene != Scene::kAerial || terrain_relief_m <= height_m, "terrain_relief_m must lie in [0, height_m]");
   require_option(street_spacing_m >= 40 && street_spacing_m <= kFarthest_m, "street_spacing_m must lie in [40, 1e5]");
   require_option(frame_distance_m > 0 && frame_distance_m <= 15, "frame_distance_m must lie in (0, 15]");
   require_option(rig_cameras >= 1 && rig_cameras <= 16, "rig_cameras must lie in [1, 16]");
@@ -125,10 +127,10 @@ void SimulationOptions::check() const {
   require_option(image_noise_px >= 0 && image_noise_px < 50, "image_noise_px must lie in [0, 50)");
   require_option(outlier_share >= 0 && outlier_share < 1, "the share of outliers must lie in [0, 1)");
   require_option(gps_share >= 0 && gps_share <= 1, "gps_share must lie in [0, 1]");
-  require_option(gps_sigma_m <= kFarthest_m, "gps_sigma_m must be at most 1e5");
-  require_option(attitude_sigma_deg <= 180, "attitude_sigma_deg must be at most 180");
-  require_option(relative_position_sigma_m <= kFarthest_m, "relative_position_sigma_m must be at most 1e5");
-  require_option(relative_rotation_sigma_deg <= 180, "relative_rotation_sigma_deg must be at most 180");
+  require_option(std::abs(gps_sigma_m) <= kFarthest_m, "gps_sigma_m must be at most 1e5");
+  require_option(std::abs(attitude_sigma_deg) <= 180, "attitude_sigma_deg must be at most 180");
+  require_option(std::abs(relative_position_sigma_m) <= kFarthest_m, "relative_position_sigma_m must be at most 1e5");
+  require_option(std::abs(relative_rotation_sigma_deg) <= 180, "relative_rotation_sigma_deg must be at most 180");
   require_option(relative_position_sigma_m <= 0 || relative_rotation_sigma_deg > 0,
                  "relative_rotation_sigma_deg must be positive with relative_position_sigma_m");
   require_option(start_offset_m >= 0 && start_offset_m <= kFarthest_m,

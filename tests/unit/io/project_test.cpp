@@ -279,7 +279,6 @@ TEST(Project, KeepsWhatIsSaidOfPositionsAndAttitudes) {
   EXPECT_THAT(said, ElementsAre("gps.sigma_horizontal_m=1.50", "gps.lever_arm_m=[0, 0.1, -0.2]", "attitude.use=false"));
 }
 
-// Far-off start values end in a block that seems to have no datum: said before.
 TEST(Project, WarnsOfSectionsThatActOnNothing) {
   ScratchDirectory folder;
   write_picture(folder.path("images/a.jpg"), 64, 48, 1);
@@ -291,6 +290,7 @@ TEST(Project, WarnsOfSectionsThatActOnNothing) {
               testing::EndsWith("block.yaml:3: 'attitude' has no effect: the images have no attitudes"))));
 }
 
+// Far-off start values end in a block that seems to have no datum: said before.
 TEST(Project, WarnsOfPosesFarFromThePositions) {
   ScratchDirectory folder;
   Project project;

@@ -54,10 +54,17 @@ TEST(PackedColumns, MeasurementsInFourBytes) {
   EXPECT_LE(packed(made<double>([&](std::size_t) { return units(random) * kPixelUnit; })), 4 * kCount + kHead);
 }
 
+TEST(PackedColumns, ControlBehindTiePoints) {
+  std::vector<double> values = made<double>([](std::size_t i) { return static_cast<double>(i) * kPixelUnit; });
+  for (int i = 0; i < 10; ++i) values.push_back(512.3 + i);
+  EXPECT_LE(packed(values), 4 * kCount + 8 * 10 + kHead);
+}
+
 TEST(PackedColumns, DoublesOfAnyKindKeepTheirBits) {
   using limits = std::numeric_limits<double>;
-  for (const double odd : {0.1, -0.0, limits::infinity(), -limits::infinity(), limits::quiet_NaN(), limits::denorm_min(),
-                           limits::max(), 0x1p31 * kPixelUnit, -0x1p31 * kPixelUnit, kPixelUnit / 2}) {
+  for (const double odd :
+       {0.1, -0.0, limits::infinity(), -limits::infinity(), limits::quiet_NaN(), limits::denorm_min(), limits::max(),
+        0x1p31 * kPixelUnit, -0x1p31 * kPixelUnit, kPixelUnit / 2}) {
     packed(std::vector<double>{odd});
     packed(std::vector<double>{0.0, odd, odd, 1.0});
     std::vector<double> values = made<double>([](std::size_t i) { return static_cast<double>(i); });
@@ -96,7 +103,8 @@ TEST(PackedColumns, RangesInTheBytesOfTheirLengths) {
   std::vector<std::int64_t> lengths = made<std::int64_t>([](std::size_t i) { return i % 250; }), begin;
   std::partial_sum(lengths.begin(), lengths.end(), std::back_inserter(begin));
   EXPECT_LE(packed(begin), kCount + kHead);
-  packed(std::vector<std::int64_t>{std::int64_t{1} << 61, 0, -(std::int64_t{1} << 61), 5});
+  using limits = std::numeric_limits<std::int64_t>;
+  packed(std::vector<std::int64_t>{limits::max(), 0, limits::min(), 5, limits::max(), limits::min(), -1});
 }
 
 TEST(PackedColumns, PointsInTheBytesOfTheirGaps) {
@@ -149,13 +157,28 @@ TEST(PackedColumns, AFileThatEndsEarly) {
   expect_named_when_short(std::vector<TilePoint>{{PointRole::kTie, 3}, {PointRole::kControl, 9}});
 }
 
-TEST(PackedColumns, RunsThatDoNotFit) {
-  std::string bytes = written(std::vector<double>(100, 0.1));
-  bytes[bytes.size() - 4] = 101;  // the run's length
+// With one byte of what is written changed.
+template <typename T>
+void expect_refused(const std::vector<T>& values, std::size_t place, char byte) {
+  std::string bytes = written(values);
+  ASSERT_NE(bytes.at(place), byte);
+  bytes[place] = byte;
   std::istringstream file(bytes);
-  std::vector<double> back;
+  std::vector<T> back;
   read_column(file, back);
-  EXPECT_FALSE(file);
+  EXPECT_FALSE(file) << place;
+}
+
+TEST(PackedColumns, FormsThatAreNone) {
+  constexpr std::size_t kForm = 8;  // behind the count
+  const std::vector<double> sigmas(100, 0.1), measurements{1, 2, 3};
+  expect_refused(sigmas, written(sigmas).size() - 4, 101);  // longer than the column
+  expect_refused(sigmas, kForm, 7);
+  expect_refused(measurements, kForm, 7);
+  expect_refused(measurements, kForm + 1, 4);  // more of them
+  expect_refused(std::vector<std::uint8_t>{1, 0, 1}, kForm, 7);
+  expect_refused(std::vector<LocalImage>{LocalImage(3), LocalImage(70'000)}, kForm + 8, 3);  // bytes each
+  expect_refused(std::vector<LocalImage>{LocalImage(3), LocalImage(70'000)}, kForm + 8, 16);
 }
 
 }  // namespace

@@ -92,6 +92,27 @@ TEST_F(TileStoreTest, EveryTileComesBackWhole) {
   EXPECT_EQ(store.outline(3).problem.frames, made_up_tile(3, kPoints).problem.frames);
 }
 
+// Of its files as they are, with a trial's points beside the present ones.
+TEST_F(TileStoreTest, CountsWhatIsInScratch) {
+  TileStore store(options());
+  fill(store);
+  const auto expected = [&] {
+    std::int64_t bytes = 0;
+    for (std::int64_t row = 0; row < kTiles; ++row)
+      if (store.in_scratch(static_cast<std::size_t>(row)))
+        bytes += 2 * kPoints * 24 + static_cast<std::int64_t>(std::filesystem::file_size(
+                                        scratch_.path("rank-0/tile-" + std::to_string(row) + "-measurements.bin")));
+    return bytes;
+  };
+  const std::int64_t before = store.scratch_bytes();
+  EXPECT_EQ(before, expected());
+  EXPECT_GT(before, 3 * 2 * kPoints * 24);
+  for (std::size_t row = 0; row < store.size(); ++row)
+    store.change(row, [](RankTile& tile) { tile.problem.kept.assign(tile.problem.kept.size(), 1); });
+  EXPECT_EQ(store.scratch_bytes(), expected());
+  EXPECT_LT(store.scratch_bytes(), before);
+}
+
 TEST_F(TileStoreTest, ATileInScratchTakesNoMemory) {
   TileStore store(options());
   fill(store);
@@ -172,6 +193,7 @@ TEST_F(TileStoreTest, NothingIsLostWhenTheScratchDiskFails) {
     mend_disk();
   }
   EXPECT_EQ(store.spilled(), 0);
+  EXPECT_EQ(store.scratch_bytes(), 0);
   for (std::size_t row = 0; row < store.size(); ++row) {
     RankTile expected = made_up_tile(static_cast<std::int64_t>(row), kPoints);
     expected.problem.kept[0] = 1;

@@ -304,7 +304,10 @@ TEST(BlockDiagnostics, OfImagesAloneNobodyKnowsWhereDownIs) {
   const auto found = [&] { return diagnose(survey.block, survey.state, [](bool) { return TieEvidence(); }, {}); };
   EXPECT_FALSE(found().aerial);
   EXPECT_TRUE(found().pairs.empty() && found().footprints.empty());
-  survey.block.control_points.emplace_back();
+  ControlPoint& point = survey.block.control_points.emplace_back();
+  point.role = PointRole::kCheck;  // takes no part
+  EXPECT_FALSE(found().aerial);
+  point.role = PointRole::kControl;
   EXPECT_TRUE(found().aerial);
 }
 
