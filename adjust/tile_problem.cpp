@@ -38,7 +38,7 @@ bool TileProblem::active(std::int64_t point) const {
 }
 
 void ObservationOptions::check() const {
-  if (!(image_sigma_px > 0)) throw InputError("image_sigma_px must be positive (pixels)");
+  if (!(image_sigma_px >= 1e-6 && image_sigma_px <= 1e4)) throw InputError("image_sigma_px must lie in [1e-6, 1e4]");
   for (const RobustLoss& loss : {image_loss, position_loss, attitude_loss, relative_loss, line_loss, vertical_loss})
     if (loss.kind != RobustLoss::Kind::kNone && !(loss.scale > 0))
       throw InputError("the scale of a robust loss must be positive (sigmas)");

@@ -187,15 +187,18 @@ double largest(Job& job, double figure) {
   return figure;
 }
 
-std::string not_converged(const Adjusted& adjusted) {
-  return "the global adjustment did not converge: " + describe(adjusted.position.global);
+// Why a result that is there is a failed unit all the same, now and in runs that find it; empty: it is none.
+std::string shortfall(const Adjusted& adjusted) {
+  if (!adjusted.converged) return "the global adjustment did not converge: " + describe(adjusted.position.global);
+  if (std::ranges::none_of(adjusted.state.oriented, [](std::uint8_t oriented) { return oriented != 0; }))
+    return "no image is oriented: too few observations hold in the adjustment; check start poses and cameras, and what "
+           "'adjustment' asks of tie points";
+  return "";
 }
-
-// A result that is there is a failed unit all the same, now and in runs that find it, where it is not the optimum.
-void add_unconverged(Job& job, const std::string& reason) {
+void add_shortfall(Job& job, const std::string& reason) {
   if (!reason.empty()) add_failures(job, {{"merge", kResult, reason}});
 }
-std::string unconverged_before(Job& job) {
+std::string shortfall_before(Job& job) {
   return on_first_rank(job.ranks, [&] {
     const auto record = read_record(job.store, "merge");
     return record && !record->failures.empty() ? record->failures.front().reason : std::string();
@@ -213,9 +216,10 @@ std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
 }
 
 void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
-                 MergeOutcome outcome, const std::vector<TilePart>& parts, UnitEvent& event) {
-  if (!adjusted.converged) {
-    job.notes.push_back(not_converged(adjusted));
+                 const std::string& reason, MergeOutcome outcome, const std::vector<TilePart>& parts,
+                 UnitEvent& event) {
+  if (!reason.empty()) {
+    job.notes.push_back(reason);
     std::fprintf(stderr, "merge        warning: %s\n", job.notes.back().c_str());  // --quiet or not
   }
   const std::size_t notes_before = job.notes.size();
@@ -231,7 +235,7 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
   }
   job.tables.release();  // frames
   BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
-  if (!adjusted.converged) result.failures.push_back({"merge", kResult, not_converged(adjusted)});
+  if (!reason.empty()) result.failures.push_back({"merge", kResult, reason});
   result.stages = statistics_of(job, event);
   std::vector<PartTracks::File> files;
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
@@ -247,7 +251,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   job.peak_memory.begin_stage();
   MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
-  const std::string before = unconverged_before(job);
+  const std::string before = shortfall_before(job);
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
     if (!is_current(job.store, kResult, fingerprint)) return "";
@@ -255,11 +259,12 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   });
   if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
     if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();
-    return add_unconverged(job, before);
+    return add_shortfall(job, before);
   }
 
   MergeCheckpoint checkpoint(job, fingerprint);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
+  const std::string reason = shortfall(adjusted);
   return_freed_memory();  // fronts, tiles
   clear_scratch(job);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
@@ -273,7 +278,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
     restore_names(job);
-    write_final(job, inputs, fingerprint, adjusted, make_outcome(job, adjusted, inputs.tiles), parts, event);
+    write_final(job, inputs, fingerprint, adjusted, reason, make_outcome(job, adjusted, inputs.tiles), parts, event);
     // What was written could not say it of itself.
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());
     process_peak_mib = std::max(process_peak_mib, job.peak_memory.mib());
@@ -284,7 +289,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
     checkpoint.clear();
     return std::string();
   });
-  add_unconverged(job, adjusted.converged ? "" : not_converged(adjusted));
+  add_shortfall(job, reason);
 }
 
 }  // namespace megablock

@@ -162,6 +162,20 @@ class BadInputJob(CopyOfTheBlock):
         megablock("run", project, "-j", self.job, "-q")
         self.assertEqual(status(self.job)["failed"], 0)
 
+    def test_nothing_oriented_is_no_success(self):
+        megablock("simulate", "--frames", 40, "--gps-sigma", 0.05, "--attitude-sigma", 0.1, "--control-points", 4,
+                  "--check-points", 4, "-o", self.folder / "simulated")
+        project = self.folder / "simulated/block.yaml"
+        project.write_text(project.read_text() + "adjustment: {max_residual_sigmas: 1e-3}\n")
+        for _ in range(2):
+            megablock("run", project, "-j", self.job, "-q", expect=FAILED_UNITS)
+        said = status(self.job)
+        self.assertEqual(said["oriented"], 0)
+        self.assertEqual(said["check_points"]["compared"], 0)
+        reasons = [f["reason"] for f in said["failures"] if f["unit"] == "result/block.h5"]
+        self.assertEqual(len(reasons), 1)
+        self.assertIn("no image is oriented", reasons[0])
+
     def test_two_runs_on_one_job(self):
         first = subprocess.Popen([MEGABLOCK, "run", self.project, "-j", self.job, "-q"], stdout=subprocess.DEVNULL,
                                  stderr=subprocess.DEVNULL)
