@@ -195,9 +195,11 @@ std::string shortfall(const Adjusted& adjusted) {
            "'adjustment' asks of tie points";
   return "";
 }
+
 void add_shortfall(Job& job, const std::string& reason) {
   if (!reason.empty()) add_failures(job, {{"merge", kResult, reason}});
 }
+
 std::string shortfall_before(Job& job) {
   return on_first_rank(job.ranks, [&] {
     const auto record = read_record(job.store, "merge");
