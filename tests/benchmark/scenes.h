@@ -2,7 +2,7 @@
 //
 // street: grid of 100 m, every street driven twice, a frame of ten cameras each 4 m, 1 000 observations per frame, five
 // per point, 0.5 px; position priors of 0.5 m on half of the frames, relative poses of 1 cm and 0.01 degrees;
-// calibration held; start = these integrated over stretches of 1 km, each off by up to 2 m. aerial: 80 % and 60 %
+// calibration held; start = these integrated over whole passes, each off by up to 2 m. aerial: 80 % and 60 %
 // overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated.
 //
 // Of a street with shared calibration all eight intrinsics of every camera are free, and of all mounts but the first
