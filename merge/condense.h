@@ -1,7 +1,7 @@
 // A tile: its condensed normal equations on the boundary unknowns, and the way back down.
 //
-// Inside the tile the bisection goes on to cells of about 32 frames. A point belongs to one of them (adjust/owner.h)
-// and is eliminated there: with V = sum J_p'J_p + lambda D_p = C C', W_i = J_i'J_p and Y_i = W_i C^-T,
+// Inside the tile the bisection goes on to cells of about 16 frames (32 of a lone tile). A point belongs to one of them
+// (adjust/owner.h) and is eliminated there: with V = sum J_p'J_p + lambda D_p = C C', W_i = J_i'J_p and Y_i = W_i C^-T,
 //
 //     K_ij -= Y_i Y_j',   b_i -= Y_i C^-1 b_p,   x_p = C^-T (C^-1 b_p - sum Y_i' x_i).
 //

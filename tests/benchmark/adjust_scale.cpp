@@ -1,7 +1,7 @@
 // One job on a simulated block of any size, from given tie points to the evaluated result:
 //
 //   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 16] [--folder F]
-//                [--seed 1] [--calibration held|shared] [--plain]
+//                [--seed 1] [--calibration held|shared] [--arithmetic avx2|avx512] [--plain]
 //
 // Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
 // its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of a rank,

@@ -3,8 +3,8 @@
 //   scene 1  the same; eight intrinsics and six mount unknowns of every camera shared by all frames
 //   scene 2  500 aerial images, overlaps of 80 and 60 %, 300 observations each; the camera's eight intrinsics shared
 // Parts: condense (linearise, eliminate points, factorise the cells), down (back-substitute), evaluate (points in the
-// tail of the loss, cost of the new state); iteration: all of them as the merge runs them, with the datum and the new
-// state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold stands beside
+// tail of the loss, cost of the new state); iteration: all of them, one after the other (SerialRunner), with the datum
+// and the new state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold stands beside
 // it). The counter is observations per second of processor time.
 //
 //     bench_merge --benchmark_repetitions=5

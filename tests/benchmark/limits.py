@@ -5,6 +5,7 @@ usage: limits.py tracks COMPARE_TRACKS      T-KP11: 10^8 matches, in one cell an
        limits.py solvers BENCH_SOLVERS      microseconds of minimal solvers, medians of five
        limits.py merge BENCH_MERGE          observations a second of one iteration on a street, medians of five
        limits.py scale ADJUST_SCALE         whole jobs of streets of 1 000 and 10 000 frames on two ranks
+       limits.py ceres AGAINST_CERES        an iteration on streets of 500 and 2 000 frames against Ceres
        limits.py store COMPARE_MEASUREMENTS milliseconds for 16 000 rows of the measurement store
        limits.py partition COMPARE_PARTITION         image graph and tree of a million frames, aerial and street
        limits.py ordering COMPARE_ORDERING MEGABLOCK   CN-20: 267 798 unknowns ordered and solved
@@ -12,6 +13,7 @@ usage: limits.py tracks COMPARE_TRACKS      T-KP11: 10^8 matches, in one cell an
 import json
 import os
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -120,18 +122,39 @@ def merge(program):
     return good
 
 
+def figures_of(program, *options):
+    """The JSON object that the program prints as its last line."""
+    figures = json.loads(subprocess.check_output([program, *map(str, options)], text=True).splitlines()[-1])
+    print(figures)
+    return figures
+
+
 def scale(program):
-    good = True
-    for frames in (1_000, 10_000):
-        lines = subprocess.check_output([program, "--plain", "--scene", "street", "--frames", str(frames),
-                                         "--ranks", "2"], text=True)
-        figures = json.loads(lines.splitlines()[-1])
-        print(figures)
+    good, leaf_seconds = True, []
+    for frames, runs in ((1_000, 3), (10_000, 1)):  # short runs scatter
+        of_runs = [figures_of(program, "--plain", "--scene", "street", "--frames", frames, "--ranks", 2)
+                   for _ in range(runs)]
+        figures = of_runs[-1]
         good &= check(figures["global_iterations"], 12, f"{frames} frames, global iterations")
         good &= check(figures["newton_decrement"], 1e-2, f"{frames} frames, Newton decrement")
+        leaf_seconds.append(statistics.median(run["leaf_seconds_per_image"] for run in of_runs))
     # Chi-squared of 10 000 frames has a sigma of 4e-4; the speed of fewer is that of starting.
     good &= check(abs(figures["chi2_per_dof"] - 1), 1e-3, "chi2/dof off 1")
-    return good & check_least(figures["observations_per_second_per_core"], 2e6, "observations/s/core, whole iteration")
+    good &= check_least(figures["observations_per_second_per_core"], 2e6, "observations/s/core, whole iteration")
+    good &= check(leaf_seconds[1] / leaf_seconds[0], 1.3, "seconds of passes over tiles per image, ten times the images")
+    shared = figures_of(program, "--scene", "street", "--calibration", "shared", "--frames", 1_000, "--ranks", 2)
+    return good & check_least(shared["observations_per_second_per_core"], 0.5e6,
+                              "calibration shared, observations/s/core, whole iteration")
+
+
+def ceres(program):
+    """An iteration on a street against Ceres' best, with our derivatives in both."""
+    good = True
+    for frames in (500, 2_000):
+        figures = figures_of(program, "--speed", "--scene", "street", "--frames", frames)
+        good &= check_least(figures["seconds_per_iteration_ratio"], 10, f"{frames} frames, Ceres' seconds / ours")
+        good &= check_least(figures["peak_memory_ratio"], 4, f"{frames} frames, Ceres' memory / ours")
+    return good
 
 
 def store(program):
@@ -147,5 +170,5 @@ def store(program):
 
 
 CHECKS = {"tracks": tracks, "solvers": solvers, "partition": partition, "ordering": ordering, "merge": merge,
-          "scale": scale, "store": store}
+          "scale": scale, "ceres": ceres, "store": store}
 sys.exit(0 if CHECKS[sys.argv[1]](*sys.argv[2:]) else 1)
