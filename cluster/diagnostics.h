@@ -12,6 +12,7 @@
 namespace megablock {
 
 inline constexpr const char* kDiagnostics = "result/diagnostics.json";
+inline constexpr const char* kReportPage = "result/report.html";  // shows them
 
 // From poses and kept observations of a result. Passes once through its tracks.
 BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,

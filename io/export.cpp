@@ -1,5 +1,7 @@
 #include "io/export.h"
 
+#include <filesystem>
+
 #include "io/export_bal.h"
 #include "io/export_colmap.h"
 #include "io/export_tables.h"
@@ -12,21 +14,22 @@ namespace {
 
 struct ExportFormat {
   std::string name;
-  bool folder;  // else one file
+  std::vector<std::string> files;  // in a folder; none: one file
   void (*write)(const BlockResult&, const std::string&);
 };
 
 void export_h5(const BlockResult& result, const std::string& path) { write_result(path, result); }
 
 const std::vector<ExportFormat>& writers() {
-  static const std::vector<ExportFormat> all = {{"colmap-text", true, export_colmap_text},
-                                                {"colmap-bin", true, export_colmap_binary},
-                                                {"bal", false, export_bal},
-                                                {"bundler", false, export_bundler},
-                                                {"ply", false, export_ply},
-                                                {"geojson", false, export_geojson},
-                                                {"csv", true, export_csv},
-                                                {"h5", false, export_h5}};
+  static const std::vector<ExportFormat> all = {
+      {"colmap-text", {"cameras.txt", "images.txt", "points3D.txt"}, export_colmap_text},
+      {"colmap-bin", {"cameras.bin", "images.bin", "points3D.bin"}, export_colmap_binary},
+      {"bal", {}, export_bal},
+      {"bundler", {}, export_bundler},
+      {"ply", {}, export_ply},
+      {"geojson", {}, export_geojson},
+      {"csv", {"frames.csv", "images_local.csv", "images_wgs84.csv", "cameras.csv", "mounts.csv"}, export_csv},
+      {"h5", {}, export_h5}};
   return all;
 }
 
@@ -37,10 +40,19 @@ const std::vector<std::string>& export_formats() {
   return names;
 }
 
+std::vector<std::string> export_files(const std::string& format, const std::string& out) {
+  const ExportFormat& found = format_named(writers(), format, "export");
+  std::vector<std::string> files;
+  for (const std::string& name : found.files) files.push_back((std::filesystem::path(out) / name).string());
+  if (files.empty()) files.push_back(out);
+  if (format == "bundler") files.push_back(out + ".list.txt");
+  return files;
+}
+
 void export_result(const BlockResult& result, const std::string& format, const std::string& out) {
   const ExportFormat& found = format_named(writers(), format, "export");
   check_parent(out);
-  if (found.folder) make_folder(out);
+  if (!found.files.empty()) make_folder(out);
   found.write(result, out);
 }
 

@@ -17,6 +17,9 @@ namespace megablock {
 // h5:              one self-contained file (write_result)
 const std::vector<std::string>& export_formats();
 
+// The files that a format writes for `out`; of csv some only where the block has what they hold.
+std::vector<std::string> export_files(const std::string& format, const std::string& out);
+
 // Makes the folder of a format that is one, in a folder that is there. InputError for an unknown format, or when it
 // cannot be written.
 void export_result(const BlockResult& result, const std::string& format, const std::string& out);

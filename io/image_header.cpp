@@ -142,6 +142,13 @@ std::string exiv2_reason(const Exiv2::AnyError& error) {
 
 }  // namespace
 
+bool is_image_name(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension == ".jpg" || extension == ".jpeg" || extension == ".png" || extension == ".tif" ||
+         extension == ".tiff";
+}
+
 ImageHeader read_image_header(const std::string& path) {
   std::error_code error_code;
   const auto size = std::filesystem::file_size(path, error_code);

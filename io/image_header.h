@@ -33,6 +33,9 @@ struct ImageHeader {
   std::optional<Attitude> attitude;
 };
 
+// jpg, jpeg, png, tif, tiff, letter case ignored: what is looked for in a folder of images.
+bool is_image_name(const std::string& path);
+
 // Reads the header; InputError with the reason (without the file's name) when the file is missing, empty, truncated in
 // its header or not an image.
 ImageHeader read_image_header(const std::string& path);

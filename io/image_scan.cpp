@@ -17,13 +17,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool is_image_name(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".jpg" || extension == ".jpeg" || extension == ".png" || extension == ".tif" ||
-         extension == ".tiff";
-}
-
 std::vector<std::string> image_names(const fs::path& folder, std::vector<std::string>& warnings) {
   std::vector<std::string> names;
   std::vector<fs::path> open = {folder};
@@ -41,7 +34,7 @@ std::vector<std::string> image_names(const fs::path& folder, std::vector<std::st
     for (const fs::directory_entry& item : items) {
       if (item.is_directory(error) && !item.is_symlink(error))
         open.push_back(item.path());
-      else if (is_image_name(item.path()) && !item.is_directory(error))
+      else if (is_image_name(item.path().string()) && !item.is_directory(error))
         names.push_back(item.path().lexically_relative(folder).generic_string());
     }
   }

@@ -8,6 +8,7 @@
 #include "cluster/collective.h"
 #include "cluster/commands/camera_modes.h"
 #include "cluster/commands/option_checks.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/pipeline.h"
 
 namespace megablock {
@@ -17,6 +18,8 @@ namespace {
 const std::map<std::string, CalibrationMode> kModes = {
     {"all", CalibrationMode::kAll}, {"off-line", CalibrationMode::kOffLine}, {"on-line", CalibrationMode::kOnLine}};
 const std::map<std::string, MountFreedom> kMounts = {{"stated", MountFreedom::kStated}, {"free", MountFreedom::kFree}};
+
+constexpr const char* kCalibration = "calibration.yaml";
 
 // An option with named values.
 template <typename Value>
@@ -80,6 +83,10 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   modes->push_back(add_compare_models(*command));
   command->callback([=, &action, &ranks] {
     action = [options, settings, modes, &ranks] {
+      on_first_rank(ranks, [&] {
+        check_output(options->directory + "/" + kCalibration, inputs_of(options->project, "calibration"), kCalibration);
+        return std::string();
+      });
       for (const CalibrateMode& mode : *modes)
         if (mode.chosen()) return exit_code_on_first_rank(ranks, [&] { return mode.run(*options); });
       return calibrate_job(*options, *settings, ranks);

@@ -19,6 +19,7 @@
 #include "cluster/commands/masks_command.h"
 #include "cluster/commands/measurements_command.h"
 #include "cluster/commands/option_checks.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/commands/register_command.h"
 #include "cluster/commands/simulate_command.h"
 #include "cluster/commands/terminal_text.h"
@@ -70,6 +71,7 @@ void add_init(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->callback([=, &action] {
     action = [options] {
+      check_output(options->output);
       std::printf("%s\n", init_project(*options).c_str());
       return kExitDone;
     };
@@ -79,7 +81,7 @@ void add_init(CLI::App& app, Action& action) {
 void print_result(const RunOptions& options) {
   const JobStore store(options.directory);
   std::printf("%s", for_terminal(status_text(store)).c_str());
-  if (store.seal(kResult)) std::printf("report: %s\n", store.path("result/report.html").c_str());
+  if (store.seal(kResult)) std::printf("report: %s\n", store.path(kReportPage).c_str());
 }
 
 void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::string& name, const std::string& stage,
@@ -201,6 +203,8 @@ void add_export(CLI::App& app, Action& action) {
   command->callback([=, &action] {
     action = [options] {
       check_parent(options->output);
+      const std::vector<std::string> inputs = inputs_of(options->job);
+      for (const std::string& file : export_files(options->format, options->output)) check_output(file, inputs);
       export_result(read_result(finished_result(options->job)), options->format, options->output);
       return kExitDone;
     };
@@ -221,6 +225,7 @@ void add_import(CLI::App& app, Action& action) {
   command->add_option("-o,--output", options->output, "Folder of the project to write")->required();
   command->callback([=, &action] {
     action = [options] {
+      check_output(options->output);
       const ImportedBlock imported = import_block(options->format, options->path);
       write_imported(imported, options->output);
       std::printf("%s/block.yaml: %zu images, %zu cameras, %lld points, %lld observations\n", options->output.c_str(),
@@ -243,7 +248,10 @@ void add_report(CLI::App& app, Action& action) {
   command->add_option("-o,--output", options->output, "Page to write; default: result/report.html of the job");
   command->callback([=, &action] {
     action = [options] {
-      if (!options->output.empty()) check_parent(options->output);
+      if (!options->output.empty()) {
+        check_parent(options->output);
+        check_output(options->output, inputs_of(options->job), kReportPage);
+      }
       const JobStore store(options->job);
       const std::string result = finished_result(options->job);
       const auto written =
@@ -257,12 +265,12 @@ void add_report(CLI::App& app, Action& action) {
                       {options->job, std::chrono::duration<double>(written.time_since_epoch()).count(), &diagnostics});
       if (options->output.empty()) {
         store.write_text(kDiagnostics, json);
-        store.write_text("result/report.html", page);
+        store.write_text(kReportPage, page);
       } else {
         JobStore(std::filesystem::absolute(options->output).parent_path().string())
             .write_text(std::filesystem::path(options->output).filename().string(), page);
       }
-      std::printf("%s\n", (options->output.empty() ? store.path("result/report.html") : options->output).c_str());
+      std::printf("%s\n", (options->output.empty() ? store.path(kReportPage) : options->output).c_str());
       return kExitDone;
     };
   });

@@ -12,6 +12,7 @@
 
 #include "adjust/coplanarity_block.h"
 #include "cluster/commands/option_checks.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/job_options.h"
 #include "cluster/job_so_far.h"
@@ -119,6 +120,7 @@ std::string figures_text(const CoplanarityBlock& block, const CoplanaritySolutio
 
 int adjust(const CoplanarityCommand& command) {
   const JobStore store(command.job);
+  check_output(command.output, inputs_of(command.job, "poses"));
   const JobOptions settings = options_of_job(store);
   const JobSoFar job = read_job_so_far(store);
   std::vector<TrackSet> tracks;

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "io/error.h"
 #include "io/file_error.h"
@@ -27,6 +28,8 @@ namespace megablock {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kPage = "masks.html";
 
 struct MasksOptions {
   std::string project, output;
@@ -205,6 +208,7 @@ int propose_masks(MasksOptions options) {
   if (!has_pictures(block))
     throw InputError(options.project + ": the project has no pictures; masks are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "mask_proposals").string();
+  check_output((fs::path(options.output) / kPage).string(), inputs_of(options.project));
   make_folder(options.output);
   const auto images = images_to_look_at(block, options.regions);
   std::vector<Proposal> proposals;
@@ -215,7 +219,7 @@ int propose_masks(MasksOptions options) {
     std::printf("%s: %s\n", p.camera.c_str(), finding(p).c_str());
     written += !p.file.empty();
   }
-  JobStore(options.output).write_text("masks.html", page(proposals));
+  JobStore(options.output).write_text(kPage, page(proposals));
   const bool any = std::any_of(proposals.begin(), proposals.end(), [](const Proposal& p) { return p.masked > 0; });
   std::printf("%d masks in %s; look at masks.html there%s\n", written, options.output.c_str(),
               any ? (", then add 'masks: " + options.output + "' to the project file").c_str() : "");

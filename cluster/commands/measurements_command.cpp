@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cluster/commands/option_checks.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/status.h"
 #include "io/error.h"
@@ -111,7 +112,10 @@ std::string table(const MeasurementStore& store, const Measurements& rows, bool 
 
 int measurements(const MeasurementsOptions& options) {
   check(options);
-  if (!options.output.empty()) check_parent(options.output);
+  if (!options.output.empty()) {
+    check_parent(options.output);
+    check_output(options.output, inputs_of(options.job));
+  }
   const MeasurementStore store(options.job);
   const std::string text = table(store, ask(store, options), !options.near.empty(), options.json);
   if (options.output.empty()) {

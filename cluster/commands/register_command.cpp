@@ -10,6 +10,7 @@
 
 #include "adjust/registration/frame_resection.h"
 #include "cluster/commands/option_checks.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/pipeline.h"
 #include "geometry/angles.h"
@@ -32,6 +33,7 @@ std::vector<Pose> starts_of(const Block& block, const TrajectoryOptions& options
 
 int resect(const ResectOptions& options) {
   options.resection.check();
+  check_output(options.output, inputs_of(options.project));
   const Project project = read_project(options.project);
   const Block& block = project.block;
   if (std::none_of(block.control_points.begin(), block.control_points.end(), [](const ControlPoint& point) {

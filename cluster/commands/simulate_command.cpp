@@ -8,6 +8,7 @@
 #include <map>
 
 #include "cluster/commands/option_checks.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "io/error.h"
 #include "io/simulate/simulate.h"
@@ -226,6 +227,7 @@ void add_simulate(CLI::App& app, Action& action) {
     action = [options] {
       const SimulationOptions simulation = options->settled();
       simulation.check();
+      check_output(options->output);
       if (options->threads > 0) omp_set_num_threads(options->threads);
       const EditedProject edited = options->overwrite ? EditedProject::kOverwrite : EditedProject::kRefuse;
       if (options->rendered)

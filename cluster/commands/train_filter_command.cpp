@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/stages/given_tracks.h"
 #include "io/error.h"
@@ -65,6 +66,9 @@ int train(const TrainFilterOptions& options) {
       !options.labels.empty() ? options.labels : (fs::path(project.file).parent_path() / "truth_tracks.h5").string();
   if (!fs::exists(labels))
     throw InputError(labels + ": no such file; --labels names a file that says which observations are wrong");
+  std::vector<std::string> inputs = inputs_of(options.project, "filter_model");
+  inputs.push_back(labels);
+  check_output(options.output, inputs);
   const TrackSet tracks = read_given_tracks(project.tie_points, project.block);
   const std::vector<LabelledMatch> matches =
       labelled_matches(project.block, tracks, read_truth_tracks(labels).outlier, {}, options.seed);

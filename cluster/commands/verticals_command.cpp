@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 
 #include "cluster/commands/found_verticals.h"
+#include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/stages/block_hash.h"
 #include "geometry/median.h"
@@ -170,6 +171,7 @@ int write_verticals(VerticalsOptions options) {
   if (!has_pictures(block))
     throw InputError(options.project + ": the project has no pictures; verticals are found from what they show");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "verticals.csv").string();
+  check_output(options.output, inputs_of(options.project, "verticals"));
   const fs::path output = fs::absolute(options.output);
 
   const JobStore store(output.parent_path().string());

@@ -9,6 +9,7 @@
 
 #include "adjust/image_sigma.h"
 #include "cluster/collective.h"
+#include "cluster/diagnostics.h"
 #include "cluster/process_memory.h"
 #include "cluster/progress.h"
 #include "cluster/rank_runner.h"
@@ -257,7 +258,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
     if (!is_current(job.store, kResult, fingerprint)) return "";
-    return std::filesystem::exists(job.store.path("result/report.html")) ? "current" : "";
+    return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
   });
   if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
     if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();

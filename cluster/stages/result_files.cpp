@@ -71,7 +71,7 @@ void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_
   store.write_text(kResultFigures, to_json(figures, result));
   store.write_text(kDiagnostics, to_json(diagnostics, result.block));
   const ReportContext context{store.directory(), seconds_since_1970(), &diagnostics, release_all};
-  store.write_text("result/report.html", std::move(report).html(std::move(result), context));
+  store.write_text(kReportPage, std::move(report).html(std::move(result), context));
 }
 
 }  // namespace megablock

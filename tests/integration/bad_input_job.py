@@ -85,6 +85,38 @@ class BadInputJob(CopyOfTheBlock):
         figures.write_text(json.dumps(content | {"points": 7}))  # they are read where they are of the result
         self.assertEqual(status(self.job)["points"], 7)
 
+    def test_outputs_take_no_files_place(self):
+        shutil.copytree(work / "clean_job", self.job)
+        given = work / "clean"  # whose job it is
+        inputs = [given / "block.yaml", given / "images/f000001.jpg"]
+        own = [self.job / name for name in ("job.json", "rows.csv", "features/000000.h5", "features/rows.csv",
+                                            "result/block.h5", "result/figures.json", "result/report.html", "")]
+        before = {file: file.read_bytes() for file in [*inputs, *self.job.rglob("*")] if file.is_file()}
+        link = self.folder / "link.csv"
+        link.symlink_to(given / "block.yaml")
+        commands = {"export": ("export", self.job, "--format", "ply"),
+                    "measurements": ("measurements", self.job, "--image", "f000001.jpg"),
+                    "report": ("report", self.job)}
+        for name, command in commands.items():
+            for output in [*inputs, link, *own]:
+                if (name, output.name) == ("report", "report.html"):
+                    continue
+                line = one_line(megablock(*command, "-o", output, expect=BAD_INPUT))
+                self.assertIn(f"{output}: {'is an input' if output in (*inputs, link) else 'belongs to the job dir'}", line)
+        for command in (("masks", given / "block.yaml"), ("verticals", given / "block.yaml"), ("simulate", "--frames", 6)):
+            self.assertIn("belongs to the job", one_line(megablock(*command, "-o", self.job / "merge", expect=BAD_INPUT)))
+        for project_reader in ("verticals", "resect"):
+            for output in inputs:
+                said = one_line(megablock(project_reader, given / "block.yaml", "-o", output, expect=BAD_INPUT))
+                self.assertIn(f"{output}: is an input", said)
+        self.assertEqual({file: file.read_bytes() for file in before}, before)
+        for name, command in commands.items():  # a name of its own, and that once more
+            for _ in range(2):
+                megablock(*command, "-o", self.job / "result" / f"own-{name}")
+                megablock(*command, "-o", self.folder / f"own-{name}")
+        megablock("report", self.job, "-o", self.job / "result/report.html")
+        self.assertIn("whole", megablock("check", self.job))
+
     def test_questions_for_measurements(self):
         shutil.copytree(work / "clean_job", self.job)
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
+#include <set>
 #include <sstream>
 
 #include "geometry/angles.h"
@@ -473,6 +474,19 @@ TEST(Export, GeoJsonFootprintsLieUnderTheCamera) {
   result.block.ground = GroundFrame{};
   EXPECT_THAT(message_of<InputError>([&] { export_result(result, "geojson", folder.path("f.geojson")); }),
               HasSubstr("not georeferenced"));
+}
+
+TEST(Export, SaysWhichFilesItWrites) {
+  const BlockResult result = small_result();
+  for (const std::string& format : export_formats()) {
+    ScratchDirectory folder;
+    export_result(result, format, folder.path("out"));
+    std::set<std::string> written;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path()))
+      if (entry.is_regular_file()) written.insert(entry.path().string());
+    const std::vector<std::string> said = export_files(format, folder.path("out"));
+    EXPECT_EQ(written, std::set<std::string>(said.begin(), said.end())) << format;
+  }
 }
 
 TEST(Export, RefusesUnknownFormatsAndPlacesItCannotWrite) {
