@@ -145,7 +145,7 @@ void adjust_coarsely(const Block& block, const OrientationGraph& graph, const Co
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &ceres.problem(), &summary);
-  if (!summary.IsSolutionUsable()) throw ComputeError("orientation: the coarse adjustment failed: " + summary.message);
+  if (!summary.IsSolutionUsable()) throw ComputeError("the coarse adjustment failed: " + summary.message);
 
   ceres.store(tile.state);
   for (std::size_t f = 0; f < graph.frames.size(); ++f)

@@ -23,10 +23,10 @@ namespace megablock {
 void OrientationOptions::check() const {
   observations.check();
   if (!(max_rotation_error_deg > 0 && max_rotation_error_deg < 180))
-    throw InputError("orientation: max_rotation_error_deg must lie between 0 and 180");
-  if (min_points_per_image < 4) throw InputError("orientation: min_points_per_image must be at least 4");
-  if (tracks_per_pair < 20) throw InputError("orientation: tracks_per_pair must be at least 20");
-  if (part_frames != 0 && part_frames < 50) throw InputError("orientation: part_frames must be 0 or at least 50");
+    throw InputError("max_rotation_error_deg must lie between 0 and 180");
+  if (min_points_per_image < 4) throw InputError("min_points_per_image must be at least 4");
+  if (tracks_per_pair < 20) throw InputError("tracks_per_pair must be at least 20");
+  if (part_frames != 0 && part_frames < 50) throw InputError("part_frames must be 0 or at least 50");
 }
 
 namespace {
@@ -265,7 +265,7 @@ class Orientation {
       const double limit = intersect_within(round.limit_px);
       drop_weak_frames();
       if (round.limit_px < 25) resect(limit);
-      if (oriented() < 2) throw ComputeError("orientation: fewer than two images could be oriented");
+      if (oriented() < 2) throw ComputeError("fewer than two images could be oriented");
       CoarseOptions coarse;
       coarse.observations = options_.observations;
       coarse.loss_scale_px = limit * smallest_focal() / 3;
@@ -277,7 +277,7 @@ class Orientation {
     rays_ = viewing_rays(graph_, values_.cameras);
     intersect_within(4);
     drop_weak_frames();
-    if (oriented() < 2) throw ComputeError("orientation: fewer than two images could be oriented");
+    if (oriented() < 2) throw ComputeError("fewer than two images could be oriented");
   }
 
   // Intersects with the limit in pixels; with given poses, which may be approximate and do not move, at least four
@@ -437,7 +437,7 @@ OrientationResult orient_component(const Block& block, const BlockState& start, 
                                    const std::vector<VerifiedPair>& pairs, const TrackSet& tracks,
                                    const OrientationOptions& options) {
   options.check();
-  if (frames.size() < 2) throw ComputeError("orientation: a component needs at least two frames");
+  if (frames.size() < 2) throw ComputeError("a component needs at least two frames");
   const auto placed = [&](FrameIndex frame) {
     return start.oriented[frame] ||
            (options.observations.use_position_priors && block.frames[frame].position_prior.has_value());

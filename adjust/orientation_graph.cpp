@@ -27,7 +27,7 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
   rows.image.assign(block.images.size(), -1);
   rows.frame.assign(block.frames.size(), -1);
   for (FrameIndex frame : frames) {
-    if (!block.frames.contains(frame)) throw InputError("orientation: a frame of the component is not in the block");
+    if (!block.frames.contains(frame)) throw InputError("a frame of the component is not in the block");
     rows.frame[frame] = 0;
   }
 

@@ -55,6 +55,8 @@ TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
   EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::StartsWith("block.yaml:7: merge: decrement"));
   EXPECT_THAT(message(setting("merge", "decrement", "-1")), testing::EndsWith(", not -1"));
   EXPECT_EQ(message(setting("matching", "k_best", "9")), "block.yaml:7: matching: k_best must be 1 to 7, not 9");
+  EXPECT_EQ(message(setting("orientation", "max_rotation_error_deg", "200")),
+            "block.yaml:7: orientation: max_rotation_error_deg must lie between 0 and 180, not 200");
   StageSettings two = setting("tiles", "min_tiles", "2");  // the name of the second begins with that of the first
   two.entries.push_back({"tiles", "min_tiles_from", "1", "block.yaml:8"});
   EXPECT_EQ(message(two), "block.yaml:8: tiles: min_tiles_from must be at least 2, not 1");
