@@ -34,6 +34,11 @@ std::vector<std::string> split(const std::string& line) {
 
 }  // namespace
 
+void refuse_semicolons(const std::string& header, const std::string& where) {
+  if (header.find(',') == std::string::npos && header.find(';') != std::string::npos)
+    throw InputError(where + ": semicolons between the columns; write commas there, and points in decimal numbers");
+}
+
 CsvTable::CsvTable(const std::string& path) : path_(path) {
   std::ifstream stream = open_input(path);
   std::int64_t number = 0;
@@ -46,17 +51,19 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
       if (colon != std::string::npos) comments_[trimmed(line.substr(1, colon - 1))] = trimmed(line.substr(colon + 1));
       continue;
     }
+    const std::string place = path + ":" + std::to_string(number);
     std::vector<std::string> fields = split(line);
     if (columns_.empty()) {
       header_line_ = number;
+      refuse_semicolons(line, place);
       for (std::size_t c = 0; c < fields.size(); ++c)
         if (!columns_.emplace(fields[c], c).second)
-          throw InputError(path + ":" + std::to_string(number) + ": column '" + fields[c] + "' appears twice");
+          throw InputError(place + ": column '" + fields[c] + "' appears twice");
       continue;
     }
     if (fields.size() > columns_.size())
-      throw InputError(path + ":" + std::to_string(number) + ": " + std::to_string(fields.size()) +
-                       " fields, the header has " + std::to_string(columns_.size()));
+      throw InputError(place + ": " + std::to_string(fields.size()) + " fields, the header has " +
+                       std::to_string(columns_.size()));
     fields.resize(columns_.size());
     rows_.push_back(std::move(fields));
     lines_.push_back(number);

@@ -8,6 +8,9 @@
 
 namespace megablock {
 
+// InputError "where: ..." for a header whose columns are separated by semicolons.
+void refuse_semicolons(const std::string& header, const std::string& where);
+
 class CsvTable {
  public:
   explicit CsvTable(const std::string& path);  // InputError when it cannot be read, is empty, or a row is too long

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <unordered_set>
 
+#include "io/csv_table.h"
 #include "io/error.h"
 #include "io/file_error.h"
 #include "io/plausible.h"
@@ -42,6 +43,7 @@ class CsvReader {
       if (line.front() == '#') {
         read_origin(line);
       } else if (columns_.empty()) {
+        refuse_semicolons(line, where());
         read_header(cells_of(line));
       } else {
         read_row(cells_of(line));
@@ -52,9 +54,8 @@ class CsvReader {
   }
 
  private:
-  [[noreturn]] void fail(const std::string& message) const {
-    throw InputError(path_ + ":" + std::to_string(line_) + ": " + message);
-  }
+  [[noreturn]] void fail(const std::string& message) const { throw InputError(where() + ": " + message); }
+  std::string where() const { return path_ + ":" + std::to_string(line_); }
 
   void read_origin(const std::string& line) {
     std::istringstream words(line.substr(1));
@@ -96,7 +97,7 @@ class CsvReader {
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
       if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
         fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; take the line out if there is no pose");
-      if (c >= kFirstCoordinate) check_on_earth(value[c], kColumns[c], path_ + ":" + std::to_string(line_));
+      if (c >= kFirstCoordinate) check_on_earth(value[c], kColumns[c], where());
     }
     Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
     if (std::abs(rotation.norm() - 1) > 1e-3) fail("qw,qx,qy,qz is not a unit quaternion");

@@ -165,6 +165,8 @@ TEST_F(ControlFile, CsvInTheBlocksFrameAndItsWriterReturn) {
 TEST_F(ControlFile, CsvRefusals) {
   const std::string header = "name,x,y,z,image,column_px,row_px\n";
   EXPECT_THAT(refusal("c.csv", "# crs: EPSG:123456\n" + header), HasSubstr("c.csv: coordinate reference system 'EPSG"));
+  EXPECT_EQ(refusal("c.csv", "\xef\xbb\xbfname;x;y;z;image;column_px;row_px\na;1,5;2;3;sub/0.jpg;3;4\n"),
+            "c.csv:1: semicolons between the columns; write commas there, and points in decimal numbers");
   EXPECT_THAT(refusal("c.csv", "name,x,y\n"), HasSubstr("c.csv:1: column 'z' is missing"));
   EXPECT_THAT(refusal("c.csv", "name,x,y,z,image,column_px,row_px,sigma_mm\n"), HasSubstr("unknown key 'sigma_mm'"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,x,4\n"),
