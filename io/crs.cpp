@@ -83,6 +83,14 @@ std::string proj_name(const std::string& crs) {
   return crs;
 }
 
+// A code of an authority, a PROJ string or WKT. PROJ takes any other text for a part of a name and chooses among the
+// systems that hold it.
+bool names_one_system(const std::string& proj_name) {
+  const std::size_t colon = proj_name.find(':');
+  const bool code = colon != std::string::npos && colon > 0 && proj_name.find_first_of(" \t") == std::string::npos;
+  return code || proj_name.starts_with("+") || proj_name.find('[') != std::string::npos;
+}
+
 // Longitude, latitude in degrees.
 bool in_range(const Eigen::Vector3d& p) { return std::abs(p.x()) <= 360 && std::abs(p.y()) <= 90; }
 
@@ -124,9 +132,11 @@ Eigen::Quaterniond Georeference::own_from_block(const Geodetic& position) const 
 
 CrsToWgs84::CrsToWgs84(const std::string& crs) : crs_(crs), transform_(std::make_unique<detail::ProjTransform>()) {
   PJ_CONTEXT* context = transform_->context();
-  ProjObject source(proj_create(context, proj_name(crs).c_str()));
+  const std::string name = proj_name(crs);
+  ProjObject source(names_one_system(name) ? proj_create(context, name.c_str()) : nullptr);
   if (!source || !proj_is_crs(source.get()))
-    throw InputError("coordinate reference system '" + crs + "' is not known to PROJ; write for example EPSG:25832");
+    throw InputError("coordinate reference system '" + crs +
+                     "' is not known to PROJ; write a code (EPSG:25832), WGS84, WGS84 UTM 32N, a PROJ string or WKT");
   // A system of two dimensions gets an ellipsoidal height; one with a vertical part keeps its own.
   ProjObject source_3d(proj_crs_promote_to_3D(context, nullptr, source.get()));
   ProjObject target(proj_create(context, "EPSG:4979"));

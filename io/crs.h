@@ -43,9 +43,10 @@ class Georeference {
 };
 
 // From any system PROJ knows to WGS84. `crs`: "EPSG:25832", "EPSG:25832+5773" (with a vertical system), a PROJ string,
-// "WGS84", or "WGS84 UTM 32N". Coordinates in the order x (easting or longitude), y (northing or latitude), z.
-// Without a vertical system z is a height above the ellipsoid. InputError when PROJ does not know the system, or when a
-// grid it needs (a geoid, say) is not installed: PROJ would otherwise hand back heights unchanged, silently.
+// WKT, "WGS84", or "WGS84 UTM 32N"; no other names, which PROJ would search for. Coordinates in the order x (easting or
+// longitude), y (northing or latitude), z. Without a vertical system z is a height above the ellipsoid. InputError when
+// PROJ does not know the system, or when a grid it needs (a geoid, say) is not installed: PROJ would otherwise hand
+// back heights unchanged, silently.
 class CrsToWgs84 {
  public:
   explicit CrsToWgs84(const std::string& crs);

@@ -85,6 +85,15 @@ TEST(CrsToWgs84, KnowsUtmByEveryNameOfIt) {
   }
 }
 
+TEST(CrsToWgs84, ReadsWkt) {
+  const char* const wkt =
+      R"(PROJCS["of the job",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],)"
+      R"(PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],)"
+      R"(PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",15],PARAMETER["scale_factor",0.9996],)"
+      R"(PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT["metre",1]])";
+  EXPECT_NEAR(CrsToWgs84(wkt).to_wgs84({500000, 0, 0}).longitude_deg, 15, 1e-9);
+}
+
 TEST(CrsToWgs84, TakesLongitudeFirstAndKeepsWgs84) {
   for (const char* name : {"WGS84", "EPSG:4326", "EPSG:4979"}) {
     const Geodetic p = CrsToWgs84(name).to_wgs84({13.4, 52.5, 30});
@@ -113,6 +122,8 @@ TEST(CrsToWgs84, OrthometricHeightsNeedTheirGrid) {
 TEST(CrsToWgs84, RefusesUnknownSystemsAndImpossiblePositions) {
   EXPECT_THROW(CrsToWgs84("EPSG:99999999"), InputError);
   EXPECT_THROW(CrsToWgs84("the town's grid"), InputError);
+  for (const char* part_of_names : {"FOO", "utm", "Paris", "WGS 84 / UTM", "ETRS89"})
+    EXPECT_THROW(CrsToWgs84{part_of_names}, InputError) << part_of_names;
   EXPECT_THROW(CrsToWgs84(""), InputError);
   EXPECT_THROW(CrsToWgs84("EPSG:4326").to_wgs84({13, 152, 0}), InputError);
 }
