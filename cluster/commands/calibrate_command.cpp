@@ -73,6 +73,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
       "Then: 'calibration: calibration/calibration.yaml' in the project file of any block of this rig");
   command->add_option("project", options->project, "Project file")->required();
   command->add_option("-o,--output", options->directory, "Folder for the calibration and its page")
+      ->check(named())
       ->capture_default_str();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(not_negative());

@@ -63,7 +63,7 @@ void add_init(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("init", "Scan images (EXIF, XMP) and write the project file");
   command->footer("Example: megablock init photos -o block.yaml");
   command->add_option("images", options->images, "Folder of images, searched recursively")->required();
-  command->add_option("-o,--output", options->output, "Project file to write")->capture_default_str();
+  command->add_option("-o,--output", options->output, "Project file to write")->check(named())->capture_default_str();
   command->add_option("--control", options->gcp_file, "Control points: gcp_list.txt, OpenSfM JSON or CSV");
   command->add_option("--masks", options->mask_folder, "Folder of PNG masks, one per camera: <camera>.png");
   command->add_option("--cameras", options->camera_grouping, "How images share a camera")
@@ -92,7 +92,9 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   command->footer("Example: megablock " + name + " block.yaml -j job\n         mpirun --bind-to none -n 2 megablock " +
                   name + " block.yaml -j job");
   command->add_option("project", options->project, "Project file")->required();
-  command->add_option("-j,--job", options->directory, "Job directory; an unfinished one is resumed")->required();
+  command->add_option("-j,--job", options->directory, "Job directory; an unfinished one is resumed")
+      ->check(named())
+      ->required();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(not_negative());
   command
@@ -199,7 +201,7 @@ void add_export(CLI::App& app, Action& action) {
   command->footer("Example: megablock export job --format colmap-text -o model");
   command->add_option("job", options->job, "Job directory")->required();
   command->add_option("--format", options->format, "Format")->required()->check(CLI::IsMember(export_formats()));
-  command->add_option("-o,--output", options->output, "File or folder to write")->required();
+  command->add_option("-o,--output", options->output, "File or folder to write")->check(named())->required();
   command->callback([=, &action] {
     action = [options] {
       check_parent(options->output);
@@ -222,7 +224,7 @@ void add_import(CLI::App& app, Action& action) {
       "         megablock run imported/block.yaml -j job");
   command->add_option("format", options->format, "Format")->required()->check(CLI::IsMember(import_formats()));
   command->add_option("path", options->path, "COLMAP: folder of the model; BAL, Bundler: file")->required();
-  command->add_option("-o,--output", options->output, "Folder of the project to write")->required();
+  command->add_option("-o,--output", options->output, "Folder of the project to write")->check(named())->required();
   command->callback([=, &action] {
     action = [options] {
       check_output(options->output);
@@ -245,7 +247,8 @@ void add_report(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("report", "Write the report page of a finished job again");
   command->footer("Example: megablock report job");
   command->add_option("job", options->job, "Job directory")->required();
-  command->add_option("-o,--output", options->output, "Page to write; default: result/report.html of the job");
+  command->add_option("-o,--output", options->output, "Page to write; default: result/report.html of the job")
+      ->check(named());
   command->callback([=, &action] {
     action = [options] {
       if (!options->output.empty()) {

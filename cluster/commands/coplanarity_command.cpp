@@ -151,7 +151,7 @@ void add_coplanarity(CLI::App& app, std::function<int()>& action) {
       "Example: megablock match block.yaml -j job && megablock coplanarity job -o attitudes.csv\n"
       "         megablock coplanarity job -o attitudes.csv --forcing 0 --hold images --solver direct --steps 3");
   command->add_option("job", options->job, "Job directory, with tie points")->required();
-  command->add_option("-o,--output", options->output, "Pose CSV to write")->required();
+  command->add_option("-o,--output", options->output, "Pose CSV to write")->check(named())->required();
   command
       ->add_option(
           "--forcing", options->forcing,

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "cluster/commands/option_checks.h"
 #include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "io/error.h"
@@ -234,9 +235,10 @@ void add_masks(CLI::App& app, std::function<int()>& action) {
   CLI::App* command = app.add_subcommand("masks", "Propose masks: what never changes over the images of a camera");
   command->footer("Example: megablock masks block.yaml -o masks");
   command->add_option("project", options->project, "Project file")->required();
-  command->add_option(
-      "-o,--output", options->output,
-      "Folder for the masks and masks.html; files that are there stay [mask_proposals beside the project]");
+  command
+      ->add_option("-o,--output", options->output,
+                   "Folder for the masks and masks.html; files that are there stay [mask_proposals beside the project]")
+      ->check(named());
   command->add_option("--min-images", r.min_images, "Images that a camera must have")->capture_default_str();
   command->add_option("--max-images", r.max_images, "Images looked at, of each camera")->capture_default_str();
   command->add_option("--min-distance", r.min_distance_m, "Between two of them, m")->capture_default_str();

@@ -147,7 +147,7 @@ void add_measurements(CLI::App& app, std::function<int()>& action) {
       ->allow_extra_args(false);
   command->add_option("--radius", options->radius_m, "About that position, m: of the adjusted points")
       ->check(positive());
-  command->add_option("-o,--output", options->output, "File to write instead of standard output");
+  command->add_option("-o,--output", options->output, "File to write instead of standard output")->check(named());
   command->add_flag("--json", options->json, "JSON instead of CSV");
   command->callback([=, &action] { action = [options] { return measurements(*options); }; });
 }

@@ -7,6 +7,13 @@
 
 namespace megablock {
 
+// The name of a file or folder.
+inline CLI::Validator named() {
+  return CLI::Validator(
+      [](std::string& text) { return text.empty() ? std::string("the name is empty; name a file or folder") : ""; }, "",
+      "named");
+}
+
 // A number of 0 or more.
 inline CLI::Validator not_negative() {
   return CLI::Validator(

@@ -75,7 +75,9 @@ void add_resect(CLI::App& app, std::function<int()>& action) {
   CLI::App* command = app.add_subcommand("resect", "Poses of frames from the control points that their cameras see");
   command->footer("Example: megablock resect block.yaml -o resected.csv");
   command->add_option("project", options->project, "Project file with control points and rigs")->required();
-  command->add_option("-o,--output", options->output, "CSV to write: poses, sigmas, warnings")->required();
+  command->add_option("-o,--output", options->output, "CSV to write: poses, sigmas, warnings")
+      ->check(named())
+      ->required();
   command->add_flag("--without-trajectory", options->without_trajectory,
                     "Without approximate poses: three points are then ambiguous");
   command->add_option("--min-points", r.min_points, "Agreeing points, at least")->capture_default_str();
@@ -101,7 +103,9 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
       "         mpirun --bind-to none -n 2 megablock register block.yaml -j job\n"
       "         megablock run job/register/block.yaml -j job2      (bundle adjustment from there)");
   command->add_option("project", options->run.project, "Project file")->required();
-  command->add_option("-j,--job", options->run.directory, "Job directory; an unfinished one is resumed")->required();
+  command->add_option("-j,--job", options->run.directory, "Job directory; an unfinished one is resumed")
+      ->check(named())
+      ->required();
   command->add_option("--threads", options->run.threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(not_negative());
   command->add_flag("-q,--quiet", options->run.quiet, "No progress");

@@ -220,7 +220,7 @@ void add_simulate(CLI::App& app, Action& action) {
   add_scene_options(*options);
   add_observation_options(*options);
   add_prior_options(*options);
-  command->add_option("-o,--output", options->output, "Folder to write")->required();
+  command->add_option("-o,--output", options->output, "Folder to write")->check(named())->required();
   command->add_flag("--overwrite", options->overwrite, "Overwrite a block.yaml that was edited since");
   command->add_option("--threads", options->threads, "Threads; 0 = cores of the host")->check(not_negative());
   command->callback([=, &action] {

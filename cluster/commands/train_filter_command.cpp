@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "cluster/commands/option_checks.h"
 #include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/stages/given_tracks.h"
@@ -99,7 +100,7 @@ void add_train_filter(CLI::App& app, std::function<int()>& action) {
       "         megablock train-filter street/block.yaml -o filter.yaml\n"
       "         and in a project: matching: {filter: true, filter_model: filter.yaml}");
   command->add_option("project", options->project, "Project file with tie points")->required();
-  command->add_option("-o,--output", options->output, "Model to write (YAML)")->required();
+  command->add_option("-o,--output", options->output, "Model to write (YAML)")->check(named())->required();
   command->add_option("--labels", options->labels,
                       "HDF5 with observations/outlier, 0 = right [truth_tracks.h5 beside the project]");
   command->add_option("--samples", options->samples, "Training samples of the model, half of them right")

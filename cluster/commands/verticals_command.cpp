@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 
 #include "cluster/commands/found_verticals.h"
+#include "cluster/commands/option_checks.h"
 #include "cluster/commands/output_check.h"
 #include "cluster/exit_codes.h"
 #include "cluster/stages/block_hash.h"
@@ -206,9 +207,11 @@ void add_verticals(CLI::App& app, std::function<int()>& action) {
   CLI::App* command = app.add_subcommand("verticals", "Write where down is in every picture, from its straight edges");
   command->footer("Example: megablock verticals block.yaml -o verticals.csv");
   command->add_option("project", options->project, "Project file")->required();
-  command->add_option("-o,--output", options->output,
-                      "CSV file [verticals.csv beside the project]; what is found is kept in FILE.found, so that the "
-                      "command, started again, looks at other pictures only");
+  command
+      ->add_option("-o,--output", options->output,
+                   "CSV file [verticals.csv beside the project]; what is found is kept in FILE.found, so that the "
+                   "command, started again, looks at other pictures only")
+      ->check(named());
   command->add_option("--min-length", s.min_length_px, "Shortest segment, px of images reduced to --max-megapixels")
       ->capture_default_str();
   command->add_option("--max-megapixels", s.max_megapixels, "Larger images are reduced")->capture_default_str();

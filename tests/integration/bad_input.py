@@ -66,6 +66,15 @@ class BadInput(CopyOfTheBlock):
         said = megablock("run", self.project, "-j", self.job, "--colour", expect=BAD_INPUT)
         self.assertIn("argument '--colour' was not expected; see 'megablock run --help'", said)
 
+    def test_empty_names(self):
+        for command in (("run", self.project, "-j"), ("register", self.project, "-j"), ("simulate", "-o"),
+                        ("init", self.images, "-o"), ("export", work / "clean_job", "--format", "csv", "-o"),
+                        ("measurements", work / "clean_job", "--image", "f000001.jpg", "-o"),
+                        ("calibrate", self.project, "-o"), ("verticals", self.project, "-o")):
+            option = "--job" if command[-1] == "-j" else "--output"
+            self.assertIn(f"{option}: the name is empty; name a file or folder; see 'megablock {command[0]} --help'",
+                          one_line(megablock(*command, "", expect=BAD_INPUT)))
+
     def test_rig_to_calibrate_is_missed_before_any_picture_is_read(self):
         calibration = self.folder / "calibration"
         line = one_line(megablock("calibrate", self.project, "-q", "-o", calibration, expect=BAD_INPUT))
