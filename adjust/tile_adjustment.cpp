@@ -12,6 +12,7 @@
 #include "adjust/lost_frames.h"
 #include "adjust/lost_parts.h"
 #include "io/error.h"
+#include "io/plausible.h"
 
 namespace megablock {
 
@@ -19,7 +20,7 @@ void AdjustOptions::check() const {
   observations.check();
   if (!(min_intersection_deg >= 0 && min_intersection_deg < 90))
     throw InputError("min_intersection_deg must lie in [0, 90)");
-  if (!(max_residual_sigmas > 0)) throw InputError("max_residual_sigmas must be positive");
+  require_within(max_residual_sigmas, kInSigmas, "max_residual_sigmas");
   if (screening_rounds < 1) throw InputError("screening_rounds must be at least 1");
   if (max_iterations < 1) throw InputError("max_iterations must be at least 1");
 }

@@ -9,6 +9,7 @@
 #include "adjust/owner.h"
 #include "adjust/vertical_terms.h"
 #include "io/error.h"
+#include "io/plausible.h"
 
 namespace megablock {
 
@@ -38,10 +39,13 @@ bool TileProblem::active(std::int64_t point) const {
 }
 
 void ObservationOptions::check() const {
-  if (!(image_sigma_px >= 1e-6 && image_sigma_px <= 1e4)) throw InputError("image_sigma_px must lie in [1e-6, 1e4]");
-  for (const RobustLoss& loss : {image_loss, position_loss, attitude_loss, relative_loss, line_loss, vertical_loss})
-    if (loss.kind != RobustLoss::Kind::kNone && !(loss.scale > 0))
-      throw InputError("the scale of a robust loss must be positive (sigmas)");
+  require_within(image_sigma_px, kSigmaPx, "image_sigma_px");
+  require_within(image_loss.scale, kInSigmas, "image_loss_scale");
+  require_within(position_loss.scale, kInSigmas, "position_loss_scale");
+  require_within(attitude_loss.scale, kInSigmas, "attitude_loss_scale");
+  require_within(relative_loss.scale, kInSigmas, "relative_loss_scale");
+  require_within(line_loss.scale, kInSigmas, "line_loss_scale");
+  require_within(vertical_loss.scale, kInSigmas, "vertical_loss_scale");
 }
 
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end) {

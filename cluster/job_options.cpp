@@ -7,6 +7,7 @@
 
 #include "cluster/job_json.h"
 #include "io/error.h"
+#include "io/plausible.h"
 #include "io/settings_reader.h"
 
 namespace megablock {
@@ -217,7 +218,7 @@ void hash_options(Hasher& hasher, Options options) {
 
 void MergeSettings::check() const {
   if (max_iterations < 1) throw InputError("max_iterations must be at least 1");
-  if (!(decrement > 0)) throw InputError("decrement must be positive");
+  require_within(decrement, {1e-12, 100}, "decrement");
   if (screening_rounds < 0) throw InputError("screening_rounds must not be negative");
 }
 

@@ -188,11 +188,6 @@ PointRole role_of(const std::string& text, const std::string& where) {
   throw InputError(where + ": role: '" + text + "' is none of: control, check");
 }
 
-double positive(double value, const std::string& what, const std::string& where) {
-  if (!(value > 0)) throw InputError(where + ": " + what + " must be greater than 0");
-  return value;
-}
-
 // The first line of a point gives its coordinates; later ones may leave them empty or repeat them.
 ControlTable::Point csv_point(const CsvTable& csv, std::size_t row) {
   ControlTable::Point point;
@@ -201,10 +196,8 @@ ControlTable::Point csv_point(const CsvTable& csv, std::size_t row) {
   point.role = role_of(csv.text(row, "role"), point.where);
   point.coordinates = {csv.needed_number(row, "x"), csv.needed_number(row, "y"), csv.number(row, "z").value_or(kNaN)};
   check_coordinates(point.coordinates, point.where);
-  if (const auto sigma = csv.number(row, "sigma_horizontal_m"))
-    point.sigma.head<2>().setConstant(positive(*sigma, "sigma_horizontal_m", point.where));
-  if (const auto sigma = csv.number(row, "sigma_vertical_m"))
-    point.sigma.z() = positive(*sigma, "sigma_vertical_m", point.where);
+  if (const auto sigma = csv.number(row, "sigma_horizontal_m", kSigmaMetres)) point.sigma.head<2>().setConstant(*sigma);
+  if (const auto sigma = csv.number(row, "sigma_vertical_m", kSigmaMetres)) point.sigma.z() = *sigma;
   return point;
 }
 
@@ -237,7 +230,7 @@ ControlTable read_csv(const std::string& path) {
     if (csv.text(row, "image").empty()) continue;  // a point that is not measured
     point.measurements.push_back({csv.text(row, "image"),
                                   {csv.needed_number(row, "column_px"), csv.needed_number(row, "row_px")},
-                                  positive(csv.number(row, "sigma_px").value_or(0.5), "sigma_px", where),
+                                  csv.number(row, "sigma_px", kSigmaPx).value_or(0.5),
                                   where});
   }
   return table;

@@ -95,6 +95,12 @@ std::optional<double> CsvTable::number(std::size_t row, const std::string& colum
   return parse_number(value, column, where(row));
 }
 
+std::optional<double> CsvTable::number(std::size_t row, const std::string& column, const Limits& limits) const {
+  const std::optional<double> value = number(row, column);
+  if (value) check_within(*value, limits, column, where(row));
+  return value;
+}
+
 double CsvTable::needed_number(std::size_t row, const std::string& column) const {
   const std::string value = text(row, column);
   if (value.empty()) throw InputError(where(row) + ": " + column + " is empty");

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "io/plausible.h"
+
 namespace megablock {
 
 // InputError "where: ..." for a header whose columns are separated by semicolons.
@@ -21,8 +23,10 @@ class CsvTable {
   void refuse_others(const std::vector<std::string>& columns) const;   // InputError for a column not in the list
   std::string text(std::size_t row, const std::string& column) const;  // "" when empty or absent
   std::optional<double> number(std::size_t row, const std::string& column) const;  // none when empty or NaN
-  double needed_number(std::size_t row, const std::string& column) const;          // InputError when empty or NaN
-  double needed_metres(std::size_t row, const std::string& column) const;          // and when beyond any place on Earth
+  // And InputError outside of the limits.
+  std::optional<double> number(std::size_t row, const std::string& column, const Limits& limits) const;
+  double needed_number(std::size_t row, const std::string& column) const;  // InputError when empty or NaN
+  double needed_metres(std::size_t row, const std::string& column) const;  // and when beyond any place on Earth
   std::string where(std::size_t row) const;
   // Value of a comment line "# key: value"; empty when absent.
   std::string comment(const std::string& key) const;

@@ -6,6 +6,7 @@
 
 #include "io/csv_table.h"
 #include "io/error.h"
+#include "io/plausible.h"
 
 namespace megablock {
 
@@ -30,8 +31,7 @@ Eigen::Vector2d end_of(const CsvTable& csv, std::size_t row, const char* number,
 
 KnownLine::Measurement measurement(const CsvTable& csv, std::size_t row, ImageIndex image, const Camera& camera) {
   KnownLine::Measurement m{image, end_of(csv, row, "1", camera), end_of(csv, row, "2", camera),
-                           csv.number(row, "sigma_px").value_or(1)};
-  if (!(m.sigma_px > 0)) throw InputError(csv.where(row) + ": sigma_px must be greater than 0");
+                           csv.number(row, "sigma_px", kSigmaPx).value_or(1)};
   if ((m.second - m.first).norm() < kShortestPx)
     throw InputError(csv.where(row) + ": the ends are less than 10 px apart; a line so short says nothing");
   return m;

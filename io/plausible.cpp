@@ -9,6 +9,16 @@
 
 namespace megablock {
 
+void require_within(double value, const Limits& limits, const std::string& what, const std::string& otherwise) {
+  if (!(value >= limits.least && value <= limits.most))
+    throw InputError(fmt::format("{} must lie in [{:g}, {:g}]{}", what, limits.least, limits.most, otherwise));
+}
+
+void check_within(double value, const Limits& limits, const std::string& what, const std::string& where,
+                  const std::string& otherwise) {
+  require_within(value, limits, where + ": " + what, fmt::format("{}, not {:g}", otherwise, value));
+}
+
 void check_on_earth(double coordinate, const std::string& what, const std::string& where) {
   constexpr double kFarthest = 1e8;  // northings reach 1e7 m, eastings with the zone in front 6e7 m
   if (!(std::abs(coordinate) <= kFarthest))

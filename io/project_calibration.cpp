@@ -27,9 +27,10 @@ std::string listed(const std::vector<std::string>& names) {
 void read_sigmas(YamlReader& camera, CameraCalibration& result) {
   auto sigma = camera.mapping("sigma");
   if (!sigma) return;
+  constexpr Limits kSigma{1e-60, 1e12};  // terms of high order of a correction in pixels are that small
   const CameraModel& model = result.intrinsics.model();
   for (int p = 0; p < result.intrinsics.size(); ++p)
-    if (const auto value = sigma->positive_number(parameter_name(model, p)))
+    if (const auto value = sigma->number(parameter_name(model, p), kSigma))
       result.sigma[static_cast<std::size_t>(p)] = *value;
   sigma->finish();
 }
@@ -66,9 +67,8 @@ MountCalibration read_mount(YamlReader& reader, const std::string& name) {
   check_on_vehicle(translation, "translation", reader.where("translation"));
   mount.pose.rotation = rotation_exp<double>(turn).normalized();
   mount.pose.centre = -(mount.pose.rotation.conjugate() * translation);
-  const double rotation = kDegree * reader.number("sigma_rotation_deg").value_or(0);
-  const double position = reader.number("sigma_position_m").value_or(0);
-  if (!(rotation >= 0 && position >= 0)) throw InputError(reader.where() + ": sigmas must not be negative");
+  const double rotation = kDegree * reader.number("sigma_rotation_deg", {0, kSigmaDegrees.most}).value_or(0);
+  const double position = reader.number("sigma_position_m", {0, kSigmaMetres.most}).value_or(0);
   mount.covariance.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
       Eigen::Vector3d::Constant(position * position);
   reader.finish();

@@ -51,8 +51,9 @@ void read_model(YamlReader& reader, Camera& camera) {
 }
 
 void read_focal(YamlReader& reader, Camera& camera) {
-  const auto pixels = reader.positive_number("focal_px");
-  const auto millimetres = reader.positive_number("focal_mm"), sensor = reader.positive_number("sensor_mm");
+  constexpr Limits kLengthMm{1e-3, 1e6};
+  const auto pixels = reader.number("focal_px", kFocalPx);
+  const auto millimetres = reader.number("focal_mm", kLengthMm), sensor = reader.number("sensor_mm", kLengthMm);
   if (pixels && millimetres)
     throw InputError(reader.where("focal_mm") + ": give focal_px, or focal_mm with sensor_mm, not both");
   if (millimetres.has_value() != sensor.has_value())
@@ -62,17 +63,19 @@ void read_focal(YamlReader& reader, Camera& camera) {
     throw InputError(reader.where(pixels ? "focal_px" : "focal_mm") +
                      ": the focal length of an equirectangular camera is its width / 2 pi and cannot be given");
   camera.intrinsics[kFocal] = pixels ? *pixels : *millimetres / *sensor * std::max(camera.width, camera.height);
+  if (millimetres) check_within(camera.intrinsics[kFocal], kFocalPx, "focal_mm in pixels", reader.where("focal_mm"));
   camera.focal_known = true;
 }
 
 void read_distortion(YamlReader& reader, Camera& camera) {
   auto distortion = reader.mapping("distortion");
   if (!distortion) return;
+  constexpr Limits kTerm{-1e12, 1e12};
   const CameraModel& model = camera.intrinsics.model();
   for (int p = kPrincipalY + 1; p < camera.intrinsics.size(); ++p)
     if (is_fixed(model, p))
       continue;
-    else if (const auto value = distortion->number(parameter_name(model, p)))
+    else if (const auto value = distortion->number(parameter_name(model, p), kTerm))
       camera.intrinsics[static_cast<std::size_t>(p)] = *value;
   distortion->finish();
 }
@@ -83,6 +86,9 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
   read_model(reader, camera);
   read_focal(reader, camera);
   if (const auto point = reader.numbers("principal_point_px", 2)) {
+    for (const double coordinate : *point)
+      check_within(coordinate, {-kFocalPx.most, kFocalPx.most}, "principal_point_px",
+                   reader.where("principal_point_px"));
     camera.intrinsics[kPrincipalX] = (*point)[0];
     camera.intrinsics[kPrincipalY] = (*point)[1];
     if (is_radial(camera.intrinsics.model())) {

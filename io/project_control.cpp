@@ -20,9 +20,9 @@ void set_check_points(YamlReader& control, ControlTable& table) {
 }
 
 void set_sigmas(YamlReader& control, ControlTable& table) {
-  const auto horizontal = control.positive_number("sigma_horizontal_m");
-  const auto vertical = control.positive_number("sigma_vertical_m");
-  const auto pixels = control.positive_number("sigma_px");
+  const auto horizontal = control.number("sigma_horizontal_m", kSigmaMetres);
+  const auto vertical = control.number("sigma_vertical_m", kSigmaMetres);
+  const auto pixels = control.number("sigma_px", kSigmaPx);
   for (ControlTable::Point& point : table.points) {
     if (horizontal) point.sigma.head<2>().setConstant(*horizontal);
     if (vertical) point.sigma.z() = *vertical;

@@ -25,12 +25,12 @@ struct GpsOptions {
 };
 
 // A sigma, of which 0 means: held.
-std::optional<double> read_sigma(YamlReader& reader, const std::string& key, double held) {
+std::optional<double> read_sigma(YamlReader& reader, const std::string& key, const Limits& limits, double held) {
   const auto sigma = reader.number(key);
-  if (sigma && !(*sigma >= 0))
-    throw InputError(reader.where(key) + ": " + key + " must be greater than 0, or 0 for what is held, not " +
-                     *reader.text(key));
-  return sigma && *sigma < held ? held : sigma;
+  if (!sigma) return std::nullopt;
+  if (*sigma == 0) return held;
+  check_within(*sigma, limits, key, reader.where(key), ", or be 0 for what is held");
+  return sigma;
 }
 
 GpsOptions read_gps_options(YamlReader& top, bool from_images) {
@@ -39,8 +39,8 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   if (!reader) return options;
   options.given = true;
   options.use = reader->flag("use").value_or(true);
-  options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kHeldPositionSigma);
-  options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kHeldPositionSigma);
+  options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kSigmaMetres, kHeldPositionSigma);
+  options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kSigmaMetres, kHeldPositionSigma);
   if (!from_images && reader->node("lever_arm_m"))
     refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have theirs");
   if (const auto arm = reader->numbers("lever_arm_m", 3)) {
@@ -158,7 +158,7 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
   if (auto reader = top.mapping("attitude")) {
     given = true;
     use = reader->flag("use").value_or(true);
-    sigma_deg = read_sigma(*reader, "sigma_deg", kHeldAttitudeSigma * kDegreesPerRadian);
+    sigma_deg = read_sigma(*reader, "sigma_deg", kSigmaDegrees, kHeldAttitudeSigma * kDegreesPerRadian);
     reader->finish();
   }
   Block& block = project.block;

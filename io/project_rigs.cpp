@@ -235,6 +235,10 @@ void read_rigs(YamlReader& top, Project& project) {
     throw InputError(reader->where() +
                      ": rigs: sigma_position_m and sigma_rotation_deg must both be positive, or both 0 "
                      "(mounts held)");
+  if (position > 0) {
+    check_within(position, kSigmaMetres, "rigs.sigma_position_m", reader->where("sigma_position_m"));
+    check_within(rotation, kSigmaDegrees, "rigs.sigma_rotation_deg", reader->where("sigma_rotation_deg"));
+  }
   reader->finish();
   RigBuilder builder(*cameras, *assignments, project);
   project.block = builder.build(position, rotation * std::numbers::pi / 180);

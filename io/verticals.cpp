@@ -14,6 +14,7 @@
 #include "io/csv_table.h"
 #include "io/error.h"
 #include "io/image_scan.h"
+#include "io/plausible.h"
 
 namespace megablock {
 
@@ -39,10 +40,9 @@ std::string text_of(const Eigen::Ref<const Eigen::VectorXd>& numbers) {
 }
 
 double needed_sigma(const CsvTable& csv, std::size_t row, const char* column) {
-  const double sigma = csv.needed_number(row, column) * kDegree;
-  if (!(sigma > 0 && std::isfinite(sigma)))
-    throw InputError(csv.where(row) + ": " + column + " must be greater than 0 (degrees)");
-  return sigma;
+  const double sigma = csv.needed_number(row, column);
+  check_within(sigma, kSigmaDegrees, column, csv.where(row));
+  return sigma * kDegree;
 }
 
 // Of directions, from that of roll and pitch (vertical.h).

@@ -75,10 +75,9 @@ std::optional<double> YamlReader::number(const std::string& key) {
   return value ? std::optional(parse_number(*value, full(key), where(key))) : std::nullopt;
 }
 
-std::optional<double> YamlReader::positive_number(const std::string& key) {
+std::optional<double> YamlReader::number(const std::string& key, const Limits& limits) {
   const auto value = number(key);
-  if (value && !(*value > 0))
-    throw InputError(where(key) + ": " + full(key) + " must be greater than 0, not " + *text(key));
+  if (value) check_within(*value, limits, full(key), where(key));
   return value;
 }
 

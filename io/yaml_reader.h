@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "io/plausible.h"
+
 namespace megablock {
 
 class YamlReader {
@@ -17,7 +19,7 @@ class YamlReader {
   // Each declares a key and gives its value when it is there.
   std::optional<YAML::Node> node(const std::string& key);
   std::optional<double> number(const std::string& key);
-  std::optional<double> positive_number(const std::string& key);
+  std::optional<double> number(const std::string& key, const Limits& limits);
   std::optional<bool> flag(const std::string& key);
   std::optional<std::string> text(const std::string& key);
   std::optional<std::vector<std::string>> texts(const std::string& key);  // a list

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "io/error.h"
+#include "io/plausible.h"
 
 namespace megablock {
 
@@ -26,9 +26,9 @@ Pose composed(const Pose& outer, const Pose& inner) {
 }  // namespace
 
 void TrustOptions::check() const {
-  if (!(max_seconds >= 0)) throw InputError("trajectory_seconds must not be negative");
-  if (!(position_sigma_m > 0)) throw InputError("trajectory_position_sigma_m must be positive");
-  if (!(rotation_sigma_deg > 0)) throw InputError("trajectory_rotation_sigma_deg must be positive");
+  require_within(max_seconds, {0, 1e9}, "trajectory_seconds");
+  require_within(position_sigma_m, kSigmaMetres, "trajectory_position_sigma_m");
+  require_within(rotation_sigma_deg, kSigmaDegrees, "trajectory_rotation_sigma_deg");
 }
 
 double TrustedPair::epipolar_sigma_px(double focal_px, double distance_m, double pixel_sigma) const {

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "io/error.h"
+#include "io/plausible.h"
 #include "partition/cells.h"
 #include "partition/cones.h"
 #include "partition/kd_tree.h"
@@ -320,8 +321,9 @@ void CandidateOptions::check() const {
     if (!ok) throw InputError(message);
   };
   require(neighbours >= 1, "neighbours must be at least 1");
-  require(max_pair_distance_m >= 0 || max_pair_distance_m == -1,
-          "max_pair_distance_m must not be negative (metres; 0 = no limit, -1 = 30 for rigs with poses)");
+  if (max_pair_distance_m != -1)
+    require_within(max_pair_distance_m, {0, 1e8}, "max_pair_distance_m",
+                   " (metres; 0 = no limit) or be -1 (30 for rigs with poses)");
   require(max_view_angle_deg > 0 && max_view_angle_deg <= 180, "max_view_angle_deg must be within 0 and 180 degrees");
   require(order_neighbours >= 0, "order_neighbours must not be negative");
   require(descriptor_neighbours >= 0, "descriptor_neighbours must not be negative");

@@ -229,6 +229,15 @@ class BadInput(CopyOfTheBlock):
             f.write("adjustment:\n  image_sigma_px: 0.5 mm\n")
         self.assertIn("block.yaml:", one_line(self.run_job(BAD_INPUT)))
 
+    def test_absurd_numbers(self):
+        for line, said in (("gps: {sigma_horizontal_m: 1e300}", "sigma_horizontal_m must lie in"),
+                           ("merge: {decrement: 1e300}", "merge: decrement must lie in"),
+                           ("adjustment: {image_loss_scale: 1e-300}", "adjustment: image_loss_scale must lie in"),
+                           ("cameras: {default: {focal_px: 1e300}}", "cameras.default.focal_px must lie in")):
+            self.project.write_text(f"images: images\n{line}\n")
+            self.assertRegex(one_line(self.run_job(BAD_INPUT)), rf"block.yaml:2: {said} \[.*\], .*not 1e[+-]?300")
+        self.assertFalse(self.job.exists())
+
     def test_control_point_names_missing_image(self):
         control = next(iter(self.folder.glob("gcp_list.txt")), None) or self.folder / "gcp_list.txt"
         control.write_text("WGS84\n2.35 48.85 50 320 240 not_there.jpg p1\n")

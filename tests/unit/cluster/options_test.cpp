@@ -3,6 +3,8 @@
 
 #include <fstream>
 #include <map>
+#include <regex>
+#include <sstream>
 
 #include "cluster/job_options.h"
 #include "io/error.h"
@@ -12,6 +14,16 @@ namespace {
 
 StageSettings setting(const std::string& section, const std::string& key, const std::string& value) {
   return {{{section, key, value, "block.yaml:7"}}};
+}
+
+// Empty: the settings are accepted.
+std::string message(const StageSettings& settings) {
+  try {
+    read_options(settings);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
 }
 
 std::uint64_t hash_of(const auto& options) {
@@ -39,14 +51,6 @@ TEST(JobOptions, ReadsEverySectionOfTheProjectFile) {
 }
 
 TEST(JobOptions, RefusesUnknownKeysAndWrongUnitsNamingFileAndLine) {
-  const auto message = [](const StageSettings& settings) -> std::string {
-    try {
-      read_options(settings);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  };
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("block.yaml:7"));
   EXPECT_THAT(message(setting("matching", "ratoi", "0.7")), testing::HasSubstr("ratio"));
   EXPECT_THAT(message(setting("adjustment", "image_sigma_px", "0.5 mm")), testing::HasSubstr("block.yaml:7"));
@@ -82,26 +86,60 @@ TEST(JobOptions, EveryOptionReachesItsStagesFingerprintAndNoOther) {
   EXPECT_EQ(hash_of(defaults.adjustment), hash_of(changed.adjustment));
 }
 
-// The rows "| `section.key` | default | ..." of the project file's documentation.
-std::map<std::string, std::string> documented_options() {
+struct Documented {
+  std::string usual, limits;
+};
+
+// The rows "| `section.key` | default | limits | ..." of the project file's documentation.
+std::map<std::string, Documented> documented_options() {
   std::ifstream in(MEGABLOCK_SOURCE "/docs/project-file.md");
   EXPECT_TRUE(in);
-  std::map<std::string, std::string> rows;
+  const std::regex row(R"(\| `([\w.]+)` \| *(.*?) *\| *(.*?) *\| .*)");
+  std::map<std::string, Documented> rows;
   bool section = false;
   for (std::string line; std::getline(in, line);) {
     if (line.starts_with("#")) section = line == "## Options of the stages";
-    if (!section || !line.starts_with("| `")) continue;
-    const std::size_t name = line.find('`') + 1, name_end = line.find('`', name);
-    const std::size_t value = line.find(" | ", name_end) + 3, value_end = line.find(" | ", value);
-    rows[line.substr(name, name_end - name)] = line.substr(value, value_end - value);
+    std::smatch cells;
+    if (section && std::regex_match(line, cells, row)) rows[cells[1]] = {cells[2], cells[3]};
   }
   return rows;
 }
 
 TEST(JobOptions, AreDocumentedWithTheirDefaults) {
-  std::map<std::string, std::string> options;
+  std::map<std::string, std::string> options, documented;
   for (const OptionValue& option : option_values({})) options[option.section + "." + option.key] = option.value;
-  EXPECT_EQ(documented_options(), options);
+  for (const auto& [key, row] : documented_options()) documented[key] = row.usual;
+  EXPECT_EQ(documented, options);
+}
+
+// Whatever the option, an absurd value ends with its place.
+TEST(JobOptions, RefuseAbsurdValues) {
+  for (const OptionValue& option : option_values({}))
+    EXPECT_THAT(message(setting(option.section, option.key, "1e300")), testing::StartsWith("block.yaml:7: "))
+        << option.section << "." << option.key;
+  EXPECT_EQ(message(setting("adjustment", "image_loss_scale", "1e-300")),
+            "block.yaml:7: adjustment: image_loss_scale must lie in [0.0001, 1e+06], not 1e-300");
+  EXPECT_EQ(message(setting("adjustment", "image_sigma_px", "1e5")),
+            "block.yaml:7: adjustment: image_sigma_px must lie in [1e-06, 10000], not 1e5");
+}
+
+TEST(JobOptions, RefuseValuesBeyondTheDocumentedLimits) {
+  int found = 0;
+  for (const auto& [key, row] : documented_options()) {
+    const std::size_t point = key.find('.');
+    const auto message_of = [&, name = key](double value) {
+      return message(setting(name.substr(0, point), name.substr(point + 1), (std::ostringstream() << value).str()));
+    };
+    std::smatch limits;
+    if (!std::regex_search(row.limits, limits, std::regex(R"(([0-9][0-9.e-]*) to ([0-9][0-9.e-]*))"))) continue;
+    ++found;
+    const double least = std::stod(limits[1]), most = std::stod(limits[2]);
+    EXPECT_THAT(message_of(2 * most), testing::StartsWith("block.yaml:7: ")) << key;
+    if (least > 0) {
+      EXPECT_THAT(message_of(least / 2), testing::StartsWith("block.yaml:7: ")) << key;
+    }
+  }
+  EXPECT_GT(found, 15);
 }
 
 }  // namespace

@@ -106,7 +106,7 @@ TEST_F(CalibrationFile, MistakesAreRefusedWithTheirPlace) {
               AllOf(HasSubstr("calibration.yaml:2"), HasSubstr("'translation' (three numbers) is missing")));
   EXPECT_THAT(refusal("mount:\n  c22: {}\n"), HasSubstr("did you mean 'mounts'?"));
   EXPECT_THAT(refusal("mounts:\n  c22: {rotation: [0, 0, 0], translation: [0, 0, 0], sigma_position_m: -1}\n"),
-              HasSubstr("must not be negative"));
+              HasSubstr("calibration.yaml:2: mounts.c22.sigma_position_m must lie in [0, 1e+06], not -1"));
   EXPECT_THAT(refusal("mounts:\n  c22: {rotation: [0, 0, 0], translation: [0, 0, 1e300]}\n"),
               HasSubstr("calibration.yaml:2: translation: [0, 0, 1e+300] m is no place on a vehicle"));
   EXPECT_THAT(refusal("mounts:\n  c22: {rotation: [0, -90, 0], translation: [0, 0, 0]}\n"),

@@ -173,6 +173,10 @@ TEST_F(ControlFile, CsvRefusals) {
               HasSubstr("c.csv:2: column_px: 'x' is not a number"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,none.jpg,3,4\n"),
               HasSubstr("c.csv:2: point 'a' is measured in image"));
+  for (const char* sigma : {"0", "-1", "1e-300", "1e300"})
+    EXPECT_THAT(refusal("c.csv", "name,x,y,z,image,column_px,row_px,sigma_px\na,1,2,3,sub/0.jpg,3,4," +
+                                     std::string(sigma) + "\n"),
+                HasSubstr("c.csv:2: sigma_px must lie in [1e-06, 10000], not "));
   EXPECT_THAT(refusal("c.csv", header + "a,,2,3,sub/0.jpg,3,4\n"), HasSubstr("c.csv:2: x is empty"));
   EXPECT_THAT(refusal("c.csv", header + "a,nan,2,3,sub/0.jpg,3,4\n"),
               HasSubstr("c.csv:2: x: 'nan' is not a finite number"));

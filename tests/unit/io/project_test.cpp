@@ -332,7 +332,17 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "gps:\n  sigma_horizontal_m: 3 m\n"),
               HasSubstr("block.yaml:3: gps.sigma_horizontal_m: '3 m' has something behind the number"));
   EXPECT_THAT(refusal(folder, images + "gps: {sigma_vertical_m: -1}\n"),
-              HasSubstr("must be greater than 0, or 0 for what is held, not -1"));
+              HasSubstr("block.yaml:2: sigma_vertical_m must lie in [1e-08, 1e+06], or be 0 for what is held, not -1"));
+  for (const char* absurd : {"1e300", "1e-300"}) {
+    const auto refused = [&](const std::string& text, const std::string& key) {
+      const std::string value = absurd;
+      EXPECT_THAT(refusal(folder, images + text + value + "}\n"),
+                  ::testing::AllOf(HasSubstr("block.yaml:"), HasSubstr(key + " must lie in ["), HasSubstr(", not 1e")));
+    };
+    refused("gps: {sigma_horizontal_m: ", "sigma_horizontal_m");
+    refused("attitude: {sigma_deg: ", "sigma_deg");
+    refused("cameras:\n  default: {focal_px: ", "cameras.default.focal_px");
+  }
   EXPECT_THAT(refusal(folder, images + "gps: {sigma_horizontal_cm: 3}\n"),
               HasSubstr("unknown key 'sigma_horizontal_cm' in 'gps'; did you mean 'sigma_horizontal_m'?"));
   EXPECT_THAT(refusal(folder, images + "gps: 3\n"), HasSubstr("block.yaml:2: 'gps' must be a mapping"));

@@ -77,7 +77,7 @@ TEST_F(VerticalsFile, ComesBack) {
 TEST_F(VerticalsFile, BadRowsAreNamed) {
   EXPECT_THAT(message(plain_ + "nowhere.jpg,0,1,0,0.1\n"), HasSubstr("verticals.csv:2: image 'nowhere.jpg'"));
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,0.1\n2.jpg,0,1,0,0.1\n"), HasSubstr("verticals.csv:3: image '2.jpg'"));
-  EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,0\n"), HasSubstr("sigma_deg must be greater than 0"));
+  EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,0\n"), HasSubstr("sigma_deg must lie in ["));
   EXPECT_THAT(message(plain_ + "2.jpg,nan,1,0,0.1\n"), HasSubstr("down_x"));
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,nan\n"), HasSubstr("verticals.csv:2"));
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,1,0.1\n"), HasSubstr("no unit vector"));
