@@ -179,26 +179,21 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   evaluation.normalised_error_rotation_boundary = rotation_by_place[1].value();
 }
 
-// Some measurement of it does, as far as is known: else its position says nothing of the block.
-bool takes_part(const BlockResult::ControlResult& point) {
-  for (std::size_t m = 0; m < point.residual_px.size(); ++m)
-    if (point.takes_part(m)) return true;
-  return point.residual_px.empty();
-}
-
 void evaluate_control(const BlockResult& result, double variance_factor, Evaluation& evaluation) {
   RootMeanSquare control, check, horizontal, vertical;
   NormalisedError normalised;
   for (std::size_t i = 0; i < result.control.size(); ++i) {
     const ControlPoint& point = result.block.control_points[i];
-    const Eigen::Vector3d error = result.control[i].adjusted - point.position;
-    if (!error.allFinite() || !takes_part(result.control[i])) continue;
+    const BlockResult::ControlResult& found = result.control[i];
+    const Eigen::Vector3d error = found.adjusted - point.position;
+    const bool known = !found.residual_px.empty();  // what of it takes part
+    if (!error.allFinite() || (known && !found.takes_part())) continue;
     (point.role == PointRole::kCheck ? check : control).add(error.squaredNorm());
     if (point.role != PointRole::kCheck) continue;
     horizontal.add(error.head<2>().squaredNorm());
     vertical.add(error.z() * error.z());
     const Eigen::Matrix3d stated = point.sigma.cwiseAbs2().asDiagonal();
-    normalised.add(error, variance_factor * result.control[i].covariance + stated);
+    normalised.add(error, variance_factor * found.covariance + stated);
   }
   evaluation.check_points = check.count();
   evaluation.control_points = control.count();

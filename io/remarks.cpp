@@ -236,16 +236,14 @@ std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
     const ControlPoint& given = result.block.control_points[p];
     const BlockResult::ControlResult& control = result.control[p];
-    if (given.role != role) continue;
+    if (given.role != role || control.takes_part()) continue;
     UnusedPoint point{p, {}, 0};
-    bool used = false;
     for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m) {
-      used = used || control.takes_part(m);
       const double length = control.residual_px[m].norm();
       if (std::isfinite(length) && (!point.image.valid() || length > point.worst_px))
         point = {p, given.measurements[m].image, length};
     }
-    if (!used) unused.push_back(point);
+    unused.push_back(point);
   }
   std::stable_sort(unused.begin(), unused.end(), [](const auto& a, const auto& b) { return a.worst_px > b.worst_px; });
   return unused;

@@ -53,6 +53,12 @@ void add_point(Hasher& hasher, const TrackResults& result, std::size_t row) {
 
 }  // namespace
 
+bool BlockResult::ControlResult::takes_part() const {
+  for (std::size_t m = 0; m < residual_px.size(); ++m)
+    if (takes_part(m)) return true;
+  return false;
+}
+
 void TrackResults::append(const TrackResults& from, std::size_t first, std::size_t last) {
   const auto begin = static_cast<std::int64_t>(first), end = static_cast<std::int64_t>(last);
   const auto copy = [](const auto& source, std::int64_t row, std::int64_t behind, auto& target) {

@@ -104,6 +104,7 @@ struct BlockResult : TrackResults {
     bool takes_part(std::size_t measurement) const {
       return residual_px[measurement].allFinite() && (kept.empty() || kept[measurement]);
     }
+    bool takes_part() const;  // some measurement does: else the position says nothing of the block
   };
   std::vector<ControlResult> control;  // in block order
 

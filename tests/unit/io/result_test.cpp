@@ -236,5 +236,17 @@ TEST(Reprojection, NothingOrientedGivesZeros) {
   EXPECT_EQ(statistics.mean_px, 0);
 }
 
+TEST(ControlResult, TakesPartWithOneMeasurement) {
+  const Eigen::Vector2d seen(0.1, -0.2), unseen = Eigen::Vector2d::Constant(std::nan(""));
+  const auto takes_part = [](std::vector<Eigen::Vector2d> residuals, std::vector<std::uint8_t> kept) {
+    return BlockResult::ControlResult{{1, 2, 3}, Eigen::Matrix3d::Identity(), residuals, kept}.takes_part();
+  };
+  EXPECT_TRUE(takes_part({unseen, seen}, {}));
+  EXPECT_TRUE(takes_part({seen, seen}, {0, 1}));
+  EXPECT_FALSE(takes_part({seen, unseen}, {0, 1}));
+  EXPECT_FALSE(takes_part({unseen}, {}));
+  EXPECT_FALSE(takes_part({}, {}));
+}
+
 }  // namespace
 }  // namespace megablock
