@@ -111,18 +111,19 @@ class AnalyticImage : public ceres::CostFunction {
   double inverse_sigma_;
 };
 
-// Cauchy's tail, which Ceres does not have.
+// Cauchy's tail, which Ceres does not have; up to it Ceres' Huber.
 class CauchyTail final : public ceres::LossFunction {
  public:
-  explicit CauchyTail(double scale) : square_(scale * scale) {}
+  explicit CauchyTail(double scale) : huber_(scale), square_(scale * scale) {}
   void Evaluate(double s, double rho[3]) const override {
-    const bool beyond = s > square_;
-    rho[0] = beyond ? square_ * (1 + std::log(s / square_)) : s;
-    rho[1] = beyond ? square_ / s : 1;
-    rho[2] = beyond ? -square_ / (s * s) : 0;
+    if (s <= 4 * square_) return huber_.Evaluate(s, rho);
+    rho[0] = square_ * (3 + 2 * std::log(s / (4 * square_)));
+    rho[1] = 2 * square_ / s;
+    rho[2] = -2 * square_ / (s * s);
   }
 
  private:
+  ceres::HuberLoss huber_;
   double square_;
 };
 

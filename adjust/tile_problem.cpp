@@ -14,16 +14,16 @@
 namespace megablock {
 
 std::array<double, 3> RobustLoss::evaluate_beyond(double squared_norm) const {
-  const double s = squared_norm, b = scale * scale;
+  const double s = squared_norm, b = scale * scale, end_of_line = 4 * b;  // of Cauchy's tail
   constexpr double kTiny = std::numeric_limits<double>::min();
-  if (kind == Kind::kHuber) {
+  if (kind == Kind::kHuber || (kind == Kind::kCauchyTail && s <= end_of_line)) {
     const double r = std::sqrt(s);
     const double first = std::max(kTiny, scale / r);
     return {2 * scale * r - b, first, -first / (2 * s)};
   }
   if (kind == Kind::kCauchyTail) {
-    const double first = b / s;
-    return {b * (1 + std::log(s / b)), std::max(kTiny, first), -first / s};
+    const double first = 2 * b / s;
+    return {b * (3 + 2 * std::log(s / end_of_line)), std::max(kTiny, first), -first / s};
   }
   const double sum = 1 + s / b, inverse = 1 / sum;  // Cauchy
   return {b * std::log(sum), std::max(kTiny, inverse), -inverse * inverse / b};

@@ -17,7 +17,7 @@ namespace megablock {
 // Algorithm number of each stage: part of its fingerprints, raised when its results change.
 namespace algorithm {
 inline constexpr int kFeatures = 1, kCandidates = 1, kMatching = 12, kTiles = 3, kTracks = 3, kOrientation = 9,
-                     kAdjustment = 16, kMerge = 18, kResult = 1;
+                     kAdjustment = 17, kMerge = 19, kResult = 1;
 }
 
 inline constexpr std::int64_t kShardImages = 64;  // images per unit of feature extraction

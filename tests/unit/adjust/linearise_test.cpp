@@ -300,19 +300,24 @@ TEST(RobustLoss, MatchesCeres) {
   }
 }
 
-TEST(RobustLoss, CauchysTailSquaresToItsCornerAndForgetsBeyond) {
-  const RobustLoss loss{RobustLoss::Kind::kCauchyTail, 3};
+// Squares to the corner, Huber's line to twice of it, Cauchy's logarithm beyond.
+TEST(RobustLoss, CauchysTailTakesGoodOnesForWhatTheyAreAndForgetsGrossOnes) {
+  const RobustLoss loss{RobustLoss::Kind::kCauchyTail, 3}, huber{RobustLoss::Kind::kHuber, 3};
   for (const double s : {0.0, 0.1, 4.0, 9.0}) EXPECT_EQ(loss.evaluate(s), (std::array<double, 3>{s, 1, 0}));
-  for (const double s : {9.0 + 1e-9, 12.0, 100.0, 1e6}) {
+  for (const double s : {9.0 + 1e-9, 12.0, 36.0}) EXPECT_EQ(loss.evaluate(s), huber.evaluate(s));
+  for (const double s : {10.0, 30.0, 36.0 + 1e-9, 40.0, 100.0, 1e6}) {
     const double h = 1e-4 * s;
     const auto [value, first, second] = loss.evaluate(s);
-    // Its derivative is Cauchy's far out, c^2 / s.
-    EXPECT_NEAR(first, 9 / s, 1e-15) << s;
-    EXPECT_NEAR(value, 9 + 9 * std::log(s / 9), 1e-14 * value) << s;
-    if (s < 10) continue;  // both sides beyond the corner
-    EXPECT_NEAR((loss.evaluate(s + h)[0] - loss.evaluate(s - h)[0]) / (2 * h), first, 1e-7 * first) << s;
+    const double slope = (loss.evaluate(s + h)[0] - loss.evaluate(s - h)[0]) / (2 * h);
+    EXPECT_NEAR(slope, first, 1e-4 * first) << s;
+    if (std::abs(s - 36) < 1) continue;  // the second derivative has a step there
+    EXPECT_NEAR(slope, first, 1e-7 * first) << s;
     EXPECT_NEAR((loss.evaluate(s + h)[1] - loss.evaluate(s - h)[1]) / (2 * h), second, -1e-7 * second) << s;
   }
+  // The pull rho' r falls with the distance r: 3 sigmas' at the end of the line, none from very far.
+  const auto pull = [&](double r) { return loss.evaluate(r * r)[1] * r; };
+  EXPECT_NEAR(pull(6), 3, 1e-14);
+  EXPECT_NEAR(pull(60), 0.3, 1e-14);
   EXPECT_GT(loss.evaluate(std::numeric_limits<double>::max())[1], 0);
 }
 

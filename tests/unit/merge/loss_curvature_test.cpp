@@ -143,6 +143,34 @@ TEST(PointRefinement, LeavesPointsWithoutTailAlone) {
   EXPECT_EQ(state.points, runner.states().front().points);
 }
 
+// Attitudes decide on rotations as much as tie points do, and one of five lies beyond their loss's corner.
+TEST(GlobalAdjustment, TakesFewStepsWithAttitudes) {
+  SimulationOptions options;
+  options.frames = 60;
+  options.points_per_frame = 60;
+  options.gps_sigma_m = 0.05;
+  options.attitude_sigma_deg = 0.02;
+  ObservationOptions observations;
+  observations.attitude_loss.scale = 2;
+  for (const std::uint64_t seed : {1, 2}) {
+    options.seed = seed;
+    const TiledBlock block(simulate_block(options), 25, observations, 0.01);
+    const auto beyond = std::ranges::count_if(block.whole.attitudes, [&](const auto& term) {
+      const FrameIndex frame = block.whole.frames[static_cast<std::size_t>(term.frame.value)];
+      const double s = linearise_attitude(block.simulated.truth.frames[frame], term.prior).residual.squaredNorm();
+      return !block.whole.attitude_loss.squares(s);
+    });
+    ASSERT_GE(beyond, 10);
+    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    GlobalOptions global;
+    global.max_decrement = 1e-6;
+    GlobalState state = start_global(global);
+    adjust_globally(runner, global, state);
+    EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
+    EXPECT_LE(state.iterations, 8) << describe(state);  // 11 to more than 30 with the logarithm from the corner on
+  }
+}
+
 TEST(GlobalAdjustment, TakesFewStepsWithHeavyTails) {
   const TiledBlock block(simulate_block(heavy_tailed()), 12, {}, 0.05);
   SerialRunner runner(block.tiles.tree, block.problems, block.states);
