@@ -24,7 +24,7 @@ struct RunOptions {
   int threads = 0;          // per rank; 0 = cores of the host / ranks on it
   double memory_mib = 0;    // per rank for factors of the merge; 0 = half of the host's memory / ranks on it
   double record_s = 30;     // of work between two records of a pass of the merge; 0: after every subtree
-  double scratch_mib = -1;  // per rank for factors spilled to the job's scratch; -1 = as long as its disk lasts
+  double scratch_mib = -1;  // per rank for the merge's files in the job's scratch; -1 = as long as its disk lasts
   bool strict = false;      // a failed unit ends the run
   bool quiet = false;       // no progress
   std::string last_stage;   // stop after this stage; empty = all

@@ -21,8 +21,13 @@ std::uint64_t hash_of(std::uint64_t state, const PassRecorder::Kind& kind) {
 
 }  // namespace
 
-PassRecorder::PassRecorder(std::string scratch_directory, double seconds)
-    : files_(std::move(scratch_directory)), seconds_(seconds), found_(files_.read()) {}
+PassRecorder::PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds)
+    : files_(std::move(scratch)), seconds_(seconds), found_(files_.read()) {}
+
+void PassRecorder::keep_found(std::uint64_t state) {
+  if (found_ && found_->state != state) found_.reset();
+  files_.keep_only(found_);
+}
 
 PassRecord PassRecorder::begin(const Kind& kind) {
   at_ = position_();
@@ -35,7 +40,7 @@ PassRecord PassRecorder::begin(const Kind& kind) {
     return *found;
   }
   files_.remove();  // before anything that it names is written over
-  if (found) written_.insert(found->subtrees.begin(), found->subtrees.end());
+  if (found) files_.remove_files_of(*found);
   for (const std::int64_t node : written_) files_.remove_update(node);
   written_.clear();
   return {};

@@ -7,6 +7,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -32,11 +33,13 @@ class PassRecorder {
   };
 
   // `seconds` between records; 0: one after every subtree.
-  PassRecorder(std::string scratch_directory, double seconds);
+  PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds);
 
   // The record that is there, of whatever pass.
   const std::optional<PassRecord>& found() const { return found_; }
-  void forget_found() { found_.reset(); }
+  // Before anything is written to the scratch directory: nothing that an earlier run left there stays, but for that
+  // record if it is of this state.
+  void keep_found(std::uint64_t state);
   void set_position(std::function<Position()> position) { position_ = std::move(position); }
 
   // What has been done of the pass that begins now; an empty record if nothing.
@@ -46,7 +49,7 @@ class PassRecorder {
   // Whether enough was done for a record of so many bytes. `leaves`: the subtree's update matrix goes to another rank
   // or into a front of several, where it cannot be had later.
   bool due(std::int64_t bytes, bool leaves) const;
-  // Update matrices of finished subtrees, which a record may name then; false: the disk is full.
+  // Update matrices of finished subtrees, which a record may name then; false: there is no room.
   bool write_updates(const std::map<std::int64_t, const UpdateMatrix*>& updates);
   // `record`: tiles, subtrees, factors, seams. Updates that it does not name are removed.
   void write(PassRecord record);

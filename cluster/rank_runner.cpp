@@ -48,7 +48,7 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
 
 RankRunner::RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
                        const MemoryOptions& memory, const NodeSolver& solver)
-    : ranks_(ranks), tiles_(tiles), solver_(solver), tile_plans_(memory.scratch_directory), factors_(memory) {
+    : ranks_(ranks), tiles_(tiles), solver_(solver), tile_plans_(memory.scratch), factors_(memory) {
   rank_of_node_.assign(tree.nodes.size(), 0);
   own_tile_of_node_.assign(tree.nodes.size(), -1);
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {

@@ -1,12 +1,10 @@
 #include "merge/memory.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "io/error.h"
-#include "merge/scratch_file.h"
 
 namespace megablock {
 
@@ -25,23 +23,13 @@ NodeFactors NodeFactors::read(ByteReader& in) {
   return factors;
 }
 
-void make_scratch_directory(const MemoryOptions& options) {
-  if (options.scratch_directory.empty()) return;
-  std::error_code error;
-  std::filesystem::create_directories(options.scratch_directory, error);
-  if (error)
-    throw InputError("cannot make the scratch directory " + options.scratch_directory + ": " + error.message());
-}
-
-FactorStore::FactorStore(MemoryOptions options) : options_(std::move(options)) { make_scratch_directory(options_); }
+FactorStore::FactorStore(MemoryOptions options) : options_(std::move(options)) {}
 
 FactorStore::~FactorStore() {
-  for (const std::string& path : files_) remove_scratch_file(path);
+  for (const std::int64_t node : written_) options_.scratch->remove(factor_file(node));
 }
 
-std::string factor_path(const std::string& scratch_directory, std::int64_t node) {
-  return scratch_directory + "/factor-" + std::to_string(node) + ".bin";
-}
+std::string factor_file(std::int64_t node) { return "factor-" + std::to_string(node) + ".bin"; }
 
 void FactorStore::put(std::int64_t node, NodeFactors factors, Loss loss) {
   if (const auto old = kept_.find(node); old != kept_.end()) {
@@ -77,12 +65,10 @@ void FactorStore::make_room() {
 
 bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
   if (spilled_.contains(node)) return true;
-  if (options_.scratch_directory.empty() || scratch_full_ ||
-      scratch_bytes_ + factors.byte_count() > options_.scratch_bytes)
-    return false;
-  const std::string path = factor_path(options_.scratch_directory, node);
-  files_.insert(path);
-  const bool whole = write_scratch_file(path, [&](std::ofstream& file) {
+  const std::string name = factor_file(node);
+  // Asked first: what has no room costs no copy.
+  if (scratch_full_ || !options_.scratch->reserve(name, factors.byte_count())) return false;
+  const bool whole = options_.scratch->write(name, [&](std::ostream& file) {
     ByteWriter writer(file);
     factors.write(writer);
   });
@@ -90,18 +76,18 @@ bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
     scratch_full_ = true;
     return false;
   }
-  spilled_[node] = path;
-  scratch_bytes_ += factors.byte_count();
+  spilled_.insert(node);
+  written_.insert(node);
   ++statistics_.spilled;
   return true;
 }
 
 const NodeFactors* FactorStore::get(std::int64_t node) {
   if (const auto entry = kept_.find(node); entry != kept_.end()) return &entry->second;
-  const auto entry = spilled_.find(node);
-  if (entry == spilled_.end()) return nullptr;
-  std::ifstream file(entry->second, std::ios::binary | std::ios::ate);
-  if (!file) throw StoreError("cannot read " + entry->second);
+  if (!spilled_.contains(node)) return nullptr;
+  const std::string path = options_.scratch->path(factor_file(node));
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) throw StoreError("cannot read " + path);
   const auto size = static_cast<std::size_t>(file.tellg());
   file.seekg(0);
   ByteReader reader(file, size);
@@ -126,12 +112,13 @@ void FactorStore::leave_room(std::int64_t bytes) {
 }
 
 void FactorStore::clear() {
+  for (const std::int64_t node : written_) options_.scratch->spare(factor_file(node));
   spilled_.clear();
   kept_.clear();
   node_by_time_.clear();
   time_of_node_.clear();
   never_lost_.clear();
-  bytes_ = others_ = scratch_bytes_ = 0;
+  bytes_ = others_ = 0;
   scratch_full_ = false;
   loaded_ = NodeFactors();
 }
@@ -147,19 +134,11 @@ bool FactorStore::copy_to_scratch() {
   return std::ranges::all_of(kept_, [&](const auto& entry) { return spill(entry.first, entry.second); });
 }
 
-std::vector<std::int64_t> FactorStore::nodes_in_scratch() const {
-  std::vector<std::int64_t> nodes;
-  for (const auto& [node, path] : spilled_) nodes.push_back(node);
-  return nodes;
-}
+std::vector<std::int64_t> FactorStore::nodes_in_scratch() const { return {spilled_.begin(), spilled_.end()}; }
 
 void FactorStore::adopt(const std::vector<std::int64_t>& nodes) {
-  for (const std::int64_t node : nodes) {
-    const std::string path = factor_path(options_.scratch_directory, node);
-    files_.insert(path);
-    spilled_[node] = path;
-    scratch_bytes_ += static_cast<std::int64_t>(std::filesystem::file_size(path));
-  }
+  spilled_.insert(nodes.begin(), nodes.end());
+  written_.insert(nodes.begin(), nodes.end());
 }
 
 }  // namespace megablock

@@ -1,35 +1,33 @@
 // What a rank keeps, and where: budgets, and the factors between the two passes. The tiles: tile_store.h.
 //
-// Keeping factors between the upward and the downward pass within a byte budget: in memory while they fit, else in a
-// scratch directory while its own budget and its disk last, else not at all (recomputed on the way down). The choice
-// never changes tiles or bits.
+// Keeping factors between the upward and the downward pass within a byte budget: in memory while they fit, else in the
+// rank's scratch directory while it has room (scratch_space.h), else not at all (recomputed on the way down). The
+// choice never changes tiles or bits.
 //
 // The downward pass visits nodes in the reverse order of the upward pass, so the earliest factor is needed last and
 // leaves first.
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "merge/condense.h"
+#include "merge/scratch_space.h"
 
 namespace megablock {
 
 struct MemoryOptions {
   std::int64_t factor_bytes = std::int64_t{4} << 30;  // budget of kept factors; the newest is kept in any case
-  // Of this process alone; empty: keep all tiles, recompute factors instead of spilling them.
-  std::string scratch_directory;
-  std::int64_t scratch_bytes = std::numeric_limits<std::int64_t>::max();  // budget of what is spilled
+  // Of this process alone; one nowhere: keep all tiles, recompute factors instead of spilling them.
+  std::shared_ptr<ScratchSpace> scratch = std::make_shared<ScratchSpace>();
   std::int64_t tile_bytes = std::int64_t{4} << 30;  // budget of tiles' measurements and points (tile_store.h)
 };
-// Makes it, where there is one. Throws InputError.
-void make_scratch_directory(const MemoryOptions& options);
 // Of a node's factors in a scratch directory.
-std::string factor_path(const std::string& scratch_directory, std::int64_t node);
+std::string factor_file(std::int64_t node);
 
 struct MemoryStatistics {
   std::int64_t put = 0, spilled = 0;  // factors put, moved to scratch
@@ -82,15 +80,15 @@ class FactorStore {
 
   MemoryOptions options_;
   MemoryStatistics statistics_;
-  std::int64_t bytes_ = 0, others_ = 0, scratch_bytes_ = 0, clock_ = 0;
+  std::int64_t bytes_ = 0, others_ = 0, clock_ = 0;
   bool scratch_full_ = false;                          // its disk
   std::map<std::int64_t, NodeFactors> kept_;           // by node
   std::map<std::int64_t, std::int64_t> node_by_time_;  // of kept ones
   std::map<std::int64_t, std::int64_t> time_of_node_;
   std::set<std::int64_t> never_lost_;
-  std::map<std::int64_t, std::string> spilled_;  // node -> file
-  std::set<std::string> files_;                  // also of passes before: written over
-  NodeFactors loaded_;                           // last one read back
+  std::set<std::int64_t> spilled_;  // nodes whose factors are in scratch
+  std::set<std::int64_t> written_;  // and those that passes before wrote: spare, to be written over
+  NodeFactors loaded_;              // last one read back
 };
 
 }  // namespace megablock

@@ -2,10 +2,11 @@
 
 #include <filesystem>
 #include <fstream>
+#include <numeric>
+#include <set>
 #include <system_error>
 
 #include "merge/memory.h"
-#include "merge/scratch_file.h"
 
 namespace megablock {
 
@@ -20,21 +21,29 @@ std::string start_of_machine() {
   return id;
 }
 
-}  // namespace
+constexpr const char* kRecord = "pass.bin";
 
-std::string PassRecordFiles::update_path(std::int64_t node) const {
-  return directory_ + "/update-" + std::to_string(node) + ".bin";
+std::string update_file(std::int64_t node) { return "update-" + std::to_string(node) + ".bin"; }
+
+// The record names them.
+std::vector<std::string> files_of(const PassRecord& record) {
+  std::vector<std::string> files;
+  for (const std::int64_t node : record.subtrees) files.push_back(update_file(node));
+  for (const std::int64_t node : record.factors) files.push_back(factor_file(node));
+  return files;
 }
 
+}  // namespace
+
 bool PassRecordFiles::write_update(std::int64_t node, const UpdateMatrix& update) const {
-  return write_scratch_file(update_path(node), [&](std::ofstream& file) {
+  return scratch_->write(update_file(node), [&](std::ostream& file) {
     ByteWriter writer(file);
     update.write(writer);
   });
 }
 
 UpdateMatrix PassRecordFiles::read_update(std::int64_t node) const {
-  const std::string path = update_path(node);
+  const std::string path = scratch_->path(update_file(node));
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) throw StoreError("cannot read " + path + " of the scratch directory; remove it and run again to resume");
   const auto size = static_cast<std::size_t>(file.tellg());
@@ -43,18 +52,16 @@ UpdateMatrix PassRecordFiles::read_update(std::int64_t node) const {
   return UpdateMatrix::read(reader);
 }
 
-void PassRecordFiles::remove_update(std::int64_t node) const { remove_scratch_file(update_path(node)); }
+void PassRecordFiles::remove_update(std::int64_t node) const { scratch_->remove(update_file(node)); }
 
 std::vector<std::int64_t> PassRecordFiles::sizes_of(const PassRecord& record) const {
   std::vector<std::int64_t> sizes;
-  const auto add = [&](const std::string& path) {
+  for (const std::string& file : files_of(record)) {
     std::error_code error;
-    const auto size = std::filesystem::file_size(path, error);
-    if (!error) sizes.push_back(static_cast<std::int64_t>(size));
-  };
-  for (const std::int64_t node : record.subtrees) add(update_path(node));
-  for (const std::int64_t node : record.factors) add(factor_path(directory_, node));
-  if (sizes.size() != record.subtrees.size() + record.factors.size()) sizes.clear();
+    const auto size = std::filesystem::file_size(scratch_->path(file), error);
+    if (error) return {};
+    sizes.push_back(static_cast<std::int64_t>(size));
+  }
   return sizes;
 }
 
@@ -62,8 +69,8 @@ bool PassRecordFiles::write(const PassRecord& record) const {
   const std::string start = start_of_machine();
   const std::vector<std::int64_t> sizes = sizes_of(record);
   if (start.empty() || sizes.empty()) return false;
-  const std::string next = record_path() + ".next";
-  const bool whole = write_scratch_file(next, [&](std::ofstream& file) {
+  const std::string next = std::string(kRecord) + ".next";
+  const bool whole = scratch_->write(next, [&](std::ostream& file) {
     ByteWriter writer(file);
     writer.value(kFormat);
     writer.bytes(start);
@@ -76,15 +83,13 @@ bool PassRecordFiles::write(const PassRecord& record) const {
     writer.values(record.seams);
     writer.values(sizes);
   });
-  std::error_code error;
-  if (whole) std::filesystem::rename(next, record_path(), error);
-  return whole && !error;
+  return whole && scratch_->rename(next, kRecord);
 }
 
 std::optional<PassRecord> PassRecordFiles::read() const {
   std::error_code error;
-  const auto size = std::filesystem::file_size(record_path(), error);
-  std::ifstream file(record_path(), std::ios::binary);
+  const auto size = std::filesystem::file_size(scratch_->path(kRecord), error);
+  std::ifstream file(scratch_->path(kRecord), std::ios::binary);
   if (error || !file) return std::nullopt;
   try {
     ByteReader reader(file, size);
@@ -99,12 +104,26 @@ std::optional<PassRecord> PassRecordFiles::read() const {
     record.seams = reader.values<SeamReport>();
     const auto sizes = reader.values<std::int64_t>();
     if (!reader.at_end() || sizes.empty() || sizes != sizes_of(record)) return std::nullopt;
+    if (std::accumulate(sizes.begin(), sizes.end(), static_cast<std::int64_t>(size)) > scratch_->budget())
+      return std::nullopt;
     return record;
   } catch (const StoreError&) {  // cut short
     return std::nullopt;
   }
 }
 
-void PassRecordFiles::remove() const { remove_scratch_file(record_path()); }
+void PassRecordFiles::remove() const { scratch_->remove(kRecord); }
+
+void PassRecordFiles::remove_files_of(const PassRecord& record) const {
+  for (const std::string& file : files_of(record)) scratch_->remove(file);
+}
+
+void PassRecordFiles::keep_only(const std::optional<PassRecord>& record) const {
+  if (!record) return scratch_->keep_only({});
+  const std::vector<std::string> files = files_of(*record);
+  std::set<std::string> kept(files.begin(), files.end());
+  kept.insert(kRecord);
+  scratch_->keep_only(kept);
+}
 
 }  // namespace megablock

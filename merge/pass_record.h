@@ -7,11 +7,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "merge/front.h"
+#include "merge/scratch_space.h"
 #include "merge/seam_check.h"
 
 namespace megablock {
@@ -29,27 +32,28 @@ struct PassRecord {
 // The record of one rank in its scratch directory.
 class PassRecordFiles {
  public:
-  explicit PassRecordFiles(std::string scratch_directory) : directory_(std::move(scratch_directory)) {}
+  explicit PassRecordFiles(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
 
-  // A subtree's update matrix; before the record that names it. False: the disk is full.
+  // A subtree's update matrix; before the record that names it. False: there is no room for it.
   bool write_update(std::int64_t node, const UpdateMatrix& update) const;
   // Throws StoreError.
   UpdateMatrix read_update(std::int64_t node) const;
   void remove_update(std::int64_t node) const;
 
-  // Replaces the record as a whole. False: the disk is full, or no start of a machine is to be told from another here.
+  // Replaces the record as a whole. False: there is no room, or no start of a machine is to be told from another here.
   bool write(const PassRecord& record) const;
-  // Nothing: there is none, it is of another start of the machine, or files that it names are gone or have another
-  // size.
+  // Nothing: there is none, it is of another start of the machine, files that it names are gone or have another size,
+  // or all of these are more than the scratch's budget.
   std::optional<PassRecord> read() const;
   void remove() const;  // the record alone
+  void remove_files_of(const PassRecord& record) const;
+  // Removes all files of the scratch directory but those of this record; nothing: all.
+  void keep_only(const std::optional<PassRecord>& record) const;
 
  private:
-  std::string update_path(std::int64_t node) const;
-  std::string record_path() const { return directory_ + "/pass.bin"; }
   std::vector<std::int64_t> sizes_of(const PassRecord& record) const;  // of its files; empty: one is not there
 
-  std::string directory_;
+  std::shared_ptr<ScratchSpace> scratch_;
 };
 
 }  // namespace megablock

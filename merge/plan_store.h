@@ -1,19 +1,21 @@
 // The plans of one rank's tiles: in memory, or in the rank's scratch directory beside the measurements of a tile that
-// is there (tile_store.h), read when they are asked for. A scratch disk that is full keeps them in memory; the choice
-// never changes bits.
+// is there (tile_store.h), read when they are asked for. What has no room there stays in memory; the choice never
+// changes bits.
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "merge/condense.h"
+#include "merge/scratch_space.h"
 
 namespace megablock {
 
 class PlanStore {
  public:
-  explicit PlanStore(std::string scratch_directory) : directory_(std::move(scratch_directory)) {}
+  explicit PlanStore(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
   ~PlanStore();  // removes its scratch files
   PlanStore(const PlanStore&) = delete;
   PlanStore& operator=(const PlanStore&) = delete;
@@ -29,9 +31,8 @@ class PlanStore {
     bool in_scratch = false;
     TilePlan plan;  // of a tile in memory
   };
-  std::string path(const Slot& slot) const;
 
-  std::string directory_;
+  std::shared_ptr<ScratchSpace> scratch_;
   std::vector<Slot> slots_;
   // What was read last.
   mutable TilePlan loaded_;

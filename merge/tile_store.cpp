@@ -1,12 +1,10 @@
 #include "merge/tile_store.h"
 
-#include <filesystem>
 #include <fstream>
 #include <utility>
 
 #include "io/error.h"
 #include "merge/packed_columns.h"
-#include "merge/scratch_file.h"
 
 namespace megablock {
 
@@ -40,12 +38,6 @@ std::int64_t byte_count(const RankTile& tile) {
   return bytes;
 }
 
-std::int64_t file_bytes(const std::string& path) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  return error ? 0 : static_cast<std::int64_t>(size);
-}
-
 template <typename ReadTables>
 void read_file(const std::string& path, ReadTables&& read_tables) {
   std::ifstream file(path, std::ios::binary);
@@ -53,30 +45,30 @@ void read_file(const std::string& path, ReadTables&& read_tables) {
   if (!file) throw StoreError("cannot read " + path + " of the scratch directory; run again to resume");
 }
 
-bool write_points(const std::string& path, const std::vector<Eigen::Vector3d>& points) {
-  return write_scratch_file(path, [&](std::ofstream& file) { write_column(file, points); });
+// The names of a tile's files; of two of points the present ones are in one, those of a trial in the other.
+std::string file_of(std::int64_t tile, const std::string& what) {
+  return "tile-" + std::to_string(tile) + "-" + what + ".bin";
+}
+std::string measurements_of(std::int64_t tile) { return file_of(tile, "measurements"); }
+std::string points_of(std::int64_t tile, int file) { return file_of(tile, "points-" + std::to_string(file)); }
+
+bool write_points(ScratchSpace& scratch, const std::string& name, const std::vector<Eigen::Vector3d>& points) {
+  return scratch.write(name, [&](std::ostream& file) { write_column(file, points); });
 }
 
 }  // namespace
 
-TileStore::TileStore(const MemoryOptions& options) : options_(options) { make_scratch_directory(options_); }
+TileStore::TileStore(const MemoryOptions& options) : options_(options) {}
 
 TileStore::~TileStore() {
-  for (const Slot& slot : slots_) remove_files(slot);
-}
-
-std::string TileStore::path(const Slot& slot, const char* what) const {
-  return options_.scratch_directory + "/tile-" + std::to_string(slot.tile.tile) + "-" + what + ".bin";
-}
-
-std::string TileStore::points_path(const Slot& slot, int file) const {
-  return path(slot, file == 0 ? "points-0" : "points-1");
+  for (const Slot& slot : slots_)
+    if (slot.in_scratch) remove_files(slot);
 }
 
 void TileStore::remove_files(const Slot& slot) const {
-  if (!slot.in_scratch) return;
-  for (const std::string& file : {path(slot, "measurements"), points_path(slot, 0), points_path(slot, 1)})
-    remove_scratch_file(file);
+  const std::int64_t tile = slot.tile.tile;
+  for (const std::string& file : {measurements_of(tile), points_of(tile, 0), points_of(tile, 1)})
+    options_.scratch->remove(file);
 }
 
 void TileStore::add(RankTile tile) {
@@ -84,8 +76,7 @@ void TileStore::add(RankTile tile) {
   Slot& slot = slots_.emplace_back();
   slot.tile = std::move(tile);
   const bool fits = kept_bytes_ + bytes <= options_.tile_bytes;
-  const bool room = !options_.scratch_directory.empty() && scratch_bytes_ + bytes <= options_.scratch_bytes;
-  if (fits || !room || !spill(slot)) {
+  if (fits || !options_.scratch->reserve(measurements_of(slot.tile.tile), bytes) || !spill(slot)) {
     kept_bytes_ += bytes;
     return;
   }
@@ -95,16 +86,16 @@ void TileStore::add(RankTile tile) {
 }
 
 bool TileStore::spill(Slot& slot) {
-  const bool whole = write_scratch_file(path(slot, "measurements"), [&](std::ofstream& file) {
+  const std::int64_t tile = slot.tile.tile;
+  const std::string points = points_of(tile, slot.points_file);
+  const auto write_tables = [&](std::ostream& file) {
     visit_tables([&](const auto& table) { write_column(file, table); }, slot.tile.problem);
-  });
-  scratch_bytes_ -= std::exchange(slot.scratch_bytes, 0);
-  if (whole && write_points(points_path(slot, slot.points_file), slot.tile.state.points)) {
-    slot.scratch_bytes = file_bytes(path(slot, "measurements")) + 2 * byte_count(slot.tile.state.points);
-    scratch_bytes_ += slot.scratch_bytes;
+  };
+  if (options_.scratch->write(measurements_of(tile), write_tables) &&
+      write_points(*options_.scratch, points, slot.tile.state.points) &&
+      options_.scratch->reserve(points_of(tile, 1 - slot.points_file), options_.scratch->bytes_of(points)))
     return true;
-  }
-  remove_scratch_file(path(slot, "measurements"));  // room for others
+  remove_files(slot);  // room for others
   return false;
 }
 
@@ -122,11 +113,11 @@ RankTile& TileStore::load(std::size_t row) {
     if (!before.points_here && !slot.points_here) slot.tile.state.points.swap(before.tile.state.points);
     forget(before);
   }
-  read_file(path(slot, "measurements"), [&](std::ifstream& file) {
+  read_file(options_.scratch->path(measurements_of(slot.tile.tile)), [&](std::ifstream& file) {
     visit_tables([&](auto& table) { read_column(file, table); }, slot.tile.problem);
   });
   if (!slot.points_here)
-    read_file(points_path(slot, slot.points_file),
+    read_file(options_.scratch->path(points_of(slot.tile.tile, slot.points_file)),
               [&](std::ifstream& file) { read_column(file, slot.tile.state.points); });
   loaded_ = static_cast<std::int64_t>(row);
   return slot.tile;
@@ -140,7 +131,6 @@ void TileStore::save(std::size_t row) {
   if (!slot.in_scratch) return;
   slot.points_here = false;
   if (spill(slot)) return;
-  remove_files(slot);
   slot.in_scratch = false;
   loaded_ = -1;
   --spilled_;
@@ -150,7 +140,8 @@ void TileStore::save(std::size_t row) {
 void TileStore::put_trial(std::size_t row, TileState trial) {
   Slot& slot = slots_[row];
   slot.trial = std::move(trial);
-  slot.trial_here = slot.in_scratch && !write_points(points_path(slot, 1 - slot.points_file), slot.trial.points);
+  slot.trial_here = slot.in_scratch && !write_points(*options_.scratch, points_of(slot.tile.tile, 1 - slot.points_file),
+                                                     slot.trial.points);
   if (slot.in_scratch && !slot.trial_here) std::exchange(slot.trial.points, {});
 }
 

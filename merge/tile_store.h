@@ -2,7 +2,8 @@
 // points lie in the rank's scratch directory and are read when the tile's turn comes, one tile at a time.
 //
 // Those in scratch are packed (packed_columns.h): about 15 bytes a measurement of a street instead of 39. Whether one
-// has room there is asked with its unpacked size and once; what is screened later may lengthen its flags' runs.
+// has room there (scratch_space.h), with a trial's points beside the present ones, is asked with its unpacked size and
+// once. What is screened later may lengthen its flags' runs; where these have no room the tile moves to memory.
 //
 // Which tiles stay is decided once, in the order in which they are added: passes go over all tiles again and again, now
 // upwards, now downwards, and with a fixed choice each of them reads the others exactly once. A scratch disk that is
@@ -30,7 +31,7 @@ struct RankTile {
 
 class TileStore {
  public:
-  // Uses options.tile_bytes and the scratch directory.
+  // Uses options.tile_bytes and the scratch.
   explicit TileStore(const MemoryOptions& options);
   ~TileStore();  // removes its scratch files
   TileStore(const TileStore&) = delete;
@@ -59,32 +60,28 @@ class TileStore {
   void accept();
   void reject();
 
-  std::int64_t spilled() const { return spilled_; }              // tiles in scratch
-  std::int64_t scratch_bytes() const { return scratch_bytes_; }  // of their files
-  std::int64_t kept_bytes() const { return kept_bytes_; }        // measurements and points in memory, all time
+  std::int64_t spilled() const { return spilled_; }        // tiles in scratch
+  std::int64_t kept_bytes() const { return kept_bytes_; }  // measurements and points in memory, all time
 
  private:
   struct Slot {
     RankTile tile;
     TileState trial;
     bool in_scratch = false;
-    std::int64_t scratch_bytes = 0;                // of its files, with the trial's
     bool points_here = false, trial_here = false;  // of a tile in scratch whose points did not fit there
     int points_file = 0;                           // of two: the present ones; the other has the trial's
   };
 
-  std::string path(const Slot& slot, const char* what) const;
-  std::string points_path(const Slot& slot, int file) const;
   RankTile& load(std::size_t row);
   void save(std::size_t row);
   void forget(Slot& slot);  // its measurements and points, which are in scratch
-  bool spill(Slot& slot);   // its files; false: the disk is full
+  bool spill(Slot& slot);   // its files; false, and none of them: they have no room
   void remove_files(const Slot& slot) const;
 
   MemoryOptions options_;
   std::vector<Slot> slots_;
   std::int64_t loaded_ = -1;  // row of the tile in scratch that is whole
-  std::int64_t kept_bytes_ = 0, scratch_bytes_ = 0, spilled_ = 0;
+  std::int64_t kept_bytes_ = 0, spilled_ = 0;
 };
 
 }  // namespace megablock

@@ -104,7 +104,8 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   command
       ->add_option(
           "--scratch", options->scratch_mib,
-          "Scratch per rank for these, MiB; beyond it (0: at once) tiles stay in memory, factors are computed again")
+          "All files per rank in the job's scratch during the merge, MiB; beyond it (0: at once) tiles stay in memory, "
+          "factors are computed again, passes are not recorded")
       ->check(not_negative());
   command
       ->add_option(

@@ -56,11 +56,10 @@ int most_rounds(const MergeSettings& settings) {
   return settings.estimate_sigmas ? std::max(settings.screening_rounds, kSigmaRounds) : settings.screening_rounds;
 }
 
-// Before a run (a killed one may have left files) and after it. The folder itself stays where another disk is mounted,
-// and so do the folders of ranks that `keep` theirs.
-void clear_scratch(Job& job, bool keep = false) {
+// The folder itself stays where another disk is mounted, and so do folders of this run's ranks while they `use` them.
+void clear_scratch(Job& job, bool use) {
   const std::vector<std::string> kept =  // ranks have removed their own files before they say so
-      job.ranks.gather_all(keep ? scratch_folder_of_rank(job) : std::string());
+      job.ranks.gather_all(use ? scratch_folder_of_rank(job) : std::string());
   on_first_rank(job.ranks, [&] {
     const std::filesystem::path folder(job.store.path("scratch"));
     std::error_code ignored;
@@ -125,10 +124,11 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   const std::optional<MergePosition> found = checkpoint.find();
   const MergePosition start =
       found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false)), {}};
-  PassRecorder recorder(memory_of_tiles(job).scratch_directory, job.options.record_s);
+  const MemoryOptions memory = memory_of_rank(job);
+  PassRecorder recorder(memory.scratch, job.options.record_s);
   const std::optional<MergePosition> within = checkpoint.find_pass(start, recorder);
-  clear_scratch(job, recorder.found().has_value());
-  TileStore tiles(memory_of_tiles(job));
+  clear_scratch(job, true);  // a killed run may have had more ranks
+  TileStore tiles(memory);
   Adjusted adjusted;
   BlockState& block = adjusted.state;
   block = load_block(job, inputs, checkpoint, found, rank_of_tile, tiles);
@@ -142,7 +142,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   for (;;) {
     const bool last = position.round >= most_rounds(job.settings.merge);
     const GlobalOptions options = options_of(job.settings.merge, frames, last);
-    RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(job, tiles));
+    RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
     runner.record_passes(recorder);
     return_freed_memory();  // what the plans were made from
     if (last) runner.expect_posterior();
@@ -269,7 +269,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
   const std::string reason = shortfall(adjusted);
   return_freed_memory();  // fronts, tiles
-  clear_scratch(job);
+  clear_scratch(job, false);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
   UnitEvent event;
   event.stage = "merge";

@@ -151,7 +151,7 @@ PassRecorder::Position MergeCheckpoint::of_pass(const MergePosition& position) c
 }
 
 std::optional<MergePosition> MergeCheckpoint::find_pass(const MergePosition& start, PassRecorder& recorder) {
-  if (recorder.found() && recorder.found()->state != of_pass(start).state) recorder.forget_found();
+  recorder.keep_found(of_pass(start).state);
   ByteWriter writer;
   writer.bytes(recorder.found() ? recorder.found()->position : Bytes());
   writer.value(recorder.found() ? recorder.found()->tiles : 0);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
+#include <memory>
 
 #include "adjust/image_sigma.h"
 #include "cluster/matrix_bytes.h"
@@ -119,20 +121,19 @@ std::int64_t screen(Job& job, TileStore& tiles) {
 
 std::string scratch_folder_of_rank(const Job& job) { return "rank-" + std::to_string(job.ranks.rank()); }
 
-MemoryOptions memory_of_tiles(const Job& job) {
+MemoryOptions memory_of_rank(const Job& job) {
+  const auto bytes = [](double mib) { return static_cast<std::int64_t>(mib * 1024 * 1024); };
   MemoryOptions memory;
-  memory.factor_bytes = static_cast<std::int64_t>(job.options.memory_mib * 1024 * 1024);
+  memory.factor_bytes = bytes(job.options.memory_mib);
   memory.tile_bytes = memory.factor_bytes / 2;
-  memory.scratch_directory = job.store.path("scratch/" + scratch_folder_of_rank(job));
-  if (job.options.scratch_mib >= 0)
-    memory.scratch_bytes = static_cast<std::int64_t>(job.options.scratch_mib * 1024 * 1024);
+  memory.scratch = std::make_shared<ScratchSpace>(
+      job.store.path("scratch/" + scratch_folder_of_rank(job)),
+      job.options.scratch_mib >= 0 ? bytes(job.options.scratch_mib) : std::numeric_limits<std::int64_t>::max());
   return memory;
 }
 
-MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles) {
-  MemoryOptions memory = memory_of_tiles(job);
+MemoryOptions memory_of_factors(MemoryOptions memory, const TileStore& tiles) {
   memory.factor_bytes = std::max<std::int64_t>(0, memory.factor_bytes - tiles.kept_bytes());
-  memory.scratch_bytes -= tiles.scratch_bytes();
   return memory;
 }
 

@@ -42,9 +42,9 @@ std::int64_t screen(Job& job, TileStore& tiles);
 
 // Of this rank, in the job's scratch.
 std::string scratch_folder_of_rank(const Job& job);
-// The memory of a rank: half of it for tiles; factors get what these leave of it.
-MemoryOptions memory_of_tiles(const Job& job);
-MemoryOptions memory_of_factors(const Job& job, const TileStore& tiles);
+// The memory of this rank, half of it for tiles, and its scratch, once a job; what tiles leave of it for factors.
+MemoryOptions memory_of_rank(const Job& job);
+MemoryOptions memory_of_factors(MemoryOptions memory, const TileStore& tiles);
 
 // What a runner's passes cost, over all ranks: a round of the merge.
 struct MergeCosts {

@@ -129,7 +129,7 @@ void from_scratch(benchmark::State& state) {
   const WholeTile& tile = tile_of(state);
   const ScratchDirectory scratch;
   MemoryOptions memory;
-  memory.scratch_directory = scratch.path("rank-0");
+  memory.scratch = std::make_shared<ScratchSpace>(scratch.path("rank-0"));
   memory.tile_bytes = 0;
   TileStore tiles(memory);
   for (std::int64_t number = 0; number < kTiles; ++number) tiles.add({number, tile.problem, tile.state});
@@ -140,7 +140,7 @@ void from_scratch(benchmark::State& state) {
   }
   count_observations(state, tile);
   state.counters["bytes_per_observation"] =
-      static_cast<double>(tiles.scratch_bytes()) / kTiles / static_cast<double>(tile.problem.observation_count());
+      static_cast<double>(memory.scratch->bytes()) / kTiles / static_cast<double>(tile.problem.observation_count());
 }
 
 void scenes(benchmark::internal::Benchmark* part) {

@@ -10,7 +10,6 @@
 
 #include "merge/memory.h"
 #include "merge/plan.h"
-#include "merge/scratch_file.h"
 #include "tests/unit/io/scratch_directory.h"
 
 namespace megablock {
@@ -121,16 +120,6 @@ class ScratchTest : public testing::Test {
   ScratchDirectory scratch_;
 };
 
-TEST_F(ScratchTest, FilesAreWrittenOverAndEndWhereTheyWereWritten) {
-  const std::string path = scratch_.path("file");
-  for (const std::string text : {"a long first text", "short", "and a longer one again"}) {
-    ASSERT_TRUE(write_scratch_file(path, [&](std::ofstream& file) { file << text; }));
-    std::ifstream in(path);
-    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), text);
-  }
-  EXPECT_FALSE(write_scratch_file(scratch_.path("no/such/file"), [](std::ofstream& file) { file << "text"; }));
-}
-
 TEST_F(ScratchTest, BytesOfAFileAreThoseOfMemory) {
   const std::vector<double> values = {1, 2, 3};
   std::stringstream file;
@@ -162,7 +151,7 @@ NodeFactors factors_of_size(std::size_t values) {
 }
 
 TEST_F(ScratchTest, FactorsMakeRoomForOthersAndAreDiscarded) {
-  FactorStore store({1 << 20, scratch_.path()});
+  FactorStore store({1 << 20, std::make_shared<ScratchSpace>(scratch_.path())});
   for (std::int64_t node = 0; node < 4; ++node) store.put(node, factors_of_size(20000));  // 160 kB each
   EXPECT_EQ(store.statistics().spilled, 0);
   store.leave_room(700 << 10);

@@ -28,8 +28,8 @@ NodeFactors made_up_factors(double value) {
 
 class PassRecordTest : public testing::Test {
  protected:
-  PassRecordTest() : files_(scratch_.path()) {
-    FactorStore store({4 << 20, scratch_.path()});
+  PassRecordTest() : files_(space()) {
+    FactorStore store({4 << 20, space()});
     std::filesystem::create_directory(scratch_.path("kept"));
     for (const std::int64_t node : {0, 1, 2}) store.put(node, made_up_factors(static_cast<double>(node)));
     EXPECT_EQ(store.bytes_without_copy(), 3 * made_up_factors(0).byte_count());
@@ -57,7 +57,10 @@ class PassRecordTest : public testing::Test {
     record.seams = {{2, 3.5, 4, 20}};
     return record;
   }
-  std::string factor(std::int64_t node) const { return factor_path(scratch_.path(), node); }
+  std::shared_ptr<ScratchSpace> space(std::int64_t budget = 1 << 20) const {
+    return std::make_shared<ScratchSpace>(scratch_.path(), budget);
+  }
+  std::string factor(std::int64_t node) const { return scratch_.path(factor_file(node)); }
   std::string path() const { return scratch_.path("pass.bin"); }
 
   ScratchDirectory scratch_;
@@ -81,7 +84,7 @@ TEST_F(PassRecordTest, ComesBack) {
 
 TEST_F(PassRecordTest, FactorsAreTakenOver) {
   {
-    FactorStore store({4 << 20, scratch_.path()});
+    FactorStore store({4 << 20, space()});
     store.adopt({0, 2});
     ASSERT_NE(store.get(2), nullptr);
     EXPECT_EQ(store.get(2)->front.factor, made_up_factors(2).front.factor);
@@ -120,6 +123,27 @@ TEST_F(PassRecordTest, NamesFilesThatAreThere) {
   EXPECT_THROW(files_.read_update(5), StoreError);
 }
 
+// What an earlier run left beside it is gone; a record that is more than the budget does not count.
+TEST_F(PassRecordTest, IsKeptAloneAndWithinTheBudget) {
+  std::ofstream(scratch_.path("tile-3-measurements.bin")) << "of a killed run";
+  std::int64_t all = static_cast<std::int64_t>(std::filesystem::file_size(path()));
+  for (const std::string& file :
+       {factor(0), factor(1), factor(2), scratch_.path("update-2.bin"), scratch_.path("update-5.bin")})
+    all += static_cast<std::int64_t>(std::filesystem::file_size(file));
+  EXPECT_FALSE(PassRecordFiles(space(all - 1)).read());
+  const auto enough = space(all);
+  const PassRecordFiles files(enough);
+  const auto found = files.read();
+  ASSERT_TRUE(found);
+  files.keep_only(found);
+  EXPECT_EQ(enough->bytes(), all);
+  EXPECT_FALSE(std::filesystem::exists(scratch_.path("tile-3-measurements.bin")));
+  EXPECT_TRUE(files.read());
+  files.keep_only(std::nullopt);
+  EXPECT_EQ(enough->bytes(), 0);
+  EXPECT_FALSE(std::filesystem::exists(factor(0)));
+}
+
 // Of another start of the machine: what was not on the disk then is lost.
 TEST_F(PassRecordTest, EndsWithTheMachine) {
   std::string start;
@@ -133,10 +157,10 @@ TEST_F(PassRecordTest, EndsWithTheMachine) {
 }
 
 TEST_F(PassRecordTest, AFullDiskHasNone) {
-  const PassRecordFiles nowhere(scratch_.path("no/such/folder"));
+  const PassRecordFiles nowhere(std::make_shared<ScratchSpace>());
   EXPECT_FALSE(nowhere.write_update(2, made_up_update(1)));
   EXPECT_FALSE(nowhere.write(record()));
-  FactorStore small({1 << 20, scratch_.path("small"), 1000});  // room for less than one
+  FactorStore small({1 << 20, std::make_shared<ScratchSpace>(scratch_.path("small"), 1000)});  // less than one
   small.put(0, made_up_factors(1));
   EXPECT_FALSE(small.copy_to_scratch());
   EXPECT_TRUE(small.nodes_in_scratch().empty());

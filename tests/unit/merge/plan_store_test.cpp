@@ -37,7 +37,7 @@ class PlanStoreTest : public testing::Test {
 
 TEST_F(PlanStoreTest, EveryPlanComesBack) {
   for (const bool to_scratch : {false, true}) {
-    PlanStore store(scratch.path());
+    PlanStore store(std::make_shared<ScratchSpace>(scratch.path()));
     for (std::size_t t = 0; t < plans.size(); ++t) store.add(static_cast<std::int64_t>(t), plans[t], to_scratch);
     EXPECT_EQ(std::filesystem::is_empty(scratch.path()), !to_scratch);
     ASSERT_GE(plans.size(), 3u);
@@ -56,10 +56,15 @@ TEST_F(PlanStoreTest, EveryPlanComesBack) {
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }
 
-TEST_F(PlanStoreTest, KeepsWhatTheDiskDoesNotTake) {
-  PlanStore store(scratch.path() + "/not_there");
-  store.add(0, plans[0], true);
-  EXPECT_EQ(bytes_of(store[0]), bytes_of(plans[0]));
+TEST_F(PlanStoreTest, KeepsWhatHasNoRoomInScratch) {
+  const auto size = static_cast<std::int64_t>(bytes_of(plans[0]).size());
+  for (const std::int64_t budget : {size - 1, size}) {
+    const auto space = std::make_shared<ScratchSpace>(scratch.path(), budget);
+    PlanStore store(space);
+    store.add(0, plans[0], true);
+    EXPECT_EQ(bytes_of(store[0]), bytes_of(plans[0]));
+    EXPECT_EQ(space->bytes(), budget == size ? size : 0);
+  }
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ class TileStoreTest : public testing::Test {
   // Room for about two of the five tiles.
   MemoryOptions options() const {
     MemoryOptions options;
-    options.scratch_directory = scratch_.path("rank-0");
+    options.scratch = std::make_shared<ScratchSpace>(scratch_.path("rank-0"));
     options.tile_bytes = 2 * 40 * (2 * 24 + 16 + 8 + 3 * 29) + 600;
     return options;
   }
@@ -94,23 +94,25 @@ TEST_F(TileStoreTest, EveryTileComesBackWhole) {
 
 // Of its files as they are, with a trial's points beside the present ones.
 TEST_F(TileStoreTest, CountsWhatIsInScratch) {
-  TileStore store(options());
+  const MemoryOptions memory = options();
+  const ScratchSpace& scratch = *memory.scratch;
+  TileStore store(memory);
   fill(store);
   const auto expected = [&] {
     std::int64_t bytes = 0;
     for (std::int64_t row = 0; row < kTiles; ++row)
       if (store.in_scratch(static_cast<std::size_t>(row)))
-        bytes += 2 * kPoints * 24 + static_cast<std::int64_t>(std::filesystem::file_size(
-                                        scratch_.path("rank-0/tile-" + std::to_string(row) + "-measurements.bin")));
+        bytes += 2 * (8 + kPoints * 24) + static_cast<std::int64_t>(std::filesystem::file_size(scratch_.path(
+                                              "rank-0/tile-" + std::to_string(row) + "-measurements.bin")));
     return bytes;
   };
-  const std::int64_t before = store.scratch_bytes();
+  const std::int64_t before = scratch.bytes();
   EXPECT_EQ(before, expected());
   EXPECT_GT(before, 3 * 2 * kPoints * 24);
   for (std::size_t row = 0; row < store.size(); ++row)
     store.change(row, [](RankTile& tile) { tile.problem.kept.assign(tile.problem.kept.size(), 1); });
-  EXPECT_EQ(store.scratch_bytes(), expected());
-  EXPECT_LT(store.scratch_bytes(), before);
+  EXPECT_EQ(scratch.bytes(), expected());
+  EXPECT_LT(scratch.bytes(), before);
 }
 
 TEST_F(TileStoreTest, ATileInScratchTakesNoMemory) {
@@ -167,7 +169,8 @@ TEST_F(TileStoreTest, TrialsAreTakenOrLeft) {
 
 // As on a disk that fills while the adjustment runs: the files cannot be written any more.
 TEST_F(TileStoreTest, NothingIsLostWhenTheScratchDiskFails) {
-  TileStore store(options());
+  const MemoryOptions memory = options();
+  TileStore store(memory);
   fill(store);
   const auto break_disk = [&] {
     std::filesystem::rename(scratch_.path("rank-0"), scratch_.path("gone"));
@@ -193,7 +196,7 @@ TEST_F(TileStoreTest, NothingIsLostWhenTheScratchDiskFails) {
     mend_disk();
   }
   EXPECT_EQ(store.spilled(), 0);
-  EXPECT_EQ(store.scratch_bytes(), 0);
+  EXPECT_EQ(memory.scratch->bytes(), 0);
   for (std::size_t row = 0; row < store.size(); ++row) {
     RankTile expected = made_up_tile(static_cast<std::int64_t>(row), kPoints);
     expected.problem.kept[0] = 1;
@@ -204,9 +207,9 @@ TEST_F(TileStoreTest, NothingIsLostWhenTheScratchDiskFails) {
 
 TEST_F(TileStoreTest, KeepsWhatHasNoRoomInScratch) {
   MemoryOptions none = options();
-  none.scratch_bytes = 0;
+  none.scratch = std::make_shared<ScratchSpace>(scratch_.path("none"), 0);
   MemoryOptions nowhere = options();
-  nowhere.scratch_directory.clear();
+  nowhere.scratch = std::make_shared<ScratchSpace>();
   for (const MemoryOptions& memory : {none, nowhere}) {
     TileStore store(memory);
     fill(store);
