@@ -290,7 +290,7 @@ void RankRunner::condense_tiles(std::span<const std::int64_t> leaves, const Pass
     const Stopwatch watch(seconds_.tiles);
     visit_in_rounds({std::ssize(leaves), prepare,
                      [&](std::int64_t i, std::int64_t cell) { tiles[at(i)]->condense(cell); }, finish,
-                     [&](std::int64_t i) { return !tiles_.in_scratch(row_of_leaf(leaves[at(i)])); }});
+                     [&](std::int64_t i) { return in_memory(row_of_leaf(leaves[at(i)])); }});
   }
   seconds_.tiles -= elsewhere;
 }
@@ -387,7 +387,7 @@ void RankRunner::try_steps(const std::vector<BlockMotion>& motions, const Pass& 
   visit_in_rounds({std::ssize(trials), prepare,
                    [&](std::int64_t row, std::int64_t portion) { trials[at(row)]->visit(portion); },
                    [&](std::int64_t row) { take(at(row), std::exchange(trials[at(row)], nullptr)->take()); },
-                   [&](std::int64_t row) { return !tiles_.in_scratch(at(row)); }});
+                   [&](std::int64_t row) { return in_memory(at(row)); }});
 }
 
 DownReport RankRunner::down(const Pass& pass) {

@@ -94,6 +94,8 @@ class RankRunner : public TreeRunner {
   std::size_t row_of_leaf(std::int64_t leaf) const {  // in tiles_, of a node that is one of this rank's tiles
     return static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(leaf)]);
   }
+  // Tile and plan of this row are there beside those of any other. A tile may leave scratch without its plan.
+  bool in_memory(std::size_t row) const { return !tiles_.in_scratch(row) && !tile_plans_.in_scratch(row); }
   UpdateMatrix keep(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
   // Tiles of these nodes, ascending; `take` gets one after the other.
   using TakeCondensation = std::function<void(std::size_t i, TileCondensation)>;

@@ -22,7 +22,8 @@ class PlanStore {
 
   // In the order of the tiles, `row` below counts them; `tile` is its number in the block.
   void add(std::int64_t tile, TilePlan plan, bool to_scratch);
-  // The reference holds until another row is asked for.
+  bool in_scratch(std::size_t row) const { return slots_[row].in_scratch; }
+  // The reference holds until another row is asked for that is in scratch.
   const TilePlan& operator[](std::size_t row) const;
 
  private:

@@ -42,6 +42,7 @@ TEST_F(PlanStoreTest, EveryPlanComesBack) {
     EXPECT_EQ(std::filesystem::is_empty(scratch.path()), !to_scratch);
     ASSERT_GE(plans.size(), 3u);
     for (const std::size_t t : {0u, 2u, 2u, 1u, 0u}) {
+      EXPECT_EQ(store.in_scratch(t), to_scratch);
       EXPECT_EQ(bytes_of(store[t]), bytes_of(plans[t])) << t;
       EXPECT_EQ(store[t].points.size(), plans[t].cells.node_of_leaf.size());
       for (std::size_t cell = 0; cell < plans[t].points.size(); ++cell) {
@@ -56,6 +57,19 @@ TEST_F(PlanStoreTest, EveryPlanComesBack) {
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }
 
+// Work on one tile goes on while another is begun: what is in memory stays where it is.
+TEST_F(PlanStoreTest, PlansInMemoryStandBesideThoseInScratch) {
+  PlanStore store(std::make_shared<ScratchSpace>(scratch.path()));
+  for (std::size_t t = 0; t < 3; ++t) store.add(static_cast<std::int64_t>(t), plans[t], t != 1);
+  const TilePlan& first = store[0];
+  const TilePlan& second = store[1];
+  EXPECT_TRUE(store.in_scratch(0));
+  EXPECT_FALSE(store.in_scratch(1));
+  EXPECT_EQ(bytes_of(first), bytes_of(plans[0]));
+  store[2];
+  EXPECT_EQ(bytes_of(second), bytes_of(plans[1]));
+}
+
 TEST_F(PlanStoreTest, KeepsWhatHasNoRoomInScratch) {
   const auto size = static_cast<std::int64_t>(bytes_of(plans[0]).size());
   for (const std::int64_t budget : {size - 1, size}) {
@@ -63,6 +77,7 @@ TEST_F(PlanStoreTest, KeepsWhatHasNoRoomInScratch) {
     PlanStore store(space);
     store.add(0, plans[0], true);
     EXPECT_EQ(bytes_of(store[0]), bytes_of(plans[0]));
+    EXPECT_EQ(store.in_scratch(0), budget == size);
     EXPECT_EQ(space->bytes(), budget == size ? size : 0);
   }
 }
