@@ -18,6 +18,9 @@
 
 namespace megablock {
 
+// Of memory or scratch of a rank, so that their bytes are far from the end of 64 bits.
+constexpr double kMostMib = 1e12;
+
 struct RunOptions {
   std::string project;      // block.yaml
   std::string directory;    // of the job

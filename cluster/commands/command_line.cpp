@@ -100,13 +100,13 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   command
       ->add_option("--memory", options->memory_mib,
                    "Memory per rank for tiles and factors of the merge, MiB; beyond it they go to the job's scratch")
-      ->check(not_negative());
+      ->check(mebibytes(kMostMib));
   command
       ->add_option(
           "--scratch", options->scratch_mib,
           "All files per rank in the job's scratch during the merge, MiB; beyond it (0: at once) tiles stay in memory, "
           "factors are computed again, passes are not recorded")
-      ->check(not_negative());
+      ->check(mebibytes(kMostMib));
   command
       ->add_option(
           "--record", options->record_s,

@@ -1,6 +1,8 @@
 // Checks of values on the command line, with messages of our own.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <string>
@@ -14,26 +16,30 @@ inline CLI::Validator named() {
       "named");
 }
 
-// A number of 0 or more.
-inline CLI::Validator not_negative() {
+// A number that `holds`; `words`: which numbers these are.
+template <typename Holds>
+CLI::Validator number(Holds holds, const std::string& words, const std::string& name) {
   return CLI::Validator(
-      [](std::string& text) {
-        double value = -1;
-        const bool number = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= 0;
-        return number ? std::string() : "'" + text + "' is not a number of 0 or more";
+      [=](std::string& text) {
+        double value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && holds(value);
+        return number ? std::string() : "'" + text + "' is not a number " + words;
       },
-      "NUMBER", "not negative");
+      "NUMBER", name);
 }
 
-// A number above 0.
+inline CLI::Validator not_negative() {
+  return number([](double value) { return value >= 0; }, "of 0 or more", "not negative");
+}
+
 inline CLI::Validator positive() {
-  return CLI::Validator(
-      [](std::string& text) {
-        double value = 0;
-        const bool number = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value > 0;
-        return number ? std::string() : "'" + text + "' is not a number above 0";
-      },
-      "NUMBER", "positive");
+  return number([](double value) { return value > 0; }, "above 0", "positive");
+}
+
+// Of memory or of a disk.
+inline CLI::Validator mebibytes(double most) {
+  return number([=](double value) { return value >= 0 && value <= most; }, fmt::format("of 0 to {:g} MiB", most),
+                "mebibytes");
 }
 
 }  // namespace megablock

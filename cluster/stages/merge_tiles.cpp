@@ -122,7 +122,7 @@ std::int64_t screen(Job& job, TileStore& tiles) {
 std::string scratch_folder_of_rank(const Job& job) { return "rank-" + std::to_string(job.ranks.rank()); }
 
 MemoryOptions memory_of_rank(const Job& job) {
-  const auto bytes = [](double mib) { return static_cast<std::int64_t>(mib * 1024 * 1024); };
+  const auto bytes = [](double mib) { return static_cast<std::int64_t>(std::min(mib, kMostMib) * 1024 * 1024); };
   MemoryOptions memory;
   memory.factor_bytes = bytes(job.options.memory_mib);
   memory.tile_bytes = memory.factor_bytes / 2;

@@ -59,6 +59,10 @@ class BadInput(CopyOfTheBlock):
         self.assertIn("Usage:", megablock("help"))
         said = megablock("run", self.project, "-j", self.job, "--threads", "two", expect=BAD_INPUT)
         self.assertIn("'two' is not a number of 0 or more; see 'megablock run --help'", said)
+        for option in ("--memory", "--scratch"):
+            for value in ("1e300", "1.1e12", "-1", "nan"):
+                said = megablock("run", self.project, "-j", self.job, option, value, expect=BAD_INPUT)
+                self.assertIn(f"{option}: '{value}' is not a number of 0 to 1e+12 MiB; see 'megablock run --help'", said)
         said = megablock("run", self.project, "-j", self.job, "--thread", "2", expect=BAD_INPUT)
         self.assertIn("argument '--thread' was not expected; did you mean '--threads'? see 'megablock run --help'", said)
         said = megablock("run", self.project, "--jobs=" + str(self.job), expect=BAD_INPUT)  # not: --job is required
