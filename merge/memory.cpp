@@ -1,10 +1,7 @@
 #include "merge/memory.h"
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
-
-#include "io/error.h"
 
 namespace megablock {
 
@@ -19,7 +16,6 @@ NodeFactors NodeFactors::read(ByteReader& in) {
   factors.tile = TileFactor::read(in);
   factors.front = FrontFactor::read(in);
   factors.condensed = UpdateMatrix::read(in);
-  if (!in.at_end()) throw StoreError("merge: a spilled factor has the wrong size");
   return factors;
 }
 
@@ -85,14 +81,11 @@ bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
 const NodeFactors* FactorStore::get(std::int64_t node) {
   if (const auto entry = kept_.find(node); entry != kept_.end()) return &entry->second;
   if (!spilled_.contains(node)) return nullptr;
-  const std::string path = options_.scratch->path(factor_file(node));
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) throw StoreError("cannot read " + path);
-  const auto size = static_cast<std::size_t>(file.tellg());
-  file.seekg(0);
-  ByteReader reader(file, size);
   loaded_ = NodeFactors();  // makes room first
-  loaded_ = NodeFactors::read(reader);
+  options_.scratch->read(factor_file(node), [&](std::istream& file, std::size_t size) {
+    ByteReader reader(file, size);
+    loaded_ = NodeFactors::read(reader);
+  });
   return &loaded_;
 }
 

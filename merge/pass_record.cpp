@@ -43,13 +43,12 @@ bool PassRecordFiles::write_update(std::int64_t node, const UpdateMatrix& update
 }
 
 UpdateMatrix PassRecordFiles::read_update(std::int64_t node) const {
-  const std::string path = scratch_->path(update_file(node));
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) throw StoreError("cannot read " + path + " of the scratch directory; remove it and run again to resume");
-  const auto size = static_cast<std::size_t>(file.tellg());
-  file.seekg(0);
-  ByteReader reader(file, size);
-  return UpdateMatrix::read(reader);
+  UpdateMatrix update;
+  scratch_->read(update_file(node), [&](std::istream& file, std::size_t size) {
+    ByteReader reader(file, size);
+    update = UpdateMatrix::read(reader);
+  });
+  return update;
 }
 
 void PassRecordFiles::remove_update(std::int64_t node) const { scratch_->remove(update_file(node)); }

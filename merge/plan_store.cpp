@@ -1,7 +1,6 @@
 #include "merge/plan_store.h"
 
-#include <filesystem>
-#include <fstream>
+#include <string>
 
 #include "merge/bytes.h"
 
@@ -32,13 +31,11 @@ const TilePlan& PlanStore::operator[](std::size_t row) const {
   const Slot& slot = slots_[row];
   if (!slot.in_scratch) return slot.plan;
   if (loaded_row_ == static_cast<std::int64_t>(row)) return loaded_;
-  const std::string path = scratch_->path(plan_of(slot.tile));
-  std::ifstream file(path, std::ios::binary);
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  ByteReader reader(file, error ? 0 : size);
   loaded_row_ = -1;
-  loaded_ = TilePlan::read(reader);
+  scratch_->read(plan_of(slot.tile), [&](std::istream& file, std::size_t size) {
+    ByteReader reader(file, size);
+    loaded_ = TilePlan::read(reader);
+  });
   loaded_row_ = static_cast<std::int64_t>(row);
   return loaded_;
 }

@@ -90,6 +90,19 @@ bool ScratchSpace::write(const std::string& name, const Write& write) {
   return true;
 }
 
+void ScratchSpace::read(const std::string& name, const Read& read) {
+  std::ifstream file(path(name), std::ios::binary | std::ios::ate);
+  const std::streamoff size = file.tellg();
+  file.seekg(0);
+  try {
+    if (file) read(file, static_cast<std::size_t>(size));
+    if (file && file.tellg() == size) return;
+  } catch (const StoreError&) {  // it does not say of which file
+  }
+  remove(name);
+  throw StoreError("cannot read " + path(name) + " of the scratch directory; run again to resume");
+}
+
 bool ScratchSpace::rename(const std::string& from, const std::string& to) {
   std::error_code error;
   std::filesystem::rename(path(from), path(to), error);

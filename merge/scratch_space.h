@@ -7,8 +7,10 @@
 // Where the budget ends a file fails as on a full disk: what it should have held stays with its owner.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <istream>
 #include <limits>
 #include <map>
 #include <ostream>
@@ -34,6 +36,10 @@ class ScratchSpace {
   // Leaves a file of what `write` writes. False, and no file: the disk is full, or the budget spent.
   using Write = std::function<void(std::ostream&)>;
   bool write(const std::string& name, const Write& write);
+  // Calls `read` with a file and its size. Throws StoreError, which names it, where it is not there, ends too early or
+  // has more than was read; and removes it then, so that a resumed run does without.
+  using Read = std::function<void(std::istream&, std::size_t)>;
+  void read(const std::string& name, const Read& read);
   // Holds so many bytes of the budget for a file, or what it has if that is more. False, and no file: there is no room.
   bool reserve(const std::string& name, std::int64_t bytes);
   bool rename(const std::string& from, const std::string& to);

@@ -1,9 +1,8 @@
 #include "merge/tile_store.h"
 
-#include <fstream>
+#include <string>
 #include <utility>
 
-#include "io/error.h"
 #include "merge/packed_columns.h"
 
 namespace megablock {
@@ -36,13 +35,6 @@ std::int64_t byte_count(const RankTile& tile) {
   std::int64_t bytes = 2 * byte_count(tile.state.points);
   visit_tables([&](const auto& table) { bytes += byte_count(table); }, tile.problem);
   return bytes;
-}
-
-template <typename ReadTables>
-void read_file(const std::string& path, ReadTables&& read_tables) {
-  std::ifstream file(path, std::ios::binary);
-  read_tables(file);
-  if (!file) throw StoreError("cannot read " + path + " of the scratch directory; run again to resume");
 }
 
 // The names of a tile's files; of two of points the present ones are in one, those of a trial in the other.
@@ -113,12 +105,13 @@ RankTile& TileStore::load(std::size_t row) {
     if (!before.points_here && !slot.points_here) slot.tile.state.points.swap(before.tile.state.points);
     forget(before);
   }
-  read_file(options_.scratch->path(measurements_of(slot.tile.tile)), [&](std::ifstream& file) {
+  const std::int64_t tile = slot.tile.tile;
+  options_.scratch->read(measurements_of(tile), [&](std::istream& file, std::size_t) {
     visit_tables([&](auto& table) { read_column(file, table); }, slot.tile.problem);
   });
   if (!slot.points_here)
-    read_file(options_.scratch->path(points_of(slot.tile.tile, slot.points_file)),
-              [&](std::ifstream& file) { read_column(file, slot.tile.state.points); });
+    options_.scratch->read(points_of(tile, slot.points_file),
+                           [&](std::istream& file, std::size_t) { read_column(file, slot.tile.state.points); });
   loaded_ = static_cast<std::int64_t>(row);
   return slot.tile;
 }

@@ -144,28 +144,5 @@ TEST_F(ScratchTest, BytesOfAFileAreThoseOfMemory) {
   EXPECT_THROW(truncated.bytes(), StoreError);
 }
 
-NodeFactors factors_of_size(std::size_t values) {
-  NodeFactors factors;
-  factors.front.factor.assign(values, 1.5);
-  return factors;
-}
-
-TEST_F(ScratchTest, FactorsMakeRoomForOthersAndAreDiscarded) {
-  FactorStore store({1 << 20, std::make_shared<ScratchSpace>(scratch_.path())});
-  for (std::int64_t node = 0; node < 4; ++node) store.put(node, factors_of_size(20000));  // 160 kB each
-  EXPECT_EQ(store.statistics().spilled, 0);
-  store.leave_room(700 << 10);
-  EXPECT_EQ(store.statistics().spilled, 2);
-  for (std::int64_t node = 0; node < 4; ++node) {
-    ASSERT_NE(store.get(node), nullptr);
-    EXPECT_EQ(store.get(node)->front.factor.size(), 20000U);
-  }
-  store.discard(0);
-  store.discard(3);
-  EXPECT_EQ(store.get(0), nullptr);
-  EXPECT_EQ(store.get(3), nullptr);
-  EXPECT_NE(store.get(2), nullptr);
-}
-
 }  // namespace
 }  // namespace megablock

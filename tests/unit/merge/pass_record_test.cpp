@@ -9,6 +9,7 @@
 #include "io/error.h"
 #include "merge/memory.h"
 #include "tests/unit/io/scratch_directory.h"
+#include "tests/unit/merge/damaged_scratch.h"
 
 namespace megablock {
 namespace {
@@ -142,6 +143,15 @@ TEST_F(PassRecordTest, IsKeptAloneAndWithinTheBudget) {
   files.keep_only(std::nullopt);
   EXPECT_EQ(enough->bytes(), 0);
   EXPECT_FALSE(std::filesystem::exists(factor(0)));
+}
+
+TEST_F(PassRecordTest, NamesAnUpdateThatIsDamagedAndCountsNoMore) {
+  const std::string file = scratch_.path("update-5.bin");
+  const auto size = std::filesystem::file_size(file);
+  std::filesystem::resize_file(file, size - 1);
+  expect_named([&] { files_.read_update(5); }, file);
+  EXPECT_FALSE(files_.read());
+  expect_named([&] { files_.read_update(5); }, file);
 }
 
 // Of another start of the machine: what was not on the disk then is lost.

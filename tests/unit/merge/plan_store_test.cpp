@@ -6,12 +6,13 @@
 #include <filesystem>
 
 #include "tests/unit/io/scratch_directory.h"
+#include "tests/unit/merge/damaged_scratch.h"
 #include "tests/unit/merge/tiled_block.h"
 
 namespace megablock {
 namespace {
 
-Bytes bytes_of(const TilePlan& plan) {
+Bytes plan_bytes(const TilePlan& plan) {
   ByteWriter writer;
   plan.write(writer);
   return writer.take();
@@ -43,7 +44,7 @@ TEST_F(PlanStoreTest, EveryPlanComesBack) {
     ASSERT_GE(plans.size(), 3u);
     for (const std::size_t t : {0u, 2u, 2u, 1u, 0u}) {
       EXPECT_EQ(store.in_scratch(t), to_scratch);
-      EXPECT_EQ(bytes_of(store[t]), bytes_of(plans[t])) << t;
+      EXPECT_EQ(plan_bytes(store[t]), plan_bytes(plans[t])) << t;
       EXPECT_EQ(store[t].points.size(), plans[t].cells.node_of_leaf.size());
       for (std::size_t cell = 0; cell < plans[t].points.size(); ++cell) {
         EXPECT_EQ(store[t].points[cell].rows(), plans[t].points[cell].rows());
@@ -65,21 +66,29 @@ TEST_F(PlanStoreTest, PlansInMemoryStandBesideThoseInScratch) {
   const TilePlan& second = store[1];
   EXPECT_TRUE(store.in_scratch(0));
   EXPECT_FALSE(store.in_scratch(1));
-  EXPECT_EQ(bytes_of(first), bytes_of(plans[0]));
+  EXPECT_EQ(plan_bytes(first), plan_bytes(plans[0]));
   store[2];
-  EXPECT_EQ(bytes_of(second), bytes_of(plans[1]));
+  EXPECT_EQ(plan_bytes(second), plan_bytes(plans[1]));
 }
 
 TEST_F(PlanStoreTest, KeepsWhatHasNoRoomInScratch) {
-  const auto size = static_cast<std::int64_t>(bytes_of(plans[0]).size());
+  const auto size = static_cast<std::int64_t>(plan_bytes(plans[0]).size());
   for (const std::int64_t budget : {size - 1, size}) {
     const auto space = std::make_shared<ScratchSpace>(scratch.path(), budget);
     PlanStore store(space);
     store.add(0, plans[0], true);
-    EXPECT_EQ(bytes_of(store[0]), bytes_of(plans[0]));
+    EXPECT_EQ(plan_bytes(store[0]), plan_bytes(plans[0]));
     EXPECT_EQ(store.in_scratch(0), budget == size);
     EXPECT_EQ(space->bytes(), budget == size ? size : 0);
   }
+}
+
+TEST_F(PlanStoreTest, NamesAFileThatIsDamaged) {
+  PlanStore store(std::make_shared<ScratchSpace>(scratch.path()));
+  store.add(7, plans[0], true);
+  const std::string file = scratch.path("tile-7-plan.bin");
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 1);
+  expect_named([&] { store[0]; }, file);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "io/error.h"
 #include "tests/unit/io/scratch_directory.h"
+#include "tests/unit/merge/damaged_scratch.h"
 
 namespace megablock {
 namespace {
@@ -98,6 +99,27 @@ TEST_F(ScratchSpaceTest, ReservedBytesAreNobodyElses) {
   EXPECT_FALSE(there("a"));
   space.remove("b");
   EXPECT_EQ(space.bytes(), 0);
+}
+
+TEST_F(ScratchSpaceTest, AFileThatIsNotWhatWasWrittenIsNamedAndGone) {
+  ScratchSpace space(scratch_.path());
+  const auto read = [&] {
+    std::string found(20, ' ');
+    space.read("file", [&](std::istream& file, std::size_t) { file.read(found.data(), 20); });
+    return found;
+  };
+  for (const std::size_t bytes : {19U, 20U, 21U}) {
+    EXPECT_TRUE(put(space, "file", 20));
+    std::filesystem::resize_file(scratch_.path("file"), bytes);
+    if (bytes == 20) {
+      EXPECT_EQ(read(), std::string(20, 'f'));
+      continue;
+    }
+    expect_named([&] { read(); }, scratch_.path("file"));
+    EXPECT_FALSE(there("file"));
+    EXPECT_EQ(space.bytes(), 0);
+  }
+  expect_named([&] { read(); }, scratch_.path("file"));
 }
 
 TEST_F(ScratchSpaceTest, RenamedFilesTakeThePlaceOfOthers) {
