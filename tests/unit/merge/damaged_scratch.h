@@ -1,9 +1,12 @@
-// What is said of a file of the scratch directory that cannot be read.
+// A scratch directory that fails: what is said of a file that cannot be read, and a disk that is full.
 #pragma once
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <string>
+#include <utility>
 
 #include "io/error.h"
 
@@ -19,5 +22,23 @@ void expect_named(Read&& read, const std::string& file) {
     EXPECT_EQ(std::string(error.what()), "cannot read " + file + " of the scratch directory; run again to resume");
   }
 }
+
+// As on a disk that is full, no file of the folder can be written, or read, while this lives.
+class BrokenDisk {
+ public:
+  explicit BrokenDisk(std::string folder) : folder_(std::move(folder)), aside_(folder_ + "-aside") {
+    std::filesystem::rename(folder_, aside_);
+    std::ofstream(folder_) << "in the way";
+  }
+  ~BrokenDisk() {
+    std::filesystem::remove(folder_);
+    std::filesystem::rename(aside_, folder_);
+  }
+  BrokenDisk(const BrokenDisk&) = delete;
+  BrokenDisk& operator=(const BrokenDisk&) = delete;
+
+ private:
+  const std::string folder_, aside_;
+};
 
 }  // namespace megablock

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "tests/unit/io/scratch_directory.h"
 #include "tests/unit/merge/damaged_scratch.h"
@@ -167,33 +166,23 @@ TEST_F(TileStoreTest, TrialsAreTakenOrLeft) {
   }
 }
 
-// As on a disk that fills while the adjustment runs: the files cannot be written any more.
+// The disk fills while the adjustment runs.
 TEST_F(TileStoreTest, NothingIsLostWhenTheScratchDiskFails) {
   const MemoryOptions memory = options();
   TileStore store(memory);
   fill(store);
-  const auto break_disk = [&] {
-    std::filesystem::rename(scratch_.path("rank-0"), scratch_.path("gone"));
-    std::ofstream(scratch_.path("rank-0")) << "in the way";
-  };
-  const auto mend_disk = [&] {
-    std::filesystem::remove(scratch_.path("rank-0"));
-    std::filesystem::rename(scratch_.path("gone"), scratch_.path("rank-0"));
-  };
   // Points of a step that find no room stay in memory...
   for (std::size_t row = 0; row < store.size(); ++row) {
     TileState trial = moved(store.whole(row).state, 2);
-    break_disk();
+    const BrokenDisk disk(scratch_.path("rank-0"));
     store.put_trial(row, std::move(trial));
-    mend_disk();
   }
   store.accept();
   // ... and so do whole tiles.
   for (std::size_t row = 0; row < store.size(); ++row) {
     store.whole(row);
-    break_disk();
+    const BrokenDisk disk(scratch_.path("rank-0"));
     store.change(row, [](RankTile& tile) { tile.problem.kept[0] = 1; });
-    mend_disk();
   }
   EXPECT_EQ(store.spilled(), 0);
   EXPECT_EQ(memory.scratch->bytes(), 0);
