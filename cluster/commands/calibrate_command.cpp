@@ -1,8 +1,10 @@
 #include "cluster/commands/calibrate_command.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "cluster/collective.h"
@@ -76,7 +78,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
       ->check(named())
       ->capture_default_str();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
-      ->check(not_negative());
+      ->check(threads());
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   add_rig_options(*command, *settings);
   auto modes = std::make_shared<std::vector<CalibrateMode>>();  // each added here by a function of its own file
@@ -85,7 +87,11 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   command->callback([=, &action, &ranks] {
     action = [options, settings, modes, &ranks] {
       on_first_rank(ranks, [&] {
-        check_output(options->directory + "/" + kCalibration, inputs_of(options->project, "calibration"), kCalibration);
+        const std::vector<std::string> inputs = inputs_of(options->project, "calibration");
+        check_output(options->directory + "/" + kCalibration, inputs, kCalibration);
+        // That of rigs goes on in its own job directory; other modes have none.
+        if (std::ranges::any_of(*modes, [](const CalibrateMode& mode) { return mode.chosen(); }))
+          check_output(options->directory, inputs);
         return std::string();
       });
       for (const CalibrateMode& mode : *modes)

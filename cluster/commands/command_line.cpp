@@ -96,7 +96,7 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
       ->check(named())
       ->required();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
-      ->check(not_negative());
+      ->check(threads());
   command
       ->add_option("--memory", options->memory_mib,
                    "Memory per rank for tiles and factors of the merge, MiB; beyond it they go to the job's scratch")

@@ -36,6 +36,12 @@ inline CLI::Validator positive() {
   return number([](double value) { return value > 0; }, "above 0", "positive");
 }
 
+// Of a process; 0: as many as there are cores. Each has a stack and tables of its own, so that thousands of them end a
+// process without a word.
+inline CLI::Validator threads() {
+  return number([](double value) { return value >= 0 && value <= 1024; }, "of 0 to 1024", "threads");
+}
+
 // Of memory or of a disk.
 inline CLI::Validator mebibytes(double most) {
   return number([=](double value) { return value >= 0 && value <= most; }, fmt::format("of 0 to {:g} MiB", most),

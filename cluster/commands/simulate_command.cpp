@@ -222,7 +222,7 @@ void add_simulate(CLI::App& app, Action& action) {
   add_prior_options(*options);
   command->add_option("-o,--output", options->output, "Folder to write")->check(named())->required();
   command->add_flag("--overwrite", options->overwrite, "Overwrite a block.yaml that was edited since");
-  command->add_option("--threads", options->threads, "Threads; 0 = cores of the host")->check(not_negative());
+  command->add_option("--threads", options->threads, "Threads; 0 = cores of the host")->check(threads());
   command->callback([=, &action] {
     action = [options] {
       const SimulationOptions simulation = options->settled();

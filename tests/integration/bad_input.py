@@ -58,7 +58,11 @@ class BadInput(CopyOfTheBlock):
         self.assertIn("Usage:", megablock(expect=BAD_INPUT))
         self.assertIn("Usage:", megablock("help"))
         said = megablock("run", self.project, "-j", self.job, "--threads", "two", expect=BAD_INPUT)
-        self.assertIn("'two' is not a number of 0 or more; see 'megablock run --help'", said)
+        self.assertIn("'two' is not a number of 0 to 1024; see 'megablock run --help'", said)
+        for value in ("-3", "1025", "99999999", "1e9"):
+            for command in (("run", self.project, "-j", self.job), ("simulate", "-o", self.folder / "simulated")):
+                said = megablock(*command, "--threads", value, expect=BAD_INPUT)
+                self.assertIn(f"--threads: '{value}' is not a number of 0 to 1024; see 'megablock {command[0]} --help'", said)
         for option in ("--memory", "--scratch"):
             for value in ("1e300", "1.1e12", "-1", "nan"):
                 said = megablock("run", self.project, "-j", self.job, option, value, expect=BAD_INPUT)

@@ -105,6 +105,9 @@ class BadInputJob(CopyOfTheBlock):
                 self.assertIn(f"{output}: {'is an input' if output in (*inputs, link) else 'belongs to the job dir'}", line)
         for command in (("masks", given / "block.yaml"), ("verticals", given / "block.yaml"), ("simulate", "--frames", 6)):
             self.assertIn("belongs to the job", one_line(megablock(*command, "-o", self.job / "merge", expect=BAD_INPUT)))
+        for output, words in ((self.job, "belongs to the job"), (given / "block.yaml", "is an input")):
+            said = one_line(megablock("calibrate", "--compare-models", self.job, "-o", output, expect=BAD_INPUT))
+            self.assertIn(f"{output}: {words}", said)
         for project_reader in ("verticals", "resect"):
             for output in inputs:
                 said = one_line(megablock(project_reader, given / "block.yaml", "-o", output, expect=BAD_INPUT))
