@@ -32,9 +32,9 @@ namespace megablock {
 
 struct RobustLoss {
   // Cauchy's tail: Huber's up to 2c, 3c^2 + 2c^2 log(s / 4c^2) beyond; Hampel's three parts are like it. It takes good
-  // observations for what they are, so that their sigmas and chi-square stay true, and forgets gross ones. The line from
-  // c to 2c is for what good ones lie there, three attitudes in a hundred: along a residual under the logarithm the cost
-  // curves downwards, which no step may use (merge/tile_linearisation.h), so that steps end by a constant factor each.
+  // observations for what they are, so that their sigmas and chi-square stay true, and forgets gross ones. Between c and
+  // 2c lie three good attitudes in a hundred. Under the logarithm they would come closer by a constant factor a step
+  // only, as the cost curves downwards there, which no step may use (merge/tile_linearisation.h).
   enum class Kind : std::uint8_t { kNone, kHuber, kCauchy, kCauchyTail };
   Kind kind = Kind::kNone;
   double scale = 1;  // in sigmas: the corner c, Cauchy's scale

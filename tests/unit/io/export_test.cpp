@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
-#include <set>
 #include <sstream>
 
 #include "geometry/angles.h"
@@ -474,37 +473,6 @@ TEST(Export, GeoJsonFootprintsLieUnderTheCamera) {
   result.block.ground = GroundFrame{};
   EXPECT_THAT(message_of<InputError>([&] { export_result(result, "geojson", folder.path("f.geojson")); }),
               HasSubstr("not georeferenced"));
-}
-
-TEST(Export, SaysWhichFilesItWrites) {
-  const BlockResult result = small_result();
-  for (const std::string& format : export_formats()) {
-    ScratchDirectory folder;
-    export_result(result, format, folder.path("out"));
-    std::set<std::string> written;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path()))
-      if (entry.is_regular_file()) written.insert(entry.path().string());
-    const std::vector<std::string> said = export_files(format, folder.path("out"));
-    EXPECT_EQ(written, std::set<std::string>(said.begin(), said.end())) << format;
-  }
-}
-
-TEST(Export, RefusesUnknownFormatsAndPlacesItCannotWrite) {
-  ScratchDirectory folder;
-  const BlockResult result = small_result();
-  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "kml", folder.path("x")); }),
-              HasSubstr("'kml' is no export format; they are colmap-text, "));
-  for (const std::string& format : export_formats())  // a place that is mistyped
-    EXPECT_THAT(
-        message_of<InputError>([&] { export_result(result, format, folder.path("nowhere/out/")); }),
-        HasSubstr("nowhere/out/: the folder '" + folder.path("nowhere") + "' does not exist; make it, or check"));
-  EXPECT_FALSE(std::filesystem::exists(folder.path("nowhere")));
-  write_file(folder.path("file"), "in the way");
-  EXPECT_THAT(message_of<InputError>([&] { export_result(result, "csv", folder.path("file")); }),
-              HasSubstr("file: cannot be created as a directory: a file is where a directory is needed; move it away"));
-  for (const std::string& format : export_formats())
-    EXPECT_NE(message_of<Error>([&] { export_result(result, format, folder.path("file/out")); }), "") << format;
-  EXPECT_NE(message_of<InputError>([&] { export_result(result, "bal", "/dev/full"); }), "");
 }
 
 }  // namespace
