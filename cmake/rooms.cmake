@@ -1,5 +1,5 @@
-# A room is a folder of sources that becomes one static library, megablock::<room>.
-# Every .cpp directly in the folder, or in one of its sub-folders other than `main` and `module`, belongs to it.
+# A room is a folder of sources that becomes one static library, megablock::<room>. Every .cpp in the folder and in the
+# folders below it belongs to it, except those in a folder named `main` or `module`.
 # Files named *_avx2.cpp are compiled for AVX2 and FMA, *_avx512.cpp for AVX-512, *_portable.cpp for any processor; they
 # hold raw-pointer kernels only, reached by run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them:
 # their ABI depends on the flags). Without errno a square root is one instruction.
@@ -53,8 +53,8 @@ set(megablock_avx512_options -mavx512f -mavx512dq -mavx512vl -mprefer-vector-wid
 
 function(megablock_room name)
   cmake_parse_arguments(ROOM "" "" "DEPENDS" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${name}/*.cpp ${name}/*/*.cpp)
-  list(FILTER sources EXCLUDE REGEX "/${name}/(main|module)/")
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${name}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "^${PROJECT_SOURCE_DIR}/${name}/(.*/)?(main|module)/")
   if(NOT sources)
     set(type INTERFACE)
     add_library(megablock_${name} INTERFACE)
@@ -86,7 +86,7 @@ endfunction()
 # One test program from the .cpp files of a folder under tests/, all of its cases labelled.
 function(megablock_tests target folder)
   cmake_parse_arguments(TESTS "" "LABEL;TIMEOUT" "LINK" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp)
   if(NOT sources)
     return()
   endif()

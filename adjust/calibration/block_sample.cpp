@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "io/error.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

@@ -1,8 +1,8 @@
 // A connected part of a block, small enough to be adjusted many times.
 #pragma once
 
-#include "io/block.h"
-#include "io/tracks.h"
+#include "io/block/block.h"
+#include "io/block/tracks.h"
 
 namespace megablock {
 

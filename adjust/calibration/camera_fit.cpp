@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "geometry/decompositions.h"
+#include "geometry/numbers/decompositions.h"
 
 namespace megablock {
 

@@ -3,7 +3,7 @@
 // compared, and the way to bring a calibration into a program that knows other models.
 #pragma once
 
-#include "geometry/camera.h"
+#include "geometry/camera/camera.h"
 
 namespace megablock {
 

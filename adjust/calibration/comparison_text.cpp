@@ -2,9 +2,9 @@
 #include <fmt/core.h>
 
 #include "adjust/calibration/model_comparison.h"
-#include "io/report/drawing.h"
-#include "io/report/html.h"
-#include "io/report/page.h"
+#include "io/report/drawing/drawing.h"
+#include "io/report/drawing/html.h"
+#include "io/report/drawing/page.h"
 
 namespace megablock {
 

@@ -2,7 +2,7 @@
 // those that they do.
 #pragma once
 
-#include "geometry/intrinsics.h"
+#include "geometry/camera/intrinsics.h"
 
 namespace megablock {
 

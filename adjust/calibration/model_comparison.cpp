@@ -9,8 +9,8 @@
 #include "adjust/calibration/camera_fit.h"
 #include "adjust/calibration/loose_sigmas.h"
 #include "adjust/calibration/rig_observations.h"
-#include "adjust/linearise.h"
-#include "io/error.h"
+#include "adjust/terms/linearise.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

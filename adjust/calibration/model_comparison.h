@@ -14,7 +14,7 @@
 
 #include "adjust/calibration/block_sample.h"
 #include "adjust/calibration/residual_structure.h"
-#include "adjust/tile_adjustment.h"
+#include "adjust/tile/tile_adjustment.h"
 
 namespace megablock {
 

@@ -8,12 +8,12 @@
 
 #include "adjust/calibration/loose_sigmas.h"
 #include "adjust/calibration/panoramic_system.h"
-#include "adjust/rotation_averaging.h"
-#include "geometry/chi_square.h"
-#include "geometry/decompositions.h"
-#include "geometry/median.h"
-#include "geometry/rotation_fit.h"
-#include "io/error.h"
+#include "adjust/orientation/steps/rotation_averaging.h"
+#include "geometry/numbers/chi_square.h"
+#include "geometry/numbers/decompositions.h"
+#include "geometry/numbers/median.h"
+#include "geometry/transform/rotation_fit.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

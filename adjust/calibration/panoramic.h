@@ -30,7 +30,7 @@
 #include <vector>
 
 #include "adjust/calibration/residual_structure.h"
-#include "geometry/camera.h"
+#include "geometry/camera/camera.h"
 
 namespace megablock {
 

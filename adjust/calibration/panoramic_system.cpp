@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/decompositions.h"
-#include "geometry/rotation.h"
+#include "geometry/numbers/decompositions.h"
+#include "geometry/transform/rotation.h"
 
 namespace megablock {
 

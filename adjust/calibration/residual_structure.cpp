@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/chi_square.h"
+#include "geometry/numbers/chi_square.h"
 
 namespace megablock {
 

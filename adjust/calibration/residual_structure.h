@@ -18,7 +18,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "io/residual_field.h"
+#include "io/block/residual_field.h"
 
 namespace megablock {
 

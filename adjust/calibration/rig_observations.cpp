@@ -4,11 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "adjust/linearise.h"
-#include "geometry/angles.h"
-#include "geometry/median.h"
-#include "geometry/similarity.h"
-#include "io/error.h"
+#include "adjust/terms/build_problem.h"
+#include "adjust/terms/linearise.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
+#include "geometry/similarity/similarity.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "adjust/tile_adjustment.h"
-#include "io/calibration.h"
+#include "adjust/tile/tile_adjustment.h"
+#include "io/block/calibration.h"
 
 namespace megablock {
 

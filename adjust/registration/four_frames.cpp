@@ -4,8 +4,8 @@
 #include <Eigen/LU>
 #include <limits>
 
-#include "geometry/angles.h"
-#include "geometry/decompositions.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/decompositions.h"
 
 namespace megablock {
 
@@ -16,7 +16,7 @@ constexpr double kFarthest = 500;                             // of a point from
 
 double inverse_or(double sigma, double held) { return 1 / (sigma > 0 ? sigma : held); }
 
-// Nearest point to the rays (geometry/triangulation.h, all weights one), in the axes of A.
+// Nearest point to the rays (geometry/intersection/triangulation.h, all weights one), in the axes of A.
 std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const std::array<Pose, 4>& poses,
                                              std::int32_t first, std::int32_t last) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();

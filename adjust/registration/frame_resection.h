@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "adjust/registration/trajectory.h"
-#include "adjust/rig_resection.h"
+#include "adjust/resection/rig_resection.h"
 
 namespace megablock {
 

@@ -10,9 +10,9 @@
 #include <array>
 #include <cmath>
 
-#include "adjust/ceres_residuals.h"
-#include "geometry/angles.h"
-#include "io/error.h"
+#include "adjust/terms/ceres_residuals.h"
+#include "geometry/numbers/angles.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

@@ -21,8 +21,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "geometry/rig_ray.h"
-#include "io/block.h"
+#include "geometry/resection/rig_ray.h"
+#include "io/block/block.h"
 
 namespace megablock {
 

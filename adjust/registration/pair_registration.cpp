@@ -6,11 +6,11 @@
 #include <bit>
 
 #include "adjust/registration/four_frames.h"
-#include "adjust/rig_resection.h"
-#include "geometry/angles.h"
-#include "geometry/median.h"
-#include "geometry/similarity.h"
-#include "io/error.h"
+#include "adjust/resection/rig_resection.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
+#include "geometry/similarity/similarity.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

@@ -6,13 +6,13 @@
 //
 //     Log(R_B R_AB') / s_r, (C_B - T_AB) / s_t        and likewise D from C,
 //
-// or held (s = 0), as published. Residuals are in pixels (geometry/rig_ray.h). Points are eliminated (Schur
+// or held (s = 0), as published. Residuals are in pixels (geometry/resection/rig_ray.h). Points are eliminated (Schur
 // complement); twenty iterations with a threshold that falls geometrically to its last value, within it Cauchy weights
 // of half of it.
 //
 // The published start is the trajectory's pose with a threshold of 200 px. Here A and B intersect the points first, the
-// rig of C and D is resected from them by RANSAC (adjust/rig_resection.h, covariances of the points in the weights),
-// and the threshold begins at `robust_threshold_px`; where that fails, the published start is taken.
+// rig of C and D is resected from them by RANSAC (adjust/resection/rig_resection.h, covariances of the points in the
+// weights), and the threshold begins at `robust_threshold_px`; where that fails, the published start is taken.
 #pragma once
 
 #include <array>
@@ -20,8 +20,8 @@
 #include <optional>
 #include <vector>
 
-#include "geometry/rig_ray.h"
-#include "io/registration.h"
+#include "geometry/resection/rig_ray.h"
+#include "io/block/registration.h"
 
 namespace megablock {
 

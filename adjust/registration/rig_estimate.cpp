@@ -7,10 +7,11 @@
 #include <limits>
 #include <map>
 
-#include "adjust/linearise.h"
-#include "geometry/angles.h"
-#include "geometry/median.h"
-#include "io/error.h"
+#include "adjust/terms/build_problem.h"
+#include "adjust/terms/linearise.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

@@ -12,8 +12,8 @@
 #include <string>
 
 #include "adjust/registration/joint_adjustment.h"
-#include "adjust/tile_adjustment.h"
-#include "io/tracks.h"
+#include "adjust/tile/tile_adjustment.h"
+#include "io/block/tracks.h"
 
 namespace megablock {
 

@@ -7,10 +7,10 @@
 #include <map>
 #include <optional>
 
-#include "geometry/angles.h"
-#include "geometry/pose.h"
-#include "geometry/triangulation.h"
-#include "io/error.h"
+#include "geometry/intersection/triangulation.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/transform/pose.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

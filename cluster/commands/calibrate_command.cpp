@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "cluster/collective.h"
 #include "cluster/commands/camera_modes.h"
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/pipeline.h"
+#include "cluster/mpi/collective.h"
+#include "cluster/stages/pipeline.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
 
 namespace megablock {
 

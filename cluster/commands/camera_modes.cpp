@@ -12,13 +12,13 @@
 
 #include "adjust/calibration/model_comparison.h"
 #include "adjust/calibration/panoramic.h"
-#include "cluster/calibration_input.h"
-#include "cluster/exit_codes.h"
-#include "cluster/job.h"
-#include "cluster/version.h"
-#include "io/calibration.h"
-#include "io/error.h"
-#include "io/file_error.h"
+#include "cluster/job/job.h"
+#include "cluster/outcome/calibration_input.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/process/version.h"
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "io/block/calibration.h"
 
 namespace megablock {
 

@@ -10,16 +10,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "adjust/coplanarity_block.h"
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "cluster/job_options.h"
-#include "cluster/job_so_far.h"
-#include "geometry/angles.h"
-#include "io/counted.h"
-#include "io/error.h"
-#include "io/pose_csv.h"
+#include "adjust/coplanarity/coplanarity_block.h"
+#include "cluster/job/job_options.h"
+#include "cluster/job/job_so_far.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "geometry/numbers/angles.h"
+#include "io/base/error.h"
+#include "io/project/inputs/pose_csv.h"
+#include "io/text/counted.h"
 
 namespace megablock {
 

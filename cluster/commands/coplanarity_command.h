@@ -1,4 +1,5 @@
-// `megablock coplanarity`: attitudes of a job's frames by the determinant method (adjust/coplanarity_adjustment.h).
+// `megablock coplanarity`: attitudes of a job's frames by the determinant method
+// (adjust/coplanarity/coplanarity_adjustment.h).
 #pragma once
 
 #include <functional>

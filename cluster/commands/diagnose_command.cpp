@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "cluster/block_checks.h"
-#include "cluster/commands/terminal_text.h"
-#include "cluster/diagnostics.h"
-#include "cluster/exit_codes.h"
-#include "cluster/result_figures.h"
+#include "cluster/outcome/block_checks.h"
+#include "cluster/outcome/diagnostics.h"
+#include "cluster/outcome/result_figures.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/terminal/terminal_text.h"
 
 namespace megablock {
 

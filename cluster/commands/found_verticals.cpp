@@ -7,7 +7,7 @@
 #include <fstream>
 #include <unordered_map>
 
-#include "io/error.h"
+#include "io/base/error.h"
 
 namespace megablock {
 

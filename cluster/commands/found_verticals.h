@@ -1,8 +1,9 @@
 // What the command 'verticals' has found so far, in a file beside its table, so that a run after a kill, or one with
 // more images, looks at the other pictures only.
 //
-// A sealed text file (io/job_store.h): per picture a line "key found roll segments length", then as many bytes, its row
-// of the table. The key is the hash of all that the row follows from. Pictures that could not be read are not in it.
+// A sealed text file (io/store/job/job_store.h): per picture a line "key found roll segments length", then as many
+// bytes, its row of the table. The key is the hash of all that the row follows from. Pictures that could not be read
+// are not in it.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "cluster/save_times.h"
-#include "io/job_store.h"
+#include "cluster/process/save_times.h"
+#include "io/store/job/job_store.h"
 
 namespace megablock {
 

@@ -12,17 +12,17 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "io/error.h"
-#include "io/file_error.h"
-#include "io/job_store.h"
-#include "io/picture_codec.h"
-#include "io/project.h"
-#include "io/report/html.h"
-#include "match/image_file.h"
-#include "match/static_regions.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "io/images/picture_codec.h"
+#include "io/project/project.h"
+#include "io/report/drawing/html.h"
+#include "io/store/job/job_store.h"
+#include "match/images/image_file.h"
+#include "match/images/static_regions.h"
 
 namespace megablock {
 

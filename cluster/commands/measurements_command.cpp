@@ -9,13 +9,13 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "cluster/status.h"
-#include "io/error.h"
-#include "io/file_error.h"
-#include "io/measurements.h"
+#include "cluster/outcome/status.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "io/result/measurements.h"
 
 namespace megablock {
 

@@ -9,13 +9,13 @@
 #include <filesystem>
 
 #include "adjust/registration/frame_resection.h"
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "cluster/pipeline.h"
-#include "geometry/angles.h"
-#include "io/error.h"
-#include "io/project.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/stages/pipeline.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "geometry/numbers/angles.h"
+#include "io/base/error.h"
+#include "io/project/project.h"
 
 namespace megablock {
 

@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <map>
 
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "io/error.h"
-#include "io/simulate/simulate.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "io/base/error.h"
+#include "io/simulate/blocks/simulate.h"
 
 namespace megablock {
 

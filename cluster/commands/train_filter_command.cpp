@@ -5,16 +5,16 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "cluster/stages/given_tracks.h"
-#include "io/error.h"
-#include "io/job_store.h"
-#include "io/project.h"
-#include "io/simulate/simulate.h"
-#include "io/unit_files.h"
-#include "match/filter_training.h"
+#include "cluster/job/given_tracks.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "io/base/error.h"
+#include "io/project/project.h"
+#include "io/simulate/blocks/simulate.h"
+#include "io/store/job/job_store.h"
+#include "io/store/units/unit_files.h"
+#include "match/filter/filter_training.h"
 
 namespace megablock {
 

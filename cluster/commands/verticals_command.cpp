@@ -11,18 +11,18 @@
 #include <opencv2/core.hpp>
 
 #include "cluster/commands/found_verticals.h"
-#include "cluster/commands/option_checks.h"
-#include "cluster/commands/output_check.h"
-#include "cluster/exit_codes.h"
-#include "cluster/stages/block_hash.h"
-#include "geometry/median.h"
-#include "io/error.h"
-#include "io/image_header.h"
-#include "io/job_store.h"
-#include "io/picture_codec.h"
-#include "io/project.h"
-#include "io/verticals.h"
-#include "match/image_vertical.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/stages/common/block_hash.h"
+#include "cluster/terminal/option_checks.h"
+#include "cluster/terminal/output_check.h"
+#include "geometry/numbers/median.h"
+#include "io/base/error.h"
+#include "io/images/image_header.h"
+#include "io/images/picture_codec.h"
+#include "io/project/inputs/verticals.h"
+#include "io/project/project.h"
+#include "io/store/job/job_store.h"
+#include "match/images/image_vertical.h"
 
 namespace megablock {
 

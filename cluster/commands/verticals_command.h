@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cluster/commands/found_verticals.h"
-#include "geometry/vertical.h"
-#include "io/block.h"
+#include "geometry/vanishing/vertical.h"
+#include "io/block/block.h"
 
 namespace CLI {
 class App;

@@ -4,9 +4,9 @@
 //   megablock run block.yaml -j job
 //   mpirun --bind-to none -n 2 megablock run block.yaml -j job
 
-#include "cluster/arithmetic.h"
 #include "cluster/commands/command_line.h"
-#include "cluster/signals.h"
+#include "cluster/process/arithmetic.h"
+#include "cluster/process/signals.h"
 
 int main(int argc, char** argv) {
   megablock::watch_signals();

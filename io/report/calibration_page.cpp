@@ -3,11 +3,11 @@
 
 #include <cmath>
 
-#include "geometry/angles.h"
-#include "io/calibration_report.h"
-#include "io/report/drawing.h"
-#include "io/report/html.h"
-#include "io/report/page.h"
+#include "geometry/numbers/angles.h"
+#include "io/evaluation/calibration_report.h"
+#include "io/report/drawing/drawing.h"
+#include "io/report/drawing/html.h"
+#include "io/report/drawing/page.h"
 
 namespace megablock {
 

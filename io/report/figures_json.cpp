@@ -1,8 +1,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/remarks.h"
-#include "io/report/sections.h"
+#include "io/evaluation/remarks.h"
+#include "io/report/sections/sections.h"
 
 namespace megablock::report {
 

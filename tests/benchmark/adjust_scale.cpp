@@ -21,12 +21,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "io/error.h"
-#include "io/evaluate.h"
-#include "io/events.h"
-#include "io/track_batches.h"
+#include "io/base/error.h"
+#include "io/evaluation/evaluate.h"
+#include "io/result/track_batches.h"
+#include "io/store/job/events.h"
 #include "tests/benchmark/scenes.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "tests/support/io/scratch_directory.h"
 
 namespace {
 

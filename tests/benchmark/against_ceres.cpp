@@ -3,8 +3,8 @@
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
 //                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--ranks 1|2] [--exactness|--speed]
 //
-// Scenes: tests/benchmark/scenes.h. A job of the block on as many ranks, merged to a decrement of 1e-7, gives the tiles,
-// the observations it kept and its solution. How exact this is (cluster/monolithic_comparison.h):
+// Scenes: tests/benchmark/scenes.h. A job of the block on as many ranks, merged to a decrement of 1e-7, gives the
+// tiles, the observations it kept and its solution. How exact this is (cluster/outcome/monolithic_comparison.h):
 // max_pose_difference_sigmas, the largest component of the undamped Newton step of one Ceres problem with automatic
 // derivatives at the solution over its posterior sigma; relative_cost_difference, how far Ceres lowers the cost from
 // there with all tolerances 1e-16. With --exactness these alone, with --speed all but these.
@@ -36,21 +36,22 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "adjust/ceres_problem.h"
-#include "adjust/image_sigma.h"
-#include "adjust/linearise.h"
-#include "adjust/observation_lanes.h"
-#include "adjust/sigma_scales.h"
-#include "cluster/arithmetic.h"
-#include "cluster/communicator.h"
-#include "cluster/monolithic_comparison.h"
-#include "cluster/process_memory.h"
-#include "cluster/rank_runner.h"
-#include "io/hdf5_file.h"
-#include "io/result.h"
-#include "io/unit_files.h"
+#include "adjust/lanes/observation_lanes.h"
+#include "adjust/terms/build_problem.h"
+#include "adjust/terms/linearise.h"
+#include "adjust/tile/ceres_problem.h"
+#include "adjust/tile/image_sigma.h"
+#include "adjust/tile/sigma_scales.h"
+#include "cluster/mpi/communicator.h"
+#include "cluster/outcome/monolithic_comparison.h"
+#include "cluster/process/arithmetic.h"
+#include "cluster/process/process_memory.h"
+#include "cluster/tree/rank_runner.h"
+#include "io/result/result.h"
+#include "io/store/hdf5/hdf5_file.h"
+#include "io/store/units/unit_files.h"
 #include "tests/benchmark/scenes.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "tests/support/io/scratch_directory.h"
 
 namespace {
 

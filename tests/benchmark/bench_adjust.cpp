@@ -6,8 +6,9 @@
 
 #include <limits>
 
-#include "adjust/tile_adjustment.h"
-#include "io/simulate/simulate.h"
+#include "adjust/terms/build_problem.h"
+#include "adjust/tile/tile_adjustment.h"
+#include "io/simulate/blocks/simulate.h"
 
 extern "C" void openblas_set_num_threads(int threads);
 

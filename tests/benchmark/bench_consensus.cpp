@@ -4,11 +4,11 @@
 //     bench_consensus
 #include <benchmark/benchmark.h>
 
-#include "adjust/model_link.h"
-#include "adjust/resection.h"
-#include "adjust/rig_resection.h"
-#include "geometry/median.h"
-#include "tests/unit/adjust/street_rig.h"
+#include "adjust/models/model_link.h"
+#include "adjust/orientation/steps/resection.h"
+#include "adjust/resection/rig_resection.h"
+#include "geometry/numbers/median.h"
+#include "tests/support/adjust/street_rig.h"
 
 namespace megablock {
 namespace {

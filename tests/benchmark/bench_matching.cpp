@@ -16,10 +16,10 @@
 #include <random>
 #include <vector>
 
-#include "geometry/rotation.h"
-#include "io/tracks.h"
-#include "match/nearest.h"
-#include "match/pair_matching.h"
+#include "geometry/transform/rotation.h"
+#include "io/block/tracks.h"
+#include "match/nearest/nearest.h"
+#include "match/pairs/pair_matching.h"
 
 namespace {
 

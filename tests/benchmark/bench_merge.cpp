@@ -4,8 +4,8 @@
 //   scene 2  500 aerial images, overlaps of 80 and 60 %, 300 observations each; the camera's eight intrinsics shared
 // Parts: condense (linearise, eliminate points, factorise the cells), down (back-substitute), evaluate (points in the
 // tail of the loss, cost of the new state); iteration: all of them, one after the other (SerialRunner), with the datum
-// and the new state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold stands beside
-// it). The counter is observations per second of processor time.
+// and the new state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold
+// stands beside it). The counter is observations per second of processor time.
 //
 //     bench_merge --benchmark_repetitions=5
 #include <benchmark/benchmark.h>
@@ -15,12 +15,13 @@
 #include <map>
 #include <numbers>
 
-#include "adjust/linearise.h"
-#include "io/simulate/simulate.h"
-#include "merge/point_refinement.h"
-#include "merge/serial_runner.h"
-#include "merge/tile_store.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "adjust/terms/build_problem.h"
+#include "adjust/terms/linearise.h"
+#include "io/simulate/blocks/simulate.h"
+#include "merge/step/tile_store.h"
+#include "merge/tile/point_refinement.h"
+#include "merge/tree/serial_runner.h"
+#include "tests/support/io/scratch_directory.h"
 
 extern "C" void openblas_set_num_threads(int threads);
 

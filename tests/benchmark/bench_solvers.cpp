@@ -11,15 +11,15 @@
 
 #include <algorithm>
 
-#include "geometry/five_point.h"
-#include "geometry/fundamental.h"
-#include "geometry/gp3p.h"
-#include "geometry/homography.h"
-#include "geometry/minimal_similarity.h"
-#include "geometry/p3p.h"
-#include "geometry/rotation_pair.h"
-#include "geometry/vertical_pair.h"
-#include "tests/unit/geometry/pair_scene.h"
+#include "geometry/resection/gp3p.h"
+#include "geometry/resection/p3p.h"
+#include "geometry/similarity/minimal_similarity.h"
+#include "geometry/two_view/five_point.h"
+#include "geometry/two_view/fundamental.h"
+#include "geometry/two_view/homography.h"
+#include "geometry/two_view/rotation_pair.h"
+#include "geometry/two_view/vertical_pair.h"
+#include "tests/support/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {

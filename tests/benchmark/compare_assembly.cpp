@@ -11,7 +11,7 @@
 #include <ctime>
 #include <random>
 
-#include "tests/unit/adjust/orientation_scene.h"
+#include "tests/support/adjust/orientation_scene.h"
 
 namespace {
 

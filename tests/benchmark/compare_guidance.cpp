@@ -1,4 +1,4 @@
-// Matching along trusted epipolar lines (match/guided_matching.h) against matching of whole images, on rendered
+// Matching along trusted epipolar lines (match/pairs/guided_matching.h) against matching of whole images, on rendered
 // pictures of the Stereopolis vehicle between houses whose facades repeat: matches, right ones, time.
 //
 //   compare_guidance [frames = 8] [share of repeated facades = 0.7] [seed = 1]
@@ -10,14 +10,14 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "io/picture_codec.h"
-#include "io/simulate/render.h"
-#include "io/tracks.h"
-#include "match/features.h"
-#include "match/match_filter.h"
-#include "match/pair_matching.h"
-#include "partition/candidates.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "io/block/tracks.h"
+#include "io/images/picture_codec.h"
+#include "io/simulate/pictures/render.h"
+#include "match/features/features.h"
+#include "match/filter/match_filter.h"
+#include "match/pairs/pair_matching.h"
+#include "partition/candidates/candidates.h"
+#include "tests/support/io/scratch_directory.h"
 
 namespace {
 

@@ -24,12 +24,12 @@
 #include <functional>
 #include <random>
 
-#include "cluster/process_memory.h"
-#include "io/descriptor.h"
-#include "io/error.h"
-#include "io/measurements.h"
-#include "io/unit_files.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "cluster/process/process_memory.h"
+#include "io/base/descriptor.h"
+#include "io/base/error.h"
+#include "io/result/measurements.h"
+#include "io/store/units/unit_files.h"
+#include "tests/support/io/scratch_directory.h"
 
 namespace {
 

@@ -13,11 +13,11 @@
 #include <ctime>
 
 #include "adjust/registration/trajectory.h"
-#include "geometry/angles.h"
-#include "geometry/rotation.h"
-#include "io/error.h"
-#include "io/project.h"
-#include "partition/places.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/transform/rotation.h"
+#include "io/base/error.h"
+#include "io/project/project.h"
+#include "partition/candidates/places.h"
 
 extern "C" void openblas_set_num_threads(int threads);
 

@@ -9,7 +9,7 @@
 #include <exception>
 #include <numbers>
 
-#include "tests/unit/adjust/panorama.h"
+#include "tests/support/adjust/panorama.h"
 
 namespace megablock {
 namespace {

@@ -12,8 +12,8 @@
 #include <cstdio>
 #include <ctime>
 
-#include "cluster/process_memory.h"
-#include "partition/tiles.h"
+#include "cluster/process/process_memory.h"
+#include "partition/tiles/tiles.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <string>
 
-#include "tests/unit/adjust/crossing.h"
+#include "tests/support/adjust/crossing.h"
 
 namespace {
 

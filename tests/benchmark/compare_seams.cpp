@@ -6,15 +6,15 @@
 //   compare_seams clean [blocks = 100]
 //
 // ideal: a test that is told of each of 200 tiles which two frames might be turned, and how. With B'AB the information
-// about that one number (merge/seam_check.h) it is normal with mean sqrt(B'AB), and no test has more power.
+// about that one number (merge/checks/seam_check.h) it is normal with mean sqrt(B'AB), and no test has more power.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
-#include "adjust/image_sigma.h"
-#include "geometry/chi_square.h"
-#include "io/simulate/random.h"
-#include "tests/unit/merge/turned_frames.h"
+#include "adjust/tile/image_sigma.h"
+#include "geometry/numbers/chi_square.h"
+#include "io/simulate/scene/random.h"
+#include "tests/support/merge/turned_frames.h"
 
 namespace {
 

@@ -13,9 +13,9 @@
 #include <ctime>
 #include <random>
 
-#include "cluster/process_memory.h"
-#include "io/hash.h"
-#include "match/tracks.h"
+#include "cluster/process/process_memory.h"
+#include "io/base/hash.h"
+#include "match/tracks/tracks.h"
 
 namespace {
 

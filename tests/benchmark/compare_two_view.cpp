@@ -1,5 +1,6 @@
-// Verification of pairs (match/two_view.h) against OpenCV's robust estimators (opencv_two_view.h): processor time,
-// right models, errors of rotation and base (medians; root mean square; pairs where ours is the nearer one).
+// Verification of pairs (match/verification/two_view.h) against OpenCV's robust estimators (opencv_two_view.h):
+// processor time, right models, errors of rotation and base (medians; root mean square; pairs where ours is the nearer
+// one).
 //
 //   compare_two_view [PAIRS = 40 [SCENE]]    simulated: general, plane, rotation (all); 10 to 70 % wrong matches
 //   compare_two_view selection [PAIRS]       the same, verification alone: wrong matches that are accepted, right ones
@@ -18,12 +19,12 @@
 #include <limits>
 #include <string>
 
-#include "geometry/angles.h"
-#include "geometry/camera.h"
-#include "geometry/median.h"
-#include "io/tracks.h"
-#include "match/features.h"
-#include "match/pair_matching.h"
+#include "geometry/camera/camera.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
+#include "io/block/tracks.h"
+#include "match/features/features.h"
+#include "match/pairs/pair_matching.h"
 #include "opencv_two_view.h"
 
 namespace {

@@ -1,6 +1,6 @@
 // Relative orientation by OpenCV's robust estimators (USAC: MAGSAC scores, uniform samples, inner local optimisation,
 // p = 0.999, 3000 draws), as match/ had it until it had its own: what compare_two_view measures ours against. Models
-// are told apart, and refined, as in match/two_view.cpp.
+// are told apart, and refined, as in match/verification/two_view.cpp.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,10 +8,10 @@
 #include <optional>
 #include <random>
 
-#include "geometry/pair_estimators.h"
-#include "geometry/ransac.h"
-#include "geometry/rotation_fit.h"
-#include "match/two_view.h"
+#include "geometry/estimation/ransac.h"
+#include "geometry/transform/rotation_fit.h"
+#include "geometry/two_view/pair_estimators.h"
+#include "match/verification/two_view.h"
 
 namespace megablock {
 

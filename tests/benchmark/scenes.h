@@ -22,8 +22,8 @@
 #include <numbers>
 #include <string>
 
-#include "io/error.h"
-#include "io/unit_files.h"
+#include "io/base/error.h"
+#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

@@ -2,10 +2,11 @@
 // problem.
 #include <gtest/gtest.h>
 
-#include "adjust/linearise.h"
-#include "merge/monolithic.h"
-#include "tests/unit/merge/ceres_cost.h"
-#include "tests/unit/merge/tiled_block.h"
+#include "adjust/lanes/tile_cost.h"
+#include "adjust/terms/linearise.h"
+#include "merge/checks/monolithic.h"
+#include "tests/support/merge/ceres_cost.h"
+#include "tests/support/merge/tiled_block.h"
 
 namespace megablock {
 namespace {

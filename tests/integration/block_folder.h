@@ -5,10 +5,10 @@
 #include <functional>
 #include <string>
 
-#include "cluster/pipeline.h"
-#include "io/simulate/simulate.h"
-#include "io/unit_files.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "cluster/stages/pipeline.h"
+#include "io/simulate/blocks/simulate.h"
+#include "io/store/units/unit_files.h"
+#include "tests/support/io/scratch_directory.h"
 
 namespace megablock {
 

@@ -7,13 +7,13 @@
 #include <numeric>
 #include <random>
 
-#include "cluster/exit_codes.h"
-#include "geometry/similarity.h"
-#include "io/error.h"
-#include "io/hdf5_file.h"
-#include "io/result.h"
+#include "cluster/process/exit_codes.h"
+#include "geometry/similarity/similarity.h"
+#include "io/base/error.h"
+#include "io/result/result.h"
+#include "io/store/hdf5/hdf5_file.h"
 #include "tests/integration/block_folder.h"
-#include "tests/unit/merge/two_cities.h"
+#include "tests/support/merge/two_cities.h"
 
 namespace megablock {
 namespace {

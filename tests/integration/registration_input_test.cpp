@@ -7,12 +7,12 @@
 #include <fstream>
 #include <numeric>
 
-#include "cluster/exit_codes.h"
-#include "io/error.h"
-#include "io/pose_csv.h"
-#include "io/simulate/simulate.h"
+#include "cluster/process/exit_codes.h"
+#include "io/base/error.h"
+#include "io/project/inputs/pose_csv.h"
+#include "io/simulate/blocks/simulate.h"
 #include "tests/integration/block_folder.h"
-#include "tests/unit/io/image_names.h"
+#include "tests/support/io/image_names.h"
 
 namespace megablock {
 namespace {

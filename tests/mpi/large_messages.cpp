@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "cluster/communicator.h"
+#include "cluster/mpi/communicator.h"
 #include "tests/unit/ranges/aliased_memory.h"
 
 namespace {

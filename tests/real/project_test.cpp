@@ -1,5 +1,5 @@
 // The project reader on real photographs.
-#include "io/project.h"
+#include "io/project/project.h"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "io/crs.h"
+#include "io/block/crs.h"
 #include "real_data.h"
-#include "tests/unit/io/scratch_directory.h"
+#include "tests/support/io/scratch_directory.h"
 
 namespace megablock {
 namespace {

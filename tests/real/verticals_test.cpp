@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/rotation.h"
-#include "io/image_header.h"
-#include "match/image_vertical.h"
+#include "geometry/transform/rotation.h"
+#include "io/images/image_header.h"
+#include "match/images/image_vertical.h"
 #include "real_data.h"
 
 namespace megablock {

@@ -1,5 +1,5 @@
 // Acceptance of the block diagnostics (M57): AT-36.
-#include "partition/block_diagnostics.h"
+#include "partition/diagnostics/block_diagnostics.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "io/simulate/simulate.h"
-#include "partition/link_weights.h"
+#include "io/simulate/blocks/simulate.h"
+#include "partition/links/link_weights.h"
 #include "tests/spec/reached.h"
 
 namespace megablock {

@@ -2,13 +2,13 @@
 // positions"), T-CP01, T-CP03/04, T-CP05, T-CP06 (a course of image formulas).
 #include <gtest/gtest.h>
 
-#include "geometry/camera_matrix.h"
-#include "geometry/collinearity.h"
-#include "geometry/coplanarity.h"
-#include "geometry/rotation_fit.h"
-#include "geometry/triangulation.h"
+#include "geometry/camera/camera_matrix.h"
+#include "geometry/camera/collinearity.h"
+#include "geometry/intersection/triangulation.h"
+#include "geometry/transform/rotation_fit.h"
+#include "geometry/two_view/coplanarity.h"
 #include "reached.h"
-#include "tests/unit/geometry/pair_scene.h"
+#include "tests/support/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {

@@ -1,12 +1,12 @@
 // Acceptance tests of the determinant method (A. Barrier, S. Martin, "Bundle adjustment with known positions"), on the
 // scenes of known_positions_scene.h: as published it reduces |F| and often not the errors, and it says so.
-#include "adjust/coplanarity_adjustment.h"
+#include "adjust/coplanarity/coplanarity_adjustment.h"
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/error.h"
+#include "io/base/error.h"
 #include "known_positions_scene.h"
 #include "reached.h"
 

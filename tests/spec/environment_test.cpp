@@ -1,15 +1,15 @@
 // Acceptance of the environment's corrections (CP-07): T-CP07.
-#include "geometry/environment.h"
+#include "geometry/camera/environment.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "geometry/camera.h"
-#include "geometry/median.h"
-#include "io/crs.h"
-#include "io/error.h"
-#include "io/result.h"
+#include "geometry/camera/camera.h"
+#include "geometry/numbers/median.h"
+#include "io/base/error.h"
+#include "io/block/crs.h"
+#include "io/result/result.h"
 #include "tests/integration/block_folder.h"
 #include "tests/spec/reached.h"
 

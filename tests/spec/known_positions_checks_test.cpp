@@ -5,14 +5,14 @@
 
 #include <algorithm>
 
-#include "adjust/sanity_checks.h"
-#include "adjust/subset_check.h"
-#include "io/error.h"
+#include "adjust/checks/sanity_checks.h"
+#include "adjust/checks/subset_check.h"
+#include "io/base/error.h"
 #include "known_positions_scene.h"
-#include "merge/tile_solver.h"
+#include "merge/tree/tile_solver.h"
 #include "reached.h"
-#include "tests/unit/adjust/single_tile.h"
-#include "tests/unit/merge/turned_frames.h"
+#include "tests/support/adjust/single_tile.h"
+#include "tests/support/merge/turned_frames.h"
 
 namespace megablock {
 namespace {

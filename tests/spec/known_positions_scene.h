@@ -6,10 +6,10 @@
 
 #include <random>
 
-#include "adjust/tile_adjustment.h"
-#include "geometry/coplanarity.h"
-#include "io/held_priors.h"
-#include "io/simulate/simulate.h"
+#include "adjust/tile/tile_adjustment.h"
+#include "geometry/two_view/coplanarity.h"
+#include "io/block/held_priors.h"
+#include "io/simulate/blocks/simulate.h"
 
 namespace megablock {
 

@@ -2,14 +2,14 @@
 // held positions, priors of the attitudes. Scenes and measures: known_positions_scene.h.
 #include <gtest/gtest.h>
 
-#include "adjust/common_motion.h"
-#include "geometry/angles.h"
-#include "geometry/median.h"
+#include "adjust/checks/common_motion.h"
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
 #include "known_positions_scene.h"
-#include "merge/tile_solver.h"
+#include "merge/tree/tile_solver.h"
 #include "reached.h"
-#include "tests/unit/adjust/single_tile.h"
-#include "tests/unit/geometry/pair_scene.h"
+#include "tests/support/adjust/single_tile.h"
+#include "tests/support/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {

@@ -8,13 +8,13 @@
 #include <random>
 #include <set>
 
-#include "geometry/median.h"
-#include "io/error.h"
+#include "geometry/numbers/median.h"
+#include "io/base/error.h"
 #include "known_positions_scene.h"
-#include "match/common_tracks.h"
-#include "match/pair_matching.h"
-#include "match/tracks.h"
-#include "match/two_view.h"
+#include "match/pairs/pair_matching.h"
+#include "match/tracks/common_tracks.h"
+#include "match/tracks/tracks.h"
+#include "match/verification/two_view.h"
 #include "reached.h"
 
 namespace megablock {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "reached.h"
-#include "tests/unit/adjust/model_grid.h"
+#include "tests/support/adjust/model_grid.h"
 
 namespace megablock {
 namespace {

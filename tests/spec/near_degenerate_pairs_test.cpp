@@ -6,11 +6,11 @@
 #include <cmath>
 #include <map>
 
-#include "adjust/orientation_graph.h"
-#include "adjust/rotation_averaging.h"
-#include "match/two_view.h"
+#include "adjust/orientation/steps/orientation_graph.h"
+#include "adjust/orientation/steps/rotation_averaging.h"
+#include "match/verification/two_view.h"
 #include "reached.h"
-#include "tests/unit/adjust/orientation_scene.h"
+#include "tests/support/adjust/orientation_scene.h"
 
 namespace megablock {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdio>
 
-#include "geometry/decompositions.h"
+#include "geometry/numbers/decompositions.h"
 #include "reached.h"
 #include "tests/algebra/elimination_template.h"
 #include "tests/algebra/systems.h"

@@ -5,12 +5,12 @@
 
 #include <chrono>
 
-#include "geometry/five_point.h"
-#include "geometry/relative_adjustment.h"
-#include "geometry/rotation_parameters.h"
-#include "geometry/vertical_pair.h"
+#include "geometry/transform/rotation_parameters.h"
+#include "geometry/two_view/five_point.h"
+#include "geometry/two_view/relative_adjustment.h"
+#include "geometry/two_view/vertical_pair.h"
 #include "reached.h"
-#include "tests/unit/geometry/pair_scene.h"
+#include "tests/support/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {

@@ -8,18 +8,18 @@
 #include <thread>
 #include <tuple>
 
-#include "geometry/homography.h"
-#include "geometry/pair_estimators.h"
-#include "geometry/ransac.h"
-#include "geometry/resection_estimators.h"
-#include "geometry/similarity_estimator.h"
-#include "geometry/vanishing_circles.h"
-#include "geometry/vanishing_points.h"
-#include "match/two_view.h"
+#include "geometry/estimation/ransac.h"
+#include "geometry/resection/resection_estimators.h"
+#include "geometry/similarity/similarity_estimator.h"
+#include "geometry/two_view/homography.h"
+#include "geometry/two_view/pair_estimators.h"
+#include "geometry/vanishing/vanishing_circles.h"
+#include "geometry/vanishing/vanishing_points.h"
+#include "match/verification/two_view.h"
 #include "reached.h"
-#include "tests/unit/geometry/linear_model.h"
-#include "tests/unit/geometry/scene_pairs.h"
-#include "tests/unit/geometry/segment_scenes.h"
+#include "tests/support/geometry/linear_model.h"
+#include "tests/support/geometry/scene_pairs.h"
+#include "tests/support/geometry/segment_scenes.h"
 
 namespace megablock {
 namespace {

@@ -3,12 +3,12 @@
 // along each axis, scales of 0.5 to 2, one at a time: 27 configurations.
 #include <gtest/gtest.h>
 
-#include "geometry/median.h"
-#include "geometry/minimal_similarity.h"
-#include "geometry/ransac.h"
-#include "geometry/similarity_estimator.h"
+#include "geometry/estimation/ransac.h"
+#include "geometry/numbers/median.h"
+#include "geometry/similarity/minimal_similarity.h"
+#include "geometry/similarity/similarity_estimator.h"
 #include "reached.h"
-#include "tests/unit/geometry/pair_scene.h"
+#include "tests/support/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {

@@ -8,14 +8,14 @@
 #include <chrono>
 #include <limits>
 
-#include "geometry/camera.h"
-#include "geometry/gauss_helmert.h"
-#include "geometry/rotation.h"
-#include "geometry/vanishing_circles.h"
-#include "geometry/vanishing_votes.h"
-#include "geometry/vertical.h"
+#include "geometry/camera/camera.h"
+#include "geometry/estimation/gauss_helmert.h"
+#include "geometry/transform/rotation.h"
+#include "geometry/vanishing/vanishing_circles.h"
+#include "geometry/vanishing/vanishing_votes.h"
+#include "geometry/vanishing/vertical.h"
 #include "reached.h"
-#include "tests/unit/geometry/segment_scenes.h"
+#include "tests/support/geometry/segment_scenes.h"
 
 namespace megablock {
 namespace {

@@ -2,12 +2,12 @@
 // ends alone, adjusted with a camera whose radial distortion is wrong: between the ends the strip rises like a dome.
 #include <cmath>
 
-#include "adjust/vertical_terms.h"
-#include "geometry/median.h"
+#include "adjust/terms/vertical_terms.h"
+#include "geometry/numbers/median.h"
 #include "reached.h"
-#include "tests/unit/adjust/orientation_scene.h"
-#include "tests/unit/adjust/seen_verticals.h"
-#include "tests/unit/merge/tiled_block.h"
+#include "tests/support/adjust/orientation_scene.h"
+#include "tests/support/adjust/seen_verticals.h"
+#include "tests/support/merge/tiled_block.h"
 
 namespace megablock {
 namespace {

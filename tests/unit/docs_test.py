@@ -68,7 +68,7 @@ for path in documents:
                 complain(path, number, f"ctest -{kind} {pattern.pattern} finds no test")
 
 # (where a command's JSON is made, what its keys look like there, document, heading above their table)
-for code, key, document, heading in [("io/evaluate.cpp", r'json\["(\w+)"\]', "docs/simulate.md", "Figures of `evaluate`")]:
+for code, key, document, heading in [("io/evaluation/evaluate.cpp", r'json\["(\w+)"\]', "docs/simulate.md", "Figures of `evaluate`")]:
     section = re.split(r"^## ", (source / document).read_text().split(f"## {heading}\n")[1], flags=re.MULTILINE)[0]
     keys = re.findall(key, (source / code).read_text())
     checked += len(keys)

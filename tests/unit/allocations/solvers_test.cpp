@@ -4,22 +4,22 @@
 #include <random>
 #include <vector>
 
-#include "geometry/camera_matrix.h"
-#include "geometry/collinearity.h"
-#include "geometry/coplanarity.h"
-#include "geometry/five_point.h"
-#include "geometry/fundamental.h"
-#include "geometry/gp3p.h"
-#include "geometry/homography.h"
-#include "geometry/minimal_control.h"
-#include "geometry/minimal_similarity.h"
-#include "geometry/p3p.h"
-#include "geometry/rotation_pair.h"
-#include "geometry/similarity.h"
-#include "geometry/two_rays.h"
-#include "geometry/vertical_pair.h"
+#include "geometry/camera/camera_matrix.h"
+#include "geometry/camera/collinearity.h"
+#include "geometry/intersection/two_rays.h"
+#include "geometry/resection/gp3p.h"
+#include "geometry/resection/p3p.h"
+#include "geometry/similarity/minimal_control.h"
+#include "geometry/similarity/minimal_similarity.h"
+#include "geometry/similarity/similarity.h"
+#include "geometry/two_view/coplanarity.h"
+#include "geometry/two_view/five_point.h"
+#include "geometry/two_view/fundamental.h"
+#include "geometry/two_view/homography.h"
+#include "geometry/two_view/rotation_pair.h"
+#include "geometry/two_view/vertical_pair.h"
+#include "tests/support/geometry/pair_scene.h"
 #include "tests/unit/allocations/counted_allocations.h"
-#include "tests/unit/geometry/pair_scene.h"
 
 namespace megablock {
 namespace {

@@ -5,14 +5,15 @@
 #include <cstring>
 #include <memory>
 
-#include "adjust/linearise.h"
-#include "io/error.h"
-#include "merge/bytes.h"
-#include "merge/cell_assembler.h"
-#include "merge/condense.h"
-#include "merge/front.h"
-#include "partition/tiles.h"
-#include "tests/unit/adjust/single_tile.h"
+#include "adjust/lanes/tile_cost.h"
+#include "adjust/terms/linearise.h"
+#include "io/base/error.h"
+#include "merge/front/front.h"
+#include "merge/scratch/bytes.h"
+#include "merge/tile/cell_assembler.h"
+#include "merge/tile/condense.h"
+#include "partition/tiles/tiles.h"
+#include "tests/support/adjust/single_tile.h"
 #include "tests/unit/ranges/aliased_memory.h"
 
 namespace megablock {

@@ -1,0 +1,29 @@
+// Reliability of an adjustment without ground truth: the same frames from disjoint subsets of the points (KP-14).
+//
+// Every subset is adjusted by itself, with the priors and control points that all of them share; one reference point is
+// in all. What the subsets do not share, the noise of their measurements, shows in how far their results lie apart.
+// What they do share does not: where attitude priors alone tell of a common rotation, subsets agree to a tenth of their
+// error. So the sigma of that (common_motion.h) is given beside the spread.
+#pragma once
+
+#include "adjust/checks/common_motion.h"
+#include "adjust/tile/tile_adjustment.h"
+
+namespace megablock {
+
+struct SubsetCheck {
+  int subsets = 0;
+  double rotation_spread_rad = 0;  // rms per axis about the mean of the subsets, over frames
+  double rotation_move_rad = 0;    // rms per axis, of that mean from the start
+  double image_spread_px = 0;      // rms per axis of the reference point's adjusted image positions
+  double common_sigma_rad = 0;     // what all subsets share and none can show; 0: nothing
+  // Of the mean of the subsets, per axis.
+  double rotation_sigma_rad() const;
+};
+// `state`: where each subset starts from; `reference`: a tie point, in all subsets. Other tie points go to the subsets
+// in turn. Throws InputError for fewer than two subsets or a reference that takes no part, ComputeError where a subset
+// cannot be adjusted.
+SubsetCheck check_point_subsets(const TileProblem& problem, const TileState& state, std::int64_t reference, int subsets,
+                                const MotionReference& motion, const TileSolver& solver);
+
+}  // namespace megablock

@@ -1,0 +1,29 @@
+// A block as the determinant method wants it (coplanarity_adjustment.h): single cameras of one focal length.
+//
+// Positions are those observed, else those the frames start with; they are held. Angles start at the observed
+// attitudes, else at those the frames start with. Measurements become x f / z, y f / z of their viewing rays, which
+// frees them of distortion; f is the focal length of the first camera, so that for others a pixel is one of the first.
+#pragma once
+
+#include "adjust/coplanarity/coplanarity_adjustment.h"
+#include "io/block/block.h"
+#include "io/block/tracks.h"
+
+namespace megablock {
+
+struct CoplanarityBlock {
+  CoplanarityNetwork network;
+  std::vector<FrameIndex> frames;    // [cameras of the network], ascending
+  std::vector<Pose> mounts;          // [cameras of the network]
+  double angle_sigma_rad = 0;        // rms over axes and frames of the observed attitudes; 0: of none
+  std::int64_t frames_left_out = 0;  // without position or attitude, or without a point that another one sees
+  std::int64_t points_left_out = 0;  // seen by fewer than two of the others
+
+  // Of the frame of a camera that looks so; the camera's centre is held.
+  Pose frame_pose(std::size_t camera, const XyzAngles& angles) const;
+};
+
+// Throws InputError for frames of several images, and where fewer than two frames are left.
+CoplanarityBlock coplanarity_block(const Block& block, const BlockState& start, const std::vector<TrackSet>& tracks);
+
+}  // namespace megablock

@@ -1,0 +1,58 @@
+// Included by lane_kernels_*.cpp, which set the width of vectors. Formulas: linearise.h, geometry/camera/projection.h.
+#pragma once
+
+#include "adjust/lanes/lane_kernels.h"
+#include "geometry/numbers/lane_vector.h"
+
+namespace megablock::lane_kernels {
+namespace {
+
+// With `kDerivatives` all values, else the residual alone.
+template <bool kDerivatives>
+void work(const double* const* views, const double* records, std::int64_t count, double* values, std::int64_t stride) {
+  for (std::int64_t i = 0; i < count; i += kWidth) {
+    Lanes view[kViewSize], record[kRecordSize];
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return views[i + lane]; }, view);
+    read_records(
+        [&](int lane) __attribute__((always_inline)) { return records + (i + lane) * kRecordSize; }, record);
+    const Lanes* r = view;
+    const Lanes *centre = view + 9, *shift = view + 12, *k = view + 15;  // k: f, cx, cy, k1, k2, k3, p1, p2
+    const Lanes u0 = record[0] - centre[0], u1 = record[1] - centre[1], u2 = record[2] - centre[2];
+    const Lanes depth = r[6] * u0 + r[7] * u1 + r[8] * u2 - shift[2];
+    const Lanes inverse = 1 / depth;
+    const Lanes x = (r[0] * u0 + r[1] * u1 + r[2] * u2 - shift[0]) * inverse;
+    const Lanes y = (r[3] * u0 + r[4] * u1 + r[5] * u2 - shift[1]) * inverse;
+    const Lanes r2 = x * x + y * y, xy2 = 2 * x * y;
+    const Lanes radial = 1 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+    const Lanes distorted_x = x * radial + k[6] * xy2 + k[7] * (r2 + 2 * x * x);
+    const Lanes distorted_y = y * radial + k[6] * (r2 + 2 * y * y) + k[7] * xy2;
+    const Lanes weight = record[5];
+    const Lanes nan = Lanes{} + __builtin_nan("");
+    const LaneMask in_front = depth > 0;
+    double* out = values + i;
+    const Lanes residual_x = weight * (k[1] + k[0] * distorted_x - record[3]);
+    const Lanes residual_y = weight * (k[2] + k[0] * distorted_y - record[4]);
+    store(out + kResidual * stride, in_front ? residual_x : nan);
+    store(out + (kResidual + 1) * stride, in_front ? residual_y : nan);
+    if constexpr (kDerivatives) {
+      store(out + kFromFrame * stride, u0);
+      store(out + (kFromFrame + 1) * stride, u1);
+      store(out + (kFromFrame + 2) * stride, u2);
+      const Lanes slope = k[3] + r2 * (2 * k[4] + 3 * r2 * k[5]);  // d radial / d r2
+      const Lanes scale = weight * (k[0] * inverse);
+      const Lanes cross = scale * (xy2 * slope + 2 * k[6] * x + 2 * k[7] * y);
+      const Lanes xx = scale * (radial + 2 * x * x * slope + 2 * k[6] * y + 6 * k[7] * x);
+      const Lanes yy = scale * (radial + 2 * y * y * slope + 6 * k[6] * y + 2 * k[7] * x);
+      const Lanes xz = -x * xx - y * cross, yz = -x * cross - y * yy;
+#pragma GCC unroll 64
+      for (int j = 0; j < 3; ++j) {
+        store(out + (kByPoint + j) * stride, xx * r[j] + cross * r[3 + j] + xz * r[6 + j]);
+        store(out + (kByPoint + 3 + j) * stride, cross * r[j] + yy * r[3 + j] + yz * r[6 + j]);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace megablock::lane_kernels

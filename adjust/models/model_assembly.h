@@ -1,0 +1,41 @@
+// Block adjustment of independent models: pairs, sub-blocks or tiles, each in a frame of its own, joined by one
+// similarity each (M51, M52).
+//
+// A start from the links between models: chained along the most trusted, then all together (linked_models.h). From it
+// all shared points and images together (place_adjustment.h).
+//
+// The frame is that of the model with the lowest number in each part that hangs together; its similarity is the
+// identity. Models, points and images are taken in the order of their numbers: the result has the same bits in whatever
+// order they come.
+#pragma once
+
+#include "adjust/models/model_link.h"
+
+namespace megablock {
+
+struct AssemblyOptions {
+  LinkOptions links;
+  bool joint = true;        // false: only chained along the most trusted links, for comparison
+  bool covariances = true;  // by the entries of the inverse that the factor has: about the time of two iterations
+  int max_iterations = 30;  // of the joint adjustment
+  void check() const;       // throws InputError
+};
+
+struct AssembledModels {
+  std::vector<Similarity> similarity;            // [models] model -> frame of its part
+  std::vector<SimilarityCovariance> covariance;  // [models] of steps as in similarity.h, for sigmas as they were given
+  std::vector<std::int64_t> part;                // [models] number of the model whose frame is the part's
+  std::vector<std::int64_t> lost;                // numbers of models that links join to others, and places do not
+  std::vector<ModelLink> links;                  // a, b: rows of the models given; similarity b -> a as adjusted alone
+  std::int64_t shared = 0, rejected = 0;         // points and images in models, of those that models share
+  std::int64_t redundancy = 0;
+  double sigma0 = 0;      // sqrt(weighted squares / redundancy)
+  int iterations = 0;     // of the joint adjustment
+  bool converged = true;  // false: ended by max_iterations
+};
+
+// Throws InputError for numbers that are not finite, sigmas that are not positive, numbers given twice; ComputeError
+// when the adjustment diverges. Models that nothing links are parts of their own.
+AssembledModels assemble_models(const std::vector<Model>& models, const AssemblyOptions& options = {});
+
+}  // namespace megablock

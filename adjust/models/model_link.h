@@ -1,0 +1,83 @@
+// Two models of one block and the similarity between them: what they share, and a robust fit of it (M50).
+//
+// A model is a set of points and images in a frame of its own, free in place, attitude and scale. Steps of a similarity
+// S (model -> common frame) are taken in the model's own frame and units, xi = (w, q, d):
+//
+//     S E(xi),   E(xi): x -> x + w x x + q x + d            so that    S^-1 X  moves by  -(w x z + q z + d),  z = S^-1
+//     X
+//
+// and nothing depends on the frame that the models happen to have. For a link b -> a the residuals are taken in b: of a
+// point or projection centre S^-1 x_a - x_b, variance sigma_b^2 + sigma_a^2 / s^2; of an image's attitude
+// Log(R' Q_a' Q_b), variances added.
+//
+// The start is the best of samples of three points or centres (minimal_similarity.h) and of one image's attitude with
+// the distance of two places, by the sum of squares truncated at a threshold; it is improved by least squares over what
+// agrees until that does not change. Draws depend on the numbers of the two models alone.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "geometry/similarity/similarity.h"
+
+namespace megablock {
+
+struct ModelPoint {
+  std::int64_t number = 0;  // of the point in the block
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double sigma = 0;  // of a coordinate, units of the model
+};
+struct ModelImage {
+  std::int64_t number = 0;    // of the image, or frame, in the block
+  Pose pose;                  // model's frame -> image
+  double centre_sigma = 0;    // of a coordinate, units of the model
+  double rotation_sigma = 0;  // rad, of each axis
+};
+struct Model {
+  std::int64_t number = 0;
+  std::vector<ModelPoint> points;  // in any order, each number once; of interest are those that models share
+  std::vector<ModelImage> images;
+};
+
+// What two models have in common: rows of their points and of their images.
+struct SharedRows {
+  std::vector<std::pair<std::int32_t, std::int32_t>> points, images;
+};
+
+struct ModelLink {
+  std::int32_t a = -1, b = -1;                                      // rows of the models
+  Similarity similarity;                                            // b -> a
+  SimilarityCovariance information = SimilarityCovariance::Zero();  // inverse covariance of xi, in b
+  int shared = 0, agreeing = 0;                                     // points and images
+  bool kept = true;                                                 // false: contradicts the others
+};
+
+struct LinkOptions {
+  double rejection_probability = 1e-5;  // of a good point or image, by chance
+  int min_redundancy = 8;               // equations that agree (3 a point, 6 an image) less 7; of three places at least
+  double min_share = 0.25;              // agreeing of shared points and images
+  int max_samples = 500;
+  // Sigmas of places and of attitudes are each known up to a factor, which each link takes from their median misfit
+  // over what agrees (at least 1): for models of which only the order of their errors is known. What agrees is then
+  // found a contrario (geometry/estimation/ransac.h), or, where that is too few, as the better of samples of which most
+  // places agree.
+  bool scale_sigmas = false;
+  void check() const;  // throws InputError
+};
+
+// Empty where too little agrees, or leaves the similarity open. `shared` ascending, so that the result does not depend
+// on the order of what the models hold.
+std::optional<ModelLink> fit_model_link(const std::vector<Model>& models, std::int32_t a, std::int32_t b,
+                                        const SharedRows& shared, const LinkOptions& options);
+
+// S E(xi).
+Similarity move_in_model(const Similarity& similarity, const SimilarityStep& xi);
+
+// The xi for which S is E(xi), for S near the identity.
+SimilarityStep step_of(const Similarity& near_identity);
+
+// d(S^-1 X)/dxi at z = S^-1 X.
+Eigen::Matrix<double, 3, 7> by_model_step(const Eigen::Vector3d& z);
+
+}  // namespace megablock

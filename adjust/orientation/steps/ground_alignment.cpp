@@ -1,0 +1,223 @@
+#include "adjust/orientation/steps/ground_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/numbers/decompositions.h"
+
+namespace megablock {
+
+namespace {
+
+// Mean viewing direction and mean y axis of the oriented images, ground axes (not normalised).
+struct MeanAxes {
+  Eigen::Vector3d view = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
+};
+
+MeanAxes mean_axes(const OrientationGraph& graph, const OrientationValues& values) {
+  MeanAxes result;
+  double count = 0;
+  for (std::size_t i = 0; i < graph.images.size(); ++i) {
+    const auto camera = values.camera(graph, static_cast<std::int32_t>(i));
+    if (!camera) continue;
+    result.view += camera->rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    result.down += camera->rotation.conjugate() * Eigen::Vector3d::UnitY();
+    ++count;
+  }
+  if (count > 0) result.view /= count, result.down /= count;
+  return result;
+}
+
+// Rotation about the unit axis that brings the part of `from` across the axis onto that of `to`.
+Eigen::Quaterniond turn_about(const Eigen::Vector3d& axis, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const double sine = axis.dot(from.cross(to));
+  const double cosine = from.dot(to) - axis.dot(from) * axis.dot(to);
+  return Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(sine, cosine), axis));
+}
+
+// The part of a rotation that is not about the axis (swing of the swing-twist decomposition).
+Eigen::Quaterniond without_twist(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& axis) {
+  const double along = rotation.vec().dot(axis);
+  const Eigen::Quaterniond twist(rotation.w(), along * axis.x(), along * axis.y(), along * axis.z());
+  if (!(twist.norm() > 1e-9)) return rotation;
+  return rotation * twist.normalized().conjugate();
+}
+
+Eigen::Vector3d which_points_down(const OrientationGraph& graph, const OrientationValues& values,
+                                  const Similarity& similarity, const Eigen::Vector3d& line, double distance_m) {
+  MeanAxes axes = mean_axes(graph, values);
+  axes.view = similarity.rotation * axes.view;
+  axes.down = similarity.rotation * axes.down;
+  const auto across = [&](const Eigen::Vector3d& v) { return (v - line * line.dot(v)).norm(); };
+  constexpr double kClear = 0.7, kNadirDistance = 25;  // metres
+  if (across(axes.view) < kClear) return axes.down;
+  if (across(axes.down) < kClear) return axes.view;
+  return distance_m > kNadirDistance ? axes.view : axes.down;
+}
+
+struct KnownPositions {
+  std::vector<Eigen::Vector3d> from, to;
+  std::vector<double> sigma;  // allows for the bend of first centres
+  double stated_sigma = 0;    // mean of the priors
+};
+
+double median_of(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+KnownPositions known_positions(const OrientationGraph& graph, const OrientationValues& values) {
+  KnownPositions known;
+  for (std::size_t f = 0; f < graph.frames.size(); ++f) {
+    const auto& node = graph.frames[f];
+    if (!values.frames[f] || !node.position) continue;
+    known.from.push_back(values.frames[f]->centre);
+    known.to.push_back(node.position->position);
+    known.sigma.push_back(node.position->sigma.mean());
+    known.stated_sigma += node.position->sigma.mean();
+  }
+  if (known.to.empty()) return known;
+  known.stated_sigma /= static_cast<double>(known.to.size());
+  // First centres bend over the block: allow for a twentieth of its (robust) extent.
+  Eigen::Vector3d middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> coordinates;
+    for (const auto& p : known.to) coordinates.push_back(p[axis]);
+    middle[axis] = median_of(std::move(coordinates));
+  }
+  std::vector<double> distances;
+  for (const auto& p : known.to) distances.push_back((p - middle).norm());
+  const double bend = 0.05 * median_of(std::move(distances));
+  for (double& sigma : known.sigma) sigma = std::hypot(sigma, bend);
+  return known;
+}
+
+}  // namespace
+
+GroundAngles known_angles(const OrientationGraph& graph) {
+  for (const auto& frame : graph.frames)
+    if (frame.given || frame.attitude) return GroundAngles::kAll;
+  // One or two could be wrong, and nothing would show it.
+  constexpr std::ptrdiff_t kVerticals = 3;
+  const auto seen = std::count_if(graph.images.begin(), graph.images.end(),
+                                  [](const auto& image) { return image.vertical != nullptr; });
+  return seen >= kVerticals ? GroundAngles::kLevel : GroundAngles::kNone;
+}
+
+std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, const OrientationValues& values,
+                                               const Eigen::Vector3d& down) {
+  const KnownPositions known = known_positions(graph, values);
+  const auto similarity = fit_similarity_robust(known.from, known.to, known.sigma);
+  if (!similarity) return std::nullopt;
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < known.to.size(); ++i) {
+    const double residual = ((*similarity)(known.from[i]) - known.to[i]).norm();
+    weights.push_back(1 /
+                      (static_cast<double>(known.to.size()) * (known.sigma[i] * known.sigma[i] + residual * residual)));
+  }
+  const auto covariance = similarity_covariance(*similarity, known.from, weights);
+  if (!covariance) return std::nullopt;
+  const Eigen::Vector3d here = similarity->rotation.conjugate() * down;
+  const Eigen::Matrix3d by_turn = skew(here);
+  return AxisDirection{here, by_turn * covariance->topLeftCorner<3, 3>() * by_turn.transpose()};
+}
+
+std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
+                                               double median_distance, GroundAngles known_angles) {
+  const KnownPositions known = known_positions(graph, values);
+  auto similarity = fit_similarity_robust(known.from, known.to, known.sigma);
+  if (!similarity) return std::nullopt;
+
+  // Spread of the positions that agree; a line when nothing across it exceeds its noise.
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  double count = 0;
+  for (int pass = 0; pass < 2; ++pass)
+    for (std::size_t i = 0; i < known.to.size(); ++i) {
+      if (((*similarity)(known.from[i]) - known.to[i]).norm() > 4 * known.sigma[i]) continue;
+      const Eigen::Vector3d moved = (*similarity)(known.from[i]);
+      if (pass == 0)
+        mean += moved, ++count;
+      else
+        spread += (moved - mean / count) * (moved - mean / count).transpose() / count;
+    }
+  if (count < 2) return std::nullopt;
+  const SymmetricEigen3 eigen = symmetric_eigen3(spread);
+  const double length = std::sqrt(std::max(0.0, eigen.values(2)));
+  const double width = std::sqrt(std::max(0.0, eigen.values(1)));
+  const bool line = count < 3 || width < std::max(0.03 * length, 2 * known.stated_sigma / std::sqrt(count));
+  if (!line && known_angles != GroundAngles::kLevel) return similarity;
+
+  const Eigen::Vector3d axis = eigen.vectors.col(2), up = Eigen::Vector3d::UnitZ();
+  Eigen::Quaterniond rotation;
+  if (known_angles == GroundAngles::kLevel) {
+    rotation = line ? turn_about(up, similarity->rotation.conjugate() * axis, axis)
+                    : without_twist(similarity->rotation, up).conjugate() * similarity->rotation;
+  } else if (known_angles == GroundAngles::kAll) {
+    // Left factor about the axis is what the positions leave open: take it out of the rotation.
+    rotation = without_twist(similarity->rotation, similarity->rotation.conjugate() * axis);
+  } else {
+    const double distance = similarity->scale * median_distance;
+    const Eigen::Vector3d down = which_points_down(graph, values, *similarity, axis, distance);
+    rotation = turn_about(axis, down, -Eigen::Vector3d::UnitZ()) * similarity->rotation;
+  }
+  const Eigen::Vector3d centre = mean / count;  // on the line: stays where it is
+  const Eigen::Vector3d before = similarity->inverse()(centre);
+  similarity->rotation = rotation.normalized();
+  similarity->translation = centre - similarity->scale * (similarity->rotation * before);
+  return similarity;
+}
+
+Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, GroundAngles known,
+                                    bool keep_scale) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const auto& frame : values.frames)
+    if (frame) mean += frame->centre, ++count;
+  if (count < 2) return {};
+  mean /= count;
+
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d farthest = Eigen::Vector3d::Zero();
+  for (const auto& frame : values.frames) {
+    if (!frame) continue;
+    const Eigen::Vector3d d = frame->centre - mean;
+    spread += d * d.transpose();
+    if (d.squaredNorm() > farthest.squaredNorm() * (1 + 1e-6)) farthest = d;
+  }
+  double baselines = 0, links = 0;
+  for (const auto& edge : graph.edges) {
+    const auto& a = values.frames[static_cast<std::size_t>(graph.images[static_cast<std::size_t>(edge.a)].frame)];
+    const auto& b = values.frames[static_cast<std::size_t>(graph.images[static_cast<std::size_t>(edge.b)].frame)];
+    if (a && b) baselines += (a->centre - b->centre).norm(), ++links;
+  }
+
+  Similarity result;
+  if (!keep_scale && baselines > 0) result.scale = links / baselines;
+  if (known != GroundAngles::kAll) {
+    const SymmetricEigen3 eigen = symmetric_eigen3(spread);
+    const MeanAxes axes = mean_axes(graph, values);
+    const bool line = eigen.values(1) < 1e-3 * eigen.values(2);
+    Eigen::Vector3d up = line ? Eigen::Vector3d(-axes.down) : Eigen::Vector3d(eigen.vectors.col(0));
+    if (up.dot(axes.view + axes.down) > 0) up = -up;
+    Eigen::Vector3d east = farthest.normalized();
+    up = (up - east * east.dot(up)).normalized();
+    if (!line) {
+      up = eigen.vectors.col(0) * (eigen.vectors.col(0).dot(axes.view + axes.down) > 0 ? -1.0 : 1.0);
+      east = (east - up * up.dot(east)).normalized();
+    }
+    if (known == GroundAngles::kLevel) {
+      up = Eigen::Vector3d::UnitZ();
+      east = (farthest - up * farthest.z()).normalized();
+    }
+    if (up.allFinite() && east.norm() > 0.5) {  // not of centres one above the other
+      Eigen::Matrix3d rotation;
+      rotation << east.transpose(), up.cross(east).transpose(), up.transpose();
+      result.rotation = Eigen::Quaterniond(rotation).normalized();
+    }
+  }
+  result.translation = -result.scale * (result.rotation * mean);
+  return result;
+}
+
+}  // namespace megablock

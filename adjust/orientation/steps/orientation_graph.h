@@ -1,0 +1,73 @@
+// What initial orientation works on: frames, images, relative orientations and tracks of one component in local numbers
+// whose order does not depend on the order of the block's images (frames and images by name, tracks by length, then by
+// their first observations).
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "adjust/orientation/steps/orientation_options.h"
+#include "adjust/problem/tile_problem.h"
+#include "io/block/features.h"
+
+namespace megablock {
+
+// Local numbers are signed; the standard library wants them unsigned.
+inline std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
+
+struct OrientationGraph {
+  struct FrameNode {
+    FrameIndex index;
+    std::optional<Pose> given;              // oriented beforehand: stays where it is
+    std::optional<PositionPrior> position;  // of given frames their own position
+    std::optional<AttitudePrior> attitude;
+  };
+  struct ImageNode {
+    ImageIndex index;
+    std::int32_t frame = -1;
+    std::int32_t camera = -1;  // row of `cameras`
+    Pose mount;
+    const SeenVertical* vertical = nullptr;  // of the block
+  };
+  // Relative orientation of camera b with respect to camera a.
+  struct Relative {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // camera a -> camera b
+    // Unit direction from a to b in the axes of camera a; zero: rotation only.
+    Eigen::Vector3d baseline = Eigen::Vector3d::Zero();
+    double rotation_sigma = 0, baseline_sigma = 0;  // of the matches' errors, of each axis, rad; 0: not known
+  };
+  struct PairEdge : Relative {
+    std::int32_t a = -1, b = -1;  // rows of `images`, a < b
+    double inliers = 0;
+    bool has_twin = false;
+    Relative twin;  // explains the matches of a plane nearly as well
+  };
+  // Observations of a track: rows [begin[t], begin[t + 1]); images ascending.
+  struct Observation {
+    std::int32_t image = -1;
+    Eigen::Vector2d pixel;
+  };
+
+  std::vector<FrameNode> frames;
+  std::vector<ImageNode> images;
+  std::vector<CameraIndex> cameras;
+  std::vector<PairEdge> edges;  // of images of different frames, ascending by (a, b)
+  std::vector<std::int64_t> begin;
+  std::vector<Observation> observations;
+
+  std::int64_t track_count() const { return static_cast<std::int64_t>(begin.size()) - 1; }
+  std::int32_t frame_count() const { return static_cast<std::int32_t>(frames.size()); }
+};
+
+// Keeps the longest tracks until every pair of images has `tracks_per_pair` of them and there are 20 000 in all.
+OrientationGraph make_orientation_graph(const Block& block, const BlockState& start,
+                                        const std::vector<FrameIndex>& frames, const std::vector<VerifiedPair>& pairs,
+                                        const TrackSet& tracks, const OrientationOptions& options);
+
+// Unit viewing directions of all observations in camera axes; zero where the distortion cannot be inverted.
+std::vector<Eigen::Vector3d> viewing_rays(const OrientationGraph& graph, const std::vector<Intrinsics>& cameras);
+
+}  // namespace megablock

@@ -1,0 +1,14 @@
+#include "adjust/orientation/straight_line.h"
+
+#include "geometry/numbers/decompositions.h"
+
+namespace megablock {
+
+std::optional<Eigen::Vector3d> straight_line(const Eigen::Matrix3d& scatter) {
+  constexpr double kNarrow = 0.03;  // width over length
+  const SymmetricEigen eigen = symmetric_eigen(scatter);
+  if (!(eigen.values(1) <= kNarrow * kNarrow * eigen.values(2))) return {};
+  return eigen.vectors.col(2);
+}
+
+}  // namespace megablock

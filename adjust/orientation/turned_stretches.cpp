@@ -1,0 +1,161 @@
+#include "adjust/orientation/turned_stretches.h"
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "geometry/transform/rotation.h"
+
+namespace megablock {
+
+namespace {
+
+std::size_t row_of(FrameIndex frame) { return static_cast<std::size_t>(frame.value); }
+
+// What `to` must be for the relative pose to hold, and the other way round.
+Pose predicted_to(const RelativePose& relative, const Pose& from) {
+  return {relative.pose.rotation * from.rotation, from.centre + from.rotation.conjugate() * relative.pose.centre};
+}
+Pose predicted_from(const RelativePose& relative, const Pose& to) {
+  const Eigen::Quaterniond rotation = relative.pose.rotation.conjugate() * to.rotation;
+  return {rotation, to.centre - rotation.conjugate() * relative.pose.centre};
+}
+
+double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+  return rotation_log<double>(a * b.conjugate()).norm();
+}
+
+// The movement of the ground that brings a frame from one pose to another.
+struct Movement {
+  Eigen::Quaterniond turn;
+  Eigen::Vector3d from, to;
+  Movement(const Pose& before, const Pose& after)
+      : turn(after.rotation.conjugate() * before.rotation), from(before.centre), to(after.centre) {}
+  Pose operator()(const Pose& pose) const {
+    return {(pose.rotation * turn.conjugate()).normalized(), to + turn * (pose.centre - from)};
+  }
+};
+
+class StretchTurner {
+ public:
+  StretchTurner(const Block& block, const BlockState& initial, BlockState& state, const StretchOptions& options)
+      : block_(block), initial_(initial), state_(state), options_(options), group_(block.frames.size()) {}
+
+  std::int64_t run() {
+    join_agreeing();
+    // In the order of the relative poses; a group that was moved joins the one it was moved to, so that others may
+    // follow.
+    std::int64_t moved = 0;
+    for (bool again = true; again;) {
+      again = false;
+      for (const RelativePose& relative : block_.relative_poses)
+        if (const std::int64_t frames = try_to_move(relative); frames > 0) {
+          moved += frames;
+          again = true;
+        }
+    }
+    return moved;
+  }
+
+ private:
+  bool both_oriented(const RelativePose& relative) const {
+    return state_.oriented[relative.from] && state_.oriented[relative.to];
+  }
+
+  bool contradicted(const RelativePose& relative) const {
+    const double angle = angle_between(state_.frames[relative.to].rotation,
+                                       relative.pose.rotation * state_.frames[relative.from].rotation);
+    return angle > options_.max_rotation_rad && angle > options_.max_sigmas * relative.rotation_sigma_rad;
+  }
+
+  std::size_t find(std::size_t frame) {
+    while (group_[frame] != frame) frame = group_[frame] = group_[group_[frame]];
+    return frame;
+  }
+  void join(std::size_t a, std::size_t b) {
+    a = find(a), b = find(b);
+    if (a == b) return;
+    if (members_[a].size() < members_[b].size()) std::swap(a, b);
+    group_[b] = a;
+    members_[a].insert(members_[a].end(), members_[b].begin(), members_[b].end());
+    members_[b] = {};
+  }
+
+  void join_agreeing() {
+    std::iota(group_.begin(), group_.end(), std::size_t{0});
+    for (std::size_t f = 0; f < group_.size(); ++f) members_.push_back({FrameIndex(static_cast<std::int64_t>(f))});
+    for (const RelativePose& relative : block_.relative_poses)
+      if (both_oriented(relative) && !contradicted(relative)) join(row_of(relative.from), row_of(relative.to));
+  }
+
+  // Median angle to the initial orientation of a group, moved or not.
+  template <typename Move>
+  double distance(const std::vector<FrameIndex>& frames, Move&& move) const {
+    std::vector<double> angles;
+    for (const FrameIndex frame : frames)
+      angles.push_back(angle_between(move(state_.frames[frame]).rotation, initial_.frames[frame].rotation));
+    const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
+    std::nth_element(angles.begin(), middle, angles.end());
+    return *middle;
+  }
+
+  // Whether a group has observed positions and is not further from them than they allow, or half as far again as
+  // before.
+  bool keeps_positions(const std::vector<FrameIndex>& frames, const Movement& movement) const {
+    constexpr double kAllowed = 3;  // sigmas, median
+    std::vector<double> before, after;
+    for (const FrameIndex frame : frames) {
+      const auto& prior = block_.frames[frame].position_prior;
+      if (!prior) continue;
+      const auto sigmas = [&](const Pose& pose) {
+        const Eigen::Vector3d antenna = pose.centre + pose.rotation.conjugate() * prior->lever_arm;
+        return (antenna - prior->position).cwiseQuotient(prior->sigma).norm();
+      };
+      before.push_back(sigmas(state_.frames[frame]));
+      after.push_back(sigmas(movement(state_.frames[frame])));
+    }
+    if (before.empty()) return false;
+    const auto median = [](std::vector<double>& values) {
+      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), middle, values.end());
+      return *middle;
+    };
+    return median(after) <= std::max(kAllowed, 1.5 * median(before));
+  }
+
+  // Frames moved; 0: the relative pose holds, or it is not the smaller group that is wrong.
+  std::int64_t try_to_move(const RelativePose& relative) {
+    if (!both_oriented(relative) || find(row_of(relative.from)) == find(row_of(relative.to)) || !contradicted(relative))
+      return 0;
+    const bool move_to = members_[find(row_of(relative.to))].size() <= members_[find(row_of(relative.from))].size();
+    const FrameIndex frame = move_to ? relative.to : relative.from;
+    const Pose& before = state_.frames[frame];
+    const Pose after = move_to ? predicted_to(relative, state_.frames[relative.from])
+                               : predicted_from(relative, state_.frames[relative.to]);
+    const Movement movement(before, after);
+    const std::vector<FrameIndex>& frames = members_[find(row_of(frame))];
+    const auto stay = [](const Pose& pose) { return pose; };
+    if (distance(frames, movement) > 0.5 * distance(frames, stay) || !keeps_positions(frames, movement)) return 0;
+    for (const FrameIndex member : frames) state_.frames[member] = movement(state_.frames[member]);
+    const auto count = static_cast<std::int64_t>(frames.size());
+    join(row_of(relative.from), row_of(relative.to));
+    return count;
+  }
+
+  const Block& block_;
+  const BlockState& initial_;
+  BlockState& state_;
+  const StretchOptions& options_;
+  std::vector<std::size_t> group_;                // [frames] towards the group's representative
+  std::vector<std::vector<FrameIndex>> members_;  // of representatives
+};
+
+}  // namespace
+
+std::int64_t turn_back_stretches(const Block& block, const BlockState& initial, BlockState& state,
+                                 const StretchOptions& options) {
+  if (block.relative_poses.empty()) return 0;
+  return StretchTurner(block, initial, state, options).run();
+}
+
+}  // namespace megablock

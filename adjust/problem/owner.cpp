@@ -1,0 +1,27 @@
+#include "adjust/problem/owner.h"
+
+#include <algorithm>
+
+namespace megablock {
+
+std::int64_t owner_part(std::vector<OwnerCandidate>& frames) {
+  // As unsigned numbers "none" is the greatest depth.
+  std::sort(frames.begin(), frames.end(), [](const OwnerCandidate& a, const OwnerCandidate& b) {
+    const auto first = static_cast<std::uint32_t>(a.depth), second = static_cast<std::uint32_t>(b.depth);
+    return first != second ? first > second : a.part < b.part;
+  });
+  std::int64_t best = -1;
+  std::ptrdiff_t most = 0;
+  for (auto run = frames.begin(); run != frames.end() && run->depth == frames.front().depth;) {
+    auto next = run;
+    while (next != frames.end() && next->part == run->part && next->depth == run->depth) ++next;
+    if (next - run > most) {
+      most = next - run;
+      best = run->part;
+    }
+    run = next;
+  }
+  return best;
+}
+
+}  // namespace megablock

@@ -1,0 +1,72 @@
+#include "adjust/resection/rig_sights.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/estimation/ransac.h"
+#include "geometry/resection/gp3p.h"
+
+namespace megablock {
+
+std::optional<WhitenedSight> whitened(const RigSight& sight, const Pose& pose, bool with_jacobian) {
+  const auto r = ray_residual(sight.ray, to_inside(pose, sight.point));
+  if (!r) return std::nullopt;
+  const Eigen::Matrix<double, 2, 3> by_ground = r->by_point * pose.rotation.toRotationMatrix();
+  const Eigen::Matrix2d covariance = sight.sigma_px * sight.sigma_px * Eigen::Matrix2d::Identity() +
+                                     by_ground * sight.covariance * by_ground.transpose();
+  // Cholesky factor of a 2x2, by hand: this is the innermost loop.
+  const double a = std::sqrt(covariance(0, 0)), b = covariance(1, 0) / a,
+               c = std::sqrt(std::max(covariance(1, 1) - b * b, 1e-300));
+  const auto solve = [&](const auto& v) {
+    std::decay_t<decltype(v.eval())> x = v;
+    x.row(0) /= a;
+    x.row(1) = (x.row(1) - b * x.row(0)) / c;
+    return x;
+  };
+  WhitenedSight w{solve(r->pixels), Eigen::Matrix<double, 2, 6>::Zero(), r->pixels.squaredNorm()};
+  if (with_jacobian) w.by_pose = solve((r->by_point * in_rig_by_pose(pose, sight.point)).eval());
+  return w;
+}
+
+void add_normal_equations(std::span<const RigSight> sights, const Pose& pose, double limit_squared, PoseNormal& normal,
+                          PoseIncrement& right) {
+  for (const RigSight& sight : sights) {
+    const auto w = whitened(sight, pose, true);
+    if (!w || w->residual.squaredNorm() > limit_squared) continue;
+    normal += w->by_pose.transpose() * w->by_pose;
+    right -= w->by_pose.transpose() * w->residual;
+  }
+}
+
+Solutions<Pose, 8> RigSightEstimator::solve(const std::array<std::size_t, 3>& rows) const {
+  const RigSight &a = sights_[rows[0]], &b = sights_[rows[1]], &c = sights_[rows[2]];
+  if (a.id == b.id || a.id == c.id || b.id == c.id) return {};
+  return solve_gp3p({a.ray.origin, b.ray.origin, c.ray.origin}, {a.ray.direction, b.ray.direction, c.ray.direction},
+                    {a.point, b.point, c.point});
+}
+
+std::optional<Pose> RigSightEstimator::refine(Pose pose, double threshold) const {
+  constexpr int kSteps = 2;
+  for (int step = 0; step < kSteps; ++step) {
+    PoseNormal normal = PoseNormal::Zero();
+    PoseIncrement right = PoseIncrement::Zero();
+    add_normal_equations(sights_, pose, threshold * threshold, normal, right);
+    const PoseIncrement increment = normal.ldlt().solve(right);
+    if (!increment.allFinite()) return std::nullopt;
+    pose = pose_update(pose, increment);
+  }
+  return pose;
+}
+
+std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed) {
+  RansacOptions sampling;
+  sampling.threshold = threshold_sigmas;
+  sampling.confidence = 0.999;
+  sampling.max_draws = 500;
+  sampling.seed = seed;
+  const auto found = ransac(RigSightEstimator(sights), sampling);
+  return found ? std::optional(found->model) : std::nullopt;
+}
+
+}  // namespace megablock

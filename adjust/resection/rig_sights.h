@@ -1,0 +1,67 @@
+// Points seen by a rig: whitened residuals, and the estimator of geometry/estimation/ransac.h for the rig's pose.
+//
+// Residuals are in pixels (geometry/resection/rig_ray.h), each whitened by
+//
+//     image_sigma^2 I + J R C_X R' J'        (C_X: covariance of the point, J R: derivative by the point)
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "geometry/numbers/solutions.h"
+#include "geometry/resection/rig_ray.h"
+
+namespace megablock {
+
+struct RigSight {
+  RigRay ray;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();       // ground frame, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the point, m^2
+  double sigma_px = 0.5;                                 // of the measurement, per axis
+  std::int64_t id = 0;                                   // of the point: sights of one point share it
+};
+
+// Whitened residual and its derivative by the pose.
+struct WhitenedSight {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 6> by_pose;
+  double squared_px;
+};
+// Empty where the point is not in front.
+std::optional<WhitenedSight> whitened(const RigSight& sight, const Pose& pose, bool with_jacobian);
+
+using PoseNormal = Eigen::Matrix<double, 6, 6>;
+// Adds the normal equations of the sights whose squares do not exceed the limit.
+void add_normal_equations(std::span<const RigSight> sights, const Pose& pose, double limit_squared, PoseNormal& normal,
+                          PoseIncrement& right);
+
+// Samples of three points (gp3p.h); refined by a few steps of least squares.
+class RigSightEstimator {
+ public:
+  using Model = Pose;  // ground -> rig
+  static constexpr std::size_t kSampleSize = 3;
+  // The sights must outlive it.
+  explicit RigSightEstimator(std::span<const RigSight> sights) : sights_(sights) {}
+  std::size_t size() const { return sights_.size(); }
+  Solutions<Pose, 8> solve(const std::array<std::size_t, 3>& rows) const;
+  // Of the whitened residual; infinite behind a camera.
+  auto squared_residuals(const Pose& pose) const {
+    return [sights = sights_, pose](std::size_t i) {
+      const auto w = whitened(sights[i], pose, false);
+      return w ? w->residual.squaredNorm() : std::numeric_limits<double>::infinity();
+    };
+  }
+  std::optional<Pose> refine(Pose pose, double threshold) const;
+
+ private:
+  std::span<const RigSight> sights_;
+};
+
+// The pose that most of the sights agree on, of a frame or a part of a tile that is lost: up to 500 samples, residuals
+// up to the threshold in sigmas. Empty where none is found; whether enough agree is the caller's to judge.
+std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed);
+
+}  // namespace megablock

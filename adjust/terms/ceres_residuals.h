@@ -1,0 +1,250 @@
+// The residuals of a tile for Ceres' automatic differentiation: written from the definitions in tile_problem.h alone,
+// independent of linearise.cpp, so that either can be held against the other.
+//
+// Parameter blocks: frame and mount 7 (quaternion w, x, y, z, then centre), camera as many as its model
+// has (Intrinsics), point 3.
+// PoseManifold gives a pose the project's tangent increment (PoseIncrement, right perturbation): Jacobians, gradients
+// and steps that Ceres reports in tangent space have the six columns of a frame in our order and sign.
+#pragma once
+
+#include <ceres/jet.h>
+#include <ceres/manifold.h>
+
+#include <Eigen/LU>
+
+#include "adjust/problem/tile_problem.h"
+
+namespace megablock {
+
+inline constexpr int kPoseBlock = 7;
+
+class PoseManifold : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return kPoseBlock; }
+  int TangentSize() const override { return 6; }
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
+  bool PlusJacobian(const double* x, double* jacobian) const override;
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
+  bool MinusJacobian(const double* x, double* jacobian) const override;
+};
+
+// Rows: the derivatives of the quaternion (w, x, y, z) by the right perturbation are this matrix / 4, transposed;
+// the derivative of the perturbation by the quaternion is the matrix itself.
+Eigen::Matrix<double, 3, 4> quaternion_to_tangent(const double* quaternion_wxyz);
+
+void to_block(const Pose& pose, double* block);
+Pose from_block(const double* block);
+
+namespace residual {
+
+template <typename Scalar>
+using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+
+template <typename Scalar>
+Eigen::Quaternion<Scalar> rotation_of(const Scalar* pose) {
+  return Eigen::Quaternion<Scalar>(pose[0], pose[1], pose[2], pose[3]);
+}
+template <typename Scalar>
+Vector3<Scalar> centre_of(const Scalar* pose) {
+  return Vector3<Scalar>(pose[4], pose[5], pose[6]);
+}
+
+inline double value_of(double x) { return x; }
+template <typename T, int kSize>
+double value_of(const ceres::Jet<T, kSize>& x) {
+  return x.a;
+}
+
+// The pixel m with m + d(m) = `straight`: from its value, Newton steps with the derivative of d by automatic
+// differentiation; the first gives m its derivatives, the second shows that the value was one.
+template <typename Scalar>
+Eigen::Matrix<Scalar, 2, 1> corrected_pixel(const CameraModel& model, const Scalar* camera,
+                                            const Eigen::Vector2d& value, const Eigen::Matrix<Scalar, 2, 1>& straight) {
+  using Jet = ceres::Jet<double, 2>;
+  Intrinsics plain(model);
+  for (int p = 0; p < plain.size(); ++p) plain[p] = value_of(camera[p]);
+  Eigen::Matrix<Scalar, 2, 1> pixel(Scalar(value.x()), Scalar(value.y()));
+  for (int step = 0; step < 2; ++step) {
+    const Eigen::Matrix<Jet, 2, 1> at(Jet(value_of(pixel.x()), 0), Jet(value_of(pixel.y()), 1));
+    const Eigen::Matrix<Jet, 2, 1> d = correction<Jet, double>(model, plain.data(), at);
+    Eigen::Matrix2d jacobian;
+    jacobian << 1 + d.x().v[0], d.x().v[1], d.y().v[0], 1 + d.y().v[1];
+    const Eigen::Matrix2d inverse = jacobian.inverse();
+    const Eigen::Matrix<Scalar, 2, 1> open = straight - pixel - correction<Scalar, Scalar>(model, camera, pixel);
+    for (int i = 0; i < 2; ++i) pixel[i] += inverse(i, 0) * open[0] + inverse(i, 1) * open[1];
+  }
+  return pixel;
+}
+
+struct ImageMeasured {
+  CameraModel model;
+  Eigen::Vector2d measured;
+  double inverse_sigma;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* mount, const Scalar* camera, const Scalar* point,
+                  Scalar* result) const {
+    const Vector3<Scalar> ground(point[0], point[1], point[2]);
+    const Vector3<Scalar> in_rig = to_inside<Scalar>(rotation_of(frame), centre_of(frame), ground);
+    const Vector3<Scalar> in_camera = to_inside<Scalar>(rotation_of(mount), centre_of(mount), in_rig);
+    Eigen::Matrix<Scalar, 2, 1> pixel;
+    if (!project_point(camera, in_camera, pixel)) return false;
+    const Eigen::Matrix<Scalar, 2, 1> difference = pixel_difference(model, camera, pixel, measured);
+    result[0] = difference.x() * inverse_sigma;
+    result[1] = difference.y() * inverse_sigma;
+    return true;
+  }
+
+  // False where the model has no pixel for the point.
+  template <typename Scalar>
+  bool project_point(const Scalar* camera, const Vector3<Scalar>& point, Eigen::Matrix<Scalar, 2, 1>& pixel) const {
+    if (model == CameraModel()) {
+      if (!(point.z() > Scalar(0))) return false;
+      pixel = project_directly(model.kind, camera, point);
+      return true;
+    }
+    Intrinsics plain(model);
+    for (int p = 0; p < plain.size(); ++p) plain[p] = value_of(camera[p]);
+    const Eigen::Vector2d value =
+        project(plain, Eigen::Vector3d(value_of(point.x()), value_of(point.y()), value_of(point.z())));
+    if (!value.allFinite()) return false;
+    pixel = corrects_pixels(model) ? corrected_pixel<Scalar>(model, camera, value,
+                                                             project_directly(CameraModelKind::kPinhole, camera, point))
+                                   : project_directly(model.kind, camera, point);
+    return true;
+  }
+};
+
+struct PositionMeasured {
+  PositionPrior prior;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, Scalar* result) const {
+    const Vector3<Scalar> arm = rotation_of(frame).conjugate() * prior.lever_arm.cast<Scalar>();
+    for (int i = 0; i < 3; ++i) result[i] = (frame[4 + i] - prior.position[i] + arm[i]) / prior.sigma[i];
+    return true;
+  }
+};
+
+struct AttitudeMeasured {
+  AttitudePrior prior;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, Scalar* result) const {
+    const Eigen::Quaternion<Scalar> reference = prior.rotation_cw.cast<Scalar>();
+    const Vector3<Scalar> w = rotation_log<Scalar>(rotation_of(frame) * reference.conjugate());
+    for (int i = 0; i < 3; ++i) result[i] = w[i] / prior.sigma_rad[i];
+    return true;
+  }
+};
+
+struct RelativeMeasured {
+  TileProblem::RelativeTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* from, const Scalar* to, Scalar* result) const {
+    const Eigen::Quaternion<Scalar> measured = term.pose.rotation.cast<Scalar>();
+    const Vector3<Scalar> w =
+        rotation_log<Scalar>(rotation_of(to) * rotation_of(from).conjugate() * measured.conjugate());
+    const Vector3<Scalar> base = to_inside<Scalar>(rotation_of(from), centre_of(from), centre_of(to));
+    for (int i = 0; i < 3; ++i) {
+      result[i] = w[i] / term.rotation_sigma_rad;
+      result[3 + i] = (base[i] - term.pose.centre[i]) / term.position_sigma_m;
+    }
+    return true;
+  }
+};
+
+// line_terms.h. Both are zero where linearise_line says that nothing is observed.
+template <typename Scalar>
+Scalar off_direction(const TileProblem::LineTerm& term, const Vector3<Scalar>& direction) {
+  const Vector3<Scalar> normal = term.middle.cast<Scalar>().cross(direction);
+  const Scalar squares = normal.squaredNorm();
+  if (squares < Scalar(1e-12)) return Scalar(0);
+  return direction.dot(term.across.cast<Scalar>()) * term.weight / sqrt(squares);
+}
+
+struct VerticalLine {
+  TileProblem::LineTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, Scalar* result) const {
+    const Vector3<Scalar> up = term.up.cast<Scalar>();
+    const Vector3<Scalar> direction = rotation_of(frame) * up;
+    result[0] = off_direction(term, direction);
+    return true;
+  }
+};
+
+struct HorizontalLine {
+  TileProblem::LineTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* other, Scalar* result) const {
+    const Vector3<Scalar> up = term.up.cast<Scalar>(), seen = term.other_normal.cast<Scalar>();
+    const Vector3<Scalar> normal = rotation_of(other).conjugate() * seen;
+    const Vector3<Scalar> horizontal = normal.cross(up);
+    const Scalar squares = horizontal.squaredNorm();
+    result[0] = Scalar(0);
+    if (squares < Scalar(1e-12)) return true;
+    const Vector3<Scalar> unit = horizontal / sqrt(squares);
+    const Vector3<Scalar> direction = rotation_of(frame) * unit;
+    result[0] = off_direction(term, direction);
+    return true;
+  }
+};
+
+// vertical_terms.h.
+struct VerticalSeen {
+  TileProblem::VerticalTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* mount, const Scalar* camera, Scalar* result) const {
+    const Vector3<Scalar> ground = term.ground.cast<Scalar>();
+    const Vector3<Scalar> in_rig = rotation_of(frame) * ground;
+    const Vector3<Scalar> down = rotation_of(mount) * in_rig;
+    const Scalar sum = term.seen.cast<Scalar>().dot(down) + Scalar(1);
+    const Scalar stretch = sqrt(Scalar(2) / (sum > Scalar(1e-9) ? sum : Scalar(1e-9)));
+    for (int i = 0; i < 2; ++i) {
+      result[i] = stretch * term.weight.row(i).cast<Scalar>().dot(down);
+      for (int p = 0; p < term.camera.size(); ++p) result[i] -= term.by_camera(i, p) * (camera[p] - term.camera[p]);
+    }
+    return true;
+  }
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* mount, Scalar* result) const {
+    return (*this)(frame, mount, static_cast<const Scalar*>(nullptr), result);
+  }
+};
+
+struct PointKnown {
+  TileProblem::PointTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* point, Scalar* result) const {
+    for (int i = 0; i < 3; ++i) result[i] = (point[i] - term.position[i]) * (1 / term.sigma[i]);
+    return true;
+  }
+};
+
+struct IntrinsicsKnown {
+  TileProblem::IntrinsicTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* camera, Scalar* result) const {
+    for (int p = 0; p < term.value.size(); ++p) {
+      const auto k = static_cast<std::size_t>(p);
+      const double sigma = term.sigma[k];
+      result[k] = (camera[k] - term.value[k]) * (sigma > 0 ? 1 / sigma : 0.0);
+    }
+    return true;
+  }
+};
+
+struct MountKnown {
+  TileProblem::MountTerm term;
+  template <typename Scalar>
+  bool operator()(const Scalar* mount, Scalar* result) const {
+    const Eigen::Quaternion<Scalar> reference = term.value.rotation.cast<Scalar>();
+    const Vector3<Scalar> w = rotation_log<Scalar>(rotation_of(mount) * reference.conjugate());
+    for (int i = 0; i < 3; ++i) {
+      result[i] = w[i] / term.rotation_sigma_rad;
+      result[3 + i] = (mount[4 + i] - term.value.centre[i]) / term.position_sigma_m;
+    }
+    return true;
+  }
+};
+
+}  // namespace residual
+}  // namespace megablock

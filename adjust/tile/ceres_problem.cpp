@@ -1,0 +1,362 @@
+#include "adjust/tile/ceres_problem.h"
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/cost_function.h>
+#include <ceres/dynamic_autodiff_cost_function.h>
+#include <ceres/loss_function.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "adjust/terms/linearise.h"
+#include "io/base/error.h"
+#include "io/block/held_priors.h"
+
+namespace megablock {
+
+void to_block(const Pose& pose, double* block) {
+  const Eigen::Quaterniond& q = pose.rotation;
+  block[0] = q.w(), block[1] = q.x(), block[2] = q.y(), block[3] = q.z();
+  Eigen::Map<Eigen::Vector3d>(block + 4) = pose.centre;
+}
+
+Pose from_block(const double* block) {
+  return {Eigen::Quaterniond(block[0], block[1], block[2], block[3]), Eigen::Map<const Eigen::Vector3d>(block + 4)};
+}
+
+// q Exp(w) = q (1, w/2) to first order, so dq/dw_i = q e_i / 2 for the imaginary units e_i. The q e_i are
+// orthonormal, so dw_i/dq = 2 (q e_i)'.
+Eigen::Matrix<double, 3, 4> quaternion_to_tangent(const double* q) {
+  Eigen::Matrix<double, 3, 4> result;
+  result << -q[1], q[0], q[3], -q[2],  //
+      -q[2], -q[3], q[0], q[1],        //
+      -q[3], q[2], -q[1], q[0];
+  return 2 * result;
+}
+
+bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
+  to_block(pose_update(from_block(x), Eigen::Map<const PoseIncrement>(delta)), x_plus_delta);
+  return true;
+}
+
+bool PoseManifold::PlusJacobian(const double* x, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>> map(jacobian);
+  map.setZero();
+  map.topLeftCorner<4, 3>() = 0.25 * quaternion_to_tangent(x).transpose();
+  map.bottomRightCorner<3, 3>().setIdentity();
+  return true;
+}
+
+bool PoseManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
+  const Pose a = from_block(y), b = from_block(x);
+  Eigen::Map<PoseIncrement> map(y_minus_x);
+  map << rotation_log<double>(b.rotation.conjugate() * a.rotation), a.centre - b.centre;
+  return true;
+}
+
+bool PoseManifold::MinusJacobian(const double* x, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> map(jacobian);
+  map.setZero();
+  map.topLeftCorner<3, 4>() = quaternion_to_tangent(x);
+  map.bottomRightCorner<3, 3>().setIdentity();
+  return true;
+}
+
+namespace {
+
+// linearise_image for Ceres. Ceres multiplies a pose's Jacobian by dq/dw; dw/dq is its left inverse.
+class AnalyticImage : public ceres::CostFunction {
+ public:
+  AnalyticImage(const CameraModel& model, const Eigen::Vector2d& measured, double inverse_sigma)
+      : model_(model), measured_(measured), inverse_sigma_(inverse_sigma) {
+    set_num_residuals(2);
+    *mutable_parameter_block_sizes() = {kPoseBlock, kPoseBlock, parameter_count(model), 3};
+  }
+
+  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
+    Intrinsics intrinsics(model_);
+    std::copy_n(blocks[2], intrinsics.size(), intrinsics.begin());
+    const Pose frame = from_block(blocks[0]), mount = from_block(blocks[1]);
+    const Eigen::Vector3d point = Eigen::Map<const Eigen::Vector3d>(blocks[3]);
+    Eigen::Map<Eigen::Vector2d> result(residual);
+    if (jacobians == nullptr) {
+      result = inverse_sigma_ * reprojection(intrinsics, to_camera(frame, mount, point), measured_);
+      return result.allFinite();
+    }
+    const ImageResidual image = linearise_image(frame, mount, intrinsics, point, measured_, inverse_sigma_);
+    if (!image.in_front) return false;
+    result = image.residual;
+    if (jacobians[0]) write_pose(image.by_frame, blocks[0], jacobians[0]);
+    if (jacobians[1]) write_pose(image.by_mount, blocks[1], jacobians[1]);
+    if (jacobians[2])
+      Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>(jacobians[2], 2, intrinsics.size()) =
+          image.by_intrinsics;
+    if (jacobians[3]) as_matrix<3>(jacobians[3]) = image.by_point;
+    return true;
+  }
+
+ private:
+  template <int kColumns>
+  static Eigen::Map<Eigen::Matrix<double, 2, kColumns, Eigen::RowMajor>> as_matrix(double* jacobian) {
+    return Eigen::Map<Eigen::Matrix<double, 2, kColumns, Eigen::RowMajor>>(jacobian);
+  }
+  static void write_pose(const Eigen::Matrix<double, 2, 6>& by_tangent, const double* block, double* jacobian) {
+    auto map = as_matrix<kPoseBlock>(jacobian);
+    map.leftCols<4>() = by_tangent.leftCols<3>() * quaternion_to_tangent(block);
+    map.rightCols<3>() = by_tangent.rightCols<3>();
+  }
+
+  CameraModel model_;
+  Eigen::Vector2d measured_;
+  double inverse_sigma_;
+};
+
+// Cauchy's tail, which Ceres does not have; up to it Ceres' Huber.
+class CauchyTail final : public ceres::LossFunction {
+ public:
+  explicit CauchyTail(double scale) : huber_(scale), square_(scale * scale) {}
+  void Evaluate(double s, double rho[3]) const override {
+    if (s <= 4 * square_) return huber_.Evaluate(s, rho);
+    rho[0] = square_ * (3 + 2 * std::log(s / (4 * square_)));
+    rho[1] = 2 * square_ / s;
+    rho[2] = -2 * square_ / (s * s);
+  }
+
+ private:
+  ceres::HuberLoss huber_;
+  double square_;
+};
+
+std::unique_ptr<ceres::LossFunction> ceres_loss(const RobustLoss& loss) {
+  switch (loss.kind) {
+    case RobustLoss::Kind::kHuber:
+      return std::make_unique<ceres::HuberLoss>(loss.scale);
+    case RobustLoss::Kind::kCauchy:
+      return std::make_unique<ceres::CauchyLoss>(loss.scale);
+    case RobustLoss::Kind::kCauchyTail:
+      return std::make_unique<CauchyTail>(loss.scale);
+    case RobustLoss::Kind::kNone:
+      break;
+  }
+  return nullptr;
+}
+
+ceres::Problem::Options problem_options() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.disable_all_safety_checks = true;
+  return options;
+}
+
+template <int kResiduals, int... kBlocks, typename Functor>
+ceres::CostFunction* automatic(Functor functor) {
+  return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlocks...>(new Functor(std::move(functor)));
+}
+
+struct DynamicImage {
+  residual::ImageMeasured image;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return image(blocks[0], blocks[1], blocks[2], blocks[3], result);
+  }
+};
+
+ceres::CostFunction* automatic_image(const residual::ImageMeasured& image) {
+  if (image.model == CameraModel())
+    return automatic<2, kPoseBlock, kPoseBlock, parameter_count(CameraModel()), 3>(image);
+  auto* cost = new ceres::DynamicAutoDiffCostFunction<DynamicImage, 8>(new DynamicImage{image});
+  for (const int size : {kPoseBlock, kPoseBlock, parameter_count(image.model), 3}) cost->AddParameterBlock(size);
+  cost->SetNumResiduals(2);
+  return cost;
+}
+
+// Of a camera of any model, or of none.
+struct DynamicVertical {
+  residual::VerticalSeen vertical;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return vertical(blocks[0], blocks[1], vertical.term.camera.size() > 0 ? blocks[2] : nullptr, result);
+  }
+};
+
+ceres::CostFunction* automatic_vertical(const TileProblem::VerticalTerm& term) {
+  auto* cost =
+      new ceres::DynamicAutoDiffCostFunction<DynamicVertical, 8>(new DynamicVertical{residual::VerticalSeen{term}});
+  for (const int size : {kPoseBlock, kPoseBlock}) cost->AddParameterBlock(size);
+  if (term.camera.size() > 0) cost->AddParameterBlock(static_cast<int>(term.camera.size()));
+  cost->SetNumResiduals(2);
+  return cost;
+}
+
+// A prior has as many residuals as its camera has parameters.
+struct DynamicIntrinsicsKnown {
+  residual::IntrinsicsKnown known;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return known(blocks[0], result);
+  }
+};
+
+ceres::CostFunction* automatic_prior(const TileProblem::IntrinsicTerm& term) {
+  auto* cost = new ceres::DynamicAutoDiffCostFunction<DynamicIntrinsicsKnown, 8>(
+      new DynamicIntrinsicsKnown{residual::IntrinsicsKnown{term}});
+  cost->AddParameterBlock(term.value.size());
+  cost->SetNumResiduals(term.value.size());
+  return cost;
+}
+
+}  // namespace
+
+CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options)
+    : frame_count_(std::ssize(state.frames)),
+      mount_count_(std::ssize(state.mounts)),
+      camera_count_(std::ssize(state.cameras)),
+      point_count_(std::ssize(state.points)),
+      mounts_begin_(frame_count_ * kPoseBlock),
+      point_used_(problem.points.size(), 0),
+      image_loss_(ceres_loss(problem.image_loss)),
+      position_loss_(ceres_loss(problem.position_loss)),
+      attitude_loss_(ceres_loss(problem.attitude_loss)),
+      relative_loss_(ceres_loss(problem.relative_loss)),
+      line_loss_(ceres_loss(problem.line_loss)),
+      vertical_loss_(ceres_loss(problem.vertical_loss)),
+      ceres_(std::make_unique<ceres::Problem>(problem_options())) {
+  const auto& camera_free = options.camera_free.empty() ? problem.camera_free : options.camera_free;
+  if (state.frames.size() != problem.frames.size() || state.cameras.size() != problem.cameras.size() ||
+      state.mounts.size() != problem.mounts.size() || state.points.size() != problem.points.size() ||
+      camera_free.size() != problem.cameras.size())
+    throw InputError("the tile's state does not fit its problem");
+  points_begin_ = mounts_begin_ + mount_count_ * kPoseBlock;
+  for (const Intrinsics& intrinsics : state.cameras) {
+    camera_begin_.push_back(points_begin_);
+    points_begin_ += intrinsics.size();
+  }
+  values_.resize(static_cast<std::size_t>(points_begin_ + point_count_ * 3));
+  for (std::int64_t f = 0; f < frame_count_; ++f) to_block(state.frames[f], frame(f));
+  for (std::int64_t m = 0; m < mount_count_; ++m) to_block(state.mounts[m], mount(m));
+  for (std::int64_t c = 0; c < camera_count_; ++c)
+    std::copy(state.cameras[c].begin(), state.cameras[c].end(), camera(c));
+  for (std::int64_t p = 0; p < point_count_; ++p) Eigen::Map<Eigen::Vector3d>(point(p)) = state.points[p];
+  add_images(problem, state, options.derivatives);
+  add_priors(problem);
+  hold_parameters(problem, state, camera_free);
+}
+
+CeresTile::~CeresTile() = default;
+
+void CeresTile::add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives) {
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    point_used_[p] = 1;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      const Eigen::Vector2d measured(problem.x[row], problem.y[row]);
+      const double weight = problem.inverse_sigma[row];
+      const CameraModel& model = state.cameras[image.camera.value].model();
+      ceres::CostFunction* cost = derivatives == CeresOptions::Derivatives::kAnalytic
+                                      ? static_cast<ceres::CostFunction*>(new AnalyticImage(model, measured, weight))
+                                      : automatic_image({model, measured, weight});
+      ceres_->AddResidualBlock(cost, image_loss_.get(), frame(image.frame.value), mount(image.mount),
+                               camera(image.camera.value), point(p));
+    }
+  }
+}
+
+void CeresTile::add_priors(const TileProblem& problem) {
+  for (const auto& term : problem.positions)
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::PositionMeasured{term.prior}),
+                             held(term.prior) ? nullptr : position_loss_.get(), frame(term.frame.value));
+  for (const auto& term : problem.attitudes)
+    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}),
+                             held(term.prior) ? nullptr : attitude_loss_.get(), frame(term.frame.value));
+  for (const auto& term : problem.lines) {
+    if (term.other.valid())
+      ceres_->AddResidualBlock(automatic<1, kPoseBlock, kPoseBlock>(residual::HorizontalLine{term}), line_loss_.get(),
+                               frame(term.frame.value), frame(term.other.value));
+    else
+      ceres_->AddResidualBlock(automatic<1, kPoseBlock>(residual::VerticalLine{term}), line_loss_.get(),
+                               frame(term.frame.value));
+  }
+  for (const auto& term : problem.verticals) {
+    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
+    std::vector<double*> blocks{frame(image.frame.value), mount(image.mount)};
+    if (term.camera.size() > 0) blocks.push_back(camera(image.camera.value));
+    ceres_->AddResidualBlock(automatic_vertical(term), vertical_loss_.get(), blocks);
+  }
+  for (const auto& term : problem.relatives)
+    ceres_->AddResidualBlock(automatic<6, kPoseBlock, kPoseBlock>(residual::RelativeMeasured{term}),
+                             relative_loss_.get(), frame(term.from.value), frame(term.to.value));
+  for (const auto& term : problem.point_priors)
+    if (point_used_[term.point.value])
+      ceres_->AddResidualBlock(automatic<3, 3>(residual::PointKnown{term}), nullptr, point(term.point.value));
+  for (const auto& term : problem.intrinsic_priors)
+    ceres_->AddResidualBlock(automatic_prior(term), nullptr, camera(term.camera.value));
+  for (const auto& term : problem.mount_priors)
+    ceres_->AddResidualBlock(automatic<6, kPoseBlock>(residual::MountKnown{term}), nullptr, mount(term.mount));
+}
+
+void CeresTile::hold_parameters(const TileProblem& problem, const TileState& state,
+                                const std::vector<ParameterMask>& camera_free) {
+  for (std::int64_t f = 0; f < frame_count_; ++f)
+    if (ceres_->HasParameterBlock(frame(f))) ceres_->SetManifold(frame(f), &pose_manifold_);
+  for (std::int64_t m = 0; m < mount_count_; ++m) {
+    if (!ceres_->HasParameterBlock(mount(m))) continue;
+    ceres_->SetManifold(mount(m), &pose_manifold_);
+    if (!problem.mount_free[m]) ceres_->SetParameterBlockConstant(mount(m));
+  }
+  for (std::int64_t c = 0; c < camera_count_; ++c) {
+    double* block = camera(c);
+    if (!ceres_->HasParameterBlock(block)) continue;
+    std::vector<int> held;
+    const int count = state.cameras[c].size();
+    for (int k = 0; k < count; ++k)
+      if (!contains(camera_free[c], k)) held.push_back(k);
+    if (std::ssize(held) == count) {
+      ceres_->SetParameterBlockConstant(block);
+    } else if (!held.empty()) {
+      camera_manifolds_.push_back(std::make_unique<ceres::SubsetManifold>(count, held));
+      ceres_->SetManifold(block, camera_manifolds_.back().get());
+    }
+  }
+}
+
+bool CeresTile::unknown(const double* block) const {
+  return ceres_->HasParameterBlock(block) && !ceres_->IsParameterBlockConstant(block);
+}
+
+bool CeresTile::is_point(const double* block) const {
+  const std::less_equal<const double*> not_after;
+  return not_after(values_.data() + points_begin_, block);
+}
+
+std::vector<double*> CeresTile::unknown_blocks_without_points() {
+  std::vector<double*> blocks;
+  const auto add = [&](double* block) {
+    if (unknown(block)) blocks.push_back(block);
+  };
+  for (std::int64_t f = 0; f < frame_count_; ++f) add(frame(f));
+  for (std::int64_t c = 0; c < camera_count_; ++c) add(camera(c));
+  for (std::int64_t m = 0; m < mount_count_; ++m) add(mount(m));
+  return blocks;
+}
+
+std::vector<double*> CeresTile::unknown_blocks() {
+  std::vector<double*> blocks = unknown_blocks_without_points();
+  for (std::int64_t p = 0; p < point_count_; ++p)
+    if (point_used_[p]) blocks.push_back(point(p));
+  return blocks;
+}
+
+void CeresTile::store(TileState& state) {
+  // As Plus left them: already unit, and held blocks keep their bits.
+  for (std::int64_t f = 0; f < frame_count_; ++f) state.frames[f] = from_block(frame(f));
+  for (std::int64_t m = 0; m < mount_count_; ++m) state.mounts[m] = from_block(mount(m));
+  for (std::int64_t c = 0; c < camera_count_; ++c)
+    std::copy_n(camera(c), state.cameras[c].size(), state.cameras[c].begin());
+  for (std::int64_t p = 0; p < point_count_; ++p)
+    if (point_used_[p]) state.points[p] = Eigen::Map<const Eigen::Vector3d>(point(p));
+}
+
+}  // namespace megablock

@@ -1,0 +1,70 @@
+// A tile's observations and unknowns as a ceres::Problem: shared by the tile adjustment (analytic derivatives, fast)
+// and by the monolithic reference of merge/ (automatic derivatives, none of our linearisation code).
+#pragma once
+
+#include <ceres/problem.h>
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "adjust/terms/ceres_residuals.h"
+
+namespace megablock {
+
+struct CeresOptions {
+  enum class Derivatives { kAutomatic, kAnalytic } derivatives = Derivatives::kAutomatic;
+  // Estimated intrinsics, one mask per camera of the problem; empty = problem.camera_free.
+  std::vector<ParameterMask> camera_free;
+};
+
+// Builds and owns the ceres::Problem and the parameter blocks. Holds the active points and their kept observations
+// only; frames and cameras without any residual are not in the Ceres problem. Held parameters: whole blocks constant,
+// single intrinsics by a SubsetManifold. The datum is left as the observations give it (see datum.h).
+class CeresTile {
+ public:
+  CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options = {});
+  CeresTile(const CeresTile&) = delete;
+  CeresTile& operator=(const CeresTile&) = delete;
+  ~CeresTile();
+
+  ceres::Problem& problem() { return *ceres_; }
+  double* frame(std::int64_t row) { return &values_[row * kPoseBlock]; }
+  double* mount(std::int64_t row) { return &values_[mounts_begin_ + row * kPoseBlock]; }
+  double* camera(std::int64_t row) { return &values_[camera_begin_[row]]; }
+  double* point(std::int64_t row) { return &values_[points_begin_ + row * 3]; }
+
+  bool is_point(const double* block) const;
+
+  // The blocks with unknowns: frames, cameras, mounts, points, each in the order of its table. Given to
+  // ceres::Problem::EvaluateOptions they fix the order of the columns (tangent sizes: 6, free intrinsics, 6, 3).
+  std::vector<double*> unknown_blocks();
+  // The same without points.
+  std::vector<double*> unknown_blocks_without_points();
+
+  // Writes the blocks' values back (points that take no part keep their value).
+  void store(TileState& state);
+
+ private:
+  void add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives);
+  void add_priors(const TileProblem& problem);
+  void hold_parameters(const TileProblem& problem, const TileState& state,
+                       const std::vector<ParameterMask>& camera_free);
+  bool unknown(const double* block) const;
+
+  // Ceres orders blocks by their addresses: one allocation, so that the order, and with it the bits of the result, are
+  // the same every time. Frames, mounts, cameras, points.
+  std::int64_t frame_count_, mount_count_, camera_count_, point_count_;
+  std::int64_t mounts_begin_;
+  std::vector<std::int64_t> camera_begin_;  // [cameras]
+  std::int64_t points_begin_;
+  std::vector<double> values_;
+  std::vector<std::uint8_t> point_used_;
+  PoseManifold pose_manifold_;
+  std::vector<std::unique_ptr<ceres::Manifold>> camera_manifolds_;
+  std::unique_ptr<ceres::LossFunction> image_loss_, position_loss_, attitude_loss_, relative_loss_, line_loss_,
+      vertical_loss_;
+  std::unique_ptr<ceres::Problem> ceres_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,137 @@
+#include <ceres/ceres.h>
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "adjust/lanes/residual_squares.h"
+#include "adjust/terms/line_terms.h"
+#include "adjust/terms/linearise.h"
+#include "adjust/terms/prior_loss.h"
+#include "adjust/terms/vertical_terms.h"
+#include "adjust/tile/ceres_problem.h"
+#include "adjust/tile/datum.h"
+#include "adjust/tile/tile_adjustment.h"
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace {
+
+// Weighted squares and number of the residuals that take part. Image residuals count in full (they have been
+// screened); priors under a robust loss count by their robust weight (a wrong GNSS position must not decide sigma0).
+struct ResidualSum {
+  double squares = 0;
+  std::int64_t residuals = 0, observations = 0, points = 0;
+};
+
+void add_images(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
+  const SeenImages seen(problem, state);
+  ResidualSquares residuals(problem, state, seen);
+  const std::vector<std::int64_t> active = residuals.active_points();
+  sum.points += std::ssize(active);
+  residuals.visit(active, [&](std::int64_t, std::int64_t, double squares) {
+    sum.squares += squares;
+    ++sum.observations;
+  });
+  sum.residuals += 2 * sum.observations;
+}
+
+void add_priors(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
+  const auto add = [&](double squares, std::int64_t count, const RobustLoss& loss = {}) {
+    sum.squares += loss.evaluate(squares)[1] * squares;
+    sum.residuals += count;
+  };
+  for (const auto& term : problem.positions)
+    add(linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
+        loss_of(problem, term));
+  for (const auto& term : problem.attitudes)
+    add(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
+        loss_of(problem, term));
+  for (const auto& term : problem.lines) {
+    const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
+    add(r * r, 1, problem.line_loss);
+  }
+  for (const auto& term : problem.verticals)
+    add(linearise_vertical(problem, state, term).residual.squaredNorm(), 2, problem.vertical_loss);
+  for (const auto& term : problem.relatives)
+    add(linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual.squaredNorm(), 6,
+        problem.relative_loss);
+  for (const auto& term : problem.point_priors)
+    if (problem.active(term.point.value))
+      add(point_prior_residual(state.points[term.point.value], term).squaredNorm(),
+          term.sigma.array().isFinite().count());
+  for (const auto& term : problem.intrinsic_priors)
+    for (int k = 0; k < term.value.size(); ++k) {
+      const double r = intrinsic_prior_residual(state.cameras[term.camera.value], term, k);
+      add(r * r, intrinsic_prior_weight(term, k) > 0);
+    }
+  for (const auto& term : problem.mount_priors)
+    add(linearise_mount(state.mounts[term.mount], term).residual.squaredNorm(), 6);
+}
+
+ceres::Solver::Options solver_options(CeresTile& tile, std::size_t frames, const SolveOptions& options) {
+  ceres::Solver::Options result;
+  constexpr std::size_t kDenseFrames = 150;  // below, dense is faster (measured)
+  result.linear_solver_type = frames <= kDenseFrames ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  result.dense_linear_algebra_library_type = ceres::LAPACK;
+  result.num_threads = 1;
+  result.max_num_iterations = options.max_iterations;
+  result.function_tolerance = options.function_tolerance;
+  result.gradient_tolerance = 0;
+  result.parameter_tolerance = 1e-14;
+  result.max_num_consecutive_invalid_steps = 20;
+  result.initial_trust_region_radius = 1e6;  // start values are good; weak directions need the length
+  result.logging_type = ceres::SILENT;
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<double*> all;
+  tile.problem().GetParameterBlocks(&all);
+  for (double* block : all) ordering->AddElementToGroup(block, tile.is_point(block) ? 0 : 1);
+  result.linear_solver_ordering = std::move(ordering);
+  return result;
+}
+
+}  // namespace
+
+void describe_solution(const TileProblem& problem, const TileState& state, std::int64_t unknowns,
+                       std::int64_t datum_defect, AdjustSummary& summary) {
+  ResidualSum sum;
+  add_images(problem, state, sum);
+  add_priors(problem, state, sum);
+  const std::int64_t freedom = sum.residuals - unknowns + datum_defect;
+  summary.observations = sum.observations;
+  summary.points = sum.points;
+  summary.degrees_of_freedom = freedom;
+  summary.sigma0 = freedom > 0 ? std::sqrt(sum.squares / static_cast<double>(freedom)) : 0;
+  summary.text = fmt::format("{} images, {} points, {} observations: sigma0 {:.3f}, {} iterations",
+                             problem.images.size(), sum.points, sum.observations, summary.sigma0, summary.iterations);
+}
+
+AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, const SolveOptions& options) {
+  AdjustSummary result;
+  CeresTile tile(problem, state, {CeresOptions::Derivatives::kAnalytic, options.camera_free});
+  const std::vector<DatumDefect> defects = datum_defects(problem, state);
+  constrain_datum(defects, tile);
+  if (tile.unknown_blocks().empty()) throw ComputeError("the tile has no observations to adjust");
+
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver_options(tile, problem.frames.size(), options), &tile.problem(), &summary);
+  result.usable = summary.IsSolutionUsable() && std::isfinite(summary.final_cost);
+  result.initial_cost = summary.initial_cost;
+  result.final_cost = summary.final_cost;
+  result.iterations = static_cast<int>(summary.iterations.size());
+  if (result.usable) tile.store(state);
+
+  std::int64_t unknowns = 0, defect = 0;
+  for (const double* block : tile.unknown_blocks()) unknowns += tile.problem().ParameterBlockTangentSize(block);
+  for (const DatumDefect& d : defects) defect += d.dimension;
+  describe_solution(problem, state, unknowns, defect, result);
+  if (!result.usable) result.text += ", failed: " + summary.message;
+  return result;
+}
+
+AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, int max_iterations,
+                               double function_tolerance) {
+  return solve_with_ceres(problem, state, SolveOptions{max_iterations, function_tolerance, {}});
+}
+
+}  // namespace megablock

@@ -1,0 +1,24 @@
+// What a job holds before its result: the block, poses, tracks.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "io/block/block.h"
+#include "io/block/tracks.h"
+#include "io/store/job/job_store.h"
+
+namespace megablock {
+
+struct JobSoFar {
+  Block block;
+  BlockState state;
+  std::string source;  // of the poses: "the initial orientation", "the given poses" (or position and attitude priors)
+};
+// Throws InputError for a job without a block.
+JobSoFar read_job_so_far(const JobStore& store);
+
+// Tile by tile in their order, as far as there are any.
+void visit_tracks(const JobStore& store, const std::function<void(TrackSet&&)>& take);
+
+}  // namespace megablock

@@ -1,0 +1,169 @@
+#include "cluster/job/work_queue.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "cluster/mpi/collective.h"
+#include "cluster/process/process_memory.h"
+#include "cluster/process/progress.h"
+#include "cluster/process/signals.h"
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace {
+
+using Json = nlohmann::json;
+
+std::vector<std::size_t> claim_order(const std::vector<Unit>& units) {
+  std::vector<std::size_t> order(units.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return units[a].cost > units[b].cost; });
+  return order;
+}
+
+// What one rank did, exchanged at the end of the stage.
+struct RankRecord {
+  std::vector<std::pair<std::size_t, std::string>> failures;  // unit number, reason
+  std::int64_t computed = 0;
+};
+
+std::string to_text(const RankRecord& record) {
+  return Json{{"failures", record.failures}, {"computed", record.computed}}.dump(-1, ' ', false,
+                                                                                 Json::error_handler_t::replace);
+}
+
+RankRecord from_text(const std::string& text) {
+  const Json json = Json::parse(text);
+  RankRecord record;
+  json.at("failures").get_to(record.failures);
+  json.at("computed").get_to(record.computed);
+  return record;
+}
+
+// Writes the unit and its event; a failure has its event too, and is thrown on.
+void compute_unit(Job& job, const std::string& stage, const Unit& unit, double claim_s) {
+  const double start = monotonic_seconds();
+  UnitEvent event;
+  event.stage = stage;
+  event.unit = unit.name;
+  event.rank = job.ranks.rank();
+  event.claim_seconds = claim_s;
+  const auto log = [&] {
+    event.seconds = monotonic_seconds() - start;
+    event.peak_rss_mib = peak_rss_mib();
+    job.events.append(event);
+  };
+  try {
+    event.bytes = static_cast<std::int64_t>(job.store.write(unit.name, unit.fingerprint, unit.write).length);
+  } catch (const InputError&) {
+    throw;  // the run's, not the unit's
+  } catch (const std::exception& error) {
+    event.failure = error.what();
+    log();
+    throw;
+  }
+  log();
+}
+
+void write_own_record(const Job& job) {
+  if (job.is_first_rank()) write_record(job.store, job.records.back());
+}
+
+}  // namespace
+
+void tell_of_damage(const JobStore& store, const std::string& unit, const std::string& problem) {
+  end_progress_line();
+  std::fprintf(stderr, "megablock: warning: %s: %s; it is computed again\n", store.path(unit).c_str(), problem.c_str());
+}
+
+bool is_current(const JobStore& store, const std::string& unit, std::uint64_t fingerprint) {
+  std::string damage;
+  const bool current = store.is_current(unit, fingerprint, damage);
+  if (!damage.empty()) tell_of_damage(store, unit, damage);
+  return current;
+}
+
+void begin_stage(Job& job, const std::string& stage, const std::vector<Unit>& units) {
+  if (job.records.empty() || job.records.back().stage != stage)
+    job.records.push_back({stage, job.records.empty() ? 0 : job.records.back().hash(), {}, {}});
+  for (const Unit& unit : units) job.records.back().units.emplace_back(unit.name, unit.fingerprint);
+  write_own_record(job);
+}
+
+void add_failures(Job& job, const std::vector<FailedUnit>& failures) {
+  if (failures.empty()) return;
+  job.failures.insert(job.failures.end(), failures.begin(), failures.end());
+  auto& recorded = job.records.back().failures;
+  recorded.insert(recorded.end(), failures.begin(), failures.end());
+  write_own_record(job);
+  if (job.options.strict)
+    throw AgreedError<ComputeError>("stage '" + failures.front().stage + "', " + failures.front().unit + ": " +
+                                    failures.front().reason);
+}
+
+void part_done(Job& job, std::int64_t parts) {
+  job.parts_done += parts;
+  job.ranks.add_done(parts);
+}
+
+StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units, const std::string& parts) {
+  begin_stage(job, stage, units);
+  return_freed_memory();
+  job.tables.release();
+  job.peak_memory.begin_stage();
+  job.ranks.reset_counter();
+  RankRecord mine;
+  std::string fatal;  // concerns the run, not the unit: a full disk, a read-only job
+  {
+    const std::int64_t count = std::accumulate(units.begin(), units.end(), std::int64_t{0},
+                                               [](std::int64_t sum, const Unit& unit) { return sum + unit.parts; });
+    Progress progress(
+        stage, count, parts, [&] { return job.ranks.done(); }, job.options.quiet || !job.is_first_rank());
+    const std::vector<std::size_t> order = claim_order(units);
+    while (!stop_requested()) {
+      const double before_claim = monotonic_seconds();
+      const std::int64_t number = job.ranks.claim();
+      const double claim_s = monotonic_seconds() - before_claim;
+      if (number >= static_cast<std::int64_t>(order.size())) break;
+      const std::size_t index = order[static_cast<std::size_t>(number)];
+      const Unit& unit = units[index];
+      job.parts_done = 0;
+      try {
+        if (!is_current(job.store, unit.name, unit.fingerprint)) {
+          compute_unit(job, stage, unit, claim_s);
+          job.tables.release();
+          ++mine.computed;
+        }
+      } catch (const InputError& error) {
+        fatal = error.what();
+        break;
+      } catch (const std::exception& error) {
+        mine.failures.emplace_back(index, error.what());
+        if (job.options.strict) job.ranks.use_up_counter();
+      }
+      part_done(job, unit.parts - job.parts_done);
+    }
+    if (stop_requested()) job.ranks.use_up_counter();  // the other ranks stop too, if the signal was for this one alone
+    share_error(job.ranks, 'i', fatal);                // the others' units are shown until they are done
+  }
+  if (job.ranks.any(stop_requested()))
+    throw AgreedError<Interrupted>("stopped in stage '" + stage + "' as asked; run the same command to resume");
+
+  StageOutcome outcome;
+  std::vector<std::pair<std::size_t, std::string>> failures;
+  for (const std::string& text : job.ranks.gather_all(to_text(mine))) {
+    const RankRecord record = from_text(text);
+    failures.insert(failures.end(), record.failures.begin(), record.failures.end());
+    outcome.computed += record.computed;
+  }
+  std::sort(failures.begin(), failures.end());
+  for (const auto& [index, reason] : failures) outcome.failures.push_back({stage, units[index].name, reason});
+  add_failures(job, outcome.failures);
+  return outcome;
+}
+
+}  // namespace megablock

@@ -1,0 +1,67 @@
+// What ranks know of their tiles, one value a tile, brought together on every rank in the order of tiles: sums over it
+// have the same bits whatever the ranks.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cluster/mpi/communicator.h"
+#include "merge/scratch/bytes.h"
+#include "merge/step/tile_store.h"
+
+namespace megablock {
+
+namespace tile_bytes {
+
+template <typename Value>
+concept MakesBytes = requires(const Value& value) {
+  value.to_bytes();
+};
+
+template <typename Value>
+void write(ByteWriter& writer, const Value& value) {
+  if constexpr (MakesBytes<Value>)
+    writer.bytes(value.to_bytes());
+  else
+    writer.value(value);
+}
+inline void write(ByteWriter& writer, const UnknownList& unknowns) { writer.values(unknowns); }
+
+template <typename Value>
+void read(ByteReader& reader, Value& value) {
+  if constexpr (MakesBytes<Value>)
+    value = Value::from_bytes(reader.bytes());
+  else
+    value = reader.value<Value>();
+}
+inline void read(ByteReader& reader, UnknownList& unknowns) { unknowns = reader.values<Unknown>(); }
+
+}  // namespace tile_bytes
+
+// [tiles] all tiles of the block, each held by one rank or none; `tile_of(i)`: number of the tile of values[i].
+template <typename Value, typename TileOf>
+std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<Value>& values,
+                                  const TileOf& tile_of) {
+  ByteWriter writer;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    writer.value(static_cast<std::int64_t>(tile_of(i)));
+    tile_bytes::write(writer, values[i]);
+  }
+  std::vector<Value> all(tiles);
+  for (const Bytes& bytes : ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      const auto tile = reader.value<std::int64_t>();
+      tile_bytes::read(reader, all[static_cast<std::size_t>(tile)]);
+    }
+  }
+  return all;
+}
+
+template <typename Value>
+std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const TileStore& own,
+                                  const std::vector<Value>& values) {
+  return gather_by_tile(ranks, tiles, values, [&](std::size_t i) { return own.number(i); });
+}
+
+}  // namespace megablock

@@ -1,0 +1,27 @@
+// What the calibrations of single cameras read: a project with given tie points, or a job.
+#pragma once
+
+#include <string>
+
+#include "adjust/tile/tile_adjustment.h"
+#include "io/block/block.h"
+#include "io/block/tracks.h"
+
+namespace megablock {
+
+struct CalibrationInput {
+  Block block;
+  BlockState state;  // start poses and cameras; of a finished job: adjusted ones
+  TrackSet tracks;
+  AdjustOptions adjustment;
+};
+
+enum class JobTracks {
+  kAll,      // as they were matched (a job from the stage 'match' on)
+  kAdjusted  // measurements that the finished job keeps
+};
+
+// `path`: project file or job directory. Throws InputError when it is neither, or has no tie points.
+CalibrationInput read_calibration_input(const std::string& path, JobTracks tracks);
+
+}  // namespace megablock

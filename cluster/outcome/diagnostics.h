@@ -1,0 +1,29 @@
+// The diagnostics of a job (io/block/block_diagnostics.h): of its result, or of what there is before.
+#pragma once
+
+#include <string>
+
+#include "cluster/job/job_options.h"
+#include "io/block/block_diagnostics.h"
+#include "io/result/result.h"
+#include "io/result/track_batches.h"
+#include "io/store/job/job_store.h"
+
+namespace megablock {
+
+inline constexpr const char* kDiagnostics = "result/diagnostics.json";
+inline constexpr const char* kReportPage = "result/report.html";  // shows them
+
+// From poses and kept observations of a result. Passes once through its tracks.
+BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
+                                 const DiagnosticsOptions& options);
+
+// Of the job's result; without one, of its initial orientation or given poses, and its tracks as far as there are any.
+struct JobDiagnostics {
+  Block block;
+  BlockDiagnostics found;
+  std::string source;  // what they are of: "the result", "the initial orientation", "the given poses"
+};
+JobDiagnostics diagnose_job(const JobStore& store);
+
+}  // namespace megablock

@@ -1,0 +1,60 @@
+#include "cluster/process/signals.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <thread>
+
+#include "cluster/process/exit_codes.h"
+#include "cluster/process/progress.h"
+
+namespace megablock {
+
+namespace {
+
+// A signal belongs to the process: the one piece of state it can have.
+struct Flags {
+  std::atomic<bool> stop{false}, end_of_work{false};
+};
+Flags& flags() {
+  static Flags flags;
+  return flags;
+}
+
+void write_line(const char* text, std::size_t size) {
+  if (::write(STDERR_FILENO, text, size) < 0) {
+    // Nothing to do: the terminal is gone and we are leaving.
+  }
+}
+
+}  // namespace
+
+void watch_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (int signal : {SIGUSR1, SIGTERM, SIGINT}) sigaddset(&signals, signal);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::thread([signals] {
+    for (;;) {
+      int signal = 0;
+      if (sigwait(&signals, &signal) != 0) continue;
+      if (signal == SIGUSR1) {
+        flags().stop = true;
+        continue;
+      }
+      constexpr char kText[] = "megablock: stopped; the units in hand are abandoned, run the same command to resume\n";
+      if (!flags().end_of_work) {
+        end_progress_line();
+        write_line(kText, sizeof kText - 1);
+      }
+      std::_Exit(kExitInterrupted);
+    }
+  }).detach();
+}
+
+bool stop_requested() { return flags().stop; }
+void end_of_work() { flags().end_of_work = true; }
+
+}  // namespace megablock

@@ -1,0 +1,22 @@
+// The block as it was when it had fewer images. A block grows at its end: images, frames, rigs and cameras that are
+// added follow those that were there, so that a generation is a number of images (Job::generations).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "io/block/block.h"
+
+namespace megablock {
+
+// The first n images with the frames, rigs and cameras up to the last ones they use; without relative poses and
+// control.
+Block first_images(const Block& block, std::int64_t n);
+
+std::int64_t frames_of_first_images(const Block& block, std::int64_t n);
+
+// The generation in which an image came.
+std::size_t generation_of(const std::vector<std::int64_t>& generations, ImageIndex image);
+
+}  // namespace megablock

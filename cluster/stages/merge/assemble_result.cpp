@@ -1,0 +1,104 @@
+#include "cluster/stages/merge/assemble_result.h"
+
+#include <algorithm>
+#include <limits>
+#include <unordered_set>
+#include <utility>
+
+#include "cluster/stages/result/provenance.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
+void append_control(BlockResult& result, const std::vector<TilePart>& parts) {
+  const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kUnknown);
+  for (const ControlPoint& point : result.block.control_points)
+    result.control.push_back(
+        {unknown, Eigen::Matrix3d::Constant(kUnknown),
+         std::vector<Eigen::Vector2d>(point.measurements.size(), Eigen::Vector2d::Constant(kUnknown)),
+         std::vector<std::uint8_t>(point.measurements.size(), 0)});
+  for (const TilePart& part : parts)
+    for (std::size_t i = 0; i < part.control.size(); ++i) {
+      const BlockResult::ControlResult& from = part.control[i];
+      BlockResult::ControlResult& to = result.control[static_cast<std::size_t>(part.control_rows[i])];
+      to.adjusted = from.adjusted;
+      to.covariance = from.covariance;
+      const auto rows = static_cast<std::ptrdiff_t>(std::min(from.residual_px.size(), to.residual_px.size()));
+      std::copy_n(from.residual_px.begin(), rows, to.residual_px.begin());
+      std::copy_n(from.kept.begin(), rows, to.kept.begin());
+      auto& measurements = result.block.control_points[static_cast<std::size_t>(part.control_rows[i])].measurements;
+      for (std::size_t k = 0; k < measurements.size(); ++k) measurements[k].pixel = part.control_measured[i][k];
+    }
+}
+
+void find_boundary(BlockResult& result, const std::vector<TilePart>& parts) {
+  IndexedVector<FrameIndex, int> touched(result.block.frames.size(), 0);
+  for (const TilePart& part : parts)
+    for (const FrameIndex frame : part.frames) ++touched[frame];
+  for (const int count : touched) result.boundary.push_back(count > 1 ? 1 : 0);
+}
+
+// Images without pose, each with its reason.
+void list_failures(const Job& job, BlockResult& result) {
+  result.failures = job.failures;
+  std::unordered_set<std::string> told;
+  for (const FailedUnit& failure : job.failures) told.insert(failure.unit);
+  for (std::size_t i = 0; i < result.block.images.size(); ++i) {
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    const FrameIndex frame = result.block.images[image].frame;
+    if (result.state.oriented[frame]) continue;
+    const std::string name = result.block.name_of(image);
+    if (told.contains(name)) continue;
+    const auto reason = job.not_oriented.find(frame);
+    const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
+    result.failures.push_back({linked ? "orientation" : "matching", name,
+                               linked && reason != job.not_oriented.end() ? reason->second
+                               : linked ? "oriented at first, but too few of its observations hold in the adjustment"
+                                        : "no other image shares enough verified matches with it"});
+  }
+}
+
+void scale_covariances(BlockResult& result, double factor) {
+  for (auto& covariance : result.frame_covariance) covariance *= factor;
+  for (auto& covariance : result.camera_covariance) covariance *= factor;
+  for (auto& rig : result.mount_covariance)
+    for (auto& covariance : rig) covariance *= factor;
+  for (auto& control : result.control) control.covariance *= factor;
+  result.sigma_scaled = true;
+}
+
+}  // namespace
+
+BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, const std::vector<TilePart>& parts) {
+  BlockResult result;
+  result.image_records = image_records(job);
+  result.provenance = provenance_of(job);
+  result.block = std::exchange(job.block, {});
+  result.state = std::move(outcome.state);
+  result.tiles = tiles;
+  result.frame_covariance = std::move(outcome.frame_covariance);
+  result.camera_covariance = std::move(outcome.camera_covariance);
+  result.mount_covariance = std::move(outcome.mount_covariance);
+  append_control(result, parts);
+  find_boundary(result, parts);
+  result.chi2 = outcome.chi2;
+  result.degrees_of_freedom = outcome.degrees_of_freedom;
+  result.variance_factor = outcome.variance_factor();
+  if (job.settings.merge.scale_sigma) scale_covariances(result, result.variance_factor);
+  result.image_sigma_px = outcome.image_sigma_px;
+  result.global_iterations = outcome.global_iterations;
+  result.newton_decrement = outcome.newton_decrement;
+  result.decrement_limit = job.settings.merge.decrement;
+  result.free_parts = outcome.free_parts;
+  result.gauge = outcome.gauge;
+  result.seams = outcome.seams;
+  result.observation_table = outcome.observations;
+  result.notes = job.notes;
+  list_failures(job, result);
+  return result;
+}
+
+}  // namespace megablock

@@ -1,0 +1,300 @@
+#include "cluster/stages/merge/merge.h"
+
+// The merge: exact block-wise compensation of all tiles over all ranks (design: merge.md), then the result.
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "adjust/tile/image_sigma.h"
+#include "cluster/mpi/collective.h"
+#include "cluster/outcome/diagnostics.h"
+#include "cluster/process/process_memory.h"
+#include "cluster/process/progress.h"
+#include "cluster/process/signals.h"
+#include "cluster/stages/common/block_tables.h"
+#include "cluster/stages/common/units.h"
+#include "cluster/stages/merge/assemble_result.h"
+#include "cluster/stages/merge/block_image_sigma.h"
+#include "cluster/stages/merge/merge_checkpoint.h"
+#include "cluster/stages/merge/merge_start.h"
+#include "cluster/stages/result/provenance.h"
+#include "cluster/stages/result/result_files.h"
+#include "cluster/tree/rank_runner.h"
+#include "io/base/error.h"
+#include "io/base/hash.h"
+#include "io/store/job/events.h"
+#include "io/store/units/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
+  Hasher hasher;
+  hasher.add(algorithm::kMerge);
+  add_to_hash(hasher, job.settings.merge);
+  add_to_hash(hasher, job.settings.adjustment);
+  if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
+  hasher.add(job.store.seal("block.h5")->content_hash).add(job.store.seal("tiles.h5")->content_hash);
+  for (const std::string& name : inputs.tracks) hasher.add(job.store.seal(name)->content_hash);
+  for (const std::string& name : inputs.adjusted)
+    hasher.add(name.empty() ? std::uint64_t{0} : job.store.seal(name)->content_hash);
+  return hasher.value();
+}
+
+std::vector<std::int64_t> observation_counts(const Job& job, const MergeInputs& inputs) {
+  std::vector<std::int64_t> counts;
+  for (const std::string& name : inputs.tracks)
+    counts.push_back(static_cast<std::int64_t>(job.store.seal(name)->length));
+  return counts;
+}
+
+int most_rounds(const MergeSettings& settings) {
+  constexpr int kSigmaRounds = 10;
+  return settings.estimate_sigmas ? std::max(settings.screening_rounds, kSigmaRounds) : settings.screening_rounds;
+}
+
+// The folder itself stays where another disk is mounted, and so do folders of this run's ranks while they `use` them.
+void clear_scratch(Job& job, bool use) {
+  const std::vector<std::string> kept =  // ranks have removed their own files before they say so
+      job.ranks.gather_all(use ? scratch_folder_of_rank(job) : std::string());
+  on_first_rank(job.ranks, [&] {
+    const std::filesystem::path folder(job.store.path("scratch"));
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
+      if (std::ranges::find(kept, entry.path().filename().string()) == kept.end())
+        std::filesystem::remove_all(entry.path(), ignored);
+    std::filesystem::remove(folder, ignored);
+    return std::string();
+  });
+}
+
+// The last round alone goes to the end. Those before it only lead to verdicts on observations and to sigmas: a
+// hundredth of a sigma of the frames' unknowns, in the mean, is enough for them. Chi-square is then off by 1e-4 of
+// their number.
+GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool last) {
+  constexpr double kSettled = 0.01;
+  const double settled = kSettled * std::sqrt(6 * static_cast<double>(frames));
+  GlobalOptions options;
+  options.max_decrement = last ? settings.decrement : std::max(settings.decrement, settled);
+  options.confirm = last;
+  options.max_iterations = settings.max_iterations;
+  return options;
+}
+
+// Where a round before the last one ends by its own, looser limit, the line says so: "converged" alone would promise
+// that of the options.
+void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions& options) {
+  if (!job.is_first_rank() || job.options.quiet) return;
+  std::string line = describe(state);
+  if (state.outcome == GlobalOutcome::kConverged && options.max_decrement > job.settings.merge.decrement)
+    line += fmt::format(" (limit {:.1e} of a round before the last)", options.max_decrement);
+  std::fprintf(stderr, "merge        %s\n", line.c_str());
+}
+
+// This rank's tiles from their own adjustments, or from the checkpoint that was found, and the block's state.
+BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
+                      const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
+                      TileStore& tiles) {
+  MergeStart start =
+      found ? MergeStart{checkpoint.state(), {}, {}} : merge_start(job, inputs.oriented, inputs.adjusted);
+  const double start_sigma = found ? 0 : start_image_sigma(job, inputs.adjusted);
+  load_own_tiles(
+      job, inputs, start, rank_of_tile,
+      [&](RankTile& tile) {
+        if (found) {
+          checkpoint.load_tile(tile);
+          scale_sigmas(tile.problem, found->scales);
+        } else {
+          set_image_sigma(tile.problem, start_sigma);
+        }
+      },
+      tiles);
+  return std::move(start.state);
+}
+
+Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
+  const std::size_t frames = job.block.frames.size();
+  const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
+  job.tables.release();  // frames
+  const std::vector<int> rank_of_tile =
+      distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
+  const std::optional<MergePosition> found = checkpoint.find();
+  const MergePosition start =
+      found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false)), {}};
+  const MemoryOptions memory = memory_of_rank(job);
+  PassRecorder recorder(memory.scratch, job.options.record_s);
+  const std::optional<MergePosition> within = checkpoint.find_pass(start, recorder);
+  clear_scratch(job, true);  // a killed run may have had more ranks
+  TileStore tiles(memory);
+  Adjusted adjusted;
+  BlockState& block = adjusted.state;
+  block = load_block(job, inputs, checkpoint, found, rank_of_tile, tiles);
+  inputs.oriented = {};
+  job.tables.release();
+
+  MergePosition& position = adjusted.position;
+  position = within ? *within : start;
+  recorder.set_position([&] { return checkpoint.of_pass(position); });
+  std::int32_t saved = position.global.accepted;
+  for (;;) {
+    const bool last = position.round >= most_rounds(job.settings.merge);
+    const GlobalOptions options = options_of(job.settings.merge, frames, last);
+    RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
+    runner.record_passes(recorder);
+    return_freed_memory();  // what the plans were made from
+    if (last) runner.expect_posterior();
+    adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
+      return_freed_memory();
+      say_iteration(job, state, options);
+      if (state.accepted != saved) {
+        saved = state.accepted;
+        position.global = state;
+        checkpoint.write(position, tiles, gather_state(job, block, tiles, runner));
+      }
+      if (job.ranks.any(stop_requested()))
+        throw AgreedError<Interrupted>("stopped in stage 'merge' as asked; run the same command to resume");
+    });
+    adjusted.converged = position.global.outcome == GlobalOutcome::kConverged ||
+                         position.global.outcome == GlobalOutcome::kRoundingFloor;
+    block = gather_state(job, block, tiles, runner);
+    follow(block, tiles);
+    if (last) {
+      find_posterior(job, inputs, references, runner, adjusted);
+      adjusted.costs = gather_costs(job, tiles, runner);
+      say(job, adjusted.costs);
+      break;
+    }
+    bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
+    if (job.settings.merge.estimate_sigmas) changed = adopt_sigma_scales(runner, tiles, position.scales) || changed;
+    changed = screen(job, tiles) > 0 || changed;
+    position.round = changed ? position.round + 1 : most_rounds(job.settings.merge);
+    position.tried_steps += position.global.iterations;
+    const std::int32_t accepted = position.global.accepted;
+    position.global = start_global(options);
+    position.global.accepted = accepted;
+    checkpoint.write(position, tiles, block);
+  }
+  adjusted.image_sigma_px = common_image_sigma(job, tiles);
+  return adjusted;
+}
+
+// Of what the ranks say.
+double largest(Job& job, double figure) {
+  for (const std::string& text : job.ranks.gather_all(std::to_string(figure)))
+    figure = std::max(figure, std::stod(text));
+  return figure;
+}
+
+// Why a result that is there is a failed unit all the same, now and in runs that find it; empty: it is none.
+std::string shortfall(const Adjusted& adjusted) {
+  if (!adjusted.converged) return "the global adjustment did not converge: " + describe(adjusted.position.global);
+  if (std::ranges::none_of(adjusted.state.oriented, [](std::uint8_t oriented) { return oriented != 0; }))
+    return "no image is oriented: too few observations hold in the adjustment; check start poses and cameras, and what "
+           "'adjustment' asks of tie points";
+  return "";
+}
+
+void add_shortfall(Job& job, const std::string& reason) {
+  if (!reason.empty()) add_failures(job, {{"merge", kResult, reason}});
+}
+
+std::string shortfall_before(Job& job) {
+  return on_first_rank(job.ranks, [&] {
+    const auto record = read_record(job.store, "merge");
+    return record && !record->failures.empty() ? record->failures.front().reason : std::string();
+  });
+}
+
+// Of all stages, this one as far as `event`, which ends it, says.
+std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
+  std::vector<UnitEvent> events = read_events(job.store);
+  event.time_s = seconds_since_1970();
+  events.push_back(event);
+  std::vector<StageStatistics> statistics;
+  for (const StageRecord& record : job.records) statistics.push_back(stage_statistics(record, events));
+  return statistics;
+}
+
+void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
+                 const std::string& reason, MergeOutcome outcome, const std::vector<TilePart>& parts,
+                 UnitEvent& event) {
+  if (!reason.empty()) {
+    job.notes.push_back(reason);
+    std::fprintf(stderr, "merge        warning: %s\n", job.notes.back().c_str());  // --quiet or not
+  }
+  const std::size_t notes_before = job.notes.size();
+  for (const SeamCheck& seam : outcome.seams)
+    if (!seam.note.empty()) job.notes.push_back(seam.note);
+  for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
+    job.notes.push_back(line);
+  event.figures["seam_alarms"] = static_cast<double>(job.notes.size() - notes_before);
+  for (const std::string& line : judge_kept(parts)) job.notes.push_back(line);
+  for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
+    job.notes.push_back(line);
+    if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());
+  }
+  job.tables.release();  // frames
+  BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
+  if (!reason.empty()) result.failures.push_back({"merge", kResult, reason});
+  result.stages = statistics_of(job, event);
+  std::vector<PartTracks::File> files;
+  for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
+  write_result_files(job.store, job.tables, fingerprint, std::move(result), std::move(files), job.settings.diagnostics);
+}
+
+}  // namespace
+
+void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
+               const std::vector<std::string>& adjusted_units) {
+  const double start = monotonic_seconds();
+  return_freed_memory();
+  job.peak_memory.begin_stage();
+  MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units};
+  const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
+  const std::string before = shortfall_before(job);
+  begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
+  const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
+    if (!is_current(job.store, kResult, fingerprint)) return "";
+    return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
+  });
+  if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
+    if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();
+    return add_shortfall(job, before);
+  }
+
+  MergeCheckpoint checkpoint(job, fingerprint);
+  Adjusted adjusted = adjust_block(job, inputs, checkpoint);
+  const std::string reason = shortfall(adjusted);
+  return_freed_memory();  // fronts, tiles
+  clear_scratch(job, false);
+  const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
+  UnitEvent event;
+  event.stage = "merge";
+  event.unit = kResult;
+  event.peak_rss_mib = largest(job, peak_rss_mib());
+  event.figures = adjusted.costs.figures();
+  event.figures["tried_steps"] = adjusted.position.tried_steps + adjusted.position.global.iterations;
+  double process_peak_mib = largest(job, job.peak_memory.mib());
+  event.seconds = monotonic_seconds() - start;
+  on_first_rank(job.ranks, [&] {
+    restore_names(job);
+    write_final(job, inputs, fingerprint, adjusted, reason, make_outcome(job, adjusted, inputs.tiles), parts, event);
+    // What was written could not say it of itself.
+    event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());
+    process_peak_mib = std::max(process_peak_mib, job.peak_memory.mib());
+    event.figures["process_peak_rss_mib"] = process_peak_mib;
+    event.seconds = monotonic_seconds() - start;
+    event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);
+    job.events.append(event);
+    checkpoint.clear();
+    return std::string();
+  });
+  add_shortfall(job, reason);
+}
+
+}  // namespace megablock

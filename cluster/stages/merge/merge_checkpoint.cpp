@@ -1,0 +1,183 @@
+#include "cluster/stages/merge/merge_checkpoint.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <tuple>
+
+#include "adjust/tile/image_sigma.h"
+#include "cluster/mpi/collective.h"
+#include "cluster/process/process_memory.h"
+#include "cluster/stages/common/units.h"
+#include "io/base/error.h"
+#include "io/base/hash.h"
+#include "io/store/units/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kMarker = "/iteration.bin";  // written last
+
+TileAdjustment snapshot(const RankTile& tile) {
+  TileAdjustment snapshot;
+  snapshot.frames = tile.problem.frames;
+  snapshot.poses = tile.state.frames;
+  snapshot.observations.assign(snapshot.frames.size(), 0);
+  snapshot.cameras = tile.problem.cameras;
+  snapshot.intrinsics = tile.state.cameras;
+  snapshot.camera_observations.assign(snapshot.cameras.size(), 0);
+  snapshot.points = tile.state.points;
+  snapshot.kept = tile.problem.kept;
+  snapshot.image_sigma_px = tile.problem.image_sigma_px;
+  return snapshot;
+}
+
+std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
+
+// The layout that docs/job-format.md gives.
+static_assert(sizeof(MergePosition) == 224 && offsetof(MergePosition, tried_steps) == 4 &&
+              offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
+              offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
+              offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88);
+
+void write_marker(const std::string& path, const MergePosition& position) {
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(&position), sizeof position);
+}
+
+MergePosition read_marker(const std::string& path) {
+  static_assert(std::is_trivially_copyable_v<MergePosition>);
+  MergePosition position;
+  std::ifstream in(path, std::ios::binary);
+  in.read(reinterpret_cast<char*>(&position), sizeof position);
+  if (!in) throw StoreError(path + ": is truncated; run again to compute it anew");
+  return position;
+}
+
+}  // namespace
+
+std::string MergeCheckpoint::folder(const MergePosition& position) const {
+  char text[64];
+  std::snprintf(text, sizeof text, "merge/%02d-%04d", position.round, position.global.accepted);
+  return text;
+}
+
+std::uint64_t MergeCheckpoint::fingerprint(const std::string& folder) const {
+  Hasher hasher;
+  hasher.add(inputs_).add(folder);
+  return hasher.value();
+}
+
+void MergeCheckpoint::write(const MergePosition& position, TileStore& tiles, const BlockState& state) {
+  const std::string here = folder(position);
+  const std::string before = current_;
+  on_first_rank(job_.ranks, [&] {
+    std::filesystem::create_directories(job_.store.path(here));
+    return std::string();
+  });
+  std::string problem;
+  try {
+    for (std::size_t row = 0; row < tiles.size(); ++row)
+      job_.store.write(tile_unit(here, tiles.number(row)), fingerprint(here),
+                       [&](const std::string& path) { write_adjustment(path, snapshot(tiles.whole(row))); });
+  } catch (const Error& error) {
+    problem = error.what();
+  }
+  share_error(job_.ranks, 'i', problem);
+  on_first_rank(job_.ranks, [&] {
+    job_.store.write(here + "/state.h5", fingerprint(here), [&](const std::string& path) { write_state(path, state); });
+    job_.store.write(here + kMarker, fingerprint(here), [&](const std::string& path) { write_marker(path, position); });
+    UnitEvent event;
+    event.stage = "merge";
+    event.unit = here;
+    event.seconds = monotonic_seconds() - last_s_;
+    event.peak_rss_mib = peak_rss_mib();
+    job_.events.append(event);
+    if (!before.empty() && before != here) std::filesystem::remove_all(job_.store.path(before));
+    return std::string();
+  });
+  current_ = here;
+  last_s_ = monotonic_seconds();
+}
+
+std::optional<MergePosition> MergeCheckpoint::find() {
+  current_ = on_first_rank(job_.ranks, [&] {
+    std::string last;
+    const std::filesystem::path root(job_.store.path("merge"));
+    std::vector<std::string> folders;
+    if (std::filesystem::exists(root))
+      for (const auto& entry : std::filesystem::directory_iterator(root))
+        folders.push_back("merge/" + entry.path().filename().string());
+    std::sort(folders.begin(), folders.end());
+    for (const std::string& name : folders) {
+      const auto seal = job_.store.seal(name + kMarker);
+      bool valid = seal && seal->fingerprint == fingerprint(name);
+      if (valid)
+        for (const auto& file : std::filesystem::directory_iterator(job_.store.path(name))) {
+          const std::string unit = name + "/" + file.path().filename().string(), problem = job_.store.problem(unit);
+          if (!problem.empty()) tell_of_damage(job_.store, unit, problem);
+          valid = valid && problem.empty();
+        }
+      if (valid)
+        last = name;
+      else
+        std::filesystem::remove_all(job_.store.path(name));
+    }
+    return last;
+  });
+  if (current_.empty()) return std::nullopt;
+  return read_marker(job_.store.verified_path(current_ + kMarker));
+}
+
+BlockState MergeCheckpoint::state() const { return read_state(job_.store.verified_path(current_ + "/state.h5")); }
+
+void MergeCheckpoint::load_tile(RankTile& tile) const {
+  const TileAdjustment snapshot = read_adjustment(job_.store.verified_path(tile_unit(current_, tile.tile)));
+  tile.problem.kept = snapshot.kept;
+  set_image_sigma(tile.problem, snapshot.image_sigma_px);
+  tile.state.frames = snapshot.poses;
+  tile.state.cameras = snapshot.intrinsics;
+  tile.state.points = snapshot.points;
+}
+
+PassRecorder::Position MergeCheckpoint::of_pass(const MergePosition& position) const {
+  Hasher hasher;
+  hasher.add(fingerprint(folder(position))).add(job_.ranks.size());
+  return {hasher.value(), Bytes(reinterpret_cast<const char*>(&position), sizeof position)};
+}
+
+std::optional<MergePosition> MergeCheckpoint::find_pass(const MergePosition& start, PassRecorder& recorder) {
+  recorder.keep_found(of_pass(start).state);
+  ByteWriter writer;
+  writer.bytes(recorder.found() ? recorder.found()->position : Bytes());
+  writer.value(recorder.found() ? recorder.found()->tiles : 0);
+  std::optional<MergePosition> furthest;
+  std::int64_t tiles = 0;
+  const auto order = [](const GlobalState& state) {
+    return std::tuple(state.iterations, state.pass_lambda == 0, state.next == GlobalAction::kStop);
+  };
+  for (const Bytes& bytes : job_.ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    const Bytes there = reader.bytes();
+    tiles += reader.value<std::int64_t>();
+    if (there.size() != sizeof(MergePosition)) continue;
+    MergePosition position;
+    std::memcpy(&position, there.data(), sizeof position);
+    if (!furthest || order(furthest->global) < order(position.global)) furthest = position;
+  }
+  if (furthest && job_.is_first_rank() && !job_.options.quiet)
+    std::fprintf(stderr, "merge        goes on within a pass: %lld tiles are done\n", static_cast<long long>(tiles));
+  return furthest;
+}
+
+void MergeCheckpoint::clear() {
+  std::filesystem::remove_all(job_.store.path("merge"));
+  std::filesystem::create_directories(job_.store.path("merge"));
+  current_.clear();
+}
+
+}  // namespace megablock

@@ -1,0 +1,190 @@
+#include "cluster/stages/merge/merge_outcome.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <ranges>
+
+#include "cluster/mpi/gather_by_tile.h"
+#include "cluster/mpi/matrix_bytes.h"
+#include "cluster/stages/merge/merge_start.h"
+#include "cluster/stages/result/provenance.h"
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "merge/datum/gauge.h"
+
+namespace megablock {
+
+namespace {
+
+std::vector<SeamCheck> seam_checks(const MergeTree& tree, const RankRunner::Posterior& posterior) {
+  const std::vector<std::string> alarms = describe_seams(tree, posterior.seams, posterior.tile_checks);
+  std::vector<SeamCheck> checks;
+  std::size_t alarm = 0;
+  for (const SeamReport& seam : posterior.seams) {
+    SeamCheck check{seam.node, seam.statistic, seam.degrees, seam.threshold, ""};
+    if (seam.alarm() && alarm < alarms.size()) check.note = alarms[alarm++];
+    checks.push_back(check);
+  }
+  return checks;
+}
+
+void write_file(const std::string& path, const Bytes& bytes) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) throw_file_error(path, "written", errno);
+}
+
+Bytes read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  Bytes bytes{std::istreambuf_iterator<char>(file), {}};
+  if (bytes.empty()) throw StoreError("cannot read " + path + "; run again to resume");
+  return bytes;
+}
+
+// Of the frames, cameras and mounts of a tile, zero where it does not touch one.
+void write_covariances(const std::string& path, const TileProblem& problem, const TileCovariance& covariance) {
+  ByteWriter writer;
+  writer.values(problem.frames);
+  write_matrices(writer, covariance.frames);
+  writer.values(problem.mounts);
+  write_matrices(writer, covariance.mounts);
+  writer.values(problem.cameras);
+  for (const Eigen::MatrixXd& camera : covariance.cameras) write_matrix(writer, camera);
+  write_file(path, writer.take());
+}
+
+// A frame of several tiles has the same bits in all of them; of a mount or a camera the lowest tile's are taken.
+template <typename Matrix>
+void take_first(const Matrix& from, Matrix& to) {
+  if (to.isZero(0)) to = from;
+}
+
+void read_covariances(const std::string& path, MergeOutcome& outcome) {
+  const Bytes bytes = read_file(path);
+  ByteReader reader(bytes);
+  const auto frames = reader.values<FrameIndex>();
+  const auto of_frames = read_matrices<BlockResult::Matrix6>(reader);
+  for (std::size_t f = 0; f < frames.size(); ++f) take_first(of_frames[f], outcome.frame_covariance[frames[f]]);
+  const auto mounts = reader.values<MountId>();
+  const auto of_mounts = read_matrices<BlockResult::Matrix6>(reader);
+  for (std::size_t m = 0; m < mounts.size(); ++m)
+    take_first(of_mounts[m], outcome.mount_covariance[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)]);
+  for (const CameraIndex camera : reader.values<CameraIndex>())
+    take_first(read_matrix(reader), outcome.camera_covariance[camera]);
+}
+
+void read_covariances(const Job& job, const Tiles& tiles, MergeOutcome& outcome) {
+  outcome.frame_covariance.assign(outcome.state.frames.size(), BlockResult::Matrix6::Zero());
+  for (const Intrinsics& camera : outcome.state.cameras)
+    outcome.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
+  for (const std::vector<Pose>& rig : outcome.state.mounts)
+    outcome.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
+  for (std::int64_t tile = 0; tile < tiles.tile_count; ++tile) read_covariances(covariance_path(job, tile), outcome);
+}
+
+}  // namespace
+
+std::string part_path(const Job& job, std::int64_t tile) {
+  return job.store.path("merge/parts/" + std::to_string(tile) + ".bin");
+}
+
+std::string covariance_path(const Job& job, std::int64_t tile) {
+  return job.store.path("merge/parts/" + std::to_string(tile) + ".covariances");
+}
+
+void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
+                    RankRunner& runner, Adjusted& adjusted) {
+  std::filesystem::create_directories(job.store.path("merge/parts"));
+  adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
+    write_covariances(covariance_path(job, tile.tile), tile.problem, covariance);
+    const auto t = static_cast<std::size_t>(tile.tile);
+    const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
+    adjusted.parts.push_back(write_part(part_path(job, tile.tile), tile, tracks, covariance));
+    if (tile.problem.frames.empty()) return;
+    const std::int32_t component = inputs.tiles.component[tile.problem.frames.front()];
+    if (component < 0 || references[static_cast<std::size_t>(component)].length <= 0) return;
+    adjusted.parts.back().component = component;
+    adjusted.parts.back().motion =
+        common_motion(tile.problem, tile.state, references[static_cast<std::size_t>(component)]);
+  });
+}
+
+std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count) {
+  return gather_by_tile(job.ranks, tile_count, adjusted.parts, [&](std::size_t i) { return adjusted.parts[i].tile; });
+}
+
+std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts) {
+  const std::vector<MotionReference> references = motion_references(block, tiles);
+  std::vector<CommonMotion> motions(references.size());
+  for (const TilePart& part : parts)
+    if (part.component >= 0) motions[static_cast<std::size_t>(part.component)].add(part.motion);
+  std::vector<std::string> lines;
+  for (std::size_t c = 0; c < references.size(); ++c)
+    for (const std::string& line : describe(judge(motions[c], references[c])))
+      lines.push_back((references.size() > 1 ? "part " + std::to_string(c + 1) + ": " : "") + line);
+  return lines;
+}
+
+std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
+  constexpr std::int64_t kFewest = 100;  // measurements by which a tile is judged
+  constexpr std::size_t kLines = 3;
+  double measured = 0, kept = 0;
+  for (const TilePart& part : parts)
+    measured += static_cast<double>(part.measured), kept += static_cast<double>(part.kept);
+  const auto share = [](const TilePart& part) {
+    return static_cast<double>(part.kept) / static_cast<double>(part.measured);
+  };
+  const auto share_of_others = [&](const TilePart& part) {
+    const double others = measured - static_cast<double>(part.measured);
+    return others > 0 ? (kept - static_cast<double>(part.kept)) / others : 0;
+  };
+  std::vector<const TilePart*> poor;
+  for (const TilePart& part : parts)
+    if (part.measured >= kFewest && share(part) < 0.5 * share_of_others(part)) poor.push_back(&part);
+  std::ranges::stable_sort(poor, {}, [&](const TilePart* part) { return share(*part); });
+  std::vector<std::string> lines;
+  for (const TilePart* part : poor | std::views::take(kLines))
+    lines.push_back(
+        fmt::format("tile {} disagrees with itself: it keeps {} of {} tie point measurements ({:.0f} %), the others "
+                    "{:.0f} %: little of "
+                    "what it was given holds, and what is left may agree by chance",
+                    part->tile, part->kept, part->measured, 100 * share(*part), 100 * share_of_others(*part)));
+  if (poor.size() > kLines)
+    lines.push_back(std::to_string(poor.size() - kLines) + " more tiles that keep less than half of what others do");
+  return lines;
+}
+
+MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles) {
+  MergeOutcome outcome;
+  outcome.state = std::move(adjusted.state);
+  read_covariances(job, tiles, outcome);
+  const SubtreeSums& sums = adjusted.posterior.sums;
+  outcome.chi2 = sums.weighted_squares;
+  outcome.degrees_of_freedom =
+      sums.residuals - sums.unknowns + static_cast<std::int64_t>(sums.held.size()) + sums.held_points;
+  outcome.image_sigma_px = adjusted.image_sigma_px;
+  outcome.global_iterations = adjusted.position.global.accepted;
+  outcome.newton_decrement = std::sqrt(sums.decrement_squared);
+  const BlockGauge& gauge = adjusted.posterior.gauge;
+  outcome.gauge = judge_gauge(sums, gauge, names_of(job.block)).text;
+  for (const BlockComponent& part : gauge.components)
+    if (!part.columns.empty()) {
+      outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.columns.size())});
+      outcome.degrees_of_freedom += part.defect;  // what only the datum fixes takes nothing of the observations
+    }
+  outcome.seams = seam_checks(tiles.tree, adjusted.posterior);
+  outcome.observations = adjusted.posterior.observations;
+  for (std::size_t k = 0; k < kObservationKinds; ++k)
+    outcome.observations.kinds[k].scale = adjusted.position.scales.of[k];
+  return outcome;
+}
+
+}  // namespace megablock

@@ -1,0 +1,203 @@
+#include "cluster/stages/merge/merge_tiles.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <limits>
+#include <memory>
+
+#include "adjust/terms/build_problem.h"
+#include "adjust/tile/image_sigma.h"
+#include "cluster/mpi/matrix_bytes.h"
+#include "cluster/stages/merge/merge_start.h"
+
+namespace megablock {
+
+void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart& start,
+                    const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
+                    TileStore& own) {
+  const RowsOfTiles rows = rows_of_tiles(job.block, start.state, inputs.tiles);
+  job.tables.release();
+  for (std::size_t t = 0; t < rank_of_tile.size(); ++t) {
+    if (rank_of_tile[t] != job.ranks.rank()) continue;
+    MergeTile loaded =
+        load_merge_tile(job, inputs.oriented, start, inputs.tiles, TileIndex(static_cast<std::int64_t>(t)), rows[t],
+                        inputs.tracks[t], inputs.adjusted[t]);
+    RankTile tile{static_cast<std::int64_t>(t), std::move(loaded.problem), std::move(loaded.state)};
+    prepare(tile);
+    own.add(std::move(tile));
+    job.tables.release();
+  }
+}
+
+BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const RankRunner& runner) {
+  ByteWriter writer;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const RankTile& tile = tiles.outline(i);
+    // What no kept residual of the tile touches has not moved with the block.
+    const UnknownList& touched = runner.unknowns(i);
+    const auto write = [&](const auto& table, const auto& values, auto&& id_of, auto&& write_values) {
+      std::decay_t<decltype(table)> rows;
+      std::decay_t<decltype(values)> their;
+      for (std::size_t row = 0; row < table.size(); ++row) {
+        if (find_unknown(touched, id_of(table[row])) < 0) continue;
+        rows.push_back(table[row]);
+        their.push_back(values[row]);
+      }
+      writer.values(rows);
+      write_values(their);
+    };
+    const auto as_poses = [&](const std::vector<Pose>& poses) { write_poses(writer, poses); };
+    writer.values(tile.problem.frames);
+    write(
+        tile.problem.frames, tile.state.frames,
+        [](FrameIndex f) {
+          return UnknownId{UnknownKind::kFrame, 0, f.value};
+        },
+        as_poses);
+    write(
+        tile.problem.cameras, tile.state.cameras,
+        [](CameraIndex c) {
+          return UnknownId{UnknownKind::kCamera, 0, c.value};
+        },
+        [&](const std::vector<Intrinsics>& values) { writer.values(values); });
+    write(
+        tile.problem.mounts, tile.state.mounts,
+        [](const MountId& m) {
+          return UnknownId{UnknownKind::kMount, m.mount, m.rig.value};
+        },
+        as_poses);
+  }
+  BlockState state = start;
+  std::fill(state.oriented.begin(), state.oriented.end(), std::uint8_t{0});
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    while (!reader.at_end()) {
+      for (const FrameIndex frame : reader.values<FrameIndex>()) state.oriented[frame] = start.oriented[frame];
+      const auto frames = reader.values<FrameIndex>();
+      const auto poses = read_poses(reader);
+      for (std::size_t f = 0; f < frames.size(); ++f) state.frames[frames[f]] = poses[f];
+      const auto cameras = reader.values<CameraIndex>();
+      const auto intrinsics = reader.values<Intrinsics>();
+      for (std::size_t c = 0; c < cameras.size(); ++c) state.cameras[cameras[c]] = intrinsics[c];
+      const auto mounts = reader.values<MountId>();
+      const auto mount_poses = read_poses(reader);
+      for (std::size_t m = 0; m < mounts.size(); ++m)
+        state.mounts[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)] = mount_poses[m];
+    }
+  }
+  return state;
+}
+
+void follow(const BlockState& state, TileStore& tiles) {
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(
+        row, [&](RankTile& tile) { tile.state = make_tile_state(tile.problem, state, std::move(tile.state.points)); });
+}
+
+bool adopt_sigma_scales(RankRunner& runner, TileStore& tiles, SigmaScales& scales) {
+  const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
+  if (!change.matter()) return false;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] *= change.of[k];
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(row, [&](RankTile& tile) { scale_sigmas(tile.problem, change); });
+  return true;
+}
+
+std::int64_t screen(Job& job, TileStore& tiles) {
+  std::int64_t changed = 0;
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(row, [&](RankTile& tile) {
+      const TileProblem& problem = tile.problem;
+      bool any = false;  // a tile whose own adjustment failed keeps nothing, and has no residuals to judge by
+      for (std::int64_t p = 0; p < problem.point_count() && !any; ++p) any = problem.active(p);
+      if (!any) return;
+      changed += screen_observations(tile.problem, tile.state,
+                                     screening_threshold(tile.problem, tile.state, job.settings.adjustment),
+                                     job.settings.adjustment);
+    });
+  std::int64_t total = 0;
+  for (const std::string& text : job.ranks.gather_all(std::to_string(changed))) total += std::stoll(text);
+  return total;
+}
+
+std::string scratch_folder_of_rank(const Job& job) { return "rank-" + std::to_string(job.ranks.rank()); }
+
+MemoryOptions memory_of_rank(const Job& job) {
+  const auto bytes = [](double mib) { return static_cast<std::int64_t>(std::min(mib, kMostMib) * 1024 * 1024); };
+  MemoryOptions memory;
+  memory.factor_bytes = bytes(job.options.memory_mib);
+  memory.tile_bytes = memory.factor_bytes / 2;
+  memory.scratch = std::make_shared<ScratchSpace>(
+      job.store.path("scratch/" + scratch_folder_of_rank(job)),
+      job.options.scratch_mib >= 0 ? bytes(job.options.scratch_mib) : std::numeric_limits<std::int64_t>::max());
+  return memory;
+}
+
+MemoryOptions memory_of_factors(MemoryOptions memory, const TileStore& tiles) {
+  memory.factor_bytes = std::max<std::int64_t>(0, memory.factor_bytes - tiles.kept_bytes());
+  return memory;
+}
+
+std::map<std::string, double> MergeCosts::figures() const {
+  const auto mib = [](std::int64_t bytes) { return static_cast<double>(bytes) / (1 << 20); };
+  return {{"tile_seconds", tile_seconds},
+          {"front_seconds", front_seconds},
+          {"pass_seconds", seconds},
+          {"passes", static_cast<double>(passes)},
+          {"tiles_in_scratch", static_cast<double>(tiles_in_scratch)},
+          {"factors_in_scratch", static_cast<double>(factors.spilled)},
+          {"subtrees_computed_again", static_cast<double>(factors.recomputed)},
+          {"peak_factor_mib", mib(factors.peak_bytes)},
+          {"peak_front_mib", mib(peak_front_bytes)},
+          {"root_unknowns", static_cast<double>(fronts.root)},
+          {"widest_front", static_cast<double>(fronts.widest)},
+          {"front_operations", fronts.operations}};
+}
+
+MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runner) {
+  ByteWriter writer;
+  writer.value(runner.memory());
+  writer.value(runner.seconds());
+  writer.value(runner.peak_front_bytes());
+  writer.value(static_cast<std::int64_t>(tiles.size()));
+  writer.value(tiles.spilled());
+  MergeCosts all;
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    const auto factors = reader.value<MemoryStatistics>();
+    const auto seconds = reader.value<PassSeconds>();
+    all.peak_front_bytes = std::max(all.peak_front_bytes, reader.value<std::int64_t>());
+    all.tiles += reader.value<std::int64_t>();
+    all.tiles_in_scratch += reader.value<std::int64_t>();
+    all.factors.put += factors.put;
+    all.factors.spilled += factors.spilled;
+    all.factors.recomputed += factors.recomputed;
+    all.factors.peak_bytes = std::max(all.factors.peak_bytes, factors.peak_bytes);
+    all.tile_seconds += seconds.tiles;
+    all.front_seconds += seconds.fronts;
+    all.seconds = std::max(all.seconds, seconds.all);
+    all.passes = std::max(all.passes, seconds.passes);
+  }
+  all.fronts = front_costs(runner.plan());
+  return all;
+}
+
+void say(const Job& job, const MergeCosts& costs) {
+  if (!job.is_first_rank() || job.options.quiet) return;
+  std::fprintf(stderr, "merge        fronts above the tiles: widest %lld unknowns, at the root %lld, %.3g operations\n",
+               static_cast<long long>(costs.fronts.widest), static_cast<long long>(costs.fronts.root),
+               costs.fronts.operations);
+  std::fprintf(
+      stderr,
+      "merge        last round: %.1f s, of them %.1f s on tiles and %.1f s on fronts above them (mean of the ranks)\n",
+      costs.seconds, costs.tile_seconds / job.ranks.size(), costs.front_seconds / job.ranks.size());
+  std::fprintf(stderr,
+               "merge        %lld of %lld tiles in scratch; factors: %lld made, %lld spilled to scratch, %lld subtrees "
+               "computed again, at most %.1f MiB on a rank\n",
+               static_cast<long long>(costs.tiles_in_scratch), static_cast<long long>(costs.tiles),
+               static_cast<long long>(costs.factors.put), static_cast<long long>(costs.factors.spilled),
+               static_cast<long long>(costs.factors.recomputed),
+               static_cast<double>(costs.factors.peak_bytes) / (1 << 20));
+}
+
+}  // namespace megablock

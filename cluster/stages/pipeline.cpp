@@ -1,0 +1,373 @@
+#include "cluster/stages/pipeline.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "adjust/calibration/rig_observations.h"
+#include "cluster/job/given_tracks.h"
+#include "cluster/job/job_json.h"
+#include "cluster/mpi/collective.h"
+#include "cluster/process/arithmetic.h"
+#include "cluster/process/exit_codes.h"
+#include "cluster/process/process_memory.h"
+#include "cluster/process/version.h"
+#include "cluster/stages/common/block_tables.h"
+#include "cluster/stages/merge/merge.h"
+#include "cluster/stages/pipeline/adjustment.h"
+#include "cluster/stages/pipeline/candidates.h"
+#include "cluster/stages/pipeline/features.h"
+#include "cluster/stages/pipeline/matching.h"
+#include "cluster/stages/pipeline/orientation.h"
+#include "cluster/stages/pipeline/tiles.h"
+#include "cluster/stages/pipeline/tracks.h"
+#include "io/base/error.h"
+#include "io/base/hash.h"
+#include "io/block/track_rows.h"
+#include "io/project/project.h"
+#include "io/result/check.h"
+#include "io/result/measurement_index.h"
+#include "io/result/measurements.h"
+#include "io/store/units/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+using Json = nlohmann::json;
+
+void check_job_json(const JobStore& store, const JobJson& job) {
+  job.check_version();
+  const std::string level = job.value<std::string>("arithmetic", "");
+  if (level != arithmetic_level())
+    throw InputError(store.path("job.json") + ": job of arithmetic level '" + level + "', this run computes '" +
+                     arithmetic_level() + "'; give " + kArithmeticOption + " " + level +
+                     " on a processor that has it, or start a new job directory");
+}
+
+// An image is the same when its file is, or its name where there is no file.
+std::uint64_t identity(const Block& block, ImageIndex image) {
+  const std::uint64_t hash = block.images[image].file_hash;
+  return hash != 0 ? hash : Hasher().add(block.image_names[image]).value();
+}
+
+// A job is not replaced by that of quite another block, which mostly is a slip of -j.
+void refuse_another_block(const JobStore& store, const Block& previous, const Project& project) {
+  std::vector<std::uint64_t> own;
+  own.reserve(previous.images.size());
+  for (ImageIndex i(0); previous.images.contains(i); ++i.value) own.push_back(identity(previous, i));
+  std::sort(own.begin(), own.end());
+  for (ImageIndex i(0); project.block.images.contains(i); ++i.value)
+    if (std::binary_search(own.begin(), own.end(), identity(project.block, i))) return;
+  throw InputError(store.directory() + ": is the job of another block: " + project.file + " has none of its " +
+                   std::to_string(previous.images.size()) +
+                   " images; name another folder with -j, or delete this one to begin anew");
+}
+
+// Of the job's last run; empty: there is none, or it is damaged.
+std::optional<Block> previous_block(const JobStore& store) {
+  if (!std::filesystem::exists(store.path("block.h5"))) return std::nullopt;
+  const std::string damage = store.problem("block.h5");
+  if (damage.empty()) return read_block(store.path("block.h5"));
+  tell_of_damage(store, "block.h5", damage);
+  return std::nullopt;
+}
+
+// The images of an earlier run keep their indices; new ones follow. Records when the block grew.
+std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job,
+                                              PagedTables& tables, Project& project) {
+  Block& block = project.block;
+  std::vector<std::int64_t> generations;
+  if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
+    PagedTables older(store.directory());
+    page_tables(*previous, older);
+    const auto release = [&] {  // of two blocks one table is there at a time
+      tables.release();
+      older.release();
+    };
+    refuse_another_block(store, *previous, project);
+    release();
+    // Images taken away or changed start a new block; growing keeps what is there.
+    const bool grown = has_all_images_of(*previous, block);
+    release();
+    if (grown) {
+      block = append_to(*previous, std::move(block), release);
+      generations = job->at<std::vector<std::int64_t>>("generations");
+    }
+  }
+  const auto images = static_cast<std::int64_t>(block.images.size());
+  if (generations.empty() || generations.back() > images) generations = {images};
+  if (generations.back() < images) generations.push_back(images);
+  return generations;
+}
+
+// Before anything is written: what is wrong with the project is said here, once.
+Project read_whole_project(const RunOptions& options) {
+  if (!std::filesystem::exists(options.project))
+    throw InputError(options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
+  Project project = read_project(options.project);
+  check_environment(read_options(project.settings).environment, project.block);
+  return project;
+}
+
+// A folder that holds other things than a job (photographs, say) does not become one.
+void refuse_other_folders(const JobStore& store) {
+  const std::filesystem::path folder(store.directory());
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error) || std::filesystem::is_empty(folder, error)) return;
+  if (holds_job(store)) return;
+  throw InputError(store.directory() + ": the folder holds other files and no job; name a new folder with -j");
+}
+
+// Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
+std::string prepare(const RunOptions& options, const JobStore& store, Project project) {
+  store.remove_temporaries();
+  PagedTables tables(store.directory());
+  page_tables(project.block, tables);
+  const std::optional<JobJson> before = JobJson::read(store);
+  if (before) check_job_json(store, *before);
+  if (project.block.images.empty())
+    throw InputError(options.project + ": no readable image in the block; check the images folder");
+  const std::vector<std::int64_t> generations = merge_with_previous(store, before, tables, project);
+  check(project.block);
+  tables.release();
+  Hasher fingerprint;
+  fingerprint.add(hash_file(options.project)).add(generations);
+  store.write("block.h5", fingerprint.value(),
+              [&](const std::string& path) { write_block(path, project.block, [&tables] { tables.release(); }); });
+
+  Json settings = Json::array();
+  for (const auto& e : project.settings.entries) settings.push_back({e.section, e.key, e.value, e.where});
+  Json effective = Json::object();
+  for (const OptionValue& option : option_values(read_options(project.settings)))
+    effective[option.section][option.key] = option.value;
+  Json job{{"version", JobJson::kVersion},
+           {"program", kProgram},
+           {"arithmetic", arithmetic_level()},
+           {"project", project.file},
+           {"generations", generations},
+           {"settings", settings},
+           {"options", effective},
+           {"tie_points", project.tie_points},
+           {"unreadable", project.unreadable},
+           {"warnings", project.warnings}};
+  std::string text = job.dump(1, ' ', false, Json::error_handler_t::replace);
+  store.write_text("job.json", text);
+  return text;
+}
+
+int default_threads(const Communicator& ranks) { return std::max(1, host_cores() / ranks.ranks_on_host()); }
+
+// Unit files of an earlier state of the block that no stage asks for any more (rank 0, when all stages are done).
+void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
+  if (!job.is_first_rank()) return;
+  std::set<std::string> wanted(tracks.begin(), tracks.end());
+  for (const StageRecord& record : job.records)
+    for (const auto& unit : record.units) wanted.insert(unit.first);
+  for (const char* folder : {"features", "matches", "orient", "tracks", "adjust"})
+    for (const std::string& name : job.store.list(folder))
+      if (!wanted.contains(name)) job.store.remove(name);
+}
+
+void update_measurement_index(Job& job, const std::vector<std::string>& tracks) {
+  const std::string damage =
+      on_first_rank(job.ranks, [&] { return megablock::update_measurement_index(job.store, tracks); });
+  if (!damage.empty() && job.is_first_rank()) tell_of_damage(job.store, kMeasurementIndex, damage);
+}
+
+// An orientation that only takes over what the project gives has nothing to say of single images.
+bool orients_by_names(const Block& block) {
+  return !block.verticals.empty() ||
+         std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
+}
+
+void run_stages(Job& job, const std::string& tie_points) {
+  const std::string& last = job.options.last_stage;
+  std::vector<std::string> matches;
+  Tiles tiles;
+  std::vector<std::string> tracks;
+  if (tie_points.empty()) {
+    const FeatureStage features = run_features(job);
+    const CandidateGraph graph = run_candidates(job, features);
+    if (last == "partition") return;
+    matches = run_matching(job, features, graph);
+    release_names(job);
+    use_memory_sparingly();
+    tiles = run_tiles(job, matches);
+    tracks = run_tracks(job, matches, tiles);
+  } else {
+    tiles = run_tiles_of_tracks(job, tie_points);
+    if (last == "partition") return;
+    tracks = run_given_tracks(job, tie_points, tiles);
+  }
+  if (tiles.tile_count == 0)
+    throw AgreedError<ComputeError>(
+        "no two images could be matched: nothing to orient; check overlap, masks and the match options");
+  update_measurement_index(job, tracks);
+  if (last == "match") return;
+  return_freed_memory();  // of the tracks
+  job.tables.release();
+  if (orients_by_names(job.block)) restore_names(job);
+  BlockState oriented = run_orientation(job, matches);
+  release_names(job);
+  job.tables.release();
+  if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
+    throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
+  if (last == "orient") return;
+  const std::vector<std::string> adjusted = run_adjustment(job, oriented, tiles, tracks);
+  if (last == "adjust") return;
+  run_merge(job, std::move(oriented), tiles, tracks, adjusted);
+  remove_surplus(job, tracks);
+}
+
+// The tracks of all tiles, in the order of their indices.
+TrackSet read_all_tracks(const Job& job, const std::vector<std::string>& units) {
+  std::vector<TrackSet> parts;
+  std::vector<std::pair<TrackIndex, std::pair<std::size_t, std::size_t>>> order;  // id, part and row
+  for (const std::string& unit : units) {
+    parts.push_back(read_tracks(job.store.verified_path(unit)));
+    for (std::size_t t = 0; t < parts.back().id.size(); ++t)
+      order.push_back({parts.back().id[t], {parts.size() - 1, t}});
+  }
+  std::sort(order.begin(), order.end());
+  TrackSet all;
+  all.begin.push_back(0);
+  for (const auto& [id, place] : order) {
+    const auto row = static_cast<std::int64_t>(place.second);
+    append_tracks(parts[place.first], row, row + 1, all);
+  }
+  return all;
+}
+
+TrackSource track_source(Job& job, const std::string& tie_points) {
+  if (!tie_points.empty()) {
+    TrackSource source{tie_points, 0, [&job, tie_points] { return read_given_tracks(tie_points, job.block); }, {}};
+    source.fingerprint = std::stoull(on_first_rank(job.ranks, [&] { return std::to_string(hash_file(tie_points)); }));
+    return source;
+  }
+  const FeatureStage features = run_features(job);
+  const CandidateGraph graph = run_candidates(job, features);
+  const std::vector<std::string> matches = run_matching(job, features, graph);
+  const Tiles tiles = run_tiles(job, matches);
+  const std::vector<std::string> tracks = run_tracks(job, matches, tiles);
+  update_measurement_index(job, tracks);
+  Hasher hasher;
+  for (const std::string& unit : tracks) hasher.add(job.store.seal(unit)->content_hash);
+  return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }, matches};
+}
+
+// Tracks and start poses of a calibration. Off-line nothing is matched.
+void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSettings& settings) {
+  const bool targets_alone = settings.rig.mode == CalibrationMode::kOffLine;
+  const TrackSource source = targets_alone ? TrackSource() : track_source(job, tie_points);
+  BlockState start = source.matches.empty() ? initial_state(job.block) : run_orientation(job, source.matches);
+  if (settings.rig.mode != CalibrationMode::kOnLine) resect_missing(job.block, start);
+  TrackSet tracks;
+  tracks.begin.push_back(0);
+  if (source.read) tracks = source.read();
+  if (std::none_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; }))
+    throw AgreedError<InputError>(job.options.project +
+                                  ": no frame has a pose and none sees three control points; give 'poses' in the "
+                                  "project file");
+  run_calibration(job, start, tracks, settings);
+}
+
+using Stages = std::function<void(Job& job, const std::string& tie_points)>;
+
+// Opens the job, runs the stages and returns the exit code.
+int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& stages) {
+  // The block's tables then lie where all of their memory can be given back (page_tables), not among what stays.
+  use_memory_sparingly();
+  JobStore store(run_options.directory);
+  std::optional<JobLock> lock;
+  const std::string text = on_first_rank(ranks, [&] {
+    Project project = read_whole_project(run_options);
+    refuse_other_folders(store);
+    store.create();
+    lock.emplace(store);
+    return prepare(run_options, store, std::move(project));
+  });
+  const JobJson written(store.path("job.json"), text);
+  const auto tie_points = written.at<std::string>("tie_points");
+  if (tie_points.empty())
+    keep_freed_memory();  // pictures come next
+  else
+    use_memory_sparingly();  // the heap, too, that preparing has left
+  Job job{.options = run_options,
+          .ranks = ranks,
+          .store = store,
+          .settings = read_options(written.settings()),
+          .events = EventLog(store, ranks.rank()),
+          .block = read_block_without_names(store.verified_path("block.h5")),
+          .generations = written.at<std::vector<std::int64_t>>("generations"),
+          .records = {},
+          .failures = {},
+          .not_oriented = {},
+          .notes = written.at<std::vector<std::string>>("warnings")};
+  page_tables(job.block, job.tables);
+  if (tie_points.empty()) restore_names(job);
+  if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
+  omp_set_num_threads(job.options.threads);  // where no other number is asked for: inside tiles
+  if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
+  for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
+    job.failures.push_back({"init", file, reason});
+  stages(job, tie_points);
+  ranks.barrier();  // the lock is held until everybody is done
+  return job.failures.empty() ? kExitDone : kExitFailedUnits;
+}
+
+}  // namespace
+
+int run_job(const RunOptions& options, Communicator& ranks) { return with_job(options, ranks, run_stages); }
+
+namespace {
+
+void refuse_environment(const Job& job, const std::string& command) {
+  on_first_rank(job.ranks, [&] {
+    megablock::refuse_environment(job.settings.environment, command);
+    return std::string();
+  });
+}
+
+// What all ranks were given alike is refused by all together.
+void check_once(Communicator& ranks, const auto& settings) {
+  on_first_rank(ranks, [&] {
+    settings.check();
+    return std::string();
+  });
+}
+
+}  // namespace
+
+int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks) {
+  check_once(ranks, settings);
+  return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+    refuse_environment(job, "register");
+    if (!tie_points.empty()) restore_names(job);
+    const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
+    if (job.is_first_rank()) std::printf("%s", to_text(summary).c_str());
+  });
+}
+
+int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks) {
+  check_once(ranks, settings.rig);
+  return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+    refuse_environment(job, "calibrate");
+    on_first_rank(ranks, [&] {  // before hours of matching
+      calibration_block(job.block, settings.rig);
+      return std::string();
+    });
+    if (!tie_points.empty()) restore_names(job);
+    CalibrationSettings own = settings;
+    own.rig.adjustment = job.settings.adjustment;
+    calibrate_rigs(job, tie_points, own);
+  });
+}
+
+}  // namespace megablock

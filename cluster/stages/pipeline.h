@@ -1,0 +1,28 @@
+// A whole job: project file in, one merged block out.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cluster/job/job.h"
+#include "cluster/mpi/communicator.h"
+#include "cluster/stages/pipeline/calibration.h"
+#include "cluster/stages/registration/registration.h"
+
+namespace megablock {
+
+// The stages by the names of the command line, in order.
+inline constexpr const char* kStages[] = {"partition", "match", "orient", "adjust", "merge"};
+
+// Collective. Brings the job up to date as far as options.last_stage and returns the exit code (kExitDone or
+// kExitFailedUnits). Throws the project's errors, the same on every rank.
+int run_job(const RunOptions& options, Communicator& ranks);
+
+// Collective. Opens the same job, brings its tracks up to date and registers its trajectory (stages/registration.h).
+int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks);
+
+// Collective. Opens the same kind of job, brings its tracks and poses up to date and calibrates its rigs
+// (stages/calibration.h).
+int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks);
+
+}  // namespace megablock

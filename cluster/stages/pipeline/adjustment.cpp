@@ -1,0 +1,208 @@
+#include "cluster/stages/pipeline/adjustment.h"
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "adjust/problem/environment_correction.h"
+#include "adjust/terms/build_problem.h"
+#include "adjust/tile/image_sigma.h"
+#include "adjust/tile/tile_adjustment.h"
+#include "adjust/tile/track_parts.h"
+#include "cluster/mpi/collective.h"
+#include "cluster/stages/common/problem_hash.h"
+#include "cluster/stages/common/units.h"
+#include "io/base/error.h"
+#include "io/base/hash.h"
+#include "io/store/units/unit_files.h"
+#include "merge/scratch/bytes.h"
+#include "merge/tree/tile_solver.h"
+
+namespace megablock {
+
+namespace {
+
+// What the tiles are made of.
+struct OrientedTiles {
+  const BlockState& oriented;
+  const Tiles& tiles;
+  const RowsOfTiles rows;
+};
+
+// A tile before its adjustment.
+struct TileStart {
+  TrackSet tracks;
+  TileProblem problem;
+  TileState state;
+};
+
+TileStart measured_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks) {
+  TileStart start;
+  start.tracks = std::move(tracks);
+  start.problem =
+      make_tile_problem(job.block, from.oriented, from.tiles, tile, start.tracks, job.settings.adjustment.observations,
+                        from.rows.at(static_cast<std::size_t>(tile.value)));
+  const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  start.state =
+      make_tile_state(start.problem, from.oriented, std::vector<Eigen::Vector3d>(start.problem.points.size(), unknown));
+  return start;
+}
+
+// The heights of the ground that the correction needs are those of the points as measured.
+void correct_environment(const Job& job, TileStart& start) {
+  const std::vector<std::uint8_t> kept = start.problem.kept;
+  TileState at = start.state;
+  triangulate_points(start.problem, at, job.settings.adjustment);
+  start.problem.kept = kept;
+  correct_measurements(job.settings.environment, job.block.ground, at, start.problem);
+}
+
+TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks) {
+  TileStart start = measured_start(job, from, tile, std::move(tracks));
+  if (job.settings.environment.any()) correct_environment(job, start);
+  return start;
+}
+
+// An adjusted tile, its tracks split; the merge intersects the parts that are put back. What the tile was made of goes
+// before it is made again: two of them are twice the memory of the stage.
+TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::function<TileStart(TrackSet)>& start) {
+  const std::vector<std::int64_t> rows = rows_of_split(adjusted.tracks, parts);
+  TrackSet tracks = split_tracks(adjusted.tracks, parts);
+  const std::vector<std::uint8_t> kept = std::move(adjusted.problem.kept);
+  const double image_sigma_px = adjusted.problem.image_sigma_px;
+  TileState state = std::move(adjusted.state);
+  adjusted = {};
+
+  TileStart split = start(std::move(tracks));
+  split.problem.kept = kept;  // control points' rows are behind the tracks'
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto row = static_cast<std::size_t>(rows[i]);
+    split.problem.kept[i] = parts[row] > 0 || kept[row];
+  }
+  set_image_sigma(split.problem, image_sigma_px);
+  const std::vector<Eigen::Vector3d> unknown = std::exchange(split.state.points, {}),
+                                     whole_points = std::exchange(state.points, {});
+  split.state = std::move(state);
+  const std::vector<TilePoint>& points = split.problem.points;
+  for (std::size_t p = 0, whole = 0; p < points.size(); ++p) {
+    const bool further = p > 0 && points[p].role == PointRole::kTie && points[p - 1].role == PointRole::kTie &&
+                         points[p].index == points[p - 1].index;
+    split.state.points.push_back(further ? unknown[p] : whole_points[whole++]);
+  }
+  return split;
+}
+
+TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex tile, const std::string& tracks_unit) {
+  AdjustOptions options = job.settings.adjustment;
+  options.only_start = true;
+  const auto start = [&](TrackSet tracks) { return make_start(job, from, tile, std::move(tracks)); };
+  TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)));
+  const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+  TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
+                                      screening_threshold(adjusted.problem, adjusted.state, options), options);
+  const auto restored = parts.size() - static_cast<std::size_t>(std::count(parts.begin(), parts.end(), 0));
+  if (restored > 0) adjusted = with_parts(std::move(adjusted), parts, start);
+  TileProblem& problem = adjusted.problem;
+  TileState& state = adjusted.state;
+
+  TileAdjustment result;
+  result.frames = problem.frames;
+  result.poses = state.frames;
+  result.cameras = problem.cameras;
+  result.intrinsics = state.cameras;
+  result.observations.assign(problem.frames.size(), 0);
+  result.camera_observations.assign(problem.cameras.size(), 0);
+  for (const MountId& id : problem.mounts) {
+    result.mount_rigs.push_back(id.rig);
+    result.mount_numbers.push_back(id.mount);
+  }
+  result.mounts = state.mounts;
+  result.mount_observations.assign(problem.mounts.size(), 0);
+  for (std::int64_t o = 0; o < problem.observation_count(); ++o) {
+    if (!problem.kept[o]) continue;
+    const TileImage& image = problem.images[static_cast<std::size_t>(problem.image[o].value)];
+    ++result.observations[static_cast<std::size_t>(image.frame.value)];
+    ++result.camera_observations[static_cast<std::size_t>(image.camera.value)];
+    ++result.mount_observations[static_cast<std::size_t>(image.mount)];
+  }
+  result.parts = std::move(parts);
+  result.points = std::move(state.points);
+  result.kept = std::move(problem.kept);
+  result.image_sigma_px = problem.image_sigma_px;
+  result.summary = summary.text + ", " + std::to_string(restored) + " of them put back as tracks of their own";
+  return result;
+}
+
+struct TileMark {
+  std::uint64_t fingerprint = 0;
+  std::int64_t observations = 0;
+};
+
+// Of all tiles: every rank reads its share of them. Collective.
+std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, const std::vector<std::string>& tracks) {
+  const auto ranks = static_cast<std::size_t>(job.ranks.size());
+  ByteWriter writer;
+  char kind = 'c';
+  std::string error;
+  try {
+    for (auto t = static_cast<std::size_t>(job.ranks.rank()); t < tracks.size(); t += ranks) {
+      const TileStart start = measured_start(job, from, TileIndex(static_cast<std::int64_t>(t)),
+                                             read_tracks(job.store.verified_path(tracks[t])));
+      Hasher hasher;
+      hasher.add(algorithm::kAdjustment);
+      add_to_hash(hasher, job.settings.adjustment);
+      if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
+      add_to_hash(hasher, start.problem, start.state);
+      writer.value(TileMark{hasher.value(), start.problem.observation_count()});
+      job.tables.release();
+    }
+  } catch (const InputError& e) {
+    kind = 'i';
+    error = e.what();
+  } catch (const std::exception& e) {
+    error = e.what();
+  }
+  share_error(job.ranks, kind, error);
+  std::vector<TileMark> marks(tracks.size());
+  const std::vector<Bytes> all = job.ranks.gather_all(writer.take());
+  for (std::size_t rank = 0; rank < ranks; ++rank) {
+    ByteReader reader(all[rank]);
+    for (std::size_t t = rank; t < tracks.size(); t += ranks) marks[t] = reader.value<TileMark>();
+  }
+  return marks;
+}
+
+}  // namespace
+
+std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
+                                        const std::vector<std::string>& tracks) {
+  const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles)};
+  job.tables.release();
+  const std::vector<TileMark> marks = tile_marks(job, from, tracks);
+  std::vector<Unit> units;
+  std::vector<std::string> names;
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    const TileIndex tile(static_cast<std::int64_t>(t));
+    Unit unit;
+    unit.name = unit_name("adjust", tile.value);
+    unit.fingerprint = marks[t].fingerprint;
+    unit.cost = static_cast<double>(marks[t].observations);
+    unit.write = [&job, &from, tile, track = tracks[t]](const std::string& path) {
+      write_adjustment(path, adjust_one(job, from, tile, track));
+    };
+    names.push_back(unit.name);
+    units.push_back(std::move(unit));
+  }
+  const StageOutcome outcome = run_stage(job, "adjustment", units);
+  for (const FailedUnit& failure : outcome.failures) std::erase(names, failure.unit);
+  if (names.empty()) throw AgreedError<ComputeError>("no tile could be adjusted: " + outcome.failures.front().reason);
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    const std::string name = unit_name("adjust", static_cast<std::int64_t>(t));
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      names.insert(names.begin() + static_cast<long>(t), "");
+  }
+  return names;
+}
+
+}  // namespace megablock

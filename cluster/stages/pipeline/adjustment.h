@@ -1,0 +1,16 @@
+// The stage of adjustment: adjust/<tile>.h5, the adjustment of each tile on its own.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cluster/job/job.h"
+#include "io/block/image_graph.h"
+
+namespace megablock {
+
+// Tile adjustments: adjust/<tile>.h5. Returns the unit names by tile; empty for tiles that could not be adjusted.
+std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
+                                        const std::vector<std::string>& tracks);
+
+}  // namespace megablock

@@ -1,0 +1,13 @@
+// The stage of candidate pairs: graph.h5.
+#pragma once
+
+#include "cluster/job/job.h"
+#include "cluster/stages/pipeline/features.h"
+#include "io/block/image_graph.h"
+
+namespace megablock {
+
+// Candidate pairs and cells: graph.h5.
+CandidateGraph run_candidates(Job& job, const FeatureStage& features);
+
+}  // namespace megablock

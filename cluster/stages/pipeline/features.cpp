@@ -1,0 +1,198 @@
+#include "cluster/stages/pipeline/features.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "cluster/mpi/collective.h"
+#include "cluster/process/save_times.h"
+#include "cluster/stages/common/units.h"
+#include "io/base/error.h"
+#include "io/base/hash.h"
+#include "io/images/picture_codec.h"
+#include "io/store/units/unit_files.h"
+#include "match/features/features.h"
+
+namespace megablock {
+
+namespace {
+
+std::uint64_t mask_hash(const std::string& path) { return path.empty() ? 0 : hash_file(path); }
+
+struct Shard {
+  std::string name;
+  std::int64_t first = 0;                         // image
+  std::vector<std::uint64_t> image_fingerprints;  // of its images
+};
+
+std::uint64_t shard_fingerprint(const std::vector<std::uint64_t>& image_fingerprints) {
+  Hasher hasher;
+  for (const std::uint64_t fingerprint : image_fingerprints) hasher.add(fingerprint);
+  return hasher.value();
+}
+
+std::vector<std::uint64_t> image_fingerprints(const Job& job) {
+  IndexedVector<CameraIndex, std::uint64_t> masks;
+  for (const Camera& camera : job.block.cameras) masks.push_back(mask_hash(camera.mask_path));
+  std::vector<std::uint64_t> fingerprints;
+  for (std::size_t i = 0; i < job.block.images.size(); ++i) {
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    Hasher hasher;
+    hasher.add(algorithm::kFeatures);
+    add_to_hash(hasher, job.settings.features);
+    hasher.add(job.block.images[image].file_hash).add(masks[job.block.camera_of(image)]);
+    fingerprints.push_back(hasher.value());
+  }
+  return fingerprints;
+}
+
+// A shard that grew at its end keeps the features of its first images: as many as the file there was made of.
+std::vector<ImageFeatures> features_to_keep(const JobStore& store, const std::string& name,
+                                            const std::vector<std::uint64_t>& fingerprints) {
+  for (std::size_t count = fingerprints.size() - 1; count > 0; --count) {
+    const std::uint64_t fingerprint = shard_fingerprint({fingerprints.begin(), fingerprints.begin() + count});
+    if (store.up_to_date(name, fingerprint))
+      return is_current(store, name, fingerprint) ? read_features(store.path(name)) : std::vector<ImageFeatures>();
+  }
+  return {};
+}
+
+// The features of a shard in the making. Its first images are saved now and then, as if the shard ended there, so that
+// an interruption costs seconds and not the whole unit: what is there is kept (features_to_keep).
+class GrowingShard {
+ public:
+  GrowingShard(const JobStore& store, const Shard& shard)
+      : store_(store), shard_(shard), images_(features_to_keep(store, shard.name, shard.image_fingerprints)) {
+    saved_ = images_.size();
+    done_.assign(shard.image_fingerprints.size(), 0);
+    std::fill_n(done_.begin(), saved_, 1);
+    images_.resize(done_.size());
+  }
+  std::int64_t kept() const { return static_cast<std::int64_t>(saved_); }
+  const std::vector<ImageFeatures>& images() const { return images_; }
+
+  // One thread at a time; others may be at work on later images.
+  void add(std::int64_t image, ImageFeatures features) {
+    images_[static_cast<std::size_t>(image)] = std::move(features);
+    done_[static_cast<std::size_t>(image)] = 1;
+  }
+  // The same; on the main thread, to which HDF5 belongs.
+  void save_now_and_then() {
+    const auto end = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), 0) - done_.begin());
+    if (end == saved_ || end == done_.size() || !times_.due()) return;
+    times_.run([&] { save(end); });
+  }
+
+ private:
+  void save(std::size_t count) {
+    const auto end = images_.begin() + static_cast<std::ptrdiff_t>(count);
+    std::vector<ImageFeatures> first(std::make_move_iterator(images_.begin()), std::make_move_iterator(end));
+    const auto& fingerprints = shard_.image_fingerprints;
+    const auto fingerprint =
+        shard_fingerprint({fingerprints.begin(), fingerprints.begin() + static_cast<std::ptrdiff_t>(count)});
+    try {
+      store_.write(shard_.name, fingerprint, [&](const std::string& path) { write_features(path, first); });
+      saved_ = count;
+    } catch (const std::exception&) {
+      // The unit itself will be written to the same disk, and says what is wrong with it.
+    }
+    std::move(first.begin(), first.end(), images_.begin());
+  }
+
+  const JobStore& store_;
+  const Shard& shard_;
+  std::vector<ImageFeatures> images_;
+  std::vector<std::uint8_t> done_;
+  std::size_t saved_ = 0;
+  SaveTimes times_;
+};
+
+void write_shard(Job& job, const Shard& shard, const std::string& path) {
+  GrowingShard growing(job.store, shard);
+  const std::int64_t kept = growing.kept();
+  part_done(job, kept);
+  const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());
+  load_picture_codecs();
+#pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
+  for (std::int64_t i = kept; i < count; ++i) {
+    const ImageIndex image(shard.first + i);
+    const std::string& mask = job.block.cameras[job.block.camera_of(image)].mask_path;
+    ImageFeatures features = detect_features(job.block.path_of(image), mask, image, job.settings.features);
+#pragma omp critical(features_of_a_shard)
+    {
+      growing.add(i, std::move(features));
+      if (omp_get_thread_num() == 0) growing.save_now_and_then();
+      part_done(job);
+    }
+  }
+  write_features(path, growing.images());
+}
+
+// Images without features become failures of the run, with their reasons.
+void list_unreadable(Job& job, const FeatureStage& stage) {
+  const std::string text = on_first_rank(job.ranks, [&] {
+    nlohmann::json failed = nlohmann::json::array();
+    for (const std::string& shard : stage.shards)
+      for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard)))
+        if (!image.failure.empty()) failed.push_back({job.block.name_of(image.image), image.failure});
+    return failed.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  });
+  std::vector<FailedUnit> failures;
+  for (const auto& entry : nlohmann::json::parse(text)) failures.push_back({"features", entry[0], entry[1]});
+  add_failures(job, failures);
+}
+
+}  // namespace
+
+FeatureStage run_features(Job& job) {
+  FeatureStage stage;
+  stage.image_fingerprint = image_fingerprints(job);
+  const auto images = static_cast<std::int64_t>(job.block.images.size());
+  std::vector<Unit> units;
+  for (std::int64_t first = 0; first < images; first += kShardImages) {
+    const std::int64_t end = std::min(images, first + kShardImages);
+    const Shard shard{unit_name("features", first / kShardImages),
+                      first,
+                      {stage.image_fingerprint.begin() + first, stage.image_fingerprint.begin() + end}};
+    Unit unit;
+    unit.name = shard.name;
+    unit.fingerprint = shard_fingerprint(shard.image_fingerprints);
+    unit.parts = end - first;
+    unit.cost = static_cast<double>(unit.parts);
+    unit.write = [&job, shard](const std::string& path) { write_shard(job, shard, path); };
+    stage.shards.push_back(unit.name);
+    units.push_back(std::move(unit));
+  }
+  const StageOutcome outcome = run_stage(job, "features", units, "images");
+  if (!outcome.failures.empty()) throw AgreedError<ComputeError>("features: " + outcome.failures.front().reason);
+  list_unreadable(job, stage);
+  return stage;
+}
+
+const FeatureCache::Shard& FeatureCache::shard(std::int64_t number) {
+  auto found = std::find_if(shards_.begin(), shards_.end(), [&](const Shard& s) { return s.number == number; });
+  if (found == shards_.end()) {
+    if (shards_.size() >= capacity_) shards_.erase(shards_.begin());
+    shards_.push_back({number, read_features(store_.verified_path(unit_name("features", number)))});
+    return shards_.back();
+  }
+  std::rotate(found, found + 1, shards_.end());
+  return shards_.back();
+}
+
+const ImageFeatures& FeatureCache::features(ImageIndex image) {
+  return shard(image.value / kShardImages).images[static_cast<std::size_t>(image.value % kShardImages)];
+}
+
+void FeatureCache::load(const std::vector<ImageIndex>& images) {
+  std::vector<std::int64_t> numbers;
+  for (const ImageIndex image : images) numbers.push_back(image.value / kShardImages);
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  capacity_ = std::max(capacity_, numbers.size());
+  for (const std::int64_t number : numbers) shard(number);
+}
+
+}  // namespace megablock

@@ -1,0 +1,43 @@
+// The stage of features: features/<shard>.h5, keypoints and descriptors of 64 images each.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cluster/job/job.h"
+#include "cluster/stages/common/units.h"
+#include "io/block/features.h"
+
+namespace megablock {
+
+// Features. fingerprint[image]: what the features of one image are computed from (file, mask, options).
+struct FeatureStage {
+  std::vector<std::uint64_t> image_fingerprint;
+  std::vector<std::string> shards;
+};
+FeatureStage run_features(Job& job);
+
+// Keypoints and descriptors by image, a few shards in memory at a time.
+class FeatureCache {
+ public:
+  FeatureCache(const JobStore& store, std::size_t capacity_shards) : store_(store), capacity_(capacity_shards) {}
+  const ImageFeatures& features(ImageIndex image);
+  // Makes the shards of these images resident together; pointers stay valid until the next call.
+  void load(const std::vector<ImageIndex>& images);
+
+ private:
+  struct Shard {
+    std::int64_t number;
+    std::vector<ImageFeatures> images;
+  };
+  const Shard& shard(std::int64_t number);
+  const JobStore& store_;
+  std::size_t capacity_;
+  std::vector<Shard> shards_;  // least recently used first
+};
+
+// Keypoints of every image (empty where extraction failed).
+IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job);
+
+}  // namespace megablock

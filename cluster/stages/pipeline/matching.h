@@ -1,0 +1,19 @@
+// The stage of matching: matches/<cell>.h5, the verified matches of the pairs of a cell.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cluster/job/job.h"
+#include "cluster/stages/pipeline/features.h"
+#include "io/block/image_graph.h"
+
+namespace megablock {
+
+// Matching: matches/<cell>.h5. Returns the unit names.
+std::vector<std::string> run_matching(Job& job, const FeatureStage& features, const CandidateGraph& graph);
+
+// Reads all matches of the units (in unit order).
+std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches);
+
+}  // namespace megablock

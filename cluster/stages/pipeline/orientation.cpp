@@ -1,0 +1,250 @@
+#include "cluster/stages/pipeline/orientation.h"
+
+// Initial orientation, one unit per generation of the block: images that are added later are oriented with respect to
+// those that were there, whose orientation stays what it was.
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <set>
+
+#include "adjust/orientation/given_trajectories.h"
+#include "adjust/orientation/orientation.h"
+#include "adjust/orientation/vertical_check.h"
+#include "cluster/mpi/collective.h"
+#include "cluster/stages/common/block_hash.h"
+#include "cluster/stages/common/growth.h"
+#include "cluster/stages/common/units.h"
+#include "cluster/stages/pipeline/features.h"
+#include "io/base/error.h"
+#include "io/base/hash.h"
+#include "io/block/held_priors.h"
+#include "io/store/units/unit_files.h"
+#include "match/tracks/tracks.h"
+
+namespace megablock {
+
+namespace {
+
+using Frames = std::set<FrameIndex>;
+using Links = std::map<FrameIndex, Frames>;  // of frames with a verified pair
+
+// Algorithm number of what is believed of verticals: orientations without them stay valid when it is raised.
+constexpr int kVerticalCheck = 2;
+
+void add_vertical_values(Hasher& hasher, const Block& block) {
+  if (!block.verticals.empty()) hasher.add(kVerticalCheck);
+  for (const SeenVertical& vertical : block.verticals) {
+    add_to_hash(hasher.add(vertical.image.value), vertical.down);
+    for (const double value : vertical.covariance.reshaped()) hasher.add(value);
+    for (const double value : vertical.camera) hasher.add(value);
+    for (const double value : vertical.by_camera.reshaped()) hasher.add(value);
+  }
+}
+
+void add_block_values(Hasher& hasher, const Block& block) {
+  for (ImageIndex i(0); block.images.contains(i); ++i.value)
+    hasher.add(block.image_names[i]).add(block.images[i].frame.value).add(block.images[i].mount);
+  for (const Frame& frame : block.frames) {
+    hasher.add(frame.name).add(frame.rig.value);
+    add_priors_to_hash(hasher, frame);
+    if (frame.given_pose) add_to_hash(hasher.add('g'), *frame.given_pose);
+  }
+  for (const Rig& rig : block.rigs)
+    for (const Mount& mount : rig.mounts) add_to_hash(hasher.add(mount.camera.value), mount.pose);
+  for (const Camera& camera : block.cameras) {
+    hasher.add(camera.width).add(camera.height).add(camera.focal_known);
+    add_to_hash(hasher, camera.intrinsics);
+    for (const double value : camera.prior_sigma) hasher.add(value);
+  }
+  add_vertical_values(hasher, block);
+}
+
+Links links_of(const Block& block, const std::vector<VerifiedPair>& pairs) {
+  Links links;
+  for (const VerifiedPair& pair : pairs) {
+    const FrameIndex a = block.images[pair.a].frame, b = block.images[pair.b].frame;
+    if (a == b) continue;
+    links[a].insert(b);
+    links[b].insert(a);
+  }
+  return links;
+}
+
+// Sets of frames without a pose that hang together by pairs and of which one is new, by first frame.
+std::vector<Frames> sets_to_orient(const BlockState& state, const Frames& new_frames, const Links& links) {
+  std::vector<Frames> sets;
+  Frames seen;
+  for (const FrameIndex start : new_frames) {
+    if (state.oriented[start] || !links.contains(start) || !seen.insert(start).second) continue;
+    Frames set;
+    std::vector<FrameIndex> open{start};
+    while (!open.empty()) {
+      const FrameIndex frame = open.back();
+      open.pop_back();
+      set.insert(frame);
+      for (const FrameIndex next : links.at(frame))
+        if (!state.oriented[next] && seen.insert(next).second) open.push_back(next);
+    }
+    sets.push_back(std::move(set));
+  }
+  return sets;
+}
+
+// With the frames they are linked to and those these are linked to: enough to intersect the points they see.
+Frames with_surroundings(const Frames& set, const Links& links) {
+  Frames all = set;
+  for (int ring = 0; ring < 2; ++ring) {
+    const Frames inner = all;
+    for (const FrameIndex frame : inner) all.insert(links.at(frame).begin(), links.at(frame).end());
+  }
+  return all;
+}
+
+// Orients one set; frames that had a pose keep it, and the cameras with them.
+void orient_set(const Job& job, const Block& block, const std::vector<VerifiedPair>& pairs, const Frames& set,
+                const Links& links, InitialOrientation& orientation) {
+  BlockState& state = orientation.state;
+  const Frames frames = with_surroundings(set, links);
+  std::vector<VerifiedPair> own;
+  for (const VerifiedPair& pair : pairs)
+    if (frames.contains(block.images[pair.a].frame) && frames.contains(block.images[pair.b].frame)) own.push_back(pair);
+  OrientationResult oriented;
+  try {
+    const TrackSet tracks = build_tracks(read_keypoints(job), own, job.settings.tracks);
+    oriented = orient_component(block, state, {frames.begin(), frames.end()}, own, tracks, job.settings.orientation);
+  } catch (const ComputeError& error) {  // stays without poses; the result lists its images
+    for (const FrameIndex frame : set) orientation.failed.emplace_back(frame, error.what());
+    return;
+  }
+  for (const FrameIndex frame : set) {
+    state.frames[frame] = oriented.state.frames[frame];
+    state.oriented[frame] = oriented.state.oriented[frame];
+  }
+  for (const auto& failed : oriented.failed)
+    if (set.contains(failed.first)) orientation.failed.push_back(failed);
+  for (const SetAsideVertical& vertical : oriented.verticals_aside)
+    if (set.contains(block.images[vertical.image].frame)) orientation.verticals_aside.push_back(vertical);
+  if (frames.size() == set.size()) state.cameras = oriented.state.cameras;
+}
+
+Frames frames_from(const Block& block, std::int64_t first_image) {
+  Frames frames;
+  for (ImageIndex i(first_image); block.images.contains(i); ++i.value) frames.insert(block.images[i].frame);
+  return frames;
+}
+
+// The state of a block that grew: what it had, and start values for the rest.
+BlockState grow(const BlockState& state, const Block& block) {
+  BlockState grown = initial_state(block);
+  std::copy(state.frames.begin(), state.frames.end(), grown.frames.begin());
+  std::copy(state.oriented.begin(), state.oriented.end(), grown.oriented.begin());
+  std::copy(state.cameras.begin(), state.cameras.end(), grown.cameras.begin());
+  std::copy(state.mounts.begin(), state.mounts.end(), grown.mounts.begin());
+  return grown;
+}
+
+// Pairs of the cells that belong to a generation (a cell is of the generation of its latest image) or an earlier one;
+// cells without a verified pair say nothing.
+std::vector<VerifiedPair> pairs_of_generation(const Job& job, const std::vector<std::string>& matches,
+                                              std::int64_t images, Hasher& hasher) {
+  std::vector<VerifiedPair> pairs;
+  for (const std::string& name : matches) {
+    std::vector<VerifiedPair> cell = read_matches(job.store.verified_path(name));
+    const auto later = [&](const VerifiedPair& pair) { return pair.b.value >= images; };
+    if (cell.empty() || std::any_of(cell.begin(), cell.end(), later)) continue;
+    hasher.add(job.store.seal(name)->content_hash);
+    std::move(cell.begin(), cell.end(), std::back_inserter(pairs));
+  }
+  return pairs;
+}
+
+// What is held is not a matter of the orientation, which only comes near it.
+BlockState held_in_place(const Job& job, BlockState state) {
+  BlockState placed = state;
+  place_held_frames(job.block, placed);
+  const ObservationOptions& use = job.settings.adjustment.observations;
+  for (FrameIndex f(0); job.block.frames.contains(f); ++f.value) {
+    if (use.use_attitude_priors) state.frames[f].rotation = placed.frames[f].rotation;
+    if (use.use_position_priors) state.frames[f].centre = placed.frames[f].centre;
+  }
+  return state;
+}
+
+// From here on the block does without them.
+void set_aside(Job& job, const std::vector<SetAsideVertical>& verticals, std::vector<SetAsideVertical>& all) {
+  std::set<ImageIndex> images;
+  for (const SetAsideVertical& vertical : verticals) images.insert(vertical.image);
+  std::erase_if(job.block.verticals, [&](const SeenVertical& vertical) { return images.contains(vertical.image); });
+  all.insert(all.end(), verticals.begin(), verticals.end());
+}
+
+void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std::size_t all) {
+  const std::string text = set_aside_text(job.block, aside, all);
+  if (text.empty()) return;
+  job.notes.push_back(text);
+  if (job.is_first_rank() && !job.options.quiet) std::fprintf(stderr, "orientation  %s\n", text.c_str());
+}
+
+// Where every pose is given nothing is oriented; given poses may still be poor.
+BlockState given_orientation(const Job& job, BlockState given) {
+  const GivenTrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
+  if (change.frames > 0 && job.is_first_rank() && !job.options.quiet)
+    std::fprintf(stderr,
+                 "orientation  given poses drift away from what was observed of their frames; adjusted to that as a "
+                 "start: %lld frames in %lld %s, moved by %.3g m rms, %.3g m at most\n",
+                 static_cast<long long>(change.frames), static_cast<long long>(change.trajectories),
+                 change.trajectories == 1 ? "drive" : "drives", change.rms_m, change.largest_m);
+  return held_in_place(job, std::move(given));
+}
+
+}  // namespace
+
+BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
+  BlockState start = initial_state(job.block);
+  const std::size_t verticals = job.block.verticals.size();
+  std::vector<SetAsideVertical> aside;
+  set_aside(job, against_given_poses(job.block), aside);
+  if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
+    if (job.is_first_rank()) remove_record(job.store, "orientation");  // an earlier run may have needed the stage
+    tell_of_verticals(job, aside, verticals);
+    return given_orientation(job, std::move(start));
+  }
+  if (matches.empty())
+    throw AgreedError<InputError>(
+        "images without pose cannot be oriented from given tie points alone; give poses in the project file");
+  BlockState state;
+  std::uint64_t previous = 0;
+  std::int64_t images_before = 0;
+  for (std::size_t g = 0; g < job.generations.size(); ++g) {
+    const Block block = first_images(job.block, job.generations[g]);
+    Hasher hasher;
+    hasher.add(algorithm::kOrientation).add(previous).add(images_before).add(job.settings.tracks.min_length);
+    add_to_hash(hasher, job.settings.orientation);
+    add_block_values(hasher, block);
+    const std::vector<VerifiedPair> pairs = pairs_of_generation(job, matches, job.generations[g], hasher);
+    Unit unit;
+    unit.name = unit_name("orient", static_cast<std::int64_t>(g));
+    unit.fingerprint = hasher.value();
+    unit.write = [&](const std::string& path) {
+      InitialOrientation grown{grow(state, block), {}, {}};
+      const Links links = links_of(block, pairs);
+      for (const Frames& set : sets_to_orient(grown.state, frames_from(block, images_before), links))
+        orient_set(job, block, pairs, set, links, grown);
+      write_orientation(path, grown);
+    };
+    const StageOutcome outcome = run_stage(job, "orientation", {unit});
+    if (!outcome.failures.empty())
+      throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
+    const InitialOrientation done = read_orientation(job.store.verified_path(unit.name));
+    state = done.state;
+    for (const auto& [frame, reason] : done.failed) job.not_oriented[frame] = reason;
+    set_aside(job, done.verticals_aside, aside);
+    previous = job.store.seal(unit.name)->content_hash;
+    images_before = job.generations[g];
+  }
+  tell_of_verticals(job, aside, verticals);
+  return held_in_place(job, grow(state, job.block));
+}
+
+}  // namespace megablock

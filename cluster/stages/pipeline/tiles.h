@@ -1,0 +1,16 @@
+// The stage of tiles: tiles.h5, the tiles of the block and the merge tree.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cluster/job/job.h"
+#include "io/block/image_graph.h"
+
+namespace megablock {
+
+// Tiles and merge tree: tiles.h5, from verified matches or from given tracks.
+Tiles run_tiles(Job& job, const std::vector<std::string>& matches);
+Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points);
+
+}  // namespace megablock

@@ -1,0 +1,33 @@
+// Tracks by the frames that see them, and those that four frames have in common.
+#pragma once
+
+#include "adjust/registration/pair_registration.h"
+#include "io/block/block.h"
+#include "io/block/registration.h"
+#include "io/block/tracks.h"
+
+namespace megablock {
+
+class FrameTracks {
+ public:
+  FrameTracks(const Block& block, TrackSet tracks);
+
+  const TrackSet& tracks() const { return tracks_; }
+
+  // Of a place and the ones a frame before or after along either pass: that with most tracks in `min_frames` frames.
+  Place richest(const Place& place, int min_frames) const;
+
+  std::vector<FourFrameTrack> common(const Place& place, int min_frames) const;
+
+ private:
+  // Tracks of either pass and at least min_frames of a, b, c, d; ascending.
+  std::vector<std::int64_t> shared(const Place& place, int min_frames) const;
+  bool successive(FrameIndex a, FrameIndex b) const;
+
+  const Block& block_;
+  TrackSet tracks_;
+  std::vector<std::int64_t> begin_;  // [frames + 1] into rows_
+  std::vector<std::int64_t> rows_;   // tracks of each frame, ascending
+};
+
+}  // namespace megablock

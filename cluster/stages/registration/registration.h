@@ -1,0 +1,58 @@
+// Registration of a trajectory as stages of a job: register/rig.h5 (one unit, where cameras or mounts are free),
+// register/places.h5 (one unit), register/pairs/<n>.h5 (some hundred places each, claimed by the ranks),
+// register/trajectory.h5 (one unit).
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "adjust/registration/pair_registration.h"
+#include "adjust/registration/rig_estimate.h"
+#include "adjust/registration/trajectory.h"
+#include "cluster/job/job.h"
+#include "io/block/tracks.h"
+#include "partition/candidates/places.h"
+
+namespace megablock {
+
+struct RegistrationSettings {
+  bool estimate_rig = true;  // free cameras and mounts, first of all, from the tracks along the passes
+  RigEstimateOptions rig;
+  PlaceOptions places;
+  PairRegistrationOptions pairs{.min_frames = 3};
+  TrajectoryOptions trajectory;
+  JointOptions joint;
+  bool use_registrations = true;  // false: the chain and what is absolute alone
+  bool use_resections = false;    // of frames that see three control points or more (CN-23, CN-29)
+  int units_places = 250;         // per unit
+  void check() const;             // throws InputError
+};
+
+// The tracks of the block, read when they are needed first; `fingerprint`: of all of them.
+struct TrackSource {
+  std::string file;  // of given tracks; empty: the job's own
+  std::uint64_t fingerprint = 0;
+  std::function<TrackSet()> read;
+  std::vector<std::string> matches;  // units of verified pairs that they were made of; empty: given tracks
+};
+
+struct RegistrationSummary {
+  std::int64_t frames = 0, chain = 0, places = 0, accepted = 0, different = 0, used = 0, resections = 0, points = 0;
+  std::string rig;                                                    // what was done to cameras and mounts
+  using Reasons = std::vector<std::pair<std::string, std::int64_t>>;  // without their numbers, and how often
+  Reasons refusals, not_resected;
+  double median_move_m = 0, largest_move_m = 0;  // of frames against the start
+  std::vector<std::string> check_points;         // one line each
+  double check_rms_m = 0;                        // of check points adjusted as tie points; 0: none
+  std::vector<std::string> notes;                // on the trajectory: gaps, copies
+  std::uint64_t digest = 0;                      // of the trajectory's bits
+};
+
+// Collective. Writes besides, by rank 0: register/poses.csv, register/registrations.csv, and register/block.yaml with
+// register/block.h5 (registration_output.h).
+RegistrationSummary run_registration(Job& job, const TrackSource& tracks, const RegistrationSettings& settings);
+
+std::string to_text(const RegistrationSummary& summary);
+
+}  // namespace megablock

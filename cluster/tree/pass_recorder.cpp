@@ -1,0 +1,78 @@
+#include "cluster/tree/pass_recorder.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "cluster/process/progress.h"
+#include "cluster/process/signals.h"
+#include "io/base/hash.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kBytesPerSecond = 20e6;
+
+std::uint64_t hash_of(std::uint64_t state, const PassRecorder::Kind& kind) {
+  Hasher hasher;
+  hasher.add(state).add(kind.pass.lambda).add(kind.pass.curvature).add(kind.seams).add(kind.columns);
+  return hasher.value();
+}
+
+}  // namespace
+
+PassRecorder::PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds)
+    : files_(std::move(scratch)), seconds_(seconds), found_(files_.read()) {}
+
+void PassRecorder::keep_found(std::uint64_t state) {
+  if (found_ && found_->state != state) found_.reset();
+  files_.keep_only(found_);
+}
+
+PassRecord PassRecorder::begin(const Kind& kind) {
+  at_ = position_();
+  pass_ = hash_of(at_.state, kind);
+  begin_s_ = last_s_ = monotonic_seconds();
+  given_up_ = false;
+  const std::optional<PassRecord> found = std::exchange(found_, std::nullopt);
+  if (found && found->pass == pass_) {
+    written_.insert(found->subtrees.begin(), found->subtrees.end());
+    return *found;
+  }
+  files_.remove();  // before anything that it names is written over
+  if (found) files_.remove_files_of(*found);
+  for (const std::int64_t node : written_) files_.remove_update(node);
+  written_.clear();
+  return {};
+}
+
+bool PassRecorder::due(std::int64_t bytes, bool leaves) const {
+  if (given_up_) return false;
+  if (seconds_ <= 0 || stop_requested()) return true;
+  const double worked = monotonic_seconds() - (leaves ? begin_s_ : last_s_);
+  return worked >= std::max(seconds_, static_cast<double>(bytes) / kBytesPerSecond);
+}
+
+bool PassRecorder::write_updates(const std::map<std::int64_t, const UpdateMatrix*>& updates) {
+  for (const auto& [node, update] : updates) {
+    if (written_.contains(node)) continue;
+    if (!files_.write_update(node, *update)) return false;
+    written_.insert(node);
+  }
+  return true;
+}
+
+void PassRecorder::write(PassRecord record) {
+  record.state = at_.state;
+  record.pass = pass_;
+  record.position = at_.bytes;
+  if (!files_.write(record)) return give_up();
+  std::erase_if(written_, [&](std::int64_t node) {
+    if (std::ranges::binary_search(record.subtrees, node)) return false;
+    files_.remove_update(node);
+    return true;
+  });
+  last_s_ = monotonic_seconds();
+}
+
+}  // namespace megablock

@@ -1,0 +1,160 @@
+// The merge tree over ranks: each rank condenses its own tiles; an inner node is eliminated by the rank of its left
+// child; update matrices go up and steps, covariances come down as messages. All sums are formed in tile or child
+// order, so that the bits do not depend on the ranks.
+//
+// Tiles lie in a store of their own, partly out of core (merge/step/tile_store.h): each pass asks for a tile as a whole
+// once. Factors wait for the way down within the rank's memory, else in its scratch, else they are computed again
+// (merge/step/memory.h). Those of a node whose subtree lies on several ranks are never given up: computing them again
+// would need the other ranks.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cluster/mpi/communicator.h"
+#include "cluster/tree/pass_recorder.h"
+#include "merge/checks/seam_check.h"
+#include "merge/datum/inner_constraints.h"
+#include "merge/plan/plan_store.h"
+#include "merge/step/block_motion.h"
+#include "merge/step/memory.h"
+#include "merge/step/tile_store.h"
+#include "merge/step/tile_trial.h"
+#include "merge/tile/condense.h"
+#include "merge/tree/global_adjustment.h"
+#include "merge/tree/node.h"
+
+namespace megablock {
+
+// On this rank's clock, of all passes up and down: work on its tiles, on fronts above them, and everything, waiting for
+// other ranks included.
+struct PassSeconds {
+  double tiles = 0, fronts = 0, all = 0;
+  std::int64_t passes = 0;  // upwards
+};
+
+// Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
+std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
+
+class RankRunner : public TreeRunner {
+ public:
+  // `tiles`: this rank's, ascending, longer-lived than the runner, as is `solver`; rank_of_tile: of all tiles.
+  // Collective.
+  RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
+             const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
+  ~RankRunner() override;
+
+  UpReport up(const Pass& pass) override;
+  DownReport down(const Pass& pass) override;
+  void accept() override;
+  void reject() override;
+
+  // Upward passes are recorded from now on, and the first one goes on where the record that was found ends. Of subtrees
+  // on this rank alone: what joins several ranks is computed again. `recorder` outlives the runner.
+  void record_passes(PassRecorder& recorder) { recorder_ = &recorder; }
+
+  // The next pass with lambda = 0 may be the last one: what the posterior needs of it is kept, so that it has not to be
+  // gone again. Not of free blocks.
+  void expect_posterior() { posterior_expected_ = true; }
+
+  // Collective, at the solution: an upward pass with lambda = 0, seams and gauge, then covariances.
+  struct Posterior {
+    SubtreeSums sums;  // of the whole block
+    BlockGauge gauge;
+    std::vector<SeamReport> seams;       // of all inner nodes, in node order; on every rank
+    std::vector<TileCheck> tile_checks;  // of all tiles, in tile order; on every rank
+    ObservationTable observations;       // of the whole block, on every rank
+  };
+  // `visit` gets each of this rank's tiles once, as soon as its covariances are there: they are kept nowhere.
+  using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
+  Posterior posterior(const VisitCovariance& visit = {});
+
+  // The unknowns that a tile's kept residuals touch; until another tile is asked for.
+  const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
+  const EliminationPlan& plan() const { return plan_; }
+  const PassSeconds& seconds() const { return seconds_; }
+  const MemoryStatistics& memory() const { return factors_.statistics(); }
+  // The most that a front above the tiles, its children's updates and what waited for others took at a time.
+  std::int64_t peak_front_bytes() const { return peak_front_bytes_; }
+
+ private:
+  bool mine(std::int64_t node) const;
+  UpdateMatrix child_update(std::int64_t child);
+  void pass_up(std::int64_t node, UpdateMatrix update);
+  // The part of a front's values that each child needs, and a node's from its parent.
+  template <typename Values>
+  void pass_down(std::int64_t node, const Values& front);
+  template <typename Values>
+  Values from_parent(std::int64_t node);
+  std::size_t row_of_leaf(std::int64_t leaf) const {  // in tiles_, of a node that is one of this rank's tiles
+    return static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(leaf)]);
+  }
+  // Tile and plan of this row are there beside those of any other. A tile may leave scratch without its plan.
+  bool in_memory(std::size_t row) const { return !tiles_.in_scratch(row) && !tile_plans_.in_scratch(row); }
+  UpdateMatrix keep(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
+  // Tiles of these nodes, ascending; `take` gets one after the other.
+  using TakeCondensation = std::function<void(std::size_t i, TileCondensation)>;
+  void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const TakeCondensation& take);
+  UpdateMatrix join_children(std::int64_t node, const Pass& pass);
+  void hand_on(std::int64_t node, UpdateMatrix update);  // records it, too
+  UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
+                               bool check_seam_here);
+  // Bytes of a node's front at work, whether its unknowns or their covariances; of what waits for a parent or a child.
+  std::int64_t front_bytes(std::int64_t node) const;
+  std::int64_t waiting_bytes() const;
+  // The subtree of a node that lies on this rank alone, once more.
+  UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
+  const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
+  // Nodes of these subtrees. [nodes]
+  std::vector<bool> nodes_of(const std::vector<std::int64_t>& subtrees) const;
+  // Takes over what a killed run did of the pass; the nodes that are done.
+  std::vector<bool> go_on(const PassRecord& record);
+  // Records the pass, if it is time to, once a node's front is eliminated.
+  void record(std::int64_t node, const UpdateMatrix& update);
+  // The node's update goes where no other subtree of this rank alone holds it.
+  bool leaves(std::int64_t node) const;
+  // One upward pass with the datum in gauge_.
+  UpReport condense_all(const Pass& pass);
+  void make_plans(const MergeTree& tree, std::size_t tile_count);
+  void find_gauges();
+  double seam_probability() const;  // of a false alarm at one seam
+  BlockGauge gather_gauge() const;
+  TileDatum datum_of(std::size_t row) const;
+  InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
+  // Down with the current factors: steps of this rank's tiles without those of their points.
+  std::vector<TileStep> steps_down(const Pass& pass);
+  // Where they lead to, tile by tile; `take` gets one after the other.
+  using TakeTrial = std::function<void(std::size_t row, TileTrial)>;
+  void try_steps(const std::vector<BlockMotion>& motions, const Pass& pass, const std::vector<TileStep>& steps,
+                 const TakeTrial& take);
+
+  Communicator& ranks_;
+  TileStore& tiles_;
+  const NodeSolver& solver_;
+  PlanStore tile_plans_;                          // of tiles_
+  std::vector<TileGauge> gauges_, trial_gauges_;  // of tiles_, at their states and after a step
+  std::vector<int> rank_of_node_;
+  std::vector<std::int64_t> own_tile_of_node_;  // row of tiles_, -1
+  EliminationPlan plan_;
+  std::vector<bool> on_one_rank_;                 // [nodes]: the whole subtree is this rank's
+  FactorStore factors_;                           // of this rank's nodes
+  std::map<std::int64_t, UpdateMatrix> updates_;  // waiting for their parent on this rank
+  PassRecorder* recorder_ = nullptr;
+  std::vector<std::int64_t> left_;  // recorded subtrees of this pass that leaves() is true of
+  BlockGauge gauge_;
+  bool with_columns_ = false;  // the pass carries the further right-hand sides of a free datum
+  bool check_seams_ = false;
+  bool posterior_expected_ = false;
+  std::optional<SubtreeSums> last_pass_;  // of a pass at the present state with what the posterior needs
+  std::vector<SeamReport> seams_;
+  PassSeconds seconds_;
+  std::int64_t peak_front_bytes_ = 0;
+  std::map<std::int64_t, Bytes> downward_;  // what a parent on this rank left for its child
+};
+
+}  // namespace megablock

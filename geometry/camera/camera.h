@@ -1,0 +1,81 @@
+// Projection of a camera, its inverse and its derivatives, for every model: formulas in projection.h and correction.h.
+//
+// What is in front of a camera is the model's own matter: pinhole, Brown and all corrections see Z > 0 (corrections as
+// far as they do not fold the image); the fisheye sees every direction up to where its polynomial stops growing, also
+// beyond 90 degrees; the panorama everything but its poles.
+#pragma once
+
+#include <limits>
+#include <optional>
+
+#include "geometry/camera/correction.h"
+#include "geometry/camera/projection.h"
+
+namespace megablock {
+
+// NaN where the model has no pixel for the point.
+Eigen::Vector2d project_other(const Intrinsics& k, const Eigen::Vector3d& point);  // all models but Brown
+inline Eigen::Vector2d no_pixel() { return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()); }
+inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point) {
+  if (k.model().kind != CameraModelKind::kBrown) return project_other(k, point);
+  return point.z() > 0 ? projection::brown(k.data(), point) : no_pixel();
+}
+
+// Adjusted minus measured pixel. The two edges of a panorama are the same place: its differences are less than half a
+// turn.
+template <typename Scalar>
+Eigen::Matrix<Scalar, 2, 1> pixel_difference(const CameraModel& model, const Scalar* k,
+                                             const Eigen::Matrix<Scalar, 2, 1>& adjusted,
+                                             const Eigen::Vector2d& measured) {
+  using std::floor;
+  Eigen::Matrix<Scalar, 2, 1> difference(adjusted.x() - measured.x(), adjusted.y() - measured.y());
+  if (model.kind == CameraModelKind::kEquirectangular) {
+    const Scalar turn = (2 * 3.14159265358979323846) * k[kFocal];
+    difference.x() -= turn * floor(difference.x() / turn + 0.5);
+  }
+  return difference;
+}
+inline Eigen::Vector2d pixel_difference(const Intrinsics& k, const Eigen::Vector2d& adjusted,
+                                        const Eigen::Vector2d& measured) {
+  return pixel_difference<double>(k.model(), k.data(), adjusted, measured);
+}
+
+// Projected minus measured; NaN where the model has no pixel for the point.
+inline Eigen::Vector2d reprojection(const Intrinsics& k, const Eigen::Vector3d& point,
+                                    const Eigen::Vector2d& measured) {
+  return pixel_difference(k, project(k, point), measured);
+}
+
+// Columns: the model's parameters. In place, without heap.
+using IntrinsicJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxIntrinsics>;
+
+// Projection with derivatives by camera coordinates and by the parameters (fixed ones: zero).
+struct ProjectionJacobian {
+  bool valid = false;  // otherwise the rest is undefined: the model has no pixel for the point
+  Eigen::Vector2d pixel;
+  Eigen::Matrix<double, 2, 3> by_point;
+  IntrinsicJacobian by_intrinsics;
+};
+ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point);
+
+// Unit viewing direction of a pixel in camera coordinates. Empty where the model cannot be inverted: beyond the radius
+// at which the radial polynomial turns back, where a correction folds the image, above the poles of a panorama.
+std::optional<Eigen::Vector3d> viewing_ray(const Intrinsics& k, const Eigen::Vector2d& pixel);
+
+// The ray of viewing_ray with its derivatives by the pixel and by the parameters (fixed ones: zero), by the implicit
+// function theorem: with the tangent basis T of the ray and the projection p, dray = T (p_X T)^-1 (dm - p_k dk).
+struct RayJacobian {
+  bool valid = false;  // otherwise the rest is undefined
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 3, 2> by_pixel;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxIntrinsics> by_intrinsics;
+};
+RayJacobian ray_with_jacobian(const Intrinsics& k, const Eigen::Vector2d& pixel);
+
+// Two unit vectors (columns) that complete the unit vector `direction` to an orthogonal basis.
+Eigen::Matrix<double, 3, 2> tangent_plane(const Eigen::Vector3d& direction);
+
+// The normalised image point (x, y) = (X/Z, Y/Z) of a pixel. Empty as viewing_ray, and where the ray has Z <= 0.
+std::optional<Eigen::Vector2d> unproject(const Intrinsics& k, const Eigen::Vector2d& pixel);
+
+}  // namespace megablock

@@ -1,0 +1,100 @@
+#include "geometry/numbers/polynomial.h"
+
+#include <cmath>
+
+namespace megablock {
+
+namespace {
+
+struct Value {
+  double f = 0, slope = 0, magnitude = 0;  // magnitude: sum of the terms' absolute values
+};
+
+Value value_of(std::span<const double> c, double x) {
+  Value v;
+  for (std::size_t i = c.size(); i-- > 0;) {
+    v.slope = v.slope * x + v.f;
+    v.f = v.f * x + c[i];
+    v.magnitude = v.magnitude * std::abs(x) + std::abs(c[i]);
+  }
+  return v;
+}
+
+// The root between two places of different sign; a step shorter than `settled` (relative) is the last.
+double root_between(std::span<const double> c, double low, double high, bool rising, double settled) {
+  double x = 0.5 * (low + high);
+  for (int iteration = 0; iteration < 200; ++iteration) {
+    double f = 0, slope = 0;
+    for (std::size_t i = c.size(); i-- > 0;) {
+      slope = slope * x + f;
+      f = f * x + c[i];
+    }
+    if (f == 0) return x;
+    ((f > 0) == rising ? high : low) = x;
+    double next = x - f / slope;
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (std::abs(next - x) <= settled * std::abs(x) || next == low || next == high) return next;
+    x = next;
+  }
+  return x;
+}
+
+// Roots to the last bit. Extrema only tell the roots apart, and a value there moves with the square of the place's
+// error, which after a last step of Newton's is that of the step squared.
+constexpr double kRootSettled = 1e-16, kExtremumSettled = 1e-6;
+
+// Of the coefficients, against the largest of them: a double root at zero leaves nothing else.
+constexpr double kRounding = 1e-14;
+
+using Binomials = std::array<std::array<double, detail::kMaxDegree + 1>, detail::kMaxDegree + 1>;
+constexpr Binomials kBinomials = [] {
+  Binomials b{};
+  for (std::size_t n = 0; n <= detail::kMaxDegree; ++n) {
+    b[n][0] = 1;
+    for (std::size_t k = 1; k <= n; ++k) b[n][k] = b[n - 1][k - 1] + (k < n ? b[n - 1][k] : 0);
+  }
+  return b;
+}();
+
+}  // namespace
+
+double evaluate_polynomial(std::span<const double> c, double x) { return value_of(c, x).f; }
+
+std::size_t detail::roots_within(std::span<const double> c, double low, double high, double double_root,
+                                 double* roots) {
+  const std::size_t degree = c.size() - 1;
+  std::array<double, kMaxDegree + 1> derivative;  // of order m, divided by m!
+  std::array<double, kMaxDegree + 1> places;      // its extrema between the ends
+  std::size_t count = 0;
+  for (std::size_t k = 1; k <= degree; ++k) {
+    const std::size_t order = degree - k;
+    double largest = 0;
+    for (std::size_t i = 0; i <= k; ++i) {
+      derivative[i] = kBinomials[i + order][order] * c[i + order];
+      largest = std::max(largest, std::abs(derivative[i]));
+    }
+    const std::span<const double> d(derivative.data(), k + 1);
+    for (std::size_t i = 0; i < count; ++i) places[i] = roots[i];
+    places[count] = high;
+    const std::size_t intervals = count + 1;
+    const double tolerance = k == degree ? double_root : kDoubleRoot;
+    const double settled = k == degree ? kRootSettled : kExtremumSettled;
+    count = 0;
+    bool crossed = false;  // the sign changed in the interval before
+    double start = low;
+    Value left = value_of(d, low);
+    for (std::size_t i = 0; i < intervals; ++i) {
+      const Value right = value_of(d, places[i]);
+      const bool crosses = (left.f < 0) != (right.f < 0);
+      if (i > 0 && !crossed && !crosses && std::abs(left.f) < tolerance * left.magnitude + kRounding * largest)
+        roots[count++] = start;
+      if (crosses) roots[count++] = root_between(d, start, places[i], left.f < 0, settled);
+      crossed = crosses;
+      start = places[i];
+      left = right;
+    }
+  }
+  return count;
+}
+
+}  // namespace megablock

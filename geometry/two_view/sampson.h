@@ -1,0 +1,93 @@
+// Residuals of P. D. Sampson, "Fitting conic sections to 'very scattered' data", CGIP 18, 1982, for the coplanarity of
+// matches, and their derivatives by a relative orientation.
+//
+//     E = [t]x R,  n = x_b' E x_a,  d = |(E x_a)_{1,2}|^2 + |(E' x_b)_{1,2}|^2,  r = n / sqrt(d)   (Sampson)
+//
+// for normalised image points x (X/Z, Y/Z, 1). r is the distance of the match from the nearest one that satisfies the
+// coplanarity equation, to first order; its standard deviation is that of an image coordinate. Unknowns: increment w of
+// the rotation, R Exp(w) (rotation.h), and the base t on the unit sphere, along two axes p across it. With u = R x_a,
+// the epipolar lines l_b = E x_a and l_a = E' x_b, and l' the vectors with a zero as third component
+//
+//     dn/dw = x_a x l_a,        (dd/dw)/2 = x_a x E' l_b' + l_a' x l_a,
+//     dn/dp = p . (u x x_b),    (dd/dp)/2 = p . (u x l_b' - x_b x R l_a').
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "geometry/two_view/relative_orientation.h"
+
+namespace megablock {
+
+inline double sampson_residual(const Eigen::Matrix3d& essential, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  const Eigen::Vector3d line_b = essential * a.homogeneous(), line_a = essential.transpose() * b.homogeneous();
+  const double d = line_b.head<2>().squaredNorm() + line_a.head<2>().squaredNorm();
+  return b.homogeneous().dot(line_b) / std::sqrt(d);
+}
+
+// Two unit axes across the base.
+inline Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base) {
+  Eigen::Matrix<double, 3, 2> axes;
+  axes.col(0) = base.unitOrthogonal();
+  axes.col(1) = base.cross(axes.col(0));
+  return axes;
+}
+
+// Residual of a pair with its derivatives.
+class SampsonEquations {
+ public:
+  explicit SampsonEquations(const RelativeOrientation& o)
+      : rotation_(o.rotation.toRotationMatrix()),
+        essential_(skew<double>(o.base) * rotation_),
+        across_(axes_across(o.base)) {}
+
+  // False where the residual is not defined.
+  bool at(const Eigen::Vector2d& point_a, const Eigen::Vector2d& point_b) {
+    a_ = point_a.homogeneous();
+    b_ = point_b.homogeneous();
+    line_b_.noalias() = essential_ * a_;
+    line_a_.noalias() = essential_.transpose() * b_;
+    square_ = line_b_.head<2>().squaredNorm() + line_a_.head<2>().squaredNorm();
+    if (!(square_ > 0)) return false;
+    n_ = b_.dot(line_b_);
+    residual = n_ / std::sqrt(square_);
+    return true;
+  }
+  double residual = 0;
+
+  // Of the residual by b's and a's coordinates, to first order: a unit vector.
+  Eigen::Vector4d by_points() const {
+    Eigen::Vector4d normal;
+    normal << line_b_.head<2>(), line_a_.head<2>();
+    return normal / std::sqrt(square_);
+  }
+
+  Eigen::Matrix<double, 5, 1> derivative() const {
+    const Eigen::Vector3d flat_b(line_b_.x(), line_b_.y(), 0), flat_a(line_a_.x(), line_a_.y(), 0);
+    const Eigen::Vector3d turned = rotation_ * a_;
+    Eigen::Vector3d n_base = turned.cross(b_);
+    Eigen::Vector3d half_base = turned.cross(flat_b) - b_.cross(rotation_ * flat_a);
+    Eigen::Vector3d n_rotation = a_.cross(line_a_);
+    Eigen::Vector3d half_rotation = a_.cross(essential_.transpose() * flat_b) + flat_a.cross(line_a_);
+    const double root = 1 / std::sqrt(square_), share = n_ / square_;
+    Eigen::Matrix<double, 5, 1> j;
+    j << root * (n_rotation - share * half_rotation), root * (across_.transpose() * (n_base - share * half_base));
+    return j;
+  }
+
+  // What the errors of both points add to the square of the derivative by the base, over those of a coordinate: the
+  // parallax that determines the base has the points' own errors in it, and without a base nothing else.
+  Eigen::Matrix2d base_noise() const {
+    const Eigen::Matrix<double, 2, 3> in_b = skew<double>(rotation_ * a_).topRows<2>(),
+                                      in_a = rotation_.leftCols<2>().transpose() * skew<double>(b_);
+    return across_.transpose() * (in_b.transpose() * in_b + in_a.transpose() * in_a) * across_ / square_;
+  }
+
+ private:
+  Eigen::Matrix3d rotation_, essential_;
+  Eigen::Matrix<double, 3, 2> across_;
+  Eigen::Vector3d a_, b_, line_a_, line_b_;
+  double n_ = 0, square_ = 0;
+};
+
+}  // namespace megablock

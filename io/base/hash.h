@@ -1,0 +1,55 @@
+// XXH3 (64-bit) hashing: fingerprints of units, file checksums, digests.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace megablock {
+
+// Streaming hash. Values are hashed by their bytes; lengths of strings and vectors are hashed first, so that
+// neighbouring fields cannot run into one another.
+class Hasher {
+ public:
+  Hasher();
+  ~Hasher();
+  Hasher(const Hasher&) = delete;
+  Hasher& operator=(const Hasher&) = delete;
+
+  void bytes(const void* data, std::size_t size);
+  template <typename T>
+  requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) Hasher& add(T value) {
+    bytes(&value, sizeof value);
+    return *this;
+  }
+  Hasher& add(std::string_view text) {
+    add(text.size());
+    bytes(text.data(), text.size());
+    return *this;
+  }
+  template <typename T>
+  requires(std::is_trivially_copyable_v<T>&& std::has_unique_object_representations_v<T>) Hasher& add(
+      const std::vector<T>& values) {
+    add(values.size());
+    bytes(values.data(), values.size() * sizeof(T));
+    return *this;
+  }
+  Hasher& add(const std::vector<double>& values) {
+    add(values.size());
+    bytes(values.data(), values.size() * sizeof(double));
+    return *this;
+  }
+  std::uint64_t value() const;
+
+ private:
+  void* state_;
+};
+
+std::uint64_t hash_file(const std::string& path);  // throws StoreError when it cannot be read
+std::string hex(std::uint64_t value);              // 16 digits
+
+}  // namespace megablock

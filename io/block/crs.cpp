@@ -1,0 +1,175 @@
+#include "io/block/crs.h"
+
+#include <proj.h>
+#include <proj_experimental.h>
+
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace detail {
+
+// A PROJ transformation with the context it lives in.
+class ProjTransform {
+ public:
+  ProjTransform() : context_(proj_context_create()) {
+    proj_log_level(context_, PJ_LOG_NONE);
+    proj_context_set_enable_network(context_, 0);
+  }
+  ~ProjTransform() {
+    proj_destroy(transform_);
+    proj_context_destroy(context_);
+  }
+  ProjTransform(const ProjTransform&) = delete;
+  ProjTransform& operator=(const ProjTransform&) = delete;
+
+  PJ_CONTEXT* context() const { return context_; }
+  void set(PJ* transform) { transform_ = transform; }
+
+  // False when PROJ cannot transform the point.
+  bool apply(PJ_DIRECTION direction, Eigen::Vector3d& xyz) const {
+    proj_errno_reset(transform_);
+    const PJ_COORD result = proj_trans(transform_, direction, proj_coord(xyz.x(), xyz.y(), xyz.z(), HUGE_VAL));
+    if (proj_errno(transform_) != 0) return false;
+    xyz = {result.xyz.x, result.xyz.y, result.xyz.z};
+    return xyz.allFinite();
+  }
+
+ private:
+  PJ_CONTEXT* context_;
+  PJ* transform_ = nullptr;
+};
+
+}  // namespace detail
+
+namespace {
+
+struct ProjDeleter {
+  void operator()(PJ* object) const { proj_destroy(object); }
+};
+using ProjObject = std::unique_ptr<PJ, ProjDeleter>;
+
+double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
+
+// Rows: east, north, up in geocentric axes.
+Eigen::Matrix3d enu_from_geocentric(double latitude_deg, double longitude_deg) {
+  const double sp = std::sin(radians(latitude_deg)), cp = std::cos(radians(latitude_deg));
+  const double sl = std::sin(radians(longitude_deg)), cl = std::cos(radians(longitude_deg));
+  Eigen::Matrix3d m;
+  m << -sl, cl, 0, -sp * cl, -sp * sl, cp, cp * cl, cp * sl, sp;
+  return m;
+}
+
+std::string upper(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// PROJ's name for the forms of a system that control files use.
+std::string proj_name(const std::string& crs) {
+  const std::string name = upper(crs);
+  if (name == "WGS84" || name == "EPSG:4326") return "EPSG:4979";
+  int zone = 0;
+  char hemisphere = 0;
+  if (std::sscanf(name.c_str(), "WGS84 UTM %d%c", &zone, &hemisphere) == 2 && zone >= 1 && zone <= 60 &&
+      (hemisphere == 'N' || hemisphere == 'S'))
+    return "EPSG:" + std::to_string((hemisphere == 'N' ? 32600 : 32700) + zone);
+  if (crs.starts_with("+") && crs.find("+type=crs") == std::string::npos) return crs + " +type=crs";
+  return crs;
+}
+
+// A code of an authority, a PROJ string or WKT. PROJ takes any other text for a part of a name and chooses among the
+// systems that hold it.
+bool names_one_system(const std::string& proj_name) {
+  const std::size_t colon = proj_name.find(':');
+  const bool code = colon != std::string::npos && colon > 0 && proj_name.find_first_of(" \t") == std::string::npos;
+  return code || proj_name.starts_with("+") || proj_name.find('[') != std::string::npos;
+}
+
+// Longitude, latitude in degrees.
+bool in_range(const Eigen::Vector3d& p) { return std::abs(p.x()) <= 360 && std::abs(p.y()) <= 90; }
+
+}  // namespace
+
+Georeference::Georeference(const GroundFrame& ground)
+    : ground_(ground), transform_(std::make_unique<detail::ProjTransform>()) {
+  if (!ground.georeferenced) throw InputError("the block is not georeferenced: no WGS84 coordinates can be given");
+  char pipeline[512];
+  std::snprintf(pipeline, sizeof pipeline,
+                "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart +ellps=WGS84 "
+                "+step +proj=topocentric +ellps=WGS84 +lat_0=%.15g +lon_0=%.15g +h_0=%.15g",
+                ground.latitude_deg, ground.longitude_deg, ground.height_m);
+  PJ* transform = proj_create(transform_->context(), pipeline);
+  if (!transform) throw Error("PROJ cannot set up the local frame; is proj-data installed?");
+  transform_->set(transform);
+}
+Georeference::~Georeference() = default;
+Georeference::Georeference(Georeference&&) noexcept = default;
+Georeference& Georeference::operator=(Georeference&&) noexcept = default;
+
+Eigen::Vector3d Georeference::to_local(const Geodetic& position) const {
+  Eigen::Vector3d xyz(position.longitude_deg, position.latitude_deg, position.height_m);
+  if (!in_range(xyz) || !transform_->apply(PJ_FWD, xyz)) throw InputError("a WGS84 position is out of range");
+  return xyz;
+}
+
+Geodetic Georeference::to_geodetic(const Eigen::Vector3d& local) const {
+  Eigen::Vector3d xyz = local;
+  if (!transform_->apply(PJ_INV, xyz)) throw InputError("a local position has no WGS84 coordinates");
+  return {xyz.y(), xyz.x(), xyz.z()};
+}
+
+Eigen::Quaterniond Georeference::own_from_block(const Geodetic& position) const {
+  const Eigen::Matrix3d own = enu_from_geocentric(position.latitude_deg, position.longitude_deg);
+  const Eigen::Matrix3d block = enu_from_geocentric(ground_.latitude_deg, ground_.longitude_deg);
+  return Eigen::Quaterniond(Eigen::Matrix3d(own * block.transpose())).normalized();
+}
+
+CrsToWgs84::CrsToWgs84(const std::string& crs) : crs_(crs), transform_(std::make_unique<detail::ProjTransform>()) {
+  PJ_CONTEXT* context = transform_->context();
+  const std::string name = proj_name(crs);
+  ProjObject source(names_one_system(name) ? proj_create(context, name.c_str()) : nullptr);
+  if (!source || !proj_is_crs(source.get()))
+    throw InputError("coordinate reference system '" + crs +
+                     "' is not known to PROJ; write a code (EPSG:25832), WGS84, WGS84 UTM 32N, a PROJ string or WKT");
+  // A system of two dimensions gets an ellipsoidal height; one with a vertical part keeps its own.
+  ProjObject source_3d(proj_crs_promote_to_3D(context, nullptr, source.get()));
+  ProjObject target(proj_create(context, "EPSG:4979"));
+  const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
+  PJ* transform = proj_create_crs_to_crs_from_pj(context, source_3d ? source_3d.get() : source.get(), target.get(),
+                                                 nullptr, options);
+  if (!transform)
+    throw InputError("coordinates in '" + crs +
+                     "' cannot be transformed to WGS84: a grid (a geoid, say) that PROJ needs is not installed; "
+                     "install it (package proj-data or cdn.proj.org) or give ellipsoidal heights");
+  PJ* normalised = proj_normalize_for_visualization(context, transform);
+  proj_destroy(transform);
+  transform_->set(normalised);
+}
+CrsToWgs84::~CrsToWgs84() = default;
+CrsToWgs84::CrsToWgs84(CrsToWgs84&&) noexcept = default;
+CrsToWgs84& CrsToWgs84::operator=(CrsToWgs84&&) noexcept = default;
+
+Geodetic CrsToWgs84::to_wgs84(const Eigen::Vector3d& xyz) const {
+  Eigen::Vector3d p = xyz;
+  if (!transform_->apply(PJ_FWD, p) || !in_range(p)) {
+    char text[160];
+    std::snprintf(text, sizeof text, "position (%.3f, %.3f, %.3f) cannot be transformed from ", xyz.x(), xyz.y(),
+                  xyz.z());
+    throw InputError(text + crs_ + " to WGS84; check the order of the coordinates and the installed grids");
+  }
+  return {p.y(), p.x(), p.z()};
+}
+
+Eigen::Vector3d CrsToWgs84::from_wgs84(const Geodetic& position) const {
+  Eigen::Vector3d p(position.longitude_deg, position.latitude_deg, position.height_m);
+  if (!transform_->apply(PJ_INV, p)) throw InputError("a WGS84 position cannot be transformed to " + crs_);
+  return p;
+}
+
+}  // namespace megablock

@@ -1,0 +1,19 @@
+// What a rig calibration found, for people and for programs.
+#pragma once
+
+#include <string>
+
+#include "io/block/calibration.h"
+
+namespace megablock {
+
+// Table for the terminal: a line per camera, the comparison with the start, warnings.
+std::string calibration_text(const RigCalibration& calibration);
+
+// All figures (keys carry their units; null where unknown).
+std::string calibration_json(const RigCalibration& calibration);
+
+// One self-contained page, as the report of a job. `block`: of the calibration.
+std::string calibration_html(const RigCalibration& calibration, const Block& block);
+
+}  // namespace megablock

@@ -1,0 +1,295 @@
+#include "io/evaluation/evaluate.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <unordered_map>
+
+#include "geometry/similarity/similarity.h"
+#include "io/base/error.h"
+#include "io/block/crs.h"
+#include "io/block/held_priors.h"
+#include "io/result/result_option.h"
+#include "io/store/units/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Match {
+  FrameIndex frame;
+  Pose truth;
+};
+
+// Sum of normalised squares of the errors whose covariance is positive definite.
+class NormalisedError {
+ public:
+  void add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+    const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
+    if (factor.info() != Eigen::Success) return;
+    sum_ += error.dot(factor.solve(error)) / 3;
+    ++count_;
+  }
+  double value() const { return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : Evaluation::kNone; }
+
+ private:
+  double sum_ = 0;
+  std::int64_t count_ = 0;
+};
+
+class RootMeanSquare {
+ public:
+  void add(double squared) {
+    sum_ += squared;
+    ++count_;
+  }
+  double value() const { return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : Evaluation::kNone; }
+  std::int64_t count() const { return count_; }
+
+ private:
+  double sum_ = 0;
+  std::int64_t count_ = 0;
+};
+
+// Oriented frames of the result with their true poses, in block order.
+std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& truth) {
+  std::unordered_map<std::string, std::size_t> row;
+  for (std::size_t i = 0; i < truth.names.size(); ++i) row.emplace(truth.names[i], i);
+  const Block& block = result.block;
+  std::vector<std::string> first_image(block.frames.size());
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    std::string& name = first_image[static_cast<std::size_t>(block.images[i].frame.value)];
+    if (name.empty()) name = block.name_of(i);
+  }
+  std::vector<Match> matches;
+  for (std::size_t f = 0; f < block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (!result.state.oriented[frame]) continue;
+    auto found = row.find(block.frames[frame].name);
+    if (found == row.end()) found = row.find(first_image[f]);
+    if (found != row.end()) matches.push_back({frame, truth.poses[found->second]});
+  }
+  if (matches.empty())
+    throw InputError("no oriented frame of the result has a true pose of the same name; the truth begins with '" +
+                     (truth.names.empty() ? std::string() : truth.names.front()) + "'");
+  return matches;
+}
+
+// Nothing but the images fixes the datum.
+bool is_free(const BlockResult& result) {
+  if (!result.gauge.empty()) return result.gauge.starts_with("free");
+  for (std::size_t f = 0; f < result.block.frames.size(); ++f) {
+    const FrameIndex frame(static_cast<std::int64_t>(f));
+    if (result.state.oriented[frame] && result.block.frames[frame].position_prior) return false;
+  }
+  for (const ControlPoint& point : result.block.control_points)
+    if (point.role == PointRole::kControl && point.measurements.size() >= 2) return false;
+  return true;
+}
+
+Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
+  std::vector<Eigen::Vector3d> from, to;
+  for (const Match& m : matches) {
+    from.push_back(result.state.frames[m.frame].centre);
+    to.push_back(m.truth.centre);
+  }
+  const auto similarity = matches.size() >= 3 ? fit_similarity(from, to) : std::nullopt;
+  if (!similarity)
+    throw InputError("the result is a free block: at least three frames at different places are needed to align it");
+  return *similarity;
+}
+
+// The truth in the result's ground frame, where both say which theirs is.
+PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
+  const auto same = [](double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; };
+  if (!truth.ground || !truth.ground->georeferenced || !ground.georeferenced) return truth;
+  if (same(ground.latitude_deg, truth.ground->latitude_deg, 1e-12) &&
+      same(ground.longitude_deg, truth.ground->longitude_deg, 1e-12) &&
+      same(ground.height_m, truth.ground->height_m, 1e-9))
+    return truth;
+  const Georeference of_result(ground), of_truth(*truth.ground);
+  const Eigen::Quaterniond turn =
+      of_result.own_from_block({truth.ground->latitude_deg, truth.ground->longitude_deg, truth.ground->height_m});
+  PoseTable moved = truth;
+  moved.ground = ground;
+  for (Pose& pose : moved.poses)
+    pose = {(pose.rotation * turn).normalized(), of_result.to_local(of_truth.to_geodetic(pose.centre))};
+  return moved;
+}
+
+void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Similarity& similarity,
+                     double variance_factor, Evaluation& evaluation) {
+  RootMeanSquare position, rotation, relative;
+  NormalisedError normalised_position, normalised_rotation;
+  std::array<NormalisedError, 2> position_by_place, rotation_by_place;  // interior, boundary
+  double largest = 0;
+  const bool positions_used = option_of(result, "adjustment.use_position_priors") != "false",
+             attitudes_used = option_of(result, "adjustment.use_attitude_priors") != "false";
+  const Eigen::Matrix3d turn = similarity.rotation.toRotationMatrix();
+  const Eigen::Matrix3d stretch = similarity.scale * turn;
+  Eigen::Vector3d previous_error = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Match& m = matches[i];
+    const Pose pose = similarity(result.state.frames[m.frame]);
+    const Eigen::Vector3d error = pose.centre - m.truth.centre;
+    const Eigen::Vector3d angle = rotation_log<double>(pose.rotation.conjugate() * m.truth.rotation);
+    position.add(error.squaredNorm());
+    rotation.add(angle.squaredNorm());
+    largest = std::max(largest, error.norm());
+    // Neighbours follow one another in their pass.
+    const auto& frames = result.block.frames;
+    if (i > 0 && matches[i - 1].frame.value == m.frame.value - 1 &&
+        frames[matches[i - 1].frame].pass == frames[m.frame].pass)
+      relative.add((error - previous_error).squaredNorm());
+    previous_error = error;
+    if (result.frame_covariance.empty()) continue;
+    const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
+    const Eigen::Matrix3d rotation_covariance = turn * covariance.topLeftCorner<3, 3>() * turn.transpose(),
+                          position_covariance = stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose();
+    const Frame& frame = frames[m.frame];
+    const bool by_place = !result.boundary.empty();
+    const std::size_t place = by_place && result.boundary[m.frame] != 0;
+    if (!(attitudes_used && frame.attitude_prior && held(*frame.attitude_prior))) {
+      normalised_rotation.add(angle, rotation_covariance);
+      if (by_place) rotation_by_place[place].add(angle, rotation_covariance);
+    }
+    if (!(positions_used && frame.position_prior && held(*frame.position_prior))) {
+      normalised_position.add(error, position_covariance);
+      if (by_place) position_by_place[place].add(error, position_covariance);
+    }
+  }
+  evaluation.frames = position.count();
+  evaluation.with_sigmas = !result.frame_covariance.empty();
+  evaluation.position_rms_m = position.value();
+  evaluation.position_max_m = largest;
+  evaluation.rotation_rms_deg = rotation.value() * 180 / std::numbers::pi;
+  evaluation.relative_position_rms_m = relative.value();
+  evaluation.normalised_error_position = normalised_position.value();
+  evaluation.normalised_error_rotation = normalised_rotation.value();
+  evaluation.normalised_error_position_interior = position_by_place[0].value();
+  evaluation.normalised_error_rotation_interior = rotation_by_place[0].value();
+  evaluation.normalised_error_position_boundary = position_by_place[1].value();
+  evaluation.normalised_error_rotation_boundary = rotation_by_place[1].value();
+}
+
+void evaluate_control(const BlockResult& result, double variance_factor, Evaluation& evaluation) {
+  RootMeanSquare control, check, horizontal, vertical;
+  NormalisedError normalised;
+  for (std::size_t i = 0; i < result.control.size(); ++i) {
+    const ControlPoint& point = result.block.control_points[i];
+    const BlockResult::ControlResult& found = result.control[i];
+    const Eigen::Vector3d error = found.adjusted - point.position;
+    const bool known = !found.residual_px.empty();  // what of it takes part
+    if (!error.allFinite() || (known && !found.takes_part())) continue;
+    (point.role == PointRole::kCheck ? check : control).add(error.squaredNorm());
+    if (point.role != PointRole::kCheck) continue;
+    horizontal.add(error.head<2>().squaredNorm());
+    vertical.add(error.z() * error.z());
+    const Eigen::Matrix3d stated = point.sigma.cwiseAbs2().asDiagonal();
+    normalised.add(error, variance_factor * found.covariance + stated);
+  }
+  evaluation.check_points = check.count();
+  evaluation.control_points = control.count();
+  evaluation.check_rms_m = check.value();
+  evaluation.check_rms_horizontal_m = horizontal.value();
+  evaluation.check_rms_vertical_m = vertical.value();
+  evaluation.control_rms_m = control.value();
+  evaluation.normalised_error_check = normalised.value();
+}
+
+}  // namespace
+
+Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const EvaluateOptions& options) {
+  const std::vector<Match> matches = match_by_name(result, in_ground_of(result.block.ground, truth));
+  Evaluation evaluation;
+  evaluation.frames_missing = static_cast<std::int64_t>(truth.names.size() - matches.size());
+  evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
+                       (options.align == EvaluateOptions::Align::kAuto && is_free(result));
+  const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
+  const double variance_factor = options.scale_sigma && !result.sigma_scaled ? result.variance_factor : 1;
+  evaluate_frames(result, matches, similarity, variance_factor, evaluation);
+  // The positions of check points are in the ground frame of the block: nothing to compare with when it is free.
+  if (!evaluation.aligned) evaluate_control(result, variance_factor, evaluation);
+  return evaluation;
+}
+
+Evaluation evaluate_control(const BlockResult& result) {
+  Evaluation evaluation;
+  if (!is_free(result)) evaluate_control(result, 1, evaluation);
+  return evaluation;
+}
+
+Evaluation evaluate(const BlockResult& result, const BlockState& truth, const EvaluateOptions& options) {
+  if (truth.frames.size() != result.block.frames.size())
+    throw InputError("the truth has " + std::to_string(truth.frames.size()) + " frames, the result " +
+                     std::to_string(result.block.frames.size()) + "; give the truth as a CSV file of poses instead");
+  PoseTable table = pose_table(result.block, truth);
+  return evaluate(result, table, options);
+}
+
+Evaluation evaluate(const BlockResult& result, const std::string& path, const EvaluateOptions& options) {
+  if (fs::is_directory(path)) return evaluate(result, (fs::path(path) / "truth.csv").string(), options);
+  if (fs::path(path).extension() == ".h5") return evaluate(result, read_state(path), options);
+  return evaluate(result, read_pose_csv(path), options);
+}
+
+std::string to_text(const Evaluation& e) {
+  std::string text = fmt::format("frames compared             {} ({} of the truth have no pose){}", e.frames,
+                                 e.frames_missing, e.aligned ? ", after a similarity" : "");
+  text +=
+      fmt::format("\nposition                    rms {:.4f} m, largest {:.4f} m", e.position_rms_m, e.position_max_m);
+  if (std::isfinite(e.relative_position_rms_m))
+    text += fmt::format("; between neighbours rms {:.4f} m", e.relative_position_rms_m);
+  text += fmt::format("\nrotation                    rms {:.5f} deg", e.rotation_rms_deg);
+  if (e.check_points > 0)
+    text += fmt::format("\ncheck points                {}, rms {:.4f} m horizontal, {:.4f} m vertical", e.check_points,
+                        e.check_rms_horizontal_m, e.check_rms_vertical_m);
+  std::string ratios;
+  bool some_held = false;
+  const auto add = [&](bool known, const char* name, double ratio) {
+    if (!known) return;
+    some_held = some_held || !std::isfinite(ratio);
+    ratios += fmt::format("{}{} {}", ratios.empty() ? "" : ", ", name,
+                          std::isfinite(ratio) ? fmt::format("{:.3f}", ratio) : "-");
+  };
+  add(e.with_sigmas, "position", e.normalised_error_position);
+  add(e.with_sigmas, "rotation", e.normalised_error_rotation);
+  add(std::isfinite(e.normalised_error_check), "check points", e.normalised_error_check);
+  if (!ratios.empty())
+    text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
+  return text;
+}
+
+std::string to_json(const Evaluation& e) {
+  nlohmann::ordered_json json;  // a value that is not a number is written as null
+  json["frames"] = e.frames;
+  json["frames_missing"] = e.frames_missing;
+  json["aligned"] = e.aligned;
+  json["position_rms_m"] = e.position_rms_m;
+  json["position_max_m"] = e.position_max_m;
+  json["rotation_rms_deg"] = e.rotation_rms_deg;
+  json["relative_position_rms_m"] = e.relative_position_rms_m;
+  json["normalised_error_position"] = e.normalised_error_position;
+  json["normalised_error_rotation"] = e.normalised_error_rotation;
+  json["normalised_error_position_interior"] = e.normalised_error_position_interior;
+  json["normalised_error_rotation_interior"] = e.normalised_error_rotation_interior;
+  json["normalised_error_position_boundary"] = e.normalised_error_position_boundary;
+  json["normalised_error_rotation_boundary"] = e.normalised_error_rotation_boundary;
+  json["check_points"] = e.check_points;
+  json["check_rms_m"] = e.check_rms_m;
+  json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;
+  json["check_rms_vertical_m"] = e.check_rms_vertical_m;
+  json["normalised_error_check"] = e.normalised_error_check;
+  json["control_points"] = e.control_points;
+  json["control_rms_m"] = e.control_rms_m;
+  return json.dump(2);
+}
+
+}  // namespace megablock

@@ -1,0 +1,15 @@
+// Interest points by camera, of a result.
+#pragma once
+
+#include "io/result/result.h"
+
+namespace megablock {
+
+// Interest points in the images of a camera whose number is known (CN-09).
+struct FeatureStatistics {
+  std::int64_t images = 0, least = 0, most = 0, total = 0;
+  double mean() const { return images > 0 ? static_cast<double>(total) / static_cast<double>(images) : 0; }
+};
+IndexedVector<CameraIndex, FeatureStatistics> feature_statistics(const BlockResult& result);
+
+}  // namespace megablock

@@ -1,0 +1,371 @@
+#include "io/evaluation/remarks.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "geometry/numbers/angles.h"
+#include "io/block/held_priors.h"
+#include "io/evaluation/figures.h"
+#include "io/result/result_option.h"
+#include "io/text/counted.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::size_t kNamed = 5;           // points by name
+constexpr std::size_t kParts = 5;           // of a free datum, described
+constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
+constexpr double kMisstated = 2;            // times the stated sigma, beyond what chance explains
+// Of tie points. Pairs are verified to 3 px across the epipolar line (matching.max_residual_px), two sigmas of what
+// three times the default lets expect: measuring alone leaves no more.
+constexpr double kMisstatedImage = 3;
+constexpr double kContradicted = 6;  // sigmas; one of 14 million normal deviates in three dimensions is beyond
+
+constexpr const char* kAboutTheVertical = " about the vertical";
+
+// Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
+std::string pixels(double value) {
+  if (value < 100) return fmt::format("{:.1f}", value);
+  if (value < 1e5) return fmt::format("{:.0f}", value);
+  const int power = static_cast<int>(std::floor(std::log10(value)));
+  return fmt::format("{:.1f}e{}", value / std::pow(10, power), power);
+}
+
+// What places a part: positions of its frames and control points that hold, and whether any attitude is observed.
+struct Placing {
+  std::int64_t positions = 0, attitudes = 0;
+};
+
+// Median sigma of the part's frames, largest axis.
+double rotation_deg_of(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  std::vector<double> sigmas;
+  for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
+    if (figures.part_of_frame[f] == part)
+      sigmas.push_back(std::sqrt(result.frame_covariance[f].diagonal().head<3>().maxCoeff()) * kDegreesPerRadian);
+  return report::spread(std::move(sigmas)).median;
+}
+
+Placing placing_of(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  Placing placing;
+  for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
+    if (figures.part_of_frame[f] != part) continue;
+    placing.positions += result.block.frames[f].position_prior.has_value();
+    placing.attitudes += result.block.frames[f].attitude_prior.has_value();
+  }
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    if (given.role != PointRole::kControl) continue;
+    bool here = false;
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), result.control[p].residual_px.size()); ++m)
+      here = here || (result.control[p].takes_part(m) &&
+                      figures.part_of_frame[result.block.images[given.measurements[m].image].frame] == part);
+    placing.positions += here;
+  }
+  return placing;
+}
+
+// Several positions leave a rotation free only when they lie on a line (merge/datum/gauge.h).
+std::string undetermined(int defect, const Placing& placing) {
+  if (defect >= 7) return "place, direction and scale";
+  if (defect == 6) return "place and direction";
+  if (defect == 4) return placing.positions == 0 && placing.attitudes > 0 ? "place and scale" : "direction and scale";
+  if (defect == 3) return placing.positions == 0 && placing.attitudes > 0 ? "its place" : "its direction";
+  if (defect == 1)
+    return placing.positions > 1 ? "the rotation about the line on which the positions or control points lie" : "scale";
+  return fmt::format("{} of the seven parameters of place, direction and scale", defect);
+}
+
+// Direction of an axis of the ground (east or x, north or y, up), whichever way it points.
+std::string axis_text(Eigen::Vector3d axis) {
+  constexpr double kNear = 20;  // degrees
+  if (axis.z() < 0) axis = -axis;
+  const double rise = std::asin(std::min(1.0, axis.z())) * kDegreesPerRadian;
+  if (rise > 90 - kNear) return kAboutTheVertical;
+  double azimuth = std::atan2(axis.x(), axis.y()) * kDegreesPerRadian;
+  if (rise >= kNear)
+    return fmt::format(" about an axis {:.0f} degrees above azimuth {:.0f}", rise,
+                       azimuth < 0 ? azimuth + 360 : azimuth);
+  azimuth = std::fmod(azimuth + 180, 180);
+  return fmt::format(" about a level axis of azimuth {:.0f} degrees", azimuth);
+}
+
+// Of the ground, where the rotations' sigmas are largest by far; empty where there is no such axis.
+std::string weak_axis(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
+    if (figures.part_of_frame[f] == part) sum += result.frame_covariance[f].topLeftCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sum);
+  constexpr double kByFar = 4;  // variances
+  if (!(eigen.eigenvalues()[2] > kByFar * eigen.eigenvalues()[1])) return "";
+  return axis_text(eigen.eigenvectors().col(2));
+}
+
+// A remedy for rotations about anything but the vertical; the block may have it already.
+std::string or_verticals(const BlockResult& result) {
+  return result.block.verticals.empty() ? ", or verticals where walls are seen ('megablock verticals')" : "";
+}
+
+// Of a part with positions most of which the block contradicts: these have hardly any weight, so its datum seems free
+// although it is observed. Empty for others.
+std::string positions_without_hold(const report::Figures& figures, std::int32_t part) {
+  std::vector<double> distances;
+  std::size_t positions = 0;
+  for (const report::PositionResidual& r : figures.positions) {
+    if (figures.part_of_frame[r.frame] != part) continue;
+    ++positions;
+    if (r.difference.cwiseQuotient(r.sigma).norm() > kContradicted) distances.push_back(r.difference.norm());
+  }
+  if (2 * distances.size() <= positions) return "";
+  const std::size_t wrong = distances.size();
+  const double median = report::spread(std::move(distances)).median;
+  return fmt::format(
+      "{} of its {} positions are given but do not hold it, as they differ from the block by {:.{}f} m (median): start "
+      "values ('poses') that are far off, or positions in another coordinate system; correct these and run again",
+      wrong, positions, median, median < 10 ? 2 : 0);
+}
+
+std::string consequence(const BlockResult& result, int defect, const Placing& placing) {
+  if (defect >= 6) return "coordinates are relative; add positions or three control points";
+  if (defect == 1 && placing.positions > 1)
+    return "heights and attitudes are not usable; add attitudes or control points away from that line" +
+           or_verticals(result);
+  if (defect == 1 || defect == 4) return "lengths or directions are not usable; add positions or control points";
+  return "coordinates are not usable as they are; add positions, attitudes or control points";
+}
+
+// What remarks need of a report's figures; none before anything was oriented.
+report::Figures figures_for_remarks(const BlockResult& result, const TrackBatches& tracks) {
+  report::Figures figures;
+  if (result.state.oriented.size() != result.block.frames.size()) return figures;
+  report::find_parts(result, tracks, figures);
+  report::find_near_limit(result, tracks, figures);
+  report::find_prior_residuals(result, figures);
+  return figures;
+}
+
+struct Contradiction {
+  FrameIndex frame;
+  double sigmas = 0, size = 0;  // of the difference; metres or degrees
+};
+
+// Frames whose observed position or attitude the block contradicts, worst first, as text; empty without any.
+template <typename Residual>
+std::string contradicted_text(const BlockResult& result, const std::vector<Residual>& residuals, double held_sigma,
+                              const char* kind, double unit, const char* unit_name) {
+  std::vector<Contradiction> wrong;
+  std::int64_t observed = 0;
+  for (const Residual& r : residuals) {
+    if (r.sigma.minCoeff() <= 2 * held_sigma) continue;  // held: the block was put there
+    ++observed;
+    const double sigmas = r.difference.cwiseQuotient(r.sigma).norm();
+    if (sigmas > kContradicted) wrong.push_back({r.frame, sigmas, r.difference.norm() * unit});
+  }
+  if (wrong.empty()) return "";
+  std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  std::string text = fmt::format("{} of {} {} {} from the block by more than {:.0f} sigmas: ", wrong.size(), observed,
+                                 kind, wrong.size() == 1 ? "differs" : "differ", kContradicted);
+  for (std::size_t i = 0; i < std::min(kNamed, wrong.size()); ++i)
+    text += fmt::format("{}{} by {:.{}f} {}", i > 0 ? ", " : "", result.block.frames[wrong[i].frame].name,
+                        wrong[i].size, wrong[i].size < 10 ? 2 : 0, unit_name);
+  if (wrong.size() > kNamed) text += fmt::format(" and {} more", wrong.size() - kNamed);
+  return text;
+}
+
+// "positions are held", "positions are stated to 0.01 m" (median); empty without any.
+std::string stated_text(const char* kind, std::vector<double> sigmas, double held_sigma, const char* unit) {
+  if (sigmas.empty()) return "";
+  const double sigma = report::spread(std::move(sigmas)).median;
+  return sigma <= 2 * held_sigma ? fmt::format("{} are held", kind)
+                                 : fmt::format("{} are stated to {:.2g} {}", kind, sigma, unit);
+}
+
+// What else than tie points places the oriented frames, and how exactly it is stated.
+std::string placing_text(const BlockResult& result) {
+  std::vector<double> positions, attitudes;
+  for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
+    const Frame& frame = result.block.frames[f];
+    if (!result.state.oriented[f]) continue;
+    if (frame.position_prior) positions.push_back(frame.position_prior->sigma.minCoeff());
+    if (frame.attitude_prior) attitudes.push_back(frame.attitude_prior->sigma_rad.minCoeff() * kDegreesPerRadian);
+  }
+  if (option_of(result, "adjustment.use_position_priors") == "false") positions.clear();
+  if (option_of(result, "adjustment.use_attitude_priors") == "false") attitudes.clear();
+  const auto control = std::count_if(result.block.control_points.begin(), result.block.control_points.end(),
+                                     [](const ControlPoint& point) { return point.role == PointRole::kControl; });
+  std::string text;
+  for (const std::string& part :
+       {stated_text("positions", positions, kHeldPositionSigma, "m"),
+        stated_text("attitudes", attitudes, kHeldAttitudeSigma * kDegreesPerRadian, "degrees"),
+        control > 0 ? counted(control, "control point") : std::string()})
+    if (!part.empty()) text += (text.empty() ? "" : ", ") + part;
+  return text;
+}
+
+// Sigma naught does not show what bends the tie points where their sigma is estimated: it is estimated with them.
+std::string image_sigma_text(const BlockResult& result) {
+  const std::string stated = option_of(result, "adjustment.image_sigma_px");
+  const double factor = result.observation_table[ObservationKind::kTieImage].sigma_factor();
+  const double assumed = std::strtod(stated.c_str(), nullptr);
+  const double shown = result.image_sigma_px * (factor > 1 ? factor : 1);
+  if (!(assumed > 0 && shown > kMisstatedImage * assumed)) return "";
+  const std::string placing = placing_text(result);
+  return fmt::format(
+      "Tie points fit to {:.1f} px only, {:.1f} times the {} px that adjustment.image_sigma_px assumes: {}the camera "
+      "model is wrong, or many matches are{}",
+      shown, shown / assumed, stated,
+      placing.empty() ? "" : "what places the block contradicts the images (" + placing + "), ",
+      placing.empty() ? "; see cameras and images in the report"
+                      : "; state larger sigmas, and run with 'adjustment: {use_position_priors: false, "
+                        "use_attitude_priors: false}' to see how the images alone fit");
+}
+
+std::string rotation_text(double rotation_deg) {
+  if (!std::isfinite(rotation_deg) || rotation_deg < 1) return "";
+  return fmt::format(" (sigma of the rotations {:.0f} degrees)", rotation_deg);
+}
+
+}  // namespace
+
+std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role) {
+  std::vector<UnusedPoint> unused;
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    const BlockResult::ControlResult& control = result.control[p];
+    if (given.role != role || control.takes_part()) continue;
+    UnusedPoint point{p, {}, 0};
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m) {
+      const double length = control.residual_px[m].norm();
+      if (std::isfinite(length) && (!point.image.valid() || length > point.worst_px))
+        point = {p, given.measurements[m].image, length};
+    }
+    unused.push_back(point);
+  }
+  std::stable_sort(unused.begin(), unused.end(), [](const auto& a, const auto& b) { return a.worst_px > b.worst_px; });
+  return unused;
+}
+
+std::string unused_points_text(const BlockResult& result, PointRole role) {
+  const std::vector<UnusedPoint> unused = unused_points(result, role);
+  if (unused.empty()) return "";
+  const bool one = unused.size() == 1;
+  std::string text =
+      fmt::format("{} {} {} take{} no part: ", unused.size(), role == PointRole::kCheck ? "check" : "control",
+                  one ? "point" : "points", one ? "s" : "");
+  for (std::size_t i = 0; i < std::min(kNamed, unused.size()); ++i) {
+    const UnusedPoint& point = unused[i];
+    text += (i > 0 ? ", " : "") + result.block.control_points[point.point].name + " (" +
+            (point.image.valid() ? pixels(point.worst_px) + " px in " + result.block.name_of(point.image) + ", rejected"
+                                 : "not seen by an oriented image") +
+            ")";
+  }
+  if (unused.size() > kNamed) text += fmt::format(" and {} more", unused.size() - kNamed);
+  return text;
+}
+
+std::vector<std::string> datum_texts(const BlockResult& result) {
+  return datum_texts(result, figures_for_remarks(result, WholeTracks(result)));
+}
+
+std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures) {
+  std::vector<std::string> lines;
+  if (result.state.oriented.size() != result.block.frames.size()) return lines;  // nothing was oriented yet
+  std::size_t free = 0;
+  for (std::size_t p = 0; p < figures.parts.size(); ++p) {
+    const report::BlockPart& part = figures.parts[p];
+    const double rotation_deg = rotation_deg_of(result, figures, static_cast<std::int32_t>(p));
+    const bool whole = figures.parts.size() == 1;
+    if (part.defect > 0) {
+      if (++free > kParts) continue;
+      const Placing placing = placing_of(result, figures, static_cast<std::int32_t>(p));
+      const std::string wrong_positions = positions_without_hold(figures, static_cast<std::int32_t>(p));
+      lines.push_back(
+          fmt::format("{} free: nothing determines {}{}; {}",
+                      whole ? "The datum is" : fmt::format("The datum of part {} ({} frames) is", p + 1, part.frames),
+                      undetermined(part.defect, placing), rotation_text(rotation_deg),
+                      wrong_positions.empty() ? consequence(result, part.defect, placing) : wrong_positions));
+    } else if (rotation_deg > kUnusableRotationDeg) {
+      const std::string axis = weak_axis(result, figures, static_cast<std::int32_t>(p));
+      lines.push_back(
+          fmt::format("The rotations{}{} are known to {:.0f} degrees only (sigma): {} are not usable; add control "
+                      "points or attitudes{}",
+                      whole ? "" : fmt::format(" of part {}", p + 1), axis, rotation_deg,
+                      axis == kAboutTheVertical ? "directions in plan" : "heights and attitudes",
+                      axis == kAboutTheVertical ? "" : or_verticals(result)));
+    }
+  }
+  if (free > kParts) lines.push_back(fmt::format("The datum of {} more parts is free", free - kParts));
+  return lines;
+}
+
+double chance_of_factor(const ObservationStatistics& statistics) { return 5 / std::sqrt(2 * statistics.redundancy); }
+
+std::vector<std::string> misstated_texts(const BlockResult& result) {
+  using enum ObservationKind;
+  std::vector<std::string> lines;
+  if (std::string text = image_sigma_text(result); !text.empty()) lines.push_back(std::move(text));
+  for (std::size_t k = 0; k < kObservationKinds; ++k) {
+    const auto kind = static_cast<ObservationKind>(k);
+    const ObservationStatistics& s = result.observation_table.kinds[k];
+    const double factor = s.sigma_factor();
+    if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, 1 + chance_of_factor(s)))) continue;
+    const bool weighed = kind >= kPositionHorizontal && kind <= kRelativePosition;
+    lines.push_back(
+        fmt::format("Residuals of {} ({}) are {:.1f} times what the stated sigmas let expect: some are wrong, or the "
+                    "sigmas are too small{}",
+                    name_of(kind), s.count, factor,
+                    weighed ? "; 'merge: {estimate_sigmas: true}' weighs them by what they show" : ""));
+  }
+  return lines;
+}
+
+std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures) {
+  std::vector<std::string> lines;
+  for (const std::string& text :
+       {contradicted_text(result, figures.positions, kHeldPositionSigma, "positions", 1, "m"),
+        contradicted_text(result, figures.attitudes, kHeldAttitudeSigma, "attitudes", kDegreesPerRadian, "degrees")})
+    if (!text.empty()) lines.push_back(text);
+  return lines;
+}
+
+// A tile decides which of its measurements take part, at first by itself. Clean blocks have half of what normal errors
+// leave near the limit and less, photographs 1.7 to 3.8 times as many, the BAL problem of Dubrovnik 2.9 to 3.3 times.
+// What the tiles change shows where images alone place the block: one tile and several differ by up to 29 sigmas of the
+// rotations (BAL) and by 1.1 (167 photographs without their positions; 0.1 with positions of metres, which hide it).
+std::string near_limit_text(const BlockResult& result, const report::Figures& figures) {
+  constexpr double kMany = 2.5, kChance = 5;  // times as many as expected; standard deviations
+  const report::NearLimit& found = figures.near_limit;
+  const double expected = found.expected * static_cast<double>(found.tested);
+  const auto near = static_cast<double>(found.near);
+  if (!(near > std::max(kMany * expected, expected + kChance * std::sqrt(expected + 1)))) return "";
+  return fmt::format(
+      "{} of {} tie point measurements ({:.2f} %) lie within {:.0f} % of the limit of screening, {:.1f} times as many "
+      "as normal errors would: which of them are kept, and with them poses and estimated sigmas, by a sigma and more, "
+      "depend on how the block is tiled; "
+      "'adjustment: {{image_sigma_px: {:.2g}, estimate_image_sigma: false, max_residual_sigmas: 1000}}' leaves them to "
+      "the loss alone, which does not",
+      found.near, found.tested, 100 * found.share(), 100 * report::NearLimit::kNear, found.share() / found.expected,
+      result.image_sigma_px);
+}
+
+std::vector<std::string> remarks(const BlockResult& result) { return remarks(result, WholeTracks(result)); }
+
+std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks) {
+  return remarks(result, figures_for_remarks(result, tracks));
+}
+
+std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
+  std::vector<std::string> lines = datum_texts(result, figures);
+  for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
+  for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
+  if (std::string text = near_limit_text(result, figures); !text.empty()) lines.push_back(std::move(text));
+  for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
+    if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
+  return lines;
+}
+
+}  // namespace megablock

@@ -1,0 +1,42 @@
+#include "io/exchange/bal/bal_camera.h"
+
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace {
+
+const Eigen::Matrix3d kFlip = Eigen::Vector3d(1, -1, -1).asDiagonal();
+
+bool is_brown(const Intrinsics& k) { return k.model().kind == CameraModelKind::kBrown; }
+
+}  // namespace
+
+void check_bal_model(const std::string& camera, const CameraModel& model) {
+  if (model.kind != CameraModelKind::kFisheye && model.kind != CameraModelKind::kEquirectangular) return;
+  throw InputError("camera '" + camera + "' has the model " + model_name(model) +
+                   ", whose images BAL and Bundler files cannot hold");
+}
+
+BalCamera to_bal(const Pose& pose, const Intrinsics& k) {
+  const Eigen::Matrix3d rotation = kFlip * pose.rotation.toRotationMatrix();
+  return {rotation, -(rotation * pose.centre), k[kFocal], is_brown(k) ? k[kRadial1] : 0, is_brown(k) ? k[kRadial2] : 0};
+}
+
+Pose pose_from_bal(const BalCamera& camera) {
+  const Eigen::Matrix3d rotation = kFlip * camera.rotation;
+  return {Eigen::Quaterniond(rotation).normalized(), -(camera.rotation.transpose() * camera.translation)};
+}
+
+std::optional<Eigen::Vector2d> to_bal_image(const Intrinsics& k, const Eigen::Vector2d& pixel) {
+  Eigen::Vector2d image(pixel.x() - k[kPrincipalX], k[kPrincipalY] - pixel.y());
+  if (is_brown(k) && k[kRadial3] == 0 && k[kDecentring1] == 0 && k[kDecentring2] == 0) return image;
+  if (k.model().kind == CameraModelKind::kPinhole) return image;
+  const auto ray = unproject(k, pixel);
+  if (!ray) return std::nullopt;
+  const double r2 = ray->squaredNorm();
+  const double scale = is_brown(k) ? k[kFocal] * (1 + r2 * (k[kRadial1] + r2 * k[kRadial2])) : k[kFocal];
+  return Eigen::Vector2d(scale * ray->x(), -scale * ray->y());
+}
+
+}  // namespace megablock

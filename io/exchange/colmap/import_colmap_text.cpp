@@ -1,0 +1,88 @@
+#include <charconv>
+#include <filesystem>
+
+#include "io/exchange/colmap/import_colmap.h"
+#include "io/text/number_reader.h"
+
+namespace megablock {
+
+namespace {
+
+class TextReader {
+ public:
+  explicit TextReader(const std::string& folder) : folder_(folder) {}
+
+  ImportedBlock read() {
+    read_file("points3D.txt", [this](NumberReader& reader, const std::string& first) { read_point(reader, first); });
+    read_file("cameras.txt", [this](NumberReader& reader, const std::string& first) { read_camera(reader, first); });
+    read_file("images.txt", [this](NumberReader& reader, const std::string& first) { read_image(reader, first); });
+    return builder_.finish();
+  }
+
+ private:
+  // Hands over the first word of each line that is no comment; the function reads the rest.
+  template <typename ReadLine>
+  void read_file(const char* name, ReadLine read_line) {
+    NumberReader reader((std::filesystem::path(folder_) / name).string());
+    builder_.fail = [&](const std::string& message) { reader.fail(message); };
+    while (!reader.at_end()) {
+      const std::string first(reader.word("a line"));
+      if (first.starts_with('#'))
+        reader.rest_of_line();
+      else
+        read_line(reader, first);
+    }
+  }
+
+  static std::int64_t parse_id(NumberReader& reader, const std::string& word, const char* what) {
+    std::int64_t value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size() || value < 0)
+      reader.fail(std::string(what) + ": '" + word + "' is not a whole number");
+    return value;
+  }
+
+  void read_point(NumberReader& reader, const std::string& first) {
+    Eigen::Vector3d point;
+    for (double& value : point) value = reader.number("a point's coordinates");
+    reader.rest_of_line();  // colour, error; the track comes from the images
+    builder_.add_point(parse_id(reader, first, "a point's id"), point);
+  }
+
+  void read_camera(NumberReader& reader, const std::string& first) {
+    const std::int64_t id = parse_id(reader, first, "a camera's id");
+    const ColmapModel& model = colmap_model(std::string(reader.word("a camera's model")), builder_.fail);
+    const std::int64_t width = reader.integer("a camera's width", 1, kMany);
+    const std::int64_t height = reader.integer("a camera's height", 1, kMany);
+    std::vector<double> parameters;
+    for (std::size_t i = 0; i < model.parameters.size(); ++i)
+      parameters.push_back(reader.number("a camera's parameters"));
+    builder_.add_camera(id, model, width, height, parameters);
+    reader.rest_of_line();
+  }
+
+  void read_image(NumberReader& reader, const std::string& first) {
+    const std::int64_t id = parse_id(reader, first, "an image's id");
+    std::array<double, 4> q;
+    Eigen::Vector3d translation;
+    for (double& value : q) value = reader.number("an image's rotation");
+    for (double& value : translation) value = reader.number("an image's translation");
+    const std::int64_t camera = reader.integer("an image's camera", 0, kMany);
+    builder_.add_image(id, q, translation, camera, std::string(reader.rest_of_line()));
+    while (reader.line_has_more()) {
+      const double x = reader.number("x of an observation", kFarthestPixel),
+                   y = reader.number("y of an observation", kFarthestPixel);
+      builder_.add_observation(x, y, reader.integer("point of an observation", -1, kMany));
+    }
+    reader.rest_of_line();
+  }
+
+  std::string folder_;
+  ColmapBuilder builder_;
+};
+
+}  // namespace
+
+ImportedBlock import_colmap_text(const std::string& folder) { return TextReader(folder).read(); }
+
+}  // namespace megablock

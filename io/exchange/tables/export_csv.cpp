@@ -1,0 +1,167 @@
+#include <cmath>
+#include <filesystem>
+
+#include "geometry/numbers/angles.h"
+#include "geometry/transform/body_attitude.h"
+#include "io/block/crs.h"
+#include "io/exchange/model/export_view.h"
+#include "io/exchange/tables/export_tables.h"
+#include "io/project/inputs/pose_csv.h"
+#include "io/text/text_writer.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
+  const OmegaPhiKappa o = omega_phi_kappa(rotation);
+  const BodyAttitude y = body_attitude(rotation);
+  for (const double angle : {o.omega, o.phi, o.kappa, y.yaw, y.pitch, y.roll})
+    writer.print(",{:.12g}", angle * kDegreesPerRadian);
+}
+
+// Of (rotation about the ground axes, position) of the image's projection centre, from its frame's covariance: the
+// centre is C + R' c with the camera's place c in the rig, which a rotation w of the frame moves by [R' c]x w. The
+// mount's own covariance is not in it.
+BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i) {
+  const FrameIndex frame = view.image(i).frame;
+  BlockResult::Matrix6 move = BlockResult::Matrix6::Identity();
+  move.bottomLeftCorner<3, 3>() = skew<double>(view.pose(i).centre - view.result.state.frames[frame].centre);
+  return move * view.result.frame_covariance[frame] * move.transpose();
+}
+
+constexpr const char* kSigmaColumns = ",sigma_{0}_m,sigma_{1}_m,sigma_{2}_m,sigma_rotation_deg";
+
+// Along the axes that `to_axes` turns the ground's to.
+void print_sigmas(TextWriter& writer, const BlockResult::Matrix6& covariance, const Eigen::Quaterniond& to_axes) {
+  const Eigen::Matrix3d r = to_axes.toRotationMatrix();
+  const Eigen::Vector3d position = (r * covariance.bottomRightCorner<3, 3>() * r.transpose()).diagonal();
+  for (const double variance : position) writer.print(",{:.6g}", std::sqrt(variance));
+  writer.print(",{:.6g}", std::sqrt(covariance.topLeftCorner<3, 3>().diagonal().mean()) * kDegreesPerRadian);
+}
+
+void write_local(const ExportView& view, const std::string& path) {
+  const bool sigmas = !view.result.frame_covariance.empty();
+  TextWriter writer(path);
+  writer.print("image,frame,camera,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
+  if (sigmas) writer.print(kSigmaColumns, "x", "y", "z");
+  writer.print("\n");
+  for (std::int64_t i = 0; i < view.image_count(); ++i) {
+    const Image& image = view.image(i);
+    const Pose pose = view.pose(i);
+    writer.print("{},{},{},{},{},{}", view.image_name(i), view.result.block.frames[image.frame].name,
+                 view.result.block.cameras[view.camera_index(i)].name, pose.centre.x(), pose.centre.y(),
+                 pose.centre.z());
+    print_angles(writer, pose.rotation);
+    if (sigmas) print_sigmas(writer, image_covariance(view, i), Eigen::Quaterniond::Identity());
+    writer.print("\n");
+  }
+  writer.close();
+}
+
+void write_wgs84(const ExportView& view, const std::string& path) {
+  const Georeference georeference(view.result.block.ground);
+  TextWriter writer(path);
+  const bool sigmas = !view.result.frame_covariance.empty();
+  writer.print("image,latitude_deg,longitude_deg,height_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
+  if (sigmas) writer.print(kSigmaColumns, "east", "north", "up");
+  writer.print("\n");
+  for (std::int64_t i = 0; i < view.image_count(); ++i) {
+    const Pose pose = view.pose(i);
+    const Geodetic position = georeference.to_geodetic(pose.centre);
+    writer.print("{},{:.11f},{:.11f},{:.5f}", view.image_name(i), position.latitude_deg, position.longitude_deg,
+                 position.height_m);
+    const Eigen::Quaterniond own = georeference.own_from_block(position);
+    print_angles(writer, pose.rotation * own.conjugate());
+    if (sigmas) print_sigmas(writer, image_covariance(view, i), own);
+    writer.print("\n");
+  }
+  writer.close();
+}
+
+// Names of the parameters of all models, in the order of their first appearance.
+std::vector<std::string> all_parameters(const IndexedVector<CameraIndex, Camera>& cameras) {
+  std::vector<std::string> names;
+  for (const Camera& camera : cameras)
+    for (int p = 0; p < camera.intrinsics.size(); ++p) {
+      const std::string name = parameter_name(camera.intrinsics.model(), p);
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  return names;
+}
+
+// Cells of parameters that a camera does not have stay empty.
+void write_cameras(const BlockResult& result, const std::string& path) {
+  const std::vector<std::string> names = all_parameters(result.block.cameras);
+  TextWriter writer(path);
+  writer.print("name,width,height,model");
+  for (const std::string& name : names) writer.print(",{}", name);
+  if (!result.camera_covariance.empty())
+    for (const std::string& name : names) writer.print(",sigma_{}", name);
+  writer.print("\n");
+  for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
+    const CameraIndex index(static_cast<std::int64_t>(c));
+    const Camera& camera = result.block.cameras[index];
+    const Intrinsics& k = result.state.cameras[index];
+    writer.print("{},{},{},{}", camera.name, camera.width, camera.height, model_name(k.model()));
+    for (const std::string& name : names)
+      if (const auto p = find_parameter(k.model(), name))
+        writer.print(",{}", k[*p]);
+      else
+        writer.print(",");
+    for (std::size_t i = 0; i < names.size() && !result.camera_covariance.empty(); ++i)
+      if (const auto p = find_parameter(k.model(), names[i]))
+        writer.print(",{:.6g}", std::sqrt(result.camera_covariance[index](*p, *p)));
+      else
+        writer.print(",");
+    writer.print("\n");
+  }
+  writer.close();
+}
+
+bool has_rig(const Block& block) {
+  return std::any_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.mounts.size() > 1; });
+}
+
+// Of the rigs of two cameras and more; sigmas along and about the axes of the rig.
+void write_mounts(const BlockResult& result, const std::string& path) {
+  TextWriter writer(path);
+  writer.print("rig,mount,camera,x_m,y_m,z_m,qw,qx,qy,qz");
+  if (!result.mount_covariance.empty())
+    writer.print(",sigma_x_m,sigma_y_m,sigma_z_m,sigma_rotation_x_deg,sigma_rotation_y_deg,sigma_rotation_z_deg");
+  writer.print("\n");
+  for (RigIndex r(0); result.block.rigs.contains(r); ++r.value) {
+    const Rig& rig = result.block.rigs[r];
+    if (rig.mounts.size() < 2) continue;
+    for (std::size_t m = 0; m < rig.mounts.size(); ++m) {
+      const Pose& pose = result.state.mounts[r][m];
+      const Eigen::Quaterniond& q = pose.rotation;
+      writer.print("{},{},{}", rig.name, m, result.block.cameras[rig.mounts[m].camera].name);
+      for (const double value : {pose.centre.x(), pose.centre.y(), pose.centre.z(), q.w(), q.x(), q.y(), q.z()})
+        writer.print(",{}", value);
+      if (!result.mount_covariance.empty()) {
+        const PoseIncrement sigma = result.mount_covariance[r][m].diagonal().cwiseSqrt();
+        for (const double position : sigma.tail<3>()) writer.print(",{:.6g}", position);
+        for (const double rotation : sigma.head<3>()) writer.print(",{:.6g}", rotation * kDegreesPerRadian);
+      }
+      writer.print("\n");
+    }
+  }
+  writer.close();
+}
+
+}  // namespace
+
+void export_csv(const BlockResult& result, const std::string& folder) {
+  const ExportView view = make_export_view(result);
+  const fs::path root(folder);
+  write_pose_csv((root / "frames.csv").string(), pose_table(result.block, result.state));
+  write_local(view, (root / "images_local.csv").string());
+  if (result.block.ground.georeferenced) write_wgs84(view, (root / "images_wgs84.csv").string());
+  write_cameras(result, (root / "cameras.csv").string());
+  if (has_rig(result.block)) write_mounts(result, (root / "mounts.csv").string());
+}
+
+}  // namespace megablock

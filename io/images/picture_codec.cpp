@@ -1,0 +1,58 @@
+#include "io/images/picture_codec.h"
+
+#include <dlfcn.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kLibrary = "libmegablock_pictures.so";
+
+PictureCodecs load_codecs() {
+  void* library = dlopen(kLibrary, RTLD_NOW | RTLD_LOCAL);  // stays until the end
+  void* symbol = library == nullptr ? nullptr : dlsym(library, "megablock_picture_codecs");
+  if (symbol == nullptr)
+    throw InputError(std::string("pictures cannot be read or written: ") + dlerror() +
+                     "; it belongs beside the program, or where 'cmake --install' puts it");
+  return reinterpret_cast<decltype(&megablock_picture_codecs)>(symbol)();
+}
+
+const PictureCodecs& codecs() {
+  static const PictureCodecs loaded = load_codecs();
+  return loaded;
+}
+
+}  // namespace
+
+void load_picture_codecs() { codecs(); }
+
+cv::Mat decode_picture(const std::vector<unsigned char>& file, int flags) { return codecs().decode(file, flags); }
+
+cv::Mat read_picture(const std::string& path, int flags) {
+  std::ifstream file(path, std::ios::binary);
+  const std::vector<unsigned char> bytes(std::istreambuf_iterator<char>(file), {});
+  return bytes.empty() ? cv::Mat() : decode_picture(bytes, flags);
+}
+
+std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
+                                          const std::vector<int>& parameters) {
+  std::vector<unsigned char> bytes = codecs().encode(extension, picture, parameters);
+  if (bytes.empty()) throw ComputeError("OpenCV cannot encode a picture as " + extension);
+  return bytes;
+}
+
+void write_picture(const std::string& path, const cv::Mat& picture, const std::vector<int>& parameters) {
+  const std::vector<unsigned char> bytes =
+      encode_picture(std::filesystem::path(path).extension().string(), picture, parameters);
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
+  if (!file.flush()) throw InputError(path + ": cannot be written");
+}
+
+}  // namespace megablock

@@ -1,0 +1,189 @@
+#include "io/project/inputs/approximate_poses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "geometry/numbers/angles.h"
+#include "geometry/transform/body_attitude.h"
+#include "io/base/error.h"
+#include "io/block/ground_change.h"
+#include "io/project/inputs/pose_csv.h"
+#include "io/text/csv_table.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kGimbalDoubt = 20 * kDegree;  // of pitch -90: an aircraft does not stand on its nose
+
+// The three ways in which a file gives attitudes.
+enum class Angles { kPhotogrammetric, kGimbal, kBody };
+
+Angles angles_of(const CsvTable& csv) {
+  if (csv.has("omega_deg")) return Angles::kPhotogrammetric;
+  return csv.has("gimbal_pitch_deg") ? Angles::kGimbal : Angles::kBody;
+}
+
+void require_angles(const CsvTable& csv, Angles angles) {
+  switch (angles) {
+    case Angles::kPhotogrammetric:
+      return csv.require({"omega_deg", "phi_deg", "kappa_deg"});
+    case Angles::kGimbal:
+      return csv.require({"gimbal_yaw_deg", "gimbal_pitch_deg", "gimbal_roll_deg"});
+    case Angles::kBody:
+      return csv.require({"yaw_deg", "pitch_deg", "roll_deg"});
+  }
+}
+
+Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, Angles angles) {
+  const auto angle = [&](const char* column) { return csv.needed_number(row, column) * kDegree; };
+  if (angles == Angles::kPhotogrammetric)
+    return rotation_from(OmegaPhiKappa{angle("omega_deg"), angle("phi_deg"), angle("kappa_deg")});
+  if (angles == Angles::kGimbal)
+    return rotation_from(YawPitchRoll{angle("gimbal_yaw_deg"), angle("gimbal_pitch_deg"), angle("gimbal_roll_deg")});
+  if (std::abs(angle("pitch_deg") + std::numbers::pi / 2) < kGimbalDoubt)
+    throw InputError(csv.where(row) +
+                     ": pitch_deg near -90 looks like a gimbal's angles (-90 = nadir); name the columns "
+                     "gimbal_yaw_deg, gimbal_pitch_deg, gimbal_roll_deg (pitch_deg is 0 at nadir)");
+  return rotation_from(BodyAttitude{angle("yaw_deg"), angle("pitch_deg"), angle("roll_deg")});
+}
+
+std::optional<std::int64_t> pass_of(const CsvTable& csv, std::size_t row) {
+  if (!csv.has("pass")) return std::nullopt;
+  const double pass = csv.needed_number(row, "pass");
+  if (pass != std::floor(pass)) throw InputError(csv.where(row) + ": pass: not a whole number");
+  return static_cast<std::int64_t>(pass);
+}
+
+ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column) {
+  const bool geodetic = csv.has("latitude_deg");
+  const Angles angles = angles_of(csv);
+  if (geodetic)
+    csv.require({"latitude_deg", "longitude_deg", "height_m"});
+  else
+    csv.require({"x_m", "y_m", "z_m"});
+  require_angles(csv, angles);
+  ApproximatePoses poses;
+  std::set<std::string> seen;
+  for (std::size_t row = 0; row < csv.row_count(); ++row) {
+    ApproximatePoses::Row entry;
+    entry.name = csv.text(row, name_column);
+    entry.where = csv.where(row);
+    if (!seen.insert(entry.name).second) throw InputError(entry.where + ": '" + entry.name + "' appears twice");
+    entry.geodetic = geodetic;
+    if (geodetic)
+      entry.position = {csv.needed_number(row, "latitude_deg"), csv.needed_number(row, "longitude_deg"),
+                        csv.needed_metres(row, "height_m")};
+    else
+      entry.pose.centre = {csv.needed_metres(row, "x_m"), csv.needed_metres(row, "y_m"), csv.needed_metres(row, "z_m")};
+    entry.pose.rotation = rotation_of(csv, row, angles);
+    entry.pass = pass_of(csv, row);
+    poses.rows.push_back(std::move(entry));
+  }
+  return poses;
+}
+
+ApproximatePoses read_quaternions(const std::string& path) {
+  const PoseTable table = read_pose_csv(path);
+  ApproximatePoses poses;
+  poses.ground = table.ground;
+  for (std::size_t i = 0; i < table.names.size(); ++i)
+    poses.rows.push_back({table.names[i],
+                          path,
+                          false,
+                          {},
+                          table.poses[i],
+                          table.passes.empty() ? std::nullopt : std::optional(table.passes[i])});
+  return poses;
+}
+
+// Poses of the file in the block's frame.
+class ToBlock {
+ public:
+  ToBlock(const ApproximatePoses& poses, const GroundFrame& ground) : ground_(ground) {
+    if (ground.georeferenced) reference_.emplace(ground);
+    if (ground.georeferenced && poses.ground && !same_origin(*poses.ground, ground))
+      change_.emplace(*poses.ground, ground);
+  }
+
+  Pose operator()(const ApproximatePoses::Row& row) const {
+    if (!row.geodetic) return change_ ? change_->pose(row.pose) : row.pose;
+    if (!reference_)
+      throw InputError(row.where + ": WGS84 poses need a georeferenced block; give 'origin' in the project file");
+    try {
+      return {(row.pose.rotation * reference_->own_from_block(row.position)).normalized(),
+              reference_->to_local(row.position)};
+    } catch (const InputError& error) {
+      throw InputError(row.where + ": '" + row.name + "': " + error.what());
+    }
+  }
+
+ private:
+  GroundFrame ground_;
+  std::optional<Georeference> reference_;
+  std::optional<GroundChange> change_;
+};
+
+}  // namespace
+
+std::vector<Geodetic> ApproximatePoses::positions() const {
+  std::vector<Geodetic> result;
+  for (const Row& row : rows)
+    if (row.geodetic) result.push_back(row.position);
+  if (result.empty() && ground) result.push_back({ground->latitude_deg, ground->longitude_deg, ground->height_m});
+  return result;
+}
+
+ApproximatePoses read_approximate_poses(const std::string& path) {
+  const CsvTable csv(path);
+  if (csv.has("qw") || csv.has("qx") || csv.has("qy") || csv.has("qz")) return read_quaternions(path);
+  const std::string name_column = csv.has("image") ? "image" : "name";
+  csv.require({name_column});
+  if (!csv.has("latitude_deg") && !csv.has("x_m"))
+    throw InputError(path +
+                     ": no columns of poses: latitude_deg,longitude_deg,height_m or x_m,y_m,z_m with angles, or "
+                     "qw,qx,qy,qz,x,y,z");
+  return read_angles(csv, name_column);
+}
+
+void set_given_poses(const ApproximatePoses& poses, const std::vector<std::string>& left_out, Block& block,
+                     std::vector<std::string>& warnings) {
+  const ToBlock to_block(poses, block.ground);
+  std::map<std::string, FrameIndex> frames;
+  std::map<std::string, ImageIndex> images;
+  for (std::size_t f = 0; f < block.frames.size(); ++f)
+    frames.emplace(block.frames[FrameIndex(static_cast<std::int64_t>(f))].name,
+                   FrameIndex(static_cast<std::int64_t>(f)));
+  for (std::size_t i = 0; i < block.images.size(); ++i)
+    images.emplace(block.name_of(ImageIndex(static_cast<std::int64_t>(i))), ImageIndex(static_cast<std::int64_t>(i)));
+  std::set<FrameIndex> placed;  // by an earlier row; what the block had before gives way
+  for (const ApproximatePoses::Row& row : poses.rows) {
+    const auto image = images.find(row.name);
+    const auto frame = frames.find(row.name);
+    if (std::find(left_out.begin(), left_out.end(), row.name) != left_out.end()) {
+      warnings.push_back(row.where + ": pose of '" + row.name + "', which was left out; not used");
+    } else if (image != images.end()) {
+      // X_cam = R_m (R_f (X - C_f) - C_m): the frame's pose from the camera's.
+      const Pose camera = to_block(row);
+      const Pose& mount = block.mount_of(image->second).pose;
+      const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
+      const FrameIndex index = block.images[image->second].frame;
+      Frame& target = block.frames[index];
+      if (row.pass) target.pass = *row.pass;
+      if (placed.insert(index).second)
+        target.given_pose = Pose{rotation, camera.centre - rotation.conjugate() * mount.centre};
+    } else if (frame != frames.end()) {
+      Frame& target = block.frames[frame->second];
+      if (row.pass) target.pass = *row.pass;
+      target.given_pose = to_block(row);
+      placed.insert(frame->second);
+    } else {
+      throw InputError(row.where + ": pose of '" + row.name + "', which is no image or frame of the block");
+    }
+  }
+}
+
+}  // namespace megablock

@@ -1,0 +1,266 @@
+// Readers of the three formats of control files.
+#include "io/project/inputs/control_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "io/text/csv_table.h"
+#include "io/text/plausible.h"
+#include "io/text/settings_reader.h"
+#include "io/text/text_writer.h"
+
+namespace megablock {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// A height may be unknown.
+void check_coordinates(const Eigen::Vector3d& coordinates, const std::string& where) {
+  check_on_earth(coordinates.x(), "x", where);
+  check_on_earth(coordinates.y(), "y", where);
+  if (!std::isnan(coordinates.z())) check_on_earth(coordinates.z(), "z", where);
+}
+
+// -- gcp_list.txt --
+
+// Between tabs when the line has any (image names may then hold blanks), else between blanks.
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields;
+  const char* separators = line.find('\t') != std::string::npos ? "\t\r" : " \r";
+  for (std::size_t at = line.find_first_not_of(separators); at != std::string::npos;) {
+    const std::size_t end = line.find_first_of(separators, at);
+    fields.push_back(line.substr(at, end - at));
+    at = end == std::string::npos ? end : line.find_first_not_of(separators, end);
+  }
+  return fields;
+}
+
+double number_or_nan(const std::string& text, const std::string& what, const std::string& where) {
+  if (text == "NaN" || text == "nan" || text == "NAN") return kNaN;
+  return parse_number(text, what, where);
+}
+
+ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
+  ControlTable table;
+  table.pixels = ControlTable::Pixels::kCentresAtInteger;
+  table.crs.clear();
+  std::map<std::string, std::size_t> point_of_key;
+  std::int64_t number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    const std::string where = path + ":" + std::to_string(++number);
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    if (line.empty() || line.front() == '#') continue;
+    if (table.crs.empty()) {
+      table.crs = line;
+      table.crs_where = where;
+      continue;
+    }
+    const std::vector<std::string> fields = fields_of(line);
+    if (fields.size() < 6)
+      throw InputError(where + ": " + std::to_string(fields.size()) +
+                       " fields; expected x y z column row image [name]");
+    const std::string key = fields.size() > 6 ? fields[6] : fields[0] + " " + fields[1] + " " + fields[2];
+    const Eigen::Vector3d coordinates(parse_number(fields[0], "x", where), parse_number(fields[1], "y", where),
+                                      number_or_nan(fields[2], "z", where));
+    check_coordinates(coordinates, where);
+    const auto [found, inserted] = point_of_key.emplace(key, table.points.size());
+    if (inserted) {
+      ControlTable::Point point;
+      point.name = fields.size() > 6 ? fields[6] : "gcp" + std::to_string(table.points.size() + 1);
+      point.coordinates = coordinates;
+      point.where = where;
+      table.points.push_back(point);
+    }
+    ControlTable::Point& point = table.points[found->second];
+    const bool same_height =
+        coordinates.z() == point.coordinates.z() || (std::isnan(coordinates.z()) && std::isnan(point.coordinates.z()));
+    if (coordinates.head<2>() != point.coordinates.head<2>() || !same_height)
+      throw InputError(where + ": point '" + point.name + "' has other coordinates than in " + point.where);
+    point.measurements.push_back(
+        {fields[5], {parse_number(fields[3], "column", where), parse_number(fields[4], "row", where)}, 0.5, where});
+  }
+  if (table.crs.empty()) throw InputError(path + ": is empty; the first line names the coordinate reference system");
+  return table;
+}
+
+// -- ground_control_points.json --
+
+// JSON values carry no marks: lines are found by searching the text for the values, point after point.
+class JsonLines {
+ public:
+  JsonLines(const std::string& text, const std::string& path) : text_(text), path_(path) {}
+
+  // file:line of the next place where `value` stands between quotes, behind the one found last; `advance` moves on.
+  std::string find(const std::string& value, bool advance) {
+    const std::size_t at = text_.find("\"" + value + "\"", at_);
+    const std::size_t place = at == std::string::npos ? at_ : at;
+    if (advance) at_ = place;
+    const auto end = text_.begin() + static_cast<std::ptrdiff_t>(place);
+    return path_ + ":" + std::to_string(1 + std::count(text_.begin(), end, '\n'));
+  }
+
+ private:
+  const std::string& text_;
+  std::string path_;
+  std::size_t at_ = 0;
+};
+
+double json_number(const Json& object, const char* key, const std::string& where) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_number())
+    throw InputError(where + ": '" + std::string(key) + "' is missing or not a number");
+  return found->get<double>();
+}
+
+ControlTable::Point json_point(const Json& entry, JsonLines& lines) {
+  ControlTable::Point point;
+  if (!entry.is_object() || !entry.contains("id"))
+    throw InputError(lines.find("points", false) + ": a point has no 'id'");
+  point.name = entry["id"].is_string() ? entry["id"].get<std::string>() : entry["id"].dump();
+  point.where = lines.find(point.name, true);
+  const std::string role = entry.contains("role") ? entry["role"].dump() : "";
+  if (role == "\"metrics_only\"" || role == "1") point.role = PointRole::kCheck;
+  if (entry.contains("position")) {
+    const Json& position = entry["position"];
+    point.coordinates = {json_number(position, "longitude", point.where),
+                         json_number(position, "latitude", point.where),
+                         position.contains("altitude") ? json_number(position, "altitude", point.where) : kNaN};
+    check_coordinates(point.coordinates, point.where);
+  } else {
+    point.coordinates.setConstant(kNaN);
+  }
+  if (!entry.contains("observations")) return point;
+  for (const Json& o : entry["observations"]) {
+    if (!o.is_object() || !o.contains("shot_id") || !o["shot_id"].is_string() || !o.contains("projection") ||
+        !o["projection"].is_array() || o["projection"].size() != 2 || !o["projection"][0].is_number() ||
+        !o["projection"][1].is_number())
+      throw InputError(point.where + ": an observation of point '" + point.name +
+                       "' needs shot_id and projection: [x, y]");
+    const std::string image = o["shot_id"].get<std::string>();
+    point.measurements.push_back(
+        {image, {o["projection"][0].get<double>(), o["projection"][1].get<double>()}, 0.5, lines.find(image, false)});
+  }
+  return point;
+}
+
+ControlTable read_json(const std::string& text, const std::string& path) {
+  Json json;
+  try {
+    json = Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    const auto begin = text.begin();
+    const auto at = begin + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
+    throw InputError(path + ":" + std::to_string(1 + std::count(begin, at, '\n')) + ": not valid JSON");
+  }
+  if (!json.is_object() || !json.contains("points") || !json["points"].is_array())
+    throw InputError(path + ":1: expected an object with a list 'points'");
+  ControlTable table;
+  table.crs = "WGS84";
+  table.crs_where = path;
+  table.pixels = ControlTable::Pixels::kNormalised;
+  JsonLines lines(text, path);
+  for (const Json& entry : json["points"]) {
+    ControlTable::Point point = json_point(entry, lines);
+    if (std::isnan(point.coordinates.x()))
+      table.warnings.push_back(point.where + ": point '" + point.name + "' has no position; left out");
+    else
+      table.points.push_back(std::move(point));
+  }
+  return table;
+}
+
+// -- CSV --
+
+PointRole role_of(const std::string& text, const std::string& where) {
+  if (text.empty() || text == "control") return PointRole::kControl;
+  if (text == "check") return PointRole::kCheck;
+  throw InputError(where + ": role: '" + text + "' is none of: control, check");
+}
+
+// The first line of a point gives its coordinates; later ones may leave them empty or repeat them.
+ControlTable::Point csv_point(const CsvTable& csv, std::size_t row) {
+  ControlTable::Point point;
+  point.name = csv.text(row, "name");
+  point.where = csv.where(row);
+  point.role = role_of(csv.text(row, "role"), point.where);
+  point.coordinates = {csv.needed_number(row, "x"), csv.needed_number(row, "y"), csv.number(row, "z").value_or(kNaN)};
+  check_coordinates(point.coordinates, point.where);
+  if (const auto sigma = csv.number(row, "sigma_horizontal_m", kSigmaMetres)) point.sigma.head<2>().setConstant(*sigma);
+  if (const auto sigma = csv.number(row, "sigma_vertical_m", kSigmaMetres)) point.sigma.z() = *sigma;
+  return point;
+}
+
+void check_repeated(const CsvTable& csv, std::size_t row, const ControlTable::Point& point) {
+  const char* const columns[] = {"x", "y", "z"};
+  for (int a = 0; a < 3; ++a) {
+    const auto value = csv.number(row, columns[a]);
+    if (value && *value != point.coordinates[a])
+      throw InputError(csv.where(row) + ": point '" + point.name + "' has another " + columns[a] + " than in " +
+                       point.where);
+  }
+}
+
+ControlTable read_csv(const std::string& path) {
+  const CsvTable csv(path);
+  csv.require({"name", "x", "y", "z", "image", "column_px", "row_px"});
+  csv.refuse_others({"name", "x", "y", "z", "image", "column_px", "row_px", "role", "sigma_horizontal_m",
+                     "sigma_vertical_m", "sigma_px"});
+  ControlTable table;
+  if (!csv.comment("crs").empty()) table.crs = csv.comment("crs");
+  table.crs_where = path;
+  std::map<std::string, std::size_t> point_of_name;
+  for (std::size_t row = 0; row < csv.row_count(); ++row) {
+    const std::string name = csv.text(row, "name"), where = csv.where(row);
+    if (name.empty()) throw InputError(where + ": name is empty");
+    const auto [found, inserted] = point_of_name.emplace(name, table.points.size());
+    if (inserted) table.points.push_back(csv_point(csv, row));
+    ControlTable::Point& point = table.points[found->second];
+    if (!inserted) check_repeated(csv, row, point);
+    if (csv.text(row, "image").empty()) continue;  // a point that is not measured
+    point.measurements.push_back({csv.text(row, "image"),
+                                  {csv.needed_number(row, "column_px"), csv.needed_number(row, "row_px")},
+                                  csv.number(row, "sigma_px", kSigmaPx).value_or(0.5),
+                                  where});
+  }
+  return table;
+}
+
+}  // namespace
+
+ControlTable read_control_table(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (extension == ".csv") return read_csv(path);
+  std::ifstream stream = open_input(path);
+  if (extension != ".json") return read_gcp_list(stream, path);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return read_json(text.str(), path);
+}
+
+void write_control_csv(const std::string& path, const Block& block) {
+  TextWriter writer(path);
+  writer.print("# crs: local\nname,role,x,y,z,sigma_horizontal_m,sigma_vertical_m,image,column_px,row_px,sigma_px\n");
+  for (const ControlPoint& point : block.control_points) {
+    const Eigen::Vector3d& p = point.position;
+    const std::string head =
+        fmt::format("{},{},{},{},{},{},{}", point.name, point.role == PointRole::kCheck ? "check" : "control", p.x(),
+                    p.y(), std::isnan(p.z()) ? "" : fmt::format("{}", p.z()), point.sigma.x(), point.sigma.z());
+    for (const ImageMeasurement& m : point.measurements)
+      writer.print("{},{},{},{},{}\n", head, block.name_of(m.image), m.pixel.x(), m.pixel.y(), m.sigma_px);
+    if (point.measurements.empty()) writer.print("{},,,,\n", head);
+  }
+  writer.close();
+}
+
+}  // namespace megablock

@@ -1,0 +1,175 @@
+// The project file, section by section. What the images say comes first, what the file says overrides it.
+#include "io/project/project.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+
+#include "io/base/error.h"
+#include "io/project/image_scan.h"
+#include "io/project/inputs/approximate_poses.h"
+#include "io/project/inputs/control_file.h"
+#include "io/project/inputs/lines.h"
+#include "io/project/inputs/verticals.h"
+#include "io/project/project_sections.h"
+#include "io/store/hdf5/hdf5_file.h"
+#include "io/store/units/unit_files.h"
+#include "io/text/settings_reader.h"
+#include "io/text/yaml_reader.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// "true", "[0, 0.1, -0.2]": whatever is wrong with it is said where the block is read.
+std::string text_of(const YAML::Node& node) {
+  if (!node.IsSequence()) return node.IsScalar() ? node.Scalar() : "";
+  std::string list;
+  for (const YAML::Node& value : node) list += (list.empty() ? "" : ", ") + text_of(value);
+  return "[" + list + "]";
+}
+
+// The options of the stages, and those of the block's priors, which are kept for the report alone.
+StageSettings read_stage_settings(YamlReader& top) {
+  StageSettings settings;
+  for (const char* section : {"gps", "attitude"})
+    if (auto reader = top.mapping(section))
+      for (const std::string& key : reader->keys())
+        settings.entries.push_back({section, key, text_of(*reader->node(key)), reader->where(key)});
+  for (const std::string& section : stage_sections()) {
+    auto reader = top.mapping(section);
+    if (!reader) continue;
+    for (const std::string& key : reader->keys()) {
+      const bool is_file = section == "matching" && key == "filter_model";
+      const auto value = is_file ? reader->existing_file(key) : reader->text(key);
+      settings.entries.push_back({section, key, *value, reader->where(key)});
+    }
+  }
+  return settings;
+}
+
+// What is wrong with a file that the project names: nothing that running again would make anew.
+InputError refusal(YamlReader& top, const std::string& key, const StoreError& error) {
+  std::string reason = error.what();
+  if (const auto remedy = reason.find("; delete it"); remedy != std::string::npos)
+    reason.replace(remedy, std::string::npos, "; make it again");
+  return InputError(top.where(key) + ": " + key + ": " + reason);
+}
+
+void read_simulated_block(YamlReader& top, Project& project, const std::string& block_file) {
+  try {
+    project.block = read_block(block_file);
+  } catch (const StoreError& error) {
+    throw refusal(top, "block", error);
+  }
+}
+
+// The tracks themselves are read when they are needed.
+void check_tie_points(YamlReader& top, const std::string& file) {
+  try {
+    Hdf5Reader(file, "tracks");
+  } catch (const StoreError& error) {
+    throw refusal(top, "tie_points", error);
+  }
+}
+
+// Sections of stages that have nothing to do.
+void refuse_unused_stages(const YamlReader& top) {
+  for (const std::string& key : top.keys())
+    if (key == "features" || key == "candidates" || key == "matching")
+      refuse_unused(top, key, "with 'tie_points', which are measured and matched already");
+}
+
+// Images that are not in the block for a reason that was told: files that refer to them are not wrong.
+std::vector<std::string> names_left_out(const Project& project) {
+  std::vector<std::string> names = project.copies;
+  names.insert(names.end(), project.missing.begin(), project.missing.end());
+  for (const auto& [name, reason] : project.unreadable) names.push_back(name);
+  return names;
+}
+
+// Keys in which files are named or the block is changed, in the order in which they build on one another.
+void read_block_sections(YamlReader& top, Project& project, const std::optional<GroundFrame>& ground) {
+  const auto images = top.existing_folder("images");
+  const auto block_file = top.existing_file("block");
+  if (images && block_file)
+    throw InputError(top.where("block") + ": 'images' and 'block' exclude each other; give one of them");
+  for (const std::string& key : top.keys())
+    if (!images && !block_file && !nearest_name(key, {"images"}).empty())
+      throw InputError(top.where(key) + ": unknown key '" + key + "'; did you mean 'images'?");
+  if (!images && !block_file)
+    throw InputError(top.where() + ": key 'images' (a folder of images) is missing; add for example 'images: images'");
+  if (const auto tie_points = top.existing_file("tie_points")) {
+    check_tie_points(top, *tie_points);
+    project.tie_points = *tie_points;
+    refuse_unused_stages(top);
+  }
+  if (block_file && project.tie_points.empty())
+    throw InputError(top.where("block") + ": 'block' needs 'tie_points' as well: there are no images to measure in");
+
+  std::vector<ScannedImage> scanned;
+  if (images) scanned = scan_images(*images, project);
+  if (images && scanned.empty())
+    throw InputError(top.where("images") + ": images: no readable image (jpg, png, tif) below '" + *images + "'" +
+                     (project.unreadable.empty()
+                          ? ""
+                          : "; first reason: " + project.unreadable[0].first + ": " + project.unreadable[0].second));
+  if (block_file) read_simulated_block(top, project, *block_file);
+
+  auto cameras = top.mapping("cameras");
+  if (cameras && block_file && cameras->node("grouping"))
+    refuse_unused(*cameras, "grouping", "with 'block', which says what its cameras are");
+  const CameraGrouping grouping = cameras ? read_camera_grouping(*cameras) : CameraGrouping::kExif;
+  if (images) {
+    project.block.image_folder = (fs::path(*images) / "").string();
+    add_images(scanned, grouping, project.block);
+  }
+  if (cameras) read_cameras(*cameras, project.block);
+  if (const auto masks = top.existing_folder("masks")) {
+    if (!has_pictures(project.block)) refuse_unused(top, "masks", kNoPictures);
+    read_masks(*masks, project);
+  }
+  read_rigs(top, project);
+  read_calibration(top, project);
+
+  const auto poses = read_poses(top);
+  const auto control = read_control(top);
+  std::vector<Geodetic> others = poses ? poses->positions() : std::vector<Geodetic>();
+  if (control && others.empty()) others = geodetic_positions(*control);
+  read_positions(top, scanned, others, ground, project);
+  read_attitudes(top, scanned, project);
+  if (poses) set_given_poses(*poses, names_left_out(project), project.block, project.warnings);
+  if (control) add_control(*control, names_left_out(project), project.block, project.warnings);
+  if (const auto lines = top.existing_file("lines"))
+    read_lines(*lines, names_left_out(project), project.block, project.warnings);
+  if (const auto verticals = top.existing_file("verticals"))
+    read_verticals(*verticals, names_left_out(project), project.block);
+}
+
+}  // namespace
+
+void refuse_unused(const YamlReader& reader, const std::string& key, const std::string& why) {
+  throw InputError(reader.where(key) + ": '" + key + "' is not used " + why + "; take it out");
+}
+
+Project read_project(const std::string& path) { return read_project(path, std::nullopt); }
+
+Project read_project(const std::string& path, const std::optional<GroundFrame>& ground) {
+  Project project;
+  project.file = fs::absolute(path).lexically_normal().string();
+  YamlReader top = read_yaml(path);
+  project.settings = read_stage_settings(top);
+  read_block_sections(top, project, ground);
+  top.finish();
+  try {
+    check(project.block);
+  } catch (const InputError& error) {
+    throw InputError(project.file + ": " + error.what());
+  }
+  warn_of_distant_places(project);
+  return project;
+}
+
+}  // namespace megablock

@@ -1,0 +1,52 @@
+// The project file (YAML, docs/project-file.md): where the images are, what is known of them, the options of the job.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/block/block.h"
+#include "io/text/stage_settings.h"
+
+namespace megablock {
+
+struct Project {
+  std::string file;        // absolute path of the project file
+  Block block;             // images, cameras, rigs, priors, control as read
+  std::string tie_points;  // HDF5 of given tracks (write_tracks), absolute; empty: features and matching run
+  StageSettings settings;
+  std::vector<std::pair<std::string, std::string>> unreadable;  // image file and reason, reported and skipped
+  std::vector<std::string> copies;    // image files left out because an earlier one has the same bytes
+  std::vector<std::string> missing;   // images and exposures that the rigs' assignments name and that are not there
+  std::vector<std::string> warnings;  // one line each: GPS at 0,0, duplicates, outliers ...
+};
+
+// Reads and validates; InputError with file:line for unknown keys, wrong types or units, missing files.
+Project read_project(const std::string& path);
+// The same in the ground frame of a running job, so that images added later cannot move the origin.
+Project read_project(const std::string& path, const std::optional<GroundFrame>& ground);
+
+// Of a camera's mask in the folder `masks`: "<camera>.png", '/' in the name written '_'.
+std::string mask_file_name(const std::string& camera);
+
+// The block of a job that has grown: cameras, rigs, frames and images of `previous` keep their indices (matched by
+// name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
+// `previous` that are gone stay. The ground frame stays the previous one: positions, attitudes and control of `now` are
+// turned into it when it has another origin.
+// `after_table` is called behind a table of both that was gone through: it may leave memory.
+Block append_to(
+    const Block& previous, Block now, const std::function<void()>& after_table = [] {});
+// By name.
+bool has_all_images_of(const Block& previous, const Block& now);
+
+struct InitOptions {
+  std::string images;  // folder, searched recursively, names sorted
+  std::string output = "block.yaml";
+  std::string gcp_file, mask_folder;     // optional
+  std::string camera_grouping = "exif";  // "exif" (make, model, size, focal), "folder", "one"
+};
+// Scans the images and writes the project file. Returns its one-paragraph summary.
+std::string init_project(const InitOptions& options);
+
+}  // namespace megablock

@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <filesystem>
+
+#include "io/base/error.h"
+#include "io/block/camera_priors.h"
+#include "io/project/project_sections.h"
+#include "io/text/settings_reader.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Names of `calibrate: [...]`: the parameters and two words for groups of them.
+std::vector<int> parameters_named(const CameraModel& model, const std::string& name, const std::string& where) {
+  if (name == "focal") return {kFocal};
+  if (name == "principal_point") return {kPrincipalX, kPrincipalY};
+  if (const auto parameter = find_parameter(model, name)) return {*parameter};
+  std::string list = "focal, principal_point";
+  for (int p = 0; p < parameter_count(model); ++p) list += ", " + parameter_name(model, p);
+  throw InputError(where + ": calibrate: '" + name + "' is no camera parameter; they are " + list);
+}
+
+void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
+  const CameraModel& model = camera.intrinsics.model();
+  IntrinsicSigmas sigma{};
+  for (const auto& item : list)
+    for (const int p : parameters_named(model, item.IsScalar() ? item.Scalar() : "", where)) {
+      if (is_fixed(model, p))
+        throw InputError(where + ": calibrate: '" + parameter_name(model, p) + "' of the model " + model_name(model) +
+                         " follows from the size of the image and cannot be estimated");
+      // A panorama's cx is held by default: its sigma is that of cy.
+      const int like = camera.prior_sigma[static_cast<std::size_t>(p)] > 0 ? p : static_cast<int>(kPrincipalY);
+      sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(like)];
+    }
+  camera.prior_sigma = sigma;
+}
+
+// The camera's focal length and principal point stay.
+void read_model(YamlReader& reader, Camera& camera) {
+  const auto name = reader.text("model");
+  if (!name) return;
+  const auto model = find_model(*name);
+  if (!model)
+    throw InputError(reader.where("model") + ": model: '" + *name + "' is no camera model; they are " + model_list());
+  if (*model == camera.intrinsics.model()) return;
+  const Intrinsics before = camera.intrinsics;
+  camera.intrinsics = start_intrinsics(*model, before[kFocal], camera.width, camera.height);
+  camera.intrinsics[kPrincipalX] = before[kPrincipalX];
+  camera.intrinsics[kPrincipalY] = before[kPrincipalY];
+}
+
+void read_focal(YamlReader& reader, Camera& camera) {
+  constexpr Limits kLengthMm{1e-3, 1e6};
+  const auto pixels = reader.number("focal_px", kFocalPx);
+  const auto millimetres = reader.number("focal_mm", kLengthMm), sensor = reader.number("sensor_mm", kLengthMm);
+  if (pixels && millimetres)
+    throw InputError(reader.where("focal_mm") + ": give focal_px, or focal_mm with sensor_mm, not both");
+  if (millimetres.has_value() != sensor.has_value())
+    throw InputError(reader.where() + ": focal_mm and sensor_mm (width along the larger side) belong together");
+  if (!pixels && !millimetres) return;
+  if (is_fixed(camera.intrinsics.model(), kFocal))
+    throw InputError(reader.where(pixels ? "focal_px" : "focal_mm") +
+                     ": the focal length of an equirectangular camera is its width / 2 pi and cannot be given");
+  camera.intrinsics[kFocal] = pixels ? *pixels : *millimetres / *sensor * std::max(camera.width, camera.height);
+  if (millimetres) check_within(camera.intrinsics[kFocal], kFocalPx, "focal_mm in pixels", reader.where("focal_mm"));
+  camera.focal_known = true;
+}
+
+void read_distortion(YamlReader& reader, Camera& camera) {
+  auto distortion = reader.mapping("distortion");
+  if (!distortion) return;
+  constexpr Limits kTerm{-1e12, 1e12};
+  const CameraModel& model = camera.intrinsics.model();
+  for (int p = kPrincipalY + 1; p < camera.intrinsics.size(); ++p)
+    if (is_fixed(model, p))
+      continue;
+    else if (const auto value = distortion->number(parameter_name(model, p), kTerm))
+      camera.intrinsics[static_cast<std::size_t>(p)] = *value;
+  distortion->finish();
+}
+
+}  // namespace
+
+void read_intrinsics(YamlReader& reader, Camera& camera) {
+  read_model(reader, camera);
+  read_focal(reader, camera);
+  if (const auto point = reader.numbers("principal_point_px", 2)) {
+    for (const double coordinate : *point)
+      check_within(coordinate, {-kFocalPx.most, kFocalPx.most}, "principal_point_px",
+                   reader.where("principal_point_px"));
+    camera.intrinsics[kPrincipalX] = (*point)[0];
+    camera.intrinsics[kPrincipalY] = (*point)[1];
+    if (is_radial(camera.intrinsics.model())) {
+      camera.intrinsics[kSymmetryX] = (*point)[0];
+      camera.intrinsics[kSymmetryY] = (*point)[1];
+    }
+  }
+  read_distortion(reader, camera);
+}
+
+namespace {
+
+void read_camera(YamlReader& reader, bool pictures, Camera& camera) {
+  read_intrinsics(reader, camera);
+  camera.prior_sigma = default_intrinsic_sigmas(camera);
+  if (const auto calibrate = reader.node("calibrate")) {
+    const std::string where = reader.where("calibrate");
+    if (calibrate->IsSequence())
+      hold_except(*calibrate, where, camera);
+    else if (!*reader.flag("calibrate"))
+      camera.prior_sigma.fill(0);
+  }
+  if (const auto mask = reader.existing_file("mask")) {
+    if (!pictures) refuse_unused(reader, "mask", kNoPictures);
+    camera.mask_path = *mask;
+  }
+  reader.finish();
+}
+
+std::string names_of(const Block& block) {
+  std::string list;
+  for (const Camera& camera : block.cameras) list += (list.empty() ? "'" : ", '") + camera.name + "'";
+  return list;
+}
+
+void check_mask(const Camera& camera, const std::string& where) {
+  ImageHeader header;
+  try {
+    header = read_image_header(camera.mask_path);
+  } catch (const InputError& error) {
+    throw InputError(where + ": mask '" + camera.mask_path + "': " + error.what());
+  }
+  if (header.width == camera.width && header.height == camera.height) return;
+  throw InputError(where + ": mask '" + camera.mask_path + "' has " + std::to_string(header.width) + " x " +
+                   std::to_string(header.height) + " pixels, camera '" + camera.name + "' has " +
+                   std::to_string(camera.width) + " x " + std::to_string(camera.height));
+}
+
+}  // namespace
+
+CameraGrouping read_camera_grouping(YamlReader& cameras) {
+  const std::string grouping = cameras.text("grouping").value_or("exif");
+  if (grouping == "exif") return CameraGrouping::kExif;
+  if (grouping == "folder") return CameraGrouping::kFolder;
+  if (grouping == "one") return CameraGrouping::kOne;
+  throw InputError(cameras.where("grouping") + ": cameras.grouping: '" + grouping + "' is none of: exif, folder, one");
+}
+
+void read_cameras(YamlReader& cameras, Block& block) {
+  const bool pictures = has_pictures(block);
+  for (Camera& camera : block.cameras) {
+    if (auto reader = cameras.mapping("default")) read_camera(*reader, pictures, camera);
+    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, pictures, camera);
+    if (!camera.mask_path.empty()) check_mask(camera, cameras.where());
+  }
+  for (const std::string& key : cameras.keys())
+    if (key != "grouping" && key != "default" &&
+        std::none_of(block.cameras.begin(), block.cameras.end(), [&](const Camera& c) { return c.name == key; }))
+      throw InputError(cameras.where(key) + ": cameras: no camera is named '" + key + "'; the cameras are " +
+                       names_of(block) + " (and 'default' for all, 'grouping')");
+}
+
+std::string mask_file_name(const std::string& camera) {
+  std::string name = camera;
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name + ".png";
+}
+
+void read_masks(const std::string& folder, Project& project) {
+  std::vector<std::string> used;
+  for (Camera& camera : project.block.cameras) {
+    const std::string path = (fs::path(folder) / mask_file_name(camera.name)).string();
+    if (!fs::is_regular_file(path)) continue;
+    used.push_back(path);
+    if (camera.mask_path.empty()) camera.mask_path = path;
+    check_mask(camera, project.file);
+  }
+  for (const auto& item : fs::directory_iterator(folder))
+    if (item.path().extension() == ".png" && std::find(used.begin(), used.end(), item.path().string()) == used.end())
+      project.warnings.push_back("mask '" + item.path().string() + "' is named after no camera; the cameras are " +
+                                 names_of(project.block));
+}
+
+}  // namespace megablock

@@ -1,0 +1,119 @@
+// `megablock init`: scans the images once and writes a project file that says what was found.
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "io/project/project.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Relative to the project file's folder when the path lies below it, else absolute.
+std::string path_for(const std::string& path, const fs::path& project_folder) {
+  const fs::path absolute = fs::absolute(path).lexically_normal();
+  const fs::path relative = absolute.lexically_relative(project_folder);
+  const bool below = !relative.empty() && *relative.begin() != "..";
+  std::string text = (below ? relative : absolute).generic_string();
+  if (text.size() > 1 && text.back() == '/') text.pop_back();
+  return text;
+}
+
+// A YAML scalar in double quotes.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + "\"";
+}
+
+std::string head(const InitOptions& options, const fs::path& folder) {
+  std::string text =
+      "# Project of an image block; keys: docs/project-file.md\nimages: " + quoted(path_for(options.images, folder)) +
+      "\n";
+  if (!options.mask_folder.empty()) text += "masks: " + quoted(path_for(options.mask_folder, folder)) + "\n";
+  if (!options.gcp_file.empty()) text += "control: " + quoted(path_for(options.gcp_file, folder)) + "\n";
+  return text + "cameras:\n  grouping: " + options.camera_grouping + "\n";
+}
+
+std::string found_text(const Project& project) {
+  std::ostringstream text;
+  for (const Camera& camera : project.block.cameras) {
+    char line[128];
+    std::snprintf(line, sizeof line, "  #   focal_px: %.1f  # %s\n", camera.intrinsics[kFocal],
+                  camera.focal_known ? "from the image headers" : "a guess: 1.2 x the larger side");
+    text << "  # " << quoted(camera.name) << ":\n" << line;
+  }
+  const GroundFrame& ground = project.block.ground;
+  if (ground.georeferenced) {
+    char line[160];
+    std::snprintf(line, sizeof line, "origin: [%.9g, %.9g, %.9g]  # latitude_deg, longitude_deg, height_m (WGS84)\n",
+                  ground.latitude_deg, ground.longitude_deg, ground.height_m);
+    text << line;
+  }
+  return text.str();
+}
+
+std::string summary(const Project& project, const std::string& output) {
+  std::int64_t positions = 0, attitudes = 0;
+  for (const Frame& frame : project.block.frames) {
+    positions += frame.position_prior.has_value();
+    attitudes += frame.attitude_prior.has_value();
+  }
+  std::ostringstream text;
+  text << output << ": " << project.block.images.size() << " images of " << project.block.cameras.size()
+       << (project.block.cameras.size() == 1 ? " camera, " : " cameras, ") << positions << " with a position, "
+       << attitudes << " with angles";
+  if (!project.block.control_points.empty()) text << ", " << project.block.control_points.size() << " control points";
+  if (!project.unreadable.empty()) text << ", " << project.unreadable.size() << " unreadable files left out";
+  text << ".";
+  for (const auto& [name, reason] : project.unreadable) text << "\nunreadable: " << name << ": " << reason;
+  for (const std::string& warning : project.warnings) text << "\nwarning: " << warning;
+  return text.str();
+}
+
+void write_file(const fs::path& path, const std::string& text) {
+  std::ofstream stream(path, std::ios::trunc);
+  stream << text;
+  stream.close();
+  if (!stream) throw_file_error(path.string(), "written", errno);
+}
+
+}  // namespace
+
+std::string init_project(const InitOptions& options) {
+  std::error_code error;
+  if (!fs::is_directory(options.images, error))
+    throw InputError("'" + options.images + "' is not a folder that can be read; give the folder of the images");
+  const fs::path output = fs::absolute(options.output).lexically_normal();
+  if (fs::exists(output, error))
+    throw InputError("'" + options.output + "' exists already; remove it or choose another name with -o");
+  // Read through the reader of project files, so that what is written is what will be read.
+  const fs::path draft = output.string() + ".draft";
+  const std::string text = head(options, output.parent_path());
+  write_file(draft, text);
+  try {
+    const Project project = read_project(draft.string());
+    write_file(output, text + found_text(project));
+    fs::remove(draft, error);
+    return summary(project, options.output);
+  } catch (const InputError& wrong) {
+    fs::remove(draft, error);
+    const std::string message = wrong.what(), place = draft.string() + ":";  // a line of a file nobody has seen
+    const std::size_t end = message.find(": ");
+    throw InputError(message.starts_with(place) && end != std::string::npos ? message.substr(end + 2) : message);
+  } catch (...) {
+    fs::remove(draft, error);
+    throw;
+  }
+}
+
+}  // namespace megablock

@@ -1,0 +1,69 @@
+// What is too far away to be meant: exchanged coordinates, another zone, another country.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "geometry/numbers/median.h"
+#include "io/block/prior_differences.h"
+#include "io/project/project_sections.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kFar_m = 50e3;
+
+std::string kilometres(double metres) { return std::to_string(std::lround(metres / 1000)) + " km"; }
+
+// Given poses far from the positions of the same frames. The adjustment comes from some hundred metres to the optimum;
+// farther off a block of several tiles may find none, and then seems to have no datum: the loss gives positions that
+// are thousands of their sigmas off hardly any weight. Integrated poses that drift are nearer.
+void warn_of_distant_poses(Project& project) {
+  constexpr double kFarOff_m = 300, kFarOffSigmas = 30;
+  std::vector<double> distances, sigmas;
+  for (const Frame& frame : project.block.frames) {
+    if (!frame.position_prior || !frame.given_pose) continue;
+    const Eigen::Array3d sigma = frame.position_prior->sigma.array();  // an unknown height's is large
+    const Eigen::Array3d off = difference(*frame.given_pose, *frame.position_prior).array();
+    distances.push_back((sigma < kFarOff_m).select(off, 0).matrix().norm());
+    sigmas.push_back(sigma.minCoeff());
+  }
+  if (distances.empty()) return;
+  const double distance = median(distances);
+  if (!(distance > std::max(kFarOff_m, kFarOffSigmas * median(sigmas)))) return;
+  project.warnings.push_back(
+      "given poses lie " + std::to_string(std::lround(distance)) + " m (median) from the positions of the same " +
+      std::to_string(distances.size()) +
+      " frames: as start values they are too far off for some blocks; are both in one coordinate system (origin, axes, "
+      "zone)? correct the poses, or leave them out where there are images to start from");
+}
+
+}  // namespace
+
+void warn_of_distant_places(Project& project) {
+  warn_of_distant_poses(project);
+  std::vector<double> x, y, z;
+  for (const Frame& frame : project.block.frames) {
+    if (!frame.position_prior) continue;
+    x.push_back(frame.position_prior->position.x());
+    y.push_back(frame.position_prior->position.y());
+    z.push_back(frame.position_prior->position.z());
+  }
+  if (x.empty()) return;
+  const Eigen::Vector3d images(median(x), median(y), median(z));
+  double extent = kFar_m;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    extent = std::max(extent, 0.1 * (Eigen::Vector3d(x[i], y[i], z[i]) - images).norm());
+  const std::string remedy = "; are latitude and longitude exchanged, or is it another coordinate system?";
+  if (images.norm() > extent)
+    project.warnings.push_back("the origin lies " + kilometres(images.norm()) + " from the images" + remedy);
+  for (const ControlPoint& point : project.block.control_points) {
+    const double distance = (point.position - images).head<2>().norm();
+    if (distance > extent)
+      project.warnings.push_back("control point '" + point.name + "' lies " + kilometres(distance) +
+                                 " from the images" + remedy);
+  }
+}
+
+}  // namespace megablock

@@ -1,0 +1,201 @@
+// Position and attitude priors: what the images say (EXIF, XMP), the options `gps`, `attitude`, `origin`.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/numbers/angles.h"
+#include "io/base/error.h"
+#include "io/block/crs.h"
+#include "io/block/held_priors.h"
+#include "io/project/project_sections.h"
+#include "io/text/plausible.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kDefaultHorizontalSigma = 3, kDefaultVerticalSigma = 6;  // metres
+constexpr double kTiltSigmaDeg = 3, kYawSigmaDeg = 10;                    // of a gimbal
+
+struct GpsOptions {
+  bool given = false, use = true;  // given: there is such a section
+  std::optional<double> sigma_horizontal, sigma_vertical;
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
+};
+
+// A sigma, of which 0 means: held.
+std::optional<double> read_sigma(YamlReader& reader, const std::string& key, const Limits& limits, double held) {
+  const auto sigma = reader.number(key);
+  if (!sigma) return std::nullopt;
+  if (*sigma == 0) return held;
+  check_within(*sigma, limits, key, reader.where(key), ", or be 0 for what is held");
+  return sigma;
+}
+
+GpsOptions read_gps_options(YamlReader& top, bool from_images) {
+  GpsOptions options;
+  auto reader = top.mapping("gps");
+  if (!reader) return options;
+  options.given = true;
+  options.use = reader->flag("use").value_or(true);
+  options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kSigmaMetres, kHeldPositionSigma);
+  options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kSigmaMetres, kHeldPositionSigma);
+  if (!from_images && reader->node("lever_arm_m"))
+    refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have theirs");
+  if (const auto arm = reader->numbers("lever_arm_m", 3)) {
+    options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
+    check_on_vehicle(options.lever_arm, "gps.lever_arm_m", reader->where("lever_arm_m"));
+  }
+  reader->finish();
+  return options;
+}
+
+// The file's figures, else the image's own accuracy, else the defaults; a DOP can only widen the default (taken as
+// metres per unit, as phones write their accuracy there).
+Eigen::Vector3d position_sigma(const ImageHeader& header, const GpsOptions& options) {
+  const double own = header.position_sigma_horizontal_m;
+  double horizontal = own > 0 ? own : kDefaultHorizontalSigma;
+  if (!(own > 0) && header.dop > horizontal) horizontal = header.dop;
+  double vertical = header.position_sigma_vertical_m;
+  if (!(vertical > 0)) vertical = horizontal * (kDefaultVerticalSigma / kDefaultHorizontalSigma);
+  horizontal = options.sigma_horizontal.value_or(horizontal);
+  vertical = options.sigma_vertical.value_or(vertical);
+  if (!std::isfinite(header.position->height_m)) vertical = kUnknownHeightSigma;
+  return {horizontal, horizontal, vertical};
+}
+
+void set_position_priors(const std::vector<ScannedImage>& scanned,
+                         const std::vector<std::optional<Geodetic>>& positions, const GpsOptions& options,
+                         Block& block) {
+  const Georeference georeference(block.ground);
+  for (std::size_t i = 0; i < scanned.size(); ++i) {
+    if (!positions[i]) continue;
+    ImageHeader header = scanned[i].header;
+    header.position = positions[i];
+    Geodetic position = *positions[i];
+    if (!std::isfinite(position.height_m)) position.height_m = block.ground.height_m;
+    PositionPrior prior;
+    prior.position = georeference.to_local(position);
+    prior.sigma = position_sigma(header, options);
+    prior.lever_arm = options.lever_arm;
+    Frame& frame = block.frames[block.images[ImageIndex(static_cast<std::int64_t>(i))].frame];
+    if (!frame.position_prior) frame.position_prior = prior;  // of a rig: its first camera's
+  }
+}
+
+// A section that acts on nothing: refused with a block, which stays what it is; told of images, which may be others.
+void check_effect(const YamlReader& top, const std::string& section, const std::string& what, bool from_images,
+                  bool has_effect, std::vector<std::string>& warnings) {
+  if (has_effect) return;
+  if (!from_images) refuse_unused(top, section, "with a 'block' without " + what);
+  warnings.push_back(top.where(section) + ": '" + section + "' has no effect: the images have no " + what);
+}
+
+bool has_position(const Frame& frame) { return frame.position_prior.has_value(); }
+bool has_attitude(const Frame& frame) { return frame.attitude_prior.has_value(); }
+
+GroundFrame ground_at(const Geodetic& origin) {
+  return {true, origin.latitude_deg, origin.longitude_deg, origin.height_m, "EPSG:4979"};
+}
+
+std::optional<GroundFrame> read_origin(YamlReader& top) {
+  const auto origin = top.numbers("origin", 3);
+  if (!origin) return std::nullopt;
+  const Geodetic position{(*origin)[0], (*origin)[1], (*origin)[2]};
+  if (std::abs(position.latitude_deg) > 90 || std::abs(position.longitude_deg) > 180)
+    throw InputError(fmt::format("{}: origin must be [latitude_deg, longitude_deg, height_m] (WGS84), not {:g}, {:g}",
+                                 top.where("origin"), position.latitude_deg, position.longitude_deg));
+  check_on_earth(position.height_m, "origin", top.where("origin"));
+  return ground_at(position);
+}
+
+}  // namespace
+
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
+                    const std::optional<GroundFrame>& ground, Project& project) {
+  Block& block = project.block;
+  const bool from_images = !scanned.empty();  // else a given block with a frame of its own
+  const GpsOptions options = read_gps_options(top, from_images);
+  const auto origin = read_origin(top);
+  if (!options.use)
+    for (Frame& frame : block.frames) frame.position_prior.reset();
+  std::vector<std::optional<Geodetic>> positions(scanned.size());
+  if (options.use) positions = screen_positions(scanned, project.warnings);
+  std::vector<Geodetic> known;
+  for (const auto& position : positions)
+    if (position) known.push_back(*position);
+  if (options.given && options.use) {
+    const bool has_effect = from_images ? !known.empty() : std::ranges::any_of(block.frames, has_position);
+    check_effect(top, "gps", "positions", from_images, has_effect, project.warnings);
+  }
+  for (Frame& frame : block.frames) {
+    if (!frame.position_prior) continue;
+    if (options.sigma_horizontal) frame.position_prior->sigma.head<2>().setConstant(*options.sigma_horizontal);
+    if (options.sigma_vertical) frame.position_prior->sigma.z() = *options.sigma_vertical;
+  }
+  if (origin && !from_images)
+    throw InputError(top.where("origin") + ": 'origin' cannot be given with 'block', which has its own ground frame");
+  if (ground && from_images)
+    block.ground = *ground;
+  else if (origin)
+    block.ground = *origin;
+  else if (!known.empty())
+    block.ground = ground_at(rounded_median(known));
+  else if (!others.empty() && !block.ground.georeferenced)
+    block.ground = ground_at(rounded_median(others));
+  if (!known.empty() && !block.ground.georeferenced) {
+    project.warnings.push_back("GPS positions are not used: the job's block is not georeferenced");
+    return;
+  }
+  if (!known.empty()) set_position_priors(scanned, positions, options, block);
+}
+
+void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project) {
+  const bool from_images = !scanned.empty();
+  bool given = false, use = true;
+  std::optional<double> sigma_deg;
+  if (auto reader = top.mapping("attitude")) {
+    given = true;
+    use = reader->flag("use").value_or(true);
+    sigma_deg = read_sigma(*reader, "sigma_deg", kSigmaDegrees, kHeldAttitudeSigma * kDegreesPerRadian);
+    reader->finish();
+  }
+  Block& block = project.block;
+  if (given && use) {
+    const auto tells = [](const ScannedImage& image) { return image.header.attitude.has_value(); };
+    const bool has_effect =
+        from_images ? std::ranges::any_of(scanned, tells) : std::ranges::any_of(block.frames, has_attitude);
+    check_effect(top, "attitude", "attitudes", from_images, has_effect, project.warnings);
+  }
+  if (!use)
+    for (Frame& frame : block.frames) frame.attitude_prior.reset();
+  for (Frame& frame : block.frames)
+    if (frame.attitude_prior && sigma_deg) frame.attitude_prior->sigma_rad.setConstant(*sigma_deg * kDegree);
+  if (!use || !from_images || !block.ground.georeferenced) return;
+  const Georeference georeference(block.ground);
+  const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kDegree;
+  const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kDegree;
+  for (std::size_t i = 0; i < scanned.size(); ++i) {
+    if (!scanned[i].header.attitude) continue;
+    const auto& angles = *scanned[i].header.attitude;
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    Frame& frame = block.frames[block.images[image].frame];
+    if (frame.attitude_prior) continue;
+    AttitudePrior prior;
+    prior.rotation_cw =
+        rotation_from(YawPitchRoll{angles.yaw_deg * kDegree, angles.pitch_deg * kDegree, angles.roll_deg * kDegree});
+    if (frame.position_prior)
+      prior.rotation_cw =
+          (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))
+              .normalized();
+    prior.rotation_cw = (block.mount_of(image).pose.rotation.conjugate() * prior.rotation_cw).normalized();
+    // Heading is worse than the vertical: the ground's (tilt, tilt, yaw) seen about the rig's axes.
+    const Eigen::Matrix3d r = prior.rotation_cw.toRotationMatrix();
+    const Eigen::Vector3d variance(tilt * tilt, tilt * tilt, yaw * yaw);
+    prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();
+    frame.attitude_prior = prior;
+  }
+}
+
+}  // namespace megablock

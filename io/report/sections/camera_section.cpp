@@ -1,0 +1,180 @@
+// Cameras and mounts.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/numbers/angles.h"
+#include "io/evaluation/feature_statistics.h"
+#include "io/report/drawing/html.h"
+#include "io/report/sections/sections.h"
+
+namespace megablock::report {
+
+namespace {
+
+constexpr double kSignificant = 2;  // sigmas
+
+// The value that a parameter has in a camera that does not need it: no distortion, principal point in the centre.
+double neutral(const Camera& camera, int parameter) {
+  const Intrinsics start = start_intrinsics(camera.intrinsics.model(), 1, camera.width, camera.height);
+  return parameter == kFocal ? 0 : start[static_cast<std::size_t>(parameter)];
+}
+
+bool in_pixels(const CameraModel& model, int parameter) {
+  return parameter <= kPrincipalY || is_additive(model) || (is_radial(model) && parameter < kRadialTerms);
+}
+
+// Radial coefficients in pixels are too small for decimals.
+std::string with_digits(const CameraModel& model, int parameter, double value) {
+  if (in_pixels(model, parameter)) return fixed(value, 2);
+  return model.kind == CameraModelKind::kIgnRadial ? significant(value, 4) : fixed(value, 6);
+}
+
+// Angle between the rays through the middles of opposite borders, degrees.
+double opening(const Camera& camera, const Intrinsics& k, const Eigen::Vector2d& half) {
+  const Eigen::Vector2d centre(0.5 * camera.width, 0.5 * camera.height);
+  if (k.model().kind == CameraModelKind::kEquirectangular) return 2 * half.norm() / k[kFocal] * kDegreesPerRadian;
+  if (k.model().kind != CameraModelKind::kFisheye) return 2 * std::atan(half.norm() / k[kFocal]) * kDegreesPerRadian;
+  double angle = 0;
+  for (const double side : {-1.0, 1.0}) {
+    const auto ray = viewing_ray(k, centre + side * half);
+    angle += ray ? std::acos(std::clamp(ray->z(), -1.0, 1.0)) * kDegreesPerRadian : 180;
+  }
+  return angle;
+}
+
+// Lower triangle of the correlations of the estimated parameters.
+std::string correlation_table(const BlockResult& result, CameraIndex index) {
+  if (!result.camera_covariance.contains(index)) return "";
+  const Eigen::MatrixXd& c = result.camera_covariance[index];
+  const CameraModel& model = result.block.cameras[index].intrinsics.model();
+  std::vector<int> estimated;
+  for (int k = 0; k < parameter_count(model); ++k)
+    if (c(k, k) > 0 && std::isfinite(c(k, k))) estimated.push_back(k);
+  if (estimated.size() < 2) return "";
+  std::vector<std::string> headings = {"correlation"};
+  for (int k : estimated) headings.push_back(parameter_name(model, k));
+  Table table(std::move(headings));
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    std::vector<std::string> cells = {parameter_name(model, estimated[i])};
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double r =
+          c(estimated[i], estimated[j]) / std::sqrt(c(estimated[i], estimated[i]) * c(estimated[j], estimated[j]));
+      cells.push_back(i == j ? "1"
+                             : fmt::format("<span class=r style=\"--r:{:.2f}\">{}</span>",
+                                           std::isfinite(r) ? std::min(1.0, std::abs(r)) : 0.0, with_sign(r, 2)));
+    }
+    cells.resize(estimated.size() + 1);
+    table.add(std::move(cells));
+  }
+  return table.html("correlation");
+}
+
+std::string camera_table(const BlockResult& result, CameraIndex index) {
+  const Camera& camera = result.block.cameras[index];
+  const bool adjusted = result.state.cameras.contains(index), sigmas = result.camera_covariance.contains(index);
+  Table table({"parameter", "start", "adjusted", "change", "sigma", "÷ sigma", "prior"});
+  const CameraModel& model = camera.intrinsics.model();
+  for (int k = 0; k < parameter_count(model); ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const bool pixels = in_pixels(model, k);
+    const double start = camera.intrinsics[at], now = adjusted ? result.state.cameras[index][at] : kUnknown;
+    const double sigma = sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[index](k, k))) : kUnknown;
+    const double prior = camera.prior_sigma[at];
+    const bool held = prior == 0 || sigma == 0;
+    const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
+    const bool tested = k != kFocal && std::isfinite(ratio);
+    table.add(
+        {parameter_name(model, k) + (pixels ? " [px]" : ""), with_digits(model, k, start), with_digits(model, k, now),
+         pixels || model.kind != CameraModelKind::kIgnRadial ? with_sign(now - start, pixels ? 2 : 6)
+                                                             : significant(now - start, 4),
+         held ? "held" : significant(sigma, 2), tested ? fixed(ratio, 1) : "",
+         prior == 0             ? "held"
+         : std::isfinite(prior) ? "σ " + significant(prior, 2)
+                                : "free"},
+        tested && ratio < kSignificant ? "weak" : "");
+  }
+  return table.html();
+}
+
+// Along and about the axes of the rig; nothing of a held mount, kMissing of one that no image tells of.
+void add_mount_sigmas(const Mount& mount, const BlockResult::Matrix6& covariance, std::vector<std::string>& cells) {
+  const PoseIncrement sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const auto cell = [&](double value) {
+    cells.push_back(mount.held() ? "" : value > 0 ? sigma_text(value) : kMissing);
+  };
+  for (const double position : sigma.tail<3>()) cell(position * 1000);
+  for (const double rotation : sigma.head<3>()) cell(rotation * kDegreesPerRadian);
+}
+
+std::string mounts_table(const BlockResult& result, RigIndex index) {
+  const Rig& rig = result.block.rigs[index];
+  if (rig.mounts.size() < 2 || !result.state.mounts.contains(index)) return "";
+  const bool sigmas = result.mount_covariance.contains(index) &&
+                      std::any_of(rig.mounts.begin(), rig.mounts.end(), [](const Mount& m) { return !m.held(); });
+  std::vector<std::string> headings = {
+      "mount of " + escape(rig.name), "x [m]", "y [m]", "z [m]", "turned by [°]", "moved by [mm]"};
+  if (sigmas)
+    headings.insert(headings.end(),
+                    {"σx [mm]", "σy [mm]", "σz [mm]", "σ about x [°]", "σ about y [°]", "σ about z [°]"});
+  Table table(std::move(headings));
+  for (std::size_t m = 0; m < rig.mounts.size() && m < result.state.mounts[index].size(); ++m) {
+    const Pose &start = rig.mounts[m].pose, &now = result.state.mounts[index][m];
+    const bool held = rig.mounts[m].held();
+    std::vector<std::string> cells = {
+        count(static_cast<std::int64_t>(m)) + " " + escape(result.block.cameras[rig.mounts[m].camera].name),
+        fixed(now.centre.x(), 4),
+        fixed(now.centre.y(), 4),
+        fixed(now.centre.z(), 4),
+        held ? "held" : fixed(start.rotation.angularDistance(now.rotation) * kDegreesPerRadian, 4),
+        held ? "held" : fixed((now.centre - start.centre).norm() * 1000, 1)};
+    if (sigmas) add_mount_sigmas(rig.mounts[m], result.mount_covariance[index][m], cells);
+    table.add(std::move(cells));
+  }
+  return table.html();
+}
+
+std::string interest_points_table(const BlockResult& result) {
+  Table table({"interest points of", "images", "least", "most", "mean", "total"});
+  const auto statistics = feature_statistics(result);
+  for (CameraIndex c(0); statistics.contains(c); ++c.value) {
+    const FeatureStatistics& s = statistics[c];
+    if (s.images > 0)
+      table.add({escape(result.block.cameras[c].name), count(s.images), count(s.least), count(s.most),
+                 count(std::llround(s.mean())), count(s.total)});
+  }
+  return table.empty() ? "" : "<h3>Interest points</h3>" + table.html();
+}
+
+}  // namespace
+
+std::string cameras_section(const BlockResult& result, const Figures& f) {
+  if (result.block.cameras.empty()) return "";
+  std::string body;
+  const std::int64_t listed = 20;
+  for (CameraIndex camera(0); result.block.cameras.contains(camera) && camera.value < listed; ++camera.value) {
+    const Camera& c = result.block.cameras[camera];
+    const Intrinsics& k = result.state.cameras.contains(camera) ? result.state.cameras[camera] : c.intrinsics;
+    body += "<h3>" + escape(c.name) + "</h3>" +
+            paragraph(
+                fmt::format("{}, {} × {} px, {}° × {}°, {} oriented images{}", model_name(k.model()), c.width, c.height,
+                            fixed(opening(c, k, {0.5 * c.width, 0}), 0), fixed(opening(c, k, {0, 0.5 * c.height}), 0),
+                            count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
+                "muted") +
+            camera_table(result, camera) + correlation_table(result, camera);
+  }
+  if (result.block.cameras.next_index().value > listed)
+    body += paragraph("… and " + count(result.block.cameras.next_index().value - listed) + " more cameras.", "muted");
+  std::string mounts;
+  for (RigIndex rig(0); result.block.rigs.contains(rig) && rig.value < listed; ++rig.value)
+    mounts += mounts_table(result, rig);
+  if (!mounts.empty()) mounts = "<h3>Mounts</h3>" + mounts;
+  const std::string note = paragraph(
+      "÷ sigma: distance from no distortion, of the principal point from the image's centre; parameters within " +
+          fixed(kSignificant, 0) + " sigma are not significant and shown faint.",
+      "muted");
+  return section("cameras", "Cameras", note + body + mounts + interest_points_table(result));
+}
+
+}  // namespace megablock::report

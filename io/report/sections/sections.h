@@ -1,0 +1,46 @@
+// The parts of the report, in the order of the page. Each is empty when there is nothing to say.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "io/evaluation/figures.h"
+#include "io/report/sections/report_context.h"
+#include "io/result/result.h"
+
+namespace megablock::report {
+
+inline constexpr double kGrossRatio = 3;  // differences beyond so many sigma are marked
+
+bool alarms(const SeamCheck& seam);
+double sigmas_apart(const SeamCheck& seam);  // how far its sides differ, over what their sigmas explain
+std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty when unknown
+// Empty without covariances; `after_reading` as in ReportContext, here and below.
+std::string ellipses_figure(const BlockResult& result, const Figures& figures,
+                            const std::function<void()>& after_reading);
+
+std::string headline(const BlockResult& result, const Figures& figures);
+std::string assessment(const BlockResult& result, const Figures& figures);  // what is well and what needs a look
+std::string map_section(const BlockResult& result, const Figures& figures, const std::function<void()>& after_reading);
+std::string coverage_section(const BlockResult& result, const Figures& figures,
+                             const std::function<void()>& after_reading);
+std::string diagnostics_section(const BlockResult& result, const BlockDiagnostics& diagnostics);
+std::string images_section(const BlockResult& result, const Figures& figures,
+                           const std::function<void()>& after_reading);
+std::string tie_points_section(const BlockResult& result, const Figures& figures,
+                               const std::function<void()>& after_reading);
+std::string residuals_section(const BlockResult& result, const Figures& figures);
+std::string observations_section(const BlockResult& result, const Figures& figures);
+std::string positions_section(const BlockResult& result, const Figures& figures);
+std::string attitudes_section(const BlockResult& result, const Figures& figures);
+std::string control_section(const BlockResult& result, const Figures& figures);
+std::string cameras_section(const BlockResult& result, const Figures& figures);
+std::string accuracy_section(const BlockResult& result, const Figures& figures,
+                             const std::function<void()>& after_reading);
+std::string tiles_section(const BlockResult& result, const Figures& figures);
+std::string failures_section(const BlockResult& result, const Figures& figures);
+std::string stages_section(const BlockResult& result);
+std::string provenance_section(const BlockResult& result, const ReportContext& context);
+std::string figures_json(const BlockResult& result, const Figures& figures);  // safe inside <script>
+
+}  // namespace megablock::report

@@ -1,0 +1,137 @@
+#include "io/result/check.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "io/base/error.h"
+#include "io/block/registration.h"
+#include "io/result/measurement_index.h"
+#include "io/result/measurements.h"
+#include "io/result/result.h"
+#include "io/result/result_digest.h"
+#include "io/result/track_batches.h"
+#include "io/store/hdf5/hdf5_file.h"
+#include "io/store/job/events.h"
+#include "io/store/units/unit_files.h"
+
+namespace megablock {
+
+namespace {
+
+class Check {
+ public:
+  explicit Check(const JobStore& store) : store_(store) {}
+
+  std::vector<std::string> run() {
+    if (!std::filesystem::exists(store_.directory()))
+      throw InputError(store_.directory() + ": no such job directory; check the path");
+    if (!holds_job(store_))
+      throw InputError(store_.directory() + ": is no job directory; name the folder given to 'run -j'");
+    attempt([&] { check_text(); });
+    for (const std::string& name : units()) attempt([&] { check_unit(name); });
+    attempt([&] { check_tile_files(); });
+    return std::move(problems_);
+  }
+
+ private:
+  // Collects what an action throws as one problem.
+  void attempt(const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const Error& error) {
+      problems_.emplace_back(error.what());
+    }
+  }
+
+  void check_text() {
+    const std::string path = store_.path("job.json");
+    std::ifstream file(path);
+    if (!file) throw StoreError(path + ": is missing; this is no job, or its first run was interrupted: run it again");
+    if (!nlohmann::json::accept(file)) throw StoreError(path + ": is not valid JSON; restore it or start a new job");
+    read_events(store_);
+  }
+
+  // Everything sealed: the .h5 files of the job's own folder, everything in the folders of the stages, the result.
+  std::vector<std::string> units() const {
+    std::vector<std::string> names;
+    for (const std::string& name : store_.list("")) {
+      const bool top = name.find('/') == std::string::npos;
+      const bool text = name.starts_with("events/") || name.starts_with("stages/") || name.starts_with("scratch/") ||
+                        name.starts_with("merge/parts/") || (name.starts_with("result/") && name != kResult) ||
+                        (name.starts_with("register/") && !name.ends_with(".h5"));
+      if (top ? name.ends_with(".h5") : !text) names.push_back(name);
+    }
+    return names;
+  }
+
+  void check_unit(const std::string& name) {
+    const std::string path = store_.verified_path(name);
+    if (!name.ends_with(".h5")) return;  // its contents are known to its stage alone
+    const std::string kind = file_kind(path);
+    if (kind == "result") {
+      check_result(path);
+    } else {
+      const std::map<std::string, std::function<void()>> readers = {
+          {"block", [&] { check(read_block(path)); }},
+          {"features", [&] { read_features(path); }},
+          {"candidates", [&] { read_candidates(path); }},
+          {"matches", [&] { read_matches(path); }},
+          {"tiles", [&] { read_tiles(path); }},
+          {"tracks", [&] { read_tracks(path); }},
+          {"measurement_index", [&] { check_measurement_index(store_); }},
+          {"state", [&] { read_state(path); }},
+          {"orientation", [&] { read_orientation(path); }},
+          {"adjustment", [&] { read_adjustment(path); }},
+          {"places", [&] { read_places(path); }},
+          {"registrations", [&] { read_registrations(path); }},
+          {"trajectory", [&] { read_trajectory(path); }}};
+      if (const auto reader = readers.find(kind); reader != readers.end()) reader->second();
+    }
+  }
+
+  void check_result(const std::string& path) {
+    const BlockResult result = read_result_without_tracks(path);
+    const StoredTracks tracks(path);
+    ResultDigest contents(result.state, tracks.track_count());
+    tracks.visit([&](const TrackResults& batch) { contents.add(batch); });
+    const std::string digest = contents.text();
+    if (digest != result.digest)
+      throw StoreError(path + ": says its digest is " + result.digest + ", its contents have " + digest +
+                       "; delete it and run again");
+  }
+
+  // A stage of one unit per tile: when some tiles have their file, all must.
+  void check_tile_files() {
+    if (!store_.seal("tiles.h5")) return;
+    const std::int64_t tiles = read_tiles(store_.verified_path("tiles.h5")).tile_count;
+    if (store_.seal(kTrackList) && !std::filesystem::exists(store_.path(kMeasurementIndex)))
+      problems_.push_back(store_.path(kMeasurementIndex) + ": is missing; run the job again to make it");
+    for (const char* folder : {"tracks", "adjust"}) {
+      const std::vector<std::string> names = store_.list(folder);
+      std::int64_t found = 0;
+      for (const std::string& name : names) found += name.ends_with(".h5");
+      if (found > 0 && found < tiles)
+        problems_.push_back(store_.path(folder) + ": has files of " + std::to_string(found) + " of " +
+                            std::to_string(tiles) + " tiles; run the job again to complete it");
+    }
+  }
+
+  const JobStore& store_;
+  std::vector<std::string> problems_;
+};
+
+}  // namespace
+
+bool holds_job(const JobStore& store) {
+  std::error_code error;
+  return std::ranges::any_of(std::vector{"job.json", "lock", "events"},
+                             [&](const char* own) { return std::filesystem::exists(store.path(own), error); });
+}
+
+std::vector<std::string> check_job(const JobStore& store) { return Check(store).run(); }
+
+}  // namespace megablock

@@ -1,0 +1,21 @@
+// Names of the index by image that its writer and its readers share. Internal to io/.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "io/base/index.h"
+#include "io/store/job/job_store.h"
+
+namespace megablock {
+
+inline constexpr const char *kTrackList = "tracks/index.txt", *kMeasurementIndex = "measurements.h5";
+inline constexpr const char *kMeasurementIndexKind = "measurement_index", *kTileFingerprint = "tiles/fingerprint",
+                            *kImageBegin = "images/begin", *kImageTile = "images/tile";
+
+std::string tracks_unit(TileIndex tile);  // "tracks/000003.h5"
+
+// Of the index made of the files that this list of tracks names.
+std::uint64_t measurement_index_fingerprint(const UnitSeal& tracks);
+
+}  // namespace megablock

@@ -1,0 +1,90 @@
+// Aerial block: flight lines east and west over smooth terrain, nadir photos, the long image side across the line.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "geometry/numbers/angles.h"
+#include "io/simulate/scene/scene.h"
+#include "io/simulate/scene/terrain.h"
+
+namespace megablock {
+
+namespace {
+
+class AerialScene : public Scene {
+ public:
+  AerialScene(const SimulationOptions& options, const Intrinsics& intrinsics)
+      : options_(options), intrinsics_(intrinsics), terrain_(options.seed, options.terrain_relief_m, options.height_m) {
+    const double half_diagonal = 0.5 * std::hypot(options.image_width, options.image_height) / options.focal_px;
+    const double deepest = options.height_m + options.terrain_relief_m / 2;
+    range_m_ = 1.15 * deepest * half_diagonal + 0.1 * options.height_m;
+  }
+
+  // The terrain under a random pixel of the frame's image, by fixed-point iteration on the height.
+  std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
+    const Eigen::Vector2d pixel(random.uniform(0, options_.image_width), random.uniform(0, options_.image_height));
+    const auto ray = viewing_ray(intrinsics_, pixel);
+    if (!ray) return std::nullopt;
+    const Eigen::Vector3d direction = frame.rotation.conjugate() * *ray;
+    if (direction.z() > -0.1) return std::nullopt;
+    Eigen::Vector3d point(frame.centre.x(), frame.centre.y(), 0);
+    for (int i = 0; i < 30; ++i) {
+      const double z = terrain_.height(point.x(), point.y());
+      point = frame.centre + direction * ((z - frame.centre.z()) / direction.z());
+    }
+    point.z() = terrain_.height(point.x(), point.y());
+    return SurfacePoint{point, Eigen::Vector3d::UnitZ()};
+  }
+  bool visible(const Eigen::Vector3d&, const SurfacePoint&) const override { return true; }
+  double range_m() const override { return range_m_; }
+  bool along_passes() const override { return false; }
+
+ private:
+  SimulationOptions options_;
+  Intrinsics intrinsics_;
+  Terrain terrain_;
+  double range_m_;
+};
+
+// Nadir camera whose image x axis (right) points at azimuth `right` (from east, counter-clockwise): y down = backward.
+Eigen::Quaterniond nadir_rotation(double right) {
+  Eigen::Matrix3d r;
+  r.row(0) << std::cos(right), std::sin(right), 0;
+  r.row(1) << std::sin(right), -std::cos(right), 0;
+  r.row(2) << 0, 0, -1;
+  return Eigen::Quaterniond(r).normalized();
+}
+
+}  // namespace
+
+Layout make_aerial_layout(const SimulationOptions& options) {
+  Layout layout;
+  const CameraIndex camera = add_single_camera_rig(options, layout);
+
+  const double base = (1 - options.forward_overlap) * options.height_m * options.image_height / options.focal_px;
+  const double spacing = (1 - options.side_overlap) * options.height_m * options.image_width / options.focal_px;
+  const double n = static_cast<double>(options.frames);
+  // As square on the ground as possible.
+  const auto lines = std::max<std::int64_t>(1, std::llround(std::sqrt(n * base / spacing)));
+  const std::int64_t per_line = (options.frames + lines - 1) / lines;
+  for (std::int64_t f = 0; f < options.frames; ++f) {
+    const std::int64_t line = f / per_line, place = f % per_line;
+    const bool westward = line % 2 == 1;
+    const double along = static_cast<double>(westward ? per_line - 1 - place : place);
+    Random random(options.seed, Random::Purpose::kFrame, static_cast<std::uint64_t>(f));
+    const double heading = westward ? std::numbers::pi : 0;
+    Pose pose;
+    pose.centre = {(along - 0.5 * static_cast<double>(per_line - 1)) * base,
+                   (static_cast<double>(line) - 0.5 * static_cast<double>(lines - 1)) * spacing, options.height_m};
+    pose.centre += Eigen::Vector3d(0.03 * base, 0.02 * spacing, 0.01 * options.height_m)
+                       .cwiseProduct(random.normal3().cwiseMin(2).cwiseMax(-2));
+    const Eigen::Vector3d tilt = random.normal3().cwiseMin(2.5).cwiseMax(-2.5);
+    pose.rotation = nadir_rotation(heading - std::numbers::pi / 2);
+    pose.rotation = rotation_update(pose.rotation, kDegree * Eigen::Vector3d(1.0, 1.0, 1.5).cwiseProduct(tilt));
+    add_simulated_frame(layout, pose, line, 2.0 * static_cast<double>(f));
+  }
+  layout.scene = std::make_unique<AerialScene>(options, layout.truth.cameras[camera]);
+  return layout;
+}
+
+}  // namespace megablock

@@ -1,0 +1,267 @@
+// Tie points and their observations.
+//
+// Every frame seeds points_per_frame / mean_track points on the surfaces in its images; a second round tops up the
+// frames that got too few from their neighbours (the borders of the block). A point's observations are chosen among all
+// images that see it: the seeding frame's and, at the wanted track length, others in random order (aerial) or nearest
+// in time first, partly from another pass (street).
+//
+// Frames work in groups. All threads find what the frames of a group propose, which depends on what was there before
+// the group alone; in the order of the frames it is seen how many observations each track gets and what its number is;
+// all threads measure. Proposals draw from the frame's stream, measurements from the track's, and groups have the same
+// frames for any number of threads: so has the block.
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/threads/workers.h"
+#include "io/simulate/blocks/wrong_matches.h"
+#include "io/simulate/scene/scene.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::int64_t kGroup = 64;  // frames
+constexpr int kMostExtra = 2;        // observations that a track gets for those that others lack
+// Of the observations that are asked for, below which a frame is topped up.
+constexpr double kEnough = 0.97;
+
+// A point that a frame seeds.
+struct Proposal {
+  SurfacePoint point;
+  int wanted = 0;                   // observations
+  std::vector<Sighting> sightings;  // that may become them, first ones first; then those that do, by image
+};
+
+class TrackMaker {
+ public:
+  TrackMaker(const SimulationOptions& options, const Layout& layout, const Observer& observer, const TrackSink& sink,
+             std::int64_t batch_observations)
+      : options_(options),
+        layout_(layout),
+        observer_(observer),
+        sink_(sink),
+        batch_observations_(batch_observations),
+        count_(layout.block.frames.size(), 0) {
+    batch_.tracks.begin = {0};
+  }
+
+  void run() {
+    const auto frames = static_cast<std::int64_t>(count_.size()), groups = (frames + kGroup - 1) / kGroup;
+    for (std::int64_t group = 0; group < groups; ++group) {
+      std::vector<FrameIndex> members;
+      for (std::int64_t f = group * kGroup; f < std::min(frames, (group + 1) * kGroup); ++f) members.emplace_back(f);
+      make_tracks(members, [&](FrameIndex frame) { return seeds(frame); });
+    }
+    // Far from one another: what one of them gets leaves the others as they are.
+    for (std::int64_t group = 0; group < groups; ++group) {
+      std::vector<FrameIndex> members;
+      for (std::int64_t f = group; f < frames; f += groups) members.emplace_back(f);
+      make_tracks(members, [&](FrameIndex frame) { return topping_up(frame); });
+    }
+    hand_over();
+  }
+
+ private:
+  std::int64_t& count_of(FrameIndex frame) { return count_[static_cast<std::size_t>(frame.value)]; }
+  std::int64_t count_of(FrameIndex frame) const { return count_[static_cast<std::size_t>(frame.value)]; }
+  FrameIndex frame_of(const Sighting& sighting) const { return layout_.block.images[sighting.image].frame; }
+  Random stream_of(FrameIndex frame, int round) const {
+    return {options_.seed, Random::Purpose::kTracks, static_cast<std::uint64_t>(2 * frame.value + round)};
+  }
+  int most_tries() const { return 40 * options_.points_per_frame; }
+
+  template <typename Propose>
+  void make_tracks(const std::vector<FrameIndex>& frames, const Propose& propose) {
+    const std::int64_t count = std::ssize(frames);
+    std::vector<std::vector<Proposal>> proposals(frames.size());
+    visit_in_parallel(count, [&](std::int64_t i) {
+      proposals[static_cast<std::size_t>(i)] = propose(frames[static_cast<std::size_t>(i)]);
+    });
+    std::vector<std::int64_t> first_track;
+    for (std::vector<Proposal>& of_frame : proposals) {
+      first_track.push_back(next_track_);
+      next_track_ += std::ssize(of_frame);
+      for (Proposal& proposal : of_frame) accept(proposal);
+    }
+    std::vector<SimulatedTracks> made(frames.size());
+    visit_in_parallel(count, [&](std::int64_t i) {
+      const auto row = static_cast<std::size_t>(i);
+      made[row] = measured(proposals[row], first_track[row]);
+    });
+    for (const SimulatedTracks& tracks : made)
+      for (std::size_t t = 0; t < tracks.points.size(); ++t) {
+        append_tracks(batch_, tracks, t, t + 1);
+        if (batch_.tracks.observation_count() >= batch_observations_) hand_over();
+      }
+  }
+
+  std::vector<Proposal> seeds(FrameIndex frame) const {
+    Random random = stream_of(frame, 0);
+    // The fractional part is settled by chance, so that the mean comes out right.
+    const auto points = static_cast<std::int64_t>(options_.points_per_frame / options_.mean_track + random.uniform());
+    std::vector<Proposal> seeded;
+    for (int tries = 0; std::ssize(seeded) < points && tries < most_tries(); ++tries)
+      if (auto proposal = propose(frame, random)) seeded.push_back(*std::move(proposal));
+    return seeded;
+  }
+
+  std::vector<Proposal> topping_up(FrameIndex frame) const {
+    Random random = stream_of(frame, 1);
+    std::int64_t observations = count_of(frame);
+    std::vector<Proposal> added;
+    for (int tries = 0; static_cast<double>(observations) < kEnough * options_.points_per_frame && tries < most_tries();
+         ++tries) {
+      auto proposal = propose(frame, random);
+      if (!proposal) continue;
+      const auto length = std::min<std::ptrdiff_t>(proposal->wanted, std::ssize(proposal->sightings));
+      observations += std::count_if(proposal->sightings.begin(), proposal->sightings.begin() + length,
+                                    [&](const Sighting& s) { return frame_of(s) == frame; });
+      added.push_back(*std::move(proposal));
+    }
+    return added;
+  }
+
+  // Empty: the draw hit nothing, or nothing that another frame sees.
+  std::optional<Proposal> propose(FrameIndex frame, Random& random) const {
+    const auto point = layout_.scene->sample(layout_.truth.frames[frame], random);
+    if (!point) return std::nullopt;
+    std::vector<Sighting> seen = observer_.sightings(*point);
+    const auto in_frame =
+        std::count_if(seen.begin(), seen.end(), [&](const Sighting& s) { return frame_of(s) == frame; });
+    if (in_frame == 0 || in_frame == std::ssize(seen)) return std::nullopt;
+    const int wanted = 2 + random.poisson(options_.mean_track - 2);
+    return Proposal{*point, wanted, first_choice(frame, seen, wanted + kMostExtra, random)};
+  }
+
+  // The seeding frame first, then those whose observations are wanted most; so many of them.
+  std::vector<Sighting> first_choice(FrameIndex frame, const std::vector<Sighting>& seen, std::ptrdiff_t count,
+                                     Random& random) const {
+    const bool two_passes = layout_.scene->along_passes() && random.uniform() < 0.3;
+    const std::int64_t pass = layout_.block.frames[frame].pass;
+    struct Candidate {
+      double rank;
+      Sighting sighting;
+    };
+    std::vector<Candidate> candidates;
+    candidates.reserve(seen.size());
+    bool owned = false;
+    for (const Sighting& s : seen) {
+      const FrameIndex other = frame_of(s);
+      double rank = random.uniform();
+      if (layout_.scene->along_passes()) {
+        // Frames of another visit are ranked by distance: they meet the point anywhere in their drive.
+        const bool same = layout_.block.frames[other].pass == pass &&
+                          std::abs(other.value - frame.value) <= layout_.scene->visit_frames();
+        rank += same ? static_cast<double>(std::abs(other.value - frame.value))
+                     : (two_passes ? 0 : 1e6) +
+                           (layout_.truth.frames[other].centre - layout_.truth.frames[frame].centre).norm() /
+                               options_.frame_distance_m;
+      } else if (count_of(other) >= options_.points_per_frame) {
+        rank += 1;
+      }
+      if (other == frame && !owned) rank = -1;
+      owned = owned || other == frame;
+      candidates.push_back({rank, s});
+    }
+    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+      return a.rank != b.rank ? a.rank < b.rank : a.sighting.image < b.sighting.image;
+    });
+    // The second of the list must be of another frame: two cameras of a rig make no track.
+    const auto partner = std::find_if(candidates.begin() + 1, candidates.end(),
+                                      [&](const Candidate& c) { return frame_of(c.sighting) != frame; });
+    std::rotate(candidates.begin() + 1, partner, partner + 1);
+    candidates.resize(static_cast<std::size_t>(std::min(count, std::ssize(candidates))));
+    std::vector<Sighting> chosen;
+    for (const Candidate& candidate : candidates) chosen.push_back(candidate.sighting);
+    return chosen;
+  }
+
+  // The observations of the track. What tracks at the border of the block lack is given to later ones.
+  void accept(Proposal& proposal) {
+    const int length = proposal.wanted + std::min(kMostExtra, lacking_);
+    std::vector<Sighting>& seen = proposal.sightings;
+    seen.resize(std::min(seen.size(), static_cast<std::size_t>(length)));
+    lacking_ += proposal.wanted - static_cast<int>(seen.size());
+    std::sort(seen.begin(), seen.end(), [](const Sighting& a, const Sighting& b) { return a.image < b.image; });
+    for (const Sighting& s : seen) ++count_of(frame_of(s));
+  }
+
+  SimulatedTracks measured(const std::vector<Proposal>& proposals, std::int64_t track) const {
+    SimulatedTracks result;
+    result.tracks.begin = {0};
+    for (const Proposal& proposal : proposals) {
+      result.tracks.id.emplace_back(track);
+      result.points.push_back(proposal.point.position);
+      Random random(options_.seed, Random::Purpose::kNoise, static_cast<std::uint64_t>(track++));
+      measure(proposal, random, result);
+      result.tracks.begin.push_back(result.tracks.observation_count());
+    }
+    return result;
+  }
+
+  void measure(const Proposal& proposal, Random& random, SimulatedTracks& result) const {
+    const std::vector<Sighting>& seen = proposal.sightings;
+    const WrongGroup wrong = draw_wrong_group(options_, layout_, observer_, proposal.point, seen, random);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const Camera& camera = layout_.block.cameras[layout_.block.camera_of(seen[i].image)];
+      const bool agreed = i >= wrong.begin && i < wrong.begin + wrong.pixels.size();  // on a wrong place
+      const bool stray = agreed ? !wrong.pixels[i - wrong.begin] : random.uniform() < wrong.stray_share;
+      const Eigen::Vector2d place = agreed && !stray ? *wrong.pixels[i - wrong.begin] : seen[i].pixel;
+      Eigen::Vector2d pixel;
+      do {
+        const double a = stray ? random.uniform() : random.normal(), b = stray ? random.uniform() : random.normal();
+        pixel = stray ? Eigen::Vector2d(a * camera.width, b * camera.height)
+                      : Eigen::Vector2d(place + options_.image_noise_px * Eigen::Vector2d(a, b));
+      } while (pixel.x() < 0 || pixel.x() > camera.width || pixel.y() < 0 || pixel.y() > camera.height);
+      result.tracks.image.push_back(seen[i].image);
+      result.tracks.x.push_back(to_fixed_pixel(pixel.x()));
+      result.tracks.y.push_back(to_fixed_pixel(pixel.y()));
+      result.tracks.feature.push_back(-1);
+      result.outlier.push_back(static_cast<std::uint8_t>(stray    ? Verdict::kStray
+                                                         : agreed ? wrong.verdict
+                                                                  : Verdict::kRight));
+    }
+  }
+
+  void hand_over() {
+    if (!batch_.tracks.id.empty()) sink_(batch_);
+    batch_ = {};
+    batch_.tracks.begin = {0};
+  }
+
+  const SimulationOptions& options_;
+  const Layout& layout_;
+  const Observer& observer_;
+  const TrackSink& sink_;
+  std::int64_t batch_observations_;
+  SimulatedTracks batch_;            // finished tracks that the sink has not got yet
+  std::int64_t next_track_ = 0;      // index of the next track
+  std::vector<std::int64_t> count_;  // observations of each frame so far
+  int lacking_ = 0;                  // observations by which tracks fell short of their wanted length
+};
+
+}  // namespace
+
+void append_tracks(SimulatedTracks& to, const SimulatedTracks& from, std::size_t first, std::size_t last) {
+  const auto append = [](auto& all, const auto& some, auto begin, auto end) {
+    all.insert(all.end(), some.begin() + static_cast<std::ptrdiff_t>(begin),
+               some.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  const std::int64_t before = to.tracks.observation_count(), begin = from.tracks.begin[first],
+                     end = from.tracks.begin[last];
+  for (std::size_t t = first; t < last; ++t) to.tracks.begin.push_back(before - begin + from.tracks.begin[t + 1]);
+  append(to.tracks.id, from.tracks.id, first, last);
+  append(to.points, from.points, first, last);
+  append(to.tracks.image, from.tracks.image, begin, end);
+  append(to.tracks.x, from.tracks.x, begin, end);
+  append(to.tracks.y, from.tracks.y, begin, end);
+  append(to.tracks.feature, from.tracks.feature, begin, end);
+  append(to.outlier, from.outlier, begin, end);
+}
+
+void simulate_tracks(const SimulationOptions& options, const Layout& layout, const Observer& observer,
+                     const TrackSink& sink, std::int64_t batch_observations) {
+  TrackMaker(options, layout, observer, sink, batch_observations).run();
+}
+
+}  // namespace megablock

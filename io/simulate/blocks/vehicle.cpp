@@ -1,0 +1,129 @@
+#include "io/simulate/blocks/vehicle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "geometry/numbers/angles.h"
+
+namespace megablock {
+
+namespace {
+
+// Rig axes: x right, y down, z ahead; yaw to the right, pitch upwards.
+struct Placing {
+  int id;
+  double yaw_deg, pitch_deg;
+  Eigen::Vector3d centre;  // metres
+};
+
+Eigen::Vector3d on_head(double yaw_deg, double up) {
+  return {0.25 * std::sin(kDegree * yaw_deg), -up, 0.25 * std::cos(kDegree * yaw_deg)};
+}
+
+// In the order in which cameras are added as the rig grows.
+std::vector<Placing> places() {
+  const auto head = [](int id, double yaw, double pitch) {
+    return Placing{id, yaw, pitch, on_head(yaw, pitch > 0 ? 0.15 : 0)};
+  };
+  return {head(22, 0, 0),
+          head(42, 180, 0),
+          head(31, -90, 0),
+          head(32, 90, 0),
+          head(21, -45, 0),
+          head(23, 45, 0),
+          head(41, -135, 0),
+          head(43, 135, 0),
+          head(33, -90, 50),
+          head(34, 90, 50),
+          {11, 0, 0, {-0.6, 0.5, 0.8}},
+          {12, 0, 0, {0.6, 0.5, 0.8}},
+          {51, 180, 0, {0.6, 0.5, -0.8}},
+          {52, 180, 0, {-0.6, 0.5, -0.8}},
+          {61, -90, -20, {-0.6, 0.5, 0}},
+          {62, 90, -20, {0.6, 0.5, 0}}};
+}
+
+Pose nominal_mount(const Placing& place) {
+  const double yaw = kDegree * place.yaw_deg, pitch = kDegree * place.pitch_deg;
+  const Eigen::Vector3d right(std::cos(yaw), 0, -std::sin(yaw));
+  const Eigen::Vector3d ahead(std::sin(yaw) * std::cos(pitch), -std::sin(pitch), std::cos(yaw) * std::cos(pitch));
+  Eigen::Matrix3d r;
+  r << right.transpose(), ahead.cross(right).transpose(), ahead.transpose();
+  return {Eigen::Quaterniond(r).normalized(), place.centre};
+}
+
+// Camera 3 of the thesis (HD, f = 1400 px): principal point (961, 542), up to 14 px of distortion at the edge, here as
+// Brown's model. The lab's calibration, which the block starts from, is off by 0.1 % of the focal length, a pixel of
+// the principal point and about a pixel of distortion at the edge.
+CameraIndex add_camera(const SimulationOptions& options, const std::string& name, Random& random, Layout& layout) {
+  const CameraIndex index = layout.block.cameras.next_index();
+  Camera camera;
+  camera.name = name;
+  camera.width = options.image_width;
+  camera.height = options.image_height;
+  camera.focal_known = true;
+  camera.intrinsics = {options.focal_px, options.image_width / 2.0 + 1, options.image_height / 2.0 + 2, 0, 0, 0, 0, 0};
+  if (options.distortion) {
+    camera.intrinsics[kRadial1] = 0.09;
+    camera.intrinsics[kRadial2] = -0.095;
+  }
+  Intrinsics truth = camera.intrinsics;
+  truth[kFocal] *= 1 + 0.001 * random.normal();
+  truth[kPrincipalX] += random.normal();
+  truth[kPrincipalY] += random.normal();
+  if (options.distortion) {
+    truth[kRadial1] += 0.002 * random.normal();
+    truth[kRadial2] += 0.002 * random.normal();
+    truth[kDecentring1] = 1e-4 * random.normal();
+    truth[kDecentring2] = 1e-4 * random.normal();
+  }
+  if (options.calibrate && options.free_cameras) {
+    std::fill_n(camera.prior_sigma.begin(), camera.intrinsics.size(), std::numeric_limits<double>::infinity());
+    camera.prior_sigma[kRadial3] = 0;
+  } else {
+    camera.intrinsics = truth;
+  }
+  layout.block.cameras.push_back(camera);
+  layout.truth.cameras.push_back(truth);
+  return index;
+}
+
+}  // namespace
+
+void add_vehicle(const SimulationOptions& options, Layout& layout) {
+  std::vector<Placing> chosen = places();
+  chosen.resize(static_cast<std::size_t>(options.rig_cameras));
+  std::sort(chosen.begin(), chosen.end(), [](const Placing& a, const Placing& b) { return a.id < b.id; });
+  Rig rig;
+  rig.name = "stereopolis";
+  std::vector<Pose> truth;
+  for (const Placing& place : chosen) {
+    std::string name("c");
+    name.append(std::to_string(place.id));
+    Random random(options.vehicle_seed ? options.vehicle_seed : options.seed, Random::Purpose::kCamera,
+                  2000 + static_cast<std::uint64_t>(place.id));
+    Mount mount;
+    mount.pose = nominal_mount(place);
+    Pose real = mount.pose;
+    const Eigen::Vector3d shift = random.normal3(), turn = random.normal3();
+    if (!rig.mounts.empty()) {
+      real.centre += options.mount_position_error_m * shift;
+      real.rotation = rotation_update(real.rotation, kDegree * options.mount_rotation_error_deg * turn);
+      if (options.calibrate) {
+        mount.position_sigma_m = options.mount_position_error_m;
+        mount.rotation_sigma_rad = kDegree * options.mount_rotation_error_deg;
+      } else {
+        mount.pose = real;
+      }
+    }
+    mount.camera = add_camera(options, name, random, layout);
+    rig.mounts.push_back(mount);
+    truth.push_back(real);
+    layout.image_suffixes.push_back("_" + name);
+  }
+  layout.block.rigs.push_back(std::move(rig));
+  layout.truth.mounts.push_back(std::move(truth));
+}
+
+}  // namespace megablock

@@ -1,0 +1,43 @@
+#include "io/simulate/blocks/wrong_matches.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace megablock {
+
+// With n observations a group has m of them, m uniform in 1 .. n/2, mean (1 + n/2) / 2. It is drawn with probability
+// p = group_share n / mean, so that the expected number of wrong observations is group_share n.
+WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layout, const Observer& observer,
+                            const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random) {
+  WrongGroup group;
+  group.stray_share = options.outlier_share;
+  if (options.outlier_share == 0) return group;
+  const auto mistake = layout.scene->mistake(point, random);
+  if (!mistake) return group;
+  const double group_share = options.outlier_share * 2 / 3, n = static_cast<double>(seen.size());
+  // Of the observations outside of groups, so that the shares add up.
+  group.stray_share = (options.outlier_share - group_share) / (1 - group_share);
+  const auto most = static_cast<std::int64_t>(seen.size() / 2);
+  const double mean = 0.5 * static_cast<double>(1 + most);
+  const bool drawn = random.uniform() < group_share * n / mean;
+  const std::int64_t length = 1 + random.below(most);
+  const std::int64_t begin = random.below(std::ssize(seen) - length + 1);
+  if (!drawn) return group;
+  group.begin = static_cast<std::size_t>(begin);
+  group.verdict = mistake->verdict;
+  const auto time_of = [&](const Sighting& s) {
+    return layout.block.frames[layout.block.images[s.image].frame].time_s;
+  };
+  for (std::int64_t i = begin; i < begin + length; ++i) {
+    const Sighting& s = seen[static_cast<std::size_t>(i)];
+    const double elapsed = time_of(s) - time_of(seen[group.begin]);
+    const Eigen::Vector3d place = point.position + mistake->offset + mistake->velocity * (0.5 + elapsed);
+    auto pixel = std::abs(elapsed) < 10 ? observer.pixel_of(s.image, place) : std::nullopt;
+    // Too near to be wrong: along the line of sight.
+    if (pixel && (*pixel - s.pixel).norm() < 5 + 6 * options.image_noise_px) pixel.reset();
+    group.pixels.push_back(pixel);
+  }
+  return group;
+}
+
+}  // namespace megablock

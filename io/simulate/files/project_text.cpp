@@ -1,0 +1,30 @@
+#include "io/simulate/files/project_text.h"
+
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+
+namespace megablock {
+
+void refuse_edited_project(const std::string& folder, const std::string& text, EditedProject edited) {
+  const std::filesystem::path path = std::filesystem::path(folder) / "block.yaml";
+  if (edited == EditedProject::kOverwrite || !std::filesystem::exists(path)) return;
+  std::ifstream file(path);
+  if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return;
+  throw InputError(path.string() +
+                   ": is there and differs from what would be written: it was edited, or is of another simulation; "
+                   "name another folder with -o, or give --overwrite");
+}
+
+void write_text(const std::string& path, const std::string& text) {
+  std::ofstream stream(path);
+  stream << text;
+  stream.close();
+  if (!stream) throw_file_error(path, "written", errno);
+}
+
+}  // namespace megablock

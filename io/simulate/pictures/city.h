@@ -1,0 +1,104 @@
+// The surfaces of the rendered scenes: terrain with boxes on it, cut by rays.
+#pragma once
+
+#include "io/simulate/pictures/texture.h"
+#include "io/simulate/scene/scene.h"
+#include "io/simulate/scene/terrain.h"
+
+namespace megablock {
+
+struct Box {
+  Eigen::Vector3d low, high;  // metres, sides parallel to the axes
+};
+
+// Whether a ray from outside enters the box (slab test), at which distance, and through which axis' face. `inverse`: of
+// the direction's components.
+bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d& inverse, double& distance, int& axis);
+
+// Heights on a square lattice, bilinear between: the terrain of a rendered scene exactly.
+class HeightGrid {
+ public:
+  HeightGrid() = default;
+  // Samples `height(x, y)` over the rectangle; outside it the border's heights go on.
+  template <typename Height>
+  HeightGrid(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double cell_m, const Height& height)
+      : low_(low), cell_m_(cell_m) {
+    columns_ = static_cast<std::int64_t>((high.x() - low.x()) / cell_m) + 2;
+    rows_ = static_cast<std::int64_t>((high.y() - low.y()) / cell_m) + 2;
+    for (std::int64_t r = 0; r < rows_; ++r)
+      for (std::int64_t c = 0; c < columns_; ++c)
+        heights_.push_back(
+            height(low.x() + static_cast<double>(c) * cell_m, low.y() + static_cast<double>(r) * cell_m));
+    measure();
+  }
+  double height(double x, double y) const { return sample(x, y)[0]; }
+  Eigen::Vector3d normal(double x, double y) const;
+  // Distance along the ray (unit direction) to the surface; infinity beyond `limit`. `guess`: of a neighbouring ray.
+  double intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit, double guess) const;
+
+ private:
+  void measure();
+  // Height and its derivatives by x and y.
+  Eigen::Vector3d sample(double x, double y) const;
+
+  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
+  double cell_m_ = 1;
+  std::int64_t columns_ = 0, rows_ = 0;
+  std::vector<double> heights_;  // [rows * columns]
+  double highest_ = 0, steepest_ = 0;
+};
+
+class City : public Scene {
+ public:
+  static constexpr std::int64_t kSky = -2, kGround = -1;
+  struct Hit {
+    double distance = 0;         // along the unit direction
+    std::int64_t object = kSky;  // kSky, kGround or a box
+    Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
+  };
+
+  City(const SimulationOptions& options, const Layout& layout);
+
+  // `ground_guess`: distance at which a neighbouring ray met the ground; 0 = unknown.
+  Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double ground_guess = 0) const;
+  // Red, green, blue, 0 to 255. `pixel_angle`: of a pixel, radians.
+  Eigen::Vector3f colour(const Hit& hit, const Eigen::Vector3d& direction, double pixel_angle) const;
+  // What falls on a surface: sunlight from the south-west, with shadows of the boxes, and skylight.
+  float light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
+
+  std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override;
+  bool visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const override;
+  std::optional<SurfacePoint> road(const Eigen::Vector2d& place) const override {
+    return SurfacePoint{{place.x(), place.y(), ground_.height(place.x(), place.y())}, Eigen::Vector3d::UnitZ()};
+  }
+  double range_m() const override { return range_m_; }
+  bool along_passes() const override { return street_; }
+
+  const std::vector<Box>& boxes() const { return boxes_; }
+  const HeightGrid& ground() const { return ground_; }
+
+ private:
+  void build_town();     // blocks of houses on a lattice
+  void build_streets();  // houses along the streets of the street scene
+  void add_box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double height);
+  void sort_boxes();
+  // Nearest box before `limit`; returns its number or -1, its distance and the axis of the face.
+  std::int64_t nearest_box(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit,
+                           double& distance, int& axis) const;
+
+  SimulationOptions options_;
+  bool street_;
+  double range_m_;
+  Intrinsics intrinsics_;
+  Eigen::Vector2d low_, high_;  // extent in plan
+  HeightGrid ground_;
+  Texture texture_;
+  std::vector<Box> boxes_;
+  double highest_box_ = 0;
+  // Boxes by square cells in plan: those that touch cell c are rows [cell_begin_[c], cell_begin_[c + 1]).
+  double cell_m_ = 1;
+  std::int64_t columns_ = 0, rows_ = 0;
+  std::vector<std::int64_t> cell_begin_, cell_boxes_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,23 @@
+// Writes a rendered picture as a camera would: JPEG with EXIF.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "io/block/crs.h"
+
+namespace megablock {
+
+struct SimulatedExif {
+  std::string model;
+  double focal_px = 0;  // written as millimetres with the resolution of the focal plane
+  double time_s = 0;    // since 1970
+  std::optional<Geodetic> position;
+  double position_sigma_m = 0;  // horizontal; 0: not stated
+};
+
+// Quality 95. InputError when the file cannot be written.
+void write_jpeg(const std::string& path, const cv::Mat& image, const SimulatedExif& exif);
+
+}  // namespace megablock

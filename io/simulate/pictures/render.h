@@ -1,0 +1,38 @@
+// Pictures of a City as a camera sees them.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "io/simulate/pictures/city.h"
+#include "io/simulate/pictures/vehicle_view.h"
+
+namespace megablock {
+
+// Viewing directions of a camera at the 2 x 2 samples of every pixel, computed once and used for all its images.
+class RayTable {
+ public:
+  RayTable(const Camera& camera, const Intrinsics& intrinsics);
+  // Normalised image coordinates (X/Z, Y/Z) of a sample; rows and columns of samples, two per pixel.
+  const Eigen::Vector2f& at(int row, int column) const {
+    return rays_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
+  }
+  int rows() const { return rows_; }
+  int columns() const { return columns_; }
+
+ private:
+  int rows_, columns_;
+  std::vector<Eigen::Vector2f> rays_;
+};
+
+// The vehicle in a camera's pictures, and the light on it where this one was taken.
+struct SeenVehicle {
+  const VehicleView* view = nullptr;  // none: the picture shows the scene alone
+  VehicleView::Light light{};
+};
+
+// 8-bit BGR picture; `camera` is the pose ground -> camera. Sensor noise depends on `seed` alone, and the picture not
+// on the number of threads.
+cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed,
+                     const SeenVehicle& vehicle = {});
+
+}  // namespace megablock

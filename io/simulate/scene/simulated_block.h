@@ -1,0 +1,41 @@
+// A simulated block together with its truth.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "io/block/block.h"
+#include "io/block/tracks.h"
+
+namespace megablock {
+
+// What a simulated observation shows.
+enum class Verdict : std::uint8_t {
+  kRight = 0,     // the point, with image_noise_px
+  kStray = 1,     // anything, anywhere in the image
+  kRepeated = 2,  // another place of a repeated facade, in which neighbouring observations of the track agree
+  kVehicle = 3    // a spot on a moving vehicle, the same one in neighbouring observations
+};
+
+// State of the satellites at a frame of a simulated trajectory.
+enum class Gnss : std::uint8_t { kNone = 0, kMasked = 1, kClear = 2 };
+
+struct SimulatedTracks {
+  TrackSet tracks;                      // noisy observations
+  std::vector<Eigen::Vector3d> points;  // true positions [tracks]
+  std::vector<std::uint8_t> outlier;    // [observations] Verdict; 0 = right
+};
+
+// Everything of a block; its tracks are all of them, or none where they went to a sink.
+struct SimulatedBlock : SimulatedTracks {
+  Block block;  // what a job is given
+  BlockState truth;
+  std::vector<Eigen::Vector3d> control_truth;  // true positions [block.control_points]
+  std::vector<Gnss> gnss;                      // [frames] Stereopolis; else empty
+};
+
+// Receives the tracks of a block in batches, in the order of their indices.
+using TrackSink = std::function<void(const SimulatedTracks&)>;
+
+}  // namespace megablock

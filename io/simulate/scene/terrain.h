@@ -1,0 +1,38 @@
+// Smooth ground: a sum of four plane waves.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "io/simulate/scene/random.h"
+
+namespace megablock {
+
+class Terrain {
+ public:
+  // Heights stay within +-relief_m / 2; the shortest wave is 1.5 times `scale_m` long.
+  Terrain(std::uint64_t seed, double relief_m, double scale_m) {
+    Random random(seed, Random::Purpose::kTerrain);
+    constexpr std::array<double, 4> kShare = {0.4, 0.3, 0.2, 0.1}, kLength = {6, 4, 2.5, 1.5};
+    for (std::size_t i = 0; i < waves_.size(); ++i) {
+      const double direction = random.uniform(0, 2 * std::numbers::pi);
+      const double number = 2 * std::numbers::pi / (kLength[i] * scale_m);
+      waves_[i] = {number * std::cos(direction), number * std::sin(direction), random.uniform(0, 2 * std::numbers::pi),
+                   kShare[i] * relief_m / 2};
+    }
+  }
+  double height(double x, double y) const {
+    double z = 0;
+    for (const Wave& w : waves_) z += w.amplitude * std::sin(w.x * x + w.y * y + w.phase);
+    return z;
+  }
+
+ private:
+  struct Wave {
+    double x, y, phase, amplitude;
+  };
+  std::array<Wave, 4> waves_;
+};
+
+}  // namespace megablock

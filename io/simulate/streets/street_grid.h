@@ -1,0 +1,39 @@
+// The street scene's plan, shared by the drives, the tie points and the rendered houses.
+//
+// Streets run along x = i S and y = j S for all integers i, j (S the spacing); the ground between them is built up to
+// about kFacade metres from the axes, house by house.
+#pragma once
+
+#include "io/simulate/scene/simulated_block.h"
+#include "io/simulate/scene/simulation_options.h"
+#include "io/simulate/scene/terrain.h"
+
+namespace megablock {
+
+inline constexpr double kFacade = 9;         // mean distance of the facades from the axis, metres
+inline constexpr double kFacadeDepth = 1.5;  // houses stand back or forward by up to this, metres
+inline constexpr double kHouse = 12;         // length of a house, metres
+
+// Number of the nearest street axis in one coordinate, and the distance to it. (std::round is a slow call at the
+// baseline instruction set.)
+inline std::int64_t nearest_axis(double x, double spacing) {
+  return static_cast<std::int64_t>(x / spacing + (x < 0 ? -0.5 : 0.5));
+}
+inline double off_axis(double x, double spacing) {
+  return std::abs(x - spacing * static_cast<double>(nearest_axis(x, spacing)));
+}
+
+// Distance from the axis of the facade at a place of a street; each house stands at its own.
+inline double facade_distance(std::uint64_t seed, bool street_along_x, std::int64_t axis, int side, double place) {
+  const auto house = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(place / kHouse)));
+  const auto street = static_cast<std::uint64_t>(axis * 4 + (street_along_x ? 2 : 0) + (side > 0 ? 1 : 0));
+  const std::uint64_t bits = mix_bits(mix_bits(seed + house) + street);
+  return kFacade + kFacadeDepth * (static_cast<double>(bits >> 11) * 0x1p-52 - 1);
+}
+
+inline Terrain street_terrain(const SimulationOptions& options) {
+  const double share = options.scene == SimulationOptions::Scene::kStreet ? 0.2 : 1;
+  return Terrain(options.seed, share * options.terrain_relief_m, 400);
+}
+
+}  // namespace megablock

@@ -1,0 +1,34 @@
+// The surfaces of the street scene: roads and facades (street_grid.h).
+#pragma once
+
+#include "io/simulate/scene/scene.h"
+#include "io/simulate/streets/street_grid.h"
+
+namespace megablock {
+
+class StreetScene : public Scene {
+ public:
+  StreetScene(const SimulationOptions& options, const Terrain& terrain)
+      : spacing_(options.street_spacing_m), seed_(options.seed), terrain_(terrain) {}
+
+  double ground(double x, double y) const { return terrain_.height(x, y); }
+  double spacing() const { return spacing_; }
+  // Of the street that a place lies in: 0 along x, 1 along y (at crossings, that whose axis is nearer).
+  int direction_at(const Eigen::Vector3d& place) const {
+    return off_axis(place.y(), spacing_) < off_axis(place.x(), spacing_) ? 0 : 1;
+  }
+
+  // A place on the road or on a facade along the frame's street.
+  std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override;
+  // Within range, not too flat, and the line of sight stays over the streets.
+  bool visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const override;
+  double range_m() const override;
+  bool along_passes() const override { return true; }
+
+ private:
+  double spacing_;
+  std::uint64_t seed_;
+  Terrain terrain_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,88 @@
+#include "io/store/hdf5/hdf5_cameras.h"
+
+#include <algorithm>
+
+namespace megablock {
+
+namespace {
+
+constexpr const char* kCovariance = "cameras/covariance";
+
+// Columns of a matrix of parameters; one when there is no camera.
+std::size_t columns_of(const std::vector<CameraModel>& models) {
+  int most = 1;
+  for (const CameraModel& model : models) most = std::max(most, parameter_count(model));
+  return static_cast<std::size_t>(most);
+}
+
+std::size_t count(const CameraModel& model) { return static_cast<std::size_t>(parameter_count(model)); }
+
+}  // namespace
+
+void put_models(Hdf5Writer& file, const std::vector<CameraModel>& models) {
+  file.texts("cameras/model", column(models, [](const CameraModel& m) { return model_name(m); }),
+             {"", "docs/job-format.md, Cameras"});
+  file.texts("cameras/parameters", column(models, [](const CameraModel& m) { return parameter_names(m); }),
+             {"", "names of the parameters, in the order of the columns"});
+}
+
+std::vector<CameraModel> get_models(const Hdf5Reader& file, std::int64_t rows) {
+  std::vector<CameraModel> models;
+  for (const std::string& name : file.texts("cameras/model", rows)) {
+    const auto model = find_model(name);
+    if (!model) file.fail("cameras/model", "names a camera model that is not known, '" + name + "'");
+    models.push_back(*model);
+  }
+  return models;
+}
+
+void put_parameters(Hdf5Writer& file, const std::string& name, const std::vector<CameraModel>& models,
+                    const std::vector<const double*>& values, const std::string& description) {
+  const std::size_t columns = columns_of(models);
+  std::vector<double> matrix(models.size() * columns, kAbsent);
+  for (std::size_t c = 0; c < models.size(); ++c)
+    std::copy_n(values[c], count(models[c]), matrix.begin() + static_cast<std::ptrdiff_t>(c * columns));
+  file.matrix(name, matrix, static_cast<std::int64_t>(columns), {"", description});
+}
+
+void get_parameters(const Hdf5Reader& file, const std::string& name, const std::vector<CameraModel>& models,
+                    const std::vector<double*>& values) {
+  const std::size_t columns = columns_of(models);
+  const auto matrix =
+      file.matrix<double>(name, static_cast<std::int64_t>(columns), static_cast<std::int64_t>(models.size()));
+  for (std::size_t c = 0; c < models.size(); ++c) std::copy_n(&matrix[c * columns], count(models[c]), values[c]);
+}
+
+std::vector<Intrinsics> get_intrinsics(const Hdf5Reader& file, std::int64_t rows) {
+  const std::vector<CameraModel> models = get_models(file, rows);
+  std::vector<Intrinsics> cameras(models.begin(), models.end());
+  std::vector<double*> values;
+  for (Intrinsics& k : cameras) values.push_back(k.data());
+  get_parameters(file, "cameras/intrinsics", models, values);
+  return cameras;
+}
+
+void put_covariances(Hdf5Writer& file, const std::vector<Eigen::MatrixXd>& covariances) {
+  Eigen::Index size = 1;
+  for (const Eigen::MatrixXd& c : covariances) size = std::max(size, c.rows());
+  std::vector<double> values;
+  for (const Eigen::MatrixXd& c : covariances)
+    for (Eigen::Index i = 0; i < size; ++i)
+      for (Eigen::Index j = 0; j < size; ++j) values.push_back(std::max(i, j) < c.rows() ? c(i, j) : kAbsent);
+  file.array(kCovariance, values, {static_cast<std::int64_t>(covariances.size()), size, size},
+             {"", "posterior, of the parameters; held: 0"});
+}
+
+std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::vector<CameraModel>& models) {
+  const std::size_t size = columns_of(models);
+  const auto n = static_cast<std::int64_t>(size);
+  const auto values = file.array<double>(kCovariance, {static_cast<std::int64_t>(models.size()), n, n});
+  std::vector<Eigen::MatrixXd> covariances;
+  for (std::size_t c = 0; c < models.size(); ++c) {
+    const Eigen::Map<const Eigen::MatrixXd> padded(&values[c * size * size], n, n);
+    covariances.push_back(padded.topLeftCorner(parameter_count(models[c]), parameter_count(models[c])));
+  }
+  return covariances;
+}
+
+}  // namespace megablock

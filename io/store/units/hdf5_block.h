@@ -1,0 +1,12 @@
+// The block's groups in a file, shared by block.h5 and result/block.h5 (docs/job-format.md, "Block").
+#pragma once
+
+#include "io/block/block.h"
+#include "io/store/hdf5/hdf5_file.h"
+
+namespace megablock {
+
+void put_block(Hdf5Writer& file, const Block& block);
+Block get_block(const Hdf5Reader& file);
+
+}  // namespace megablock

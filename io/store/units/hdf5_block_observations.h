@@ -1,0 +1,24 @@
+// What is observed of a block besides tie points, as groups of its file (docs/job-format.md, "Block"): relative poses,
+// control points, lines of known direction, verticals. A file without lines or verticals has none of these groups.
+#pragma once
+
+#include <vector>
+
+#include "io/block/block.h"
+#include "io/store/hdf5/hdf5_file.h"
+
+namespace megablock {
+
+void put_relative_poses(Hdf5Writer& file, const std::vector<RelativePose>& relatives);
+std::vector<RelativePose> get_relative_poses(const Hdf5Reader& file);
+
+void put_control(Hdf5Writer& file, const std::vector<ControlPoint>& points);
+std::vector<ControlPoint> get_control(const Hdf5Reader& file);
+
+void put_lines(Hdf5Writer& file, const std::vector<KnownLine>& lines);
+std::vector<KnownLine> get_lines(const Hdf5Reader& file);
+
+void put_verticals(Hdf5Writer& file, const std::vector<SeenVertical>& verticals);
+std::vector<SeenVertical> get_verticals(const Hdf5Reader& file);
+
+}  // namespace megablock

@@ -1,0 +1,12 @@
+// The groups of tiles and merge tree in a file, shared by tiles.h5 and result/block.h5 (docs/job-format.md, "Tiles").
+#pragma once
+
+#include "io/block/image_graph.h"
+#include "io/store/hdf5/hdf5_file.h"
+
+namespace megablock {
+
+void put_tiles(Hdf5Writer& file, const Tiles& tiles);
+Tiles get_tiles(const Hdf5Reader& file);
+
+}  // namespace megablock

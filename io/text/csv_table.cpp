@@ -1,0 +1,123 @@
+#include "io/text/csv_table.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/base/error.h"
+#include "io/base/file_error.h"
+#include "io/text/plausible.h"
+#include "io/text/settings_reader.h"
+
+namespace megablock {
+
+namespace {
+
+std::string trimmed(const std::string& text) {
+  const auto first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> fields(1);
+  bool in_quotes = false;
+  for (const char c : line) {
+    if (c == '"')
+      in_quotes = !in_quotes;
+    else if (c == ',' && !in_quotes)
+      fields.emplace_back();
+    else
+      fields.back() += c;
+  }
+  for (std::string& field : fields) field = trimmed(field);
+  return fields;
+}
+
+}  // namespace
+
+void refuse_semicolons(const std::string& header, const std::string& where) {
+  if (header.find(',') == std::string::npos && header.find(';') != std::string::npos)
+    throw InputError(where + ": semicolons between the columns; write commas there, and points in decimal numbers");
+}
+
+CsvTable::CsvTable(const std::string& path) : path_(path) {
+  std::ifstream stream = open_input(path);
+  std::int64_t number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++number;
+    if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
+    if (trimmed(line).empty()) continue;
+    if (line.front() == '#') {
+      const auto colon = line.find(':');
+      if (colon != std::string::npos) comments_[trimmed(line.substr(1, colon - 1))] = trimmed(line.substr(colon + 1));
+      continue;
+    }
+    const std::string place = path + ":" + std::to_string(number);
+    std::vector<std::string> fields = split(line);
+    if (columns_.empty()) {
+      header_line_ = number;
+      refuse_semicolons(line, place);
+      for (std::size_t c = 0; c < fields.size(); ++c)
+        if (!columns_.emplace(fields[c], c).second)
+          throw InputError(place + ": column '" + fields[c] + "' appears twice");
+      continue;
+    }
+    if (fields.size() > columns_.size())
+      throw InputError(place + ": " + std::to_string(fields.size()) + " fields, the header has " +
+                       std::to_string(columns_.size()));
+    fields.resize(columns_.size());
+    rows_.push_back(std::move(fields));
+    lines_.push_back(number);
+  }
+  if (columns_.empty()) throw InputError(path + ": is empty; expected a header line with the names of the columns");
+}
+
+void CsvTable::require(const std::vector<std::string>& columns) const {
+  for (const std::string& column : columns)
+    if (!has(column))
+      throw InputError(path_ + ":" + std::to_string(header_line_) + ": column '" + column + "' is missing");
+}
+
+void CsvTable::refuse_others(const std::vector<std::string>& columns) const {
+  for (const auto& [name, position] : columns_)
+    if (std::find(columns.begin(), columns.end(), name) == columns.end())
+      throw InputError(path_ + ":" + std::to_string(header_line_) + ": " +
+                       unknown_key_message(name, "the header", columns));
+}
+
+std::string CsvTable::text(std::size_t row, const std::string& column) const {
+  const auto found = columns_.find(column);
+  return found == columns_.end() ? "" : rows_[row][found->second];
+}
+
+std::optional<double> CsvTable::number(std::size_t row, const std::string& column) const {
+  const std::string value = text(row, column);
+  if (value.empty() || value == "NaN" || value == "nan") return std::nullopt;
+  return parse_number(value, column, where(row));
+}
+
+std::optional<double> CsvTable::number(std::size_t row, const std::string& column, const Limits& limits) const {
+  const std::optional<double> value = number(row, column);
+  if (value) check_within(*value, limits, column, where(row));
+  return value;
+}
+
+double CsvTable::needed_number(std::size_t row, const std::string& column) const {
+  const std::string value = text(row, column);
+  if (value.empty()) throw InputError(where(row) + ": " + column + " is empty");
+  return parse_number(value, column, where(row));
+}
+
+double CsvTable::needed_metres(std::size_t row, const std::string& column) const {
+  const double metres = needed_number(row, column);
+  check_on_earth(metres, column, where(row));
+  return metres;
+}
+
+std::string CsvTable::where(std::size_t row) const { return path_ + ":" + std::to_string(lines_[row]); }
+
+std::string CsvTable::comment(const std::string& key) const {
+  const auto found = comments_.find(key);
+  return found == comments_.end() ? "" : found->second;
+}
+
+}  // namespace megablock

@@ -1,0 +1,29 @@
+// Lists of file formats with a name each. Internal to io/.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/base/error.h"
+
+namespace megablock {
+
+template <typename Format>
+std::vector<std::string> names_of(const std::vector<Format>& formats) {
+  std::vector<std::string> names;
+  for (const Format& format : formats) names.push_back(format.name);
+  return names;
+}
+
+// InputError that lists the names when there is none of this name; `kind`: "export", "import".
+template <typename Format>
+const Format& format_named(const std::vector<Format>& formats, const std::string& name, const std::string& kind) {
+  std::string list;
+  for (const Format& format : formats) {
+    if (format.name == name) return format;
+    list += (list.empty() ? "" : ", ") + format.name;
+  }
+  throw InputError("'" + name + "' is no " + kind + " format; they are " + list);
+}
+
+}  // namespace megablock

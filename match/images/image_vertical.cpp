@@ -1,0 +1,142 @@
+#include "match/images/image_vertical.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "match/images/image_file.h"
+
+namespace megablock {
+
+namespace {
+
+std::string size_of(const cv::Mat& picture) { return fmt::format("{} x {}", picture.cols, picture.rows); }
+
+std::vector<InterpretationPlane> planes_of(const std::vector<ImageLine>& lines, const Intrinsics& camera) {
+  std::vector<InterpretationPlane> planes;
+  planes.reserve(lines.size());
+  for (const ImageLine& line : lines)
+    if (const auto plane = interpretation_plane(line, camera)) planes.push_back(*plane);
+  return planes;
+}
+
+// Of the axis of these lines by each parameter of the camera: by a hundredth of what it may be wrong by.
+Eigen::Matrix3Xd derivatives_by_camera(const std::vector<ImageLine>& lines, const Camera& camera,
+                                       const Eigen::Vector3d& down) {
+  const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width);
+  Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Zero(3, camera.intrinsics.size());
+  for (int p = 0; p < camera.intrinsics.size(); ++p) {
+    const auto at = static_cast<std::size_t>(p);
+    const double step = 0.01 * weak[at];
+    if (!(step > 0)) continue;
+    const auto down_at = [&](double change) -> std::optional<Eigen::Vector3d> {
+      Intrinsics changed = camera.intrinsics;
+      changed[at] += change;
+      const auto fit = fit_axis(planes_of(lines, changed));
+      if (!fit) return std::nullopt;
+      return fit->axis.direction.dot(down) < 0 ? Eigen::Vector3d(-fit->axis.direction) : fit->axis.direction;
+    };
+    const auto above = down_at(step), below = down_at(-step);
+    if (above && below) result.col(p) = (*above - *below) / (2 * step);
+  }
+  return result;
+}
+
+struct Look {
+  SegmentOptions segments;
+  VanishingOptions search;
+};
+
+// Of a large picture two: the first one reduced, for shorter edges, and with every vanishing point that accident lets
+// expect once in a picture.
+std::vector<Look> looks_at(const cv::Mat& picture, const SegmentOptions& options, std::uint64_t seed) {
+  constexpr double kReducedMegapixels = 0.5, kShortestPx = 20, kTimesLarger = 4;
+  Look whole{options, {}};
+  whole.search.seed = seed;
+  if (std::min(1e-6 * static_cast<double>(picture.total()), options.max_megapixels) < kTimesLarger * kReducedMegapixels)
+    return {whole};
+  Look reduced = whole;
+  reduced.segments.max_megapixels = kReducedMegapixels;
+  reduced.segments.min_length_px = std::min(kShortestPx, options.min_length_px);
+  reduced.search.max_log10_nfa = 0;
+  return {reduced, whole};
+}
+
+struct EdgesSeen {
+  int segments = 0;
+  std::vector<ImageLine> lines;  // of those that have a plane
+  VanishingPoints found;         // of these lines
+  std::optional<Vertical> vertical;
+};
+
+EdgesSeen edges_seen(const cv::Mat& picture, const cv::Mat& mask, const Camera& camera, const VerticalPrior& prior,
+                     const Look& look) {
+  EdgesSeen seen;
+  std::vector<InterpretationPlane> planes;
+  const std::vector<LineSegment> segments = find_line_segments(picture, mask, look.segments);
+  seen.segments = static_cast<int>(segments.size());
+  for (const LineSegment& segment : segments)
+    if (const auto plane = interpretation_plane(segment.line, camera.intrinsics)) {
+      seen.lines.push_back(segment.line);
+      planes.push_back(*plane);
+    }
+  seen.found = find_vanishing_points(planes, look.search);
+  seen.vertical = find_vertical(seen.found.points, prior);
+  return seen;
+}
+
+}  // namespace
+
+ImageVertical find_image_vertical(const std::string& path, const Camera& camera, const VerticalPrior& prior,
+                                  std::uint64_t seed, const SegmentOptions& options) {
+  options.check();
+  ImageVertical result;
+  const GreyImage image = read_grey_image(path);
+  result.failure = image.failure;
+  if (!result.failure.empty()) return result;
+  if (image.pixels.cols != camera.width || image.pixels.rows != camera.height) {
+    result.failure =
+        fmt::format("has {} pixels, its camera {} x {}", size_of(image.pixels), camera.width, camera.height);
+    return result;
+  }
+  GreyImage mask;
+  if (!camera.mask_path.empty()) {
+    mask = read_grey_image(camera.mask_path);
+    if (mask.failure.empty() && mask.pixels.size() != image.pixels.size())
+      mask.failure = "has " + size_of(mask.pixels) + " pixels, the image " + size_of(image.pixels);
+    if (!mask.failure.empty()) {
+      result.failure = "mask " + camera.mask_path + ": " + mask.failure;
+      return result;
+    }
+  }
+  EdgesSeen seen;
+  try {
+    for (const Look& look : looks_at(image.pixels, options, seed)) {
+      seen = edges_seen(image.pixels, mask.pixels, camera, prior, look);
+      if (!seen.vertical && seen.segments > 0) break;  // without any, edges may be too short for the reduced picture
+    }
+  } catch (const cv::Exception& e) {
+    result.failure = "no segments: " + e.err;
+    return result;
+  }
+  result.segments = seen.segments;
+  result.vanishing_points = static_cast<int>(seen.found.points.size());
+  if (!seen.vertical) return result;
+  const Vertical& vertical = *seen.vertical;
+  const VanishingPoint& point = seen.found.points[static_cast<std::size_t>(vertical.point)];
+  result.found = true;
+  result.down = vertical.down;
+  result.roll = vertical.roll;
+  result.lines = static_cast<int>(point.lines.size());
+  result.variance_factor = point.weighted_squares / static_cast<double>(std::max<std::int64_t>(1, point.redundancy));
+  result.down.covariance *= std::max(1.0, result.variance_factor);
+  std::vector<ImageLine> own;
+  for (const int i : point.lines) own.push_back(seen.lines[static_cast<std::size_t>(i)]);
+  result.by_camera = derivatives_by_camera(own, camera, result.down.direction);
+  result.log10_nfa = point.log10_nfa;
+  return result;
+}
+
+}  // namespace megablock

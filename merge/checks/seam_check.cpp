@@ -1,0 +1,486 @@
+#include "merge/checks/seam_check.h"
+
+#include <cblas.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <numeric>
+#include <ranges>
+#include <set>
+
+#include "geometry/numbers/chi_square.h"
+#include "geometry/numbers/decompositions.h"
+
+extern "C" {
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dpstrf_(const char* uplo, const int* n, double* a, const int* lda, int* pivots, int* rank, const double* tolerance,
+             double* work, int* info);
+}
+
+namespace megablock {
+
+namespace {
+
+constexpr double kRankTolerance = 1e-10;  // pivot, of a matrix scaled to a unit diagonal
+// Of what is known of a direction, the share that is known on the other side: below, nothing is left to test, and the
+// share is lost in the rounding of the whole.
+constexpr double kShared = 1e-6;
+// Information about a frame's turn, of the most there is of any in the tile: below, its turn is not asked for.
+constexpr double kVisibleTurn = 0.25;
+// Variance factor of residuals without noise, of which a ratio means nothing.
+constexpr double kNoNoise = 0.01;
+constexpr std::size_t kLines = 3;  // of one kind; the rest is counted
+
+struct Quadratic {
+  Eigen::MatrixXd s;  // full symmetric
+  Eigen::VectorXd b;
+};
+
+Quadratic unpacked(const UpdateMatrix& update) {
+  const std::int64_t n = total_dimension(update.unknowns);
+  Quadratic q{Eigen::MatrixXd(n, n), Eigen::Map<const Eigen::VectorXd>(update.rhs.data(), n)};
+  const double* value = update.matrix.data();
+  for (std::int64_t j = 0; j < n; ++j)
+    for (std::int64_t i = j; i < n; ++i) q.s(i, j) = q.s(j, i) = *value++;
+  return q;
+}
+
+// The lower triangle of D S D.
+Eigen::MatrixXd scaled(const UpdateMatrix& update, const Eigen::VectorXd& scale) {
+  const Eigen::Index n = scale.size();
+  Eigen::MatrixXd matrix(n, n);
+  const double* value = update.matrix.data();
+  for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index i = j; i < n; ++i) matrix(i, j) = *value++ * scale[i] * scale[j];
+  return matrix;
+}
+
+// P'AP = LL' of a positive semidefinite A, to its rank; L is the lower trapezoid of `lower`.
+struct SemidefiniteFactor {
+  Eigen::MatrixXd lower;
+  std::vector<int> pivots;  // row i of P'A is row pivots[i] - 1 of A; empty: P = I
+  int rank = 0;
+
+  Eigen::MatrixXd rows_permuted(Eigen::MatrixXd m) const {  // P'm
+    if (!pivots.empty()) m = Eigen::MatrixXd(m(order(), Eigen::all));
+    return m;
+  }
+  Eigen::MatrixXd columns_permuted(Eigen::MatrixXd m) const {  // mP
+    if (!pivots.empty()) m = Eigen::MatrixXd(m(Eigen::all, order()));
+    return m;
+  }
+  // b'A^+ b of a b in the range, so that the leading rows alone give it: |L_11^-1 b_1|^2.
+  double least_squares(const Eigen::VectorXd& b) const {
+    Eigen::VectorXd leading = rows_permuted(b).topRows(rank);
+    lower.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
+    return leading.squaredNorm();
+  }
+
+ private:
+  std::vector<int> order() const {
+    std::vector<int> rows = pivots;
+    for (int& row : rows) --row;
+    return rows;
+  }
+};
+
+// Of the lower triangle that `matrix()` returns, with a diagonal of at most about one; its rank is that of the pivots
+// above `tolerance`. Without pivoting, which is several times as fast, where no pivot comes near to vanishing.
+template <typename Make>
+SemidefiniteFactor semidefinite_factor(const Make& matrix, double tolerance = kRankTolerance) {
+  const double plainly_there = std::max(1e-7, tolerance);
+  SemidefiniteFactor factor{matrix(), {}, 0};
+  const int n = factor.rank = static_cast<int>(factor.lower.rows());
+  int info = 0;
+  dpotrf_("L", &n, factor.lower.data(), &n, &info);
+  if (info == 0 && (n == 0 || factor.lower.diagonal().minCoeff() > std::sqrt(plainly_there))) return factor;
+
+  factor.lower = Eigen::MatrixXd();  // makes room first
+  factor.lower = matrix();
+  factor.pivots.resize(static_cast<std::size_t>(n));
+  std::vector<double> work(2 * static_cast<std::size_t>(n));
+  dpstrf_("L", &n, factor.lower.data(), &n, factor.pivots.data(), &factor.rank, &tolerance, work.data(), &info);
+  return factor;
+}
+
+template <typename Matrix>
+Eigen::Matrix<double, Matrix::RowsAtCompileTime, 1> scale_of(const Matrix& s) {
+  return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
+}
+
+// F of a covariance matrix C = FF': scaled to a unit diagonal and factorised, F = D P L; what is held, or no more known
+// than rounding lets one see, leaves columns of L zero.
+class CovarianceRoot {
+ public:
+  explicit CovarianceRoot(const CovarianceMatrix& c) {
+    const Eigen::Index n = total_dimension(c.unknowns);
+    const Eigen::Map<const Eigen::MatrixXd> matrix(c.matrix.data(), n, n);
+    scale_ = matrix.diagonal().cwiseMax(0).cwiseSqrt();
+    const Eigen::VectorXd inverse = scale_of(matrix);
+    factor_ =
+        semidefinite_factor([&]() -> Eigen::MatrixXd { return inverse.asDiagonal() * matrix * inverse.asDiagonal(); });
+    factor_.lower.rightCols(n - factor_.rank).setZero();
+  }
+  Eigen::MatrixXd transposed_times(Eigen::MatrixXd m) const {  // F'm, in the memory of m
+    m.array().colwise() *= scale_.array();
+    m = factor_.rows_permuted(std::move(m));
+    multiply(CblasLeft, CblasTrans, m);
+    return m;
+  }
+  Eigen::MatrixXd times(Eigen::MatrixXd m) const {  // mF
+    m.array().rowwise() *= scale_.transpose().array();
+    m = factor_.columns_permuted(std::move(m));
+    multiply(CblasRight, CblasNoTrans, m);
+    return m;
+  }
+
+ private:
+  void multiply(CBLAS_SIDE side, CBLAS_TRANSPOSE transpose, Eigen::MatrixXd& m) const {
+    const auto n = static_cast<int>(scale_.size());
+    cblas_dtrmm(CblasColMajor, side, CblasLower, transpose, CblasNonUnit, static_cast<int>(m.rows()),
+                static_cast<int>(m.cols()), 1, factor_.lower.data(), n, m.data(), static_cast<int>(m.rows()));
+  }
+  Eigen::VectorXd scale_;
+  SemidefiniteFactor factor_;
+};
+
+double normal_exceeds(double deviate) { return 0.5 * std::erfc(deviate / std::sqrt(2.0)); }
+
+// Quantiles of one alarm probability.
+class Limits {
+ public:
+  explicit Limits(double probability) : probability_(probability) {}
+  double of(std::int64_t degrees) {
+    const auto [place, fresh] = known_.emplace(degrees, 0);
+    if (fresh) place->second = chi_square_quantile(probability_, degrees);
+    return place->second;
+  }
+
+ private:
+  double probability_;
+  std::map<std::int64_t, double> known_;
+};
+
+// The score of some scalar unknowns; `own`: what the tile knows of them, `left`: A.
+template <int Size>
+UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eigen::Matrix<double, Size, Size>& own,
+                         const Eigen::Matrix<double, Size, Size>& left, double variance_factor, Limits& limits) {
+  UnknownCheck check;
+  // In units of what the tile knows.
+  const Eigen::Matrix<double, Size, 1> scale = scale_of(own);
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * left * scale.asDiagonal());
+  const Eigen::Matrix<double, Size, 1> along = eigen.vectors.transpose() * scale.cwiseProduct(score);
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
+    if (eigen.values[i] < kShared) continue;
+    ++check.degrees;
+    check.statistic += along[i] * along[i] / eigen.values[i] / variance_factor;
+  }
+  if (check.degrees > 0) check.threshold = limits.of(check.degrees);
+  return check;
+}
+
+// All checks of a tile. seen: F'S with C = FF', so that seen'seen = S C S.
+std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::MatrixXd& seen,
+                                         const UnknownList& unknowns, double probability, double variance_factor) {
+  constexpr int kKinds = 3, kTurn = 3;  // a frame's first three scalar unknowns are its rotation
+  const std::vector<std::int64_t> rows = row_offsets(unknowns);
+  std::vector<UnknownCheck> checks;
+  const auto add = [&](UnknownCheck check, const UnknownId& id, const UnknownId& other, bool turn) {
+    if (check.degrees == 0) return;
+    check.id = id;
+    check.other = other;
+    check.turn = turn;
+    checks.push_back(check);
+  };
+
+  struct Turn {
+    UnknownId frame;
+    Eigen::Index row;
+    double information;
+  };
+  std::vector<Turn> turns;
+  double most = 0;
+  Limits wholes(probability / kKinds / static_cast<double>(unknowns.size()));
+  for (std::size_t u = 0; u < unknowns.size(); ++u) {
+    const Eigen::Index row = rows[u], n = unknowns[u].dimension;
+    const Eigen::MatrixXd own = tile.s.block(row, row, n, n);
+    const Eigen::MatrixXd left = own - seen.middleCols(row, n).transpose() * seen.middleCols(row, n);
+    add(check_score<Eigen::Dynamic>(tile.b.segment(row, n), own, left, variance_factor, wholes), unknowns[u].id, {},
+        false);
+    if (unknowns[u].id.kind != UnknownKind::kFrame) continue;
+    turns.push_back({unknowns[u].id, row, left.diagonal().head<kTurn>().sum()});
+    most = std::max(most, turns.back().information);
+  }
+  std::erase_if(turns, [&](const Turn& t) { return t.information < kVisibleTurn * most; });
+  if (turns.empty()) return checks;
+
+  std::vector<Eigen::Index> wanted;
+  for (const Turn& turn : turns)
+    for (Eigen::Index k = 0; k < kTurn; ++k) wanted.push_back(turn.row + k);
+  const Eigen::VectorXd score = tile.b(wanted);
+  const Eigen::MatrixXd own = tile.s(wanted, wanted);
+  const Eigen::MatrixXd seen_turns = seen(Eigen::all, wanted);
+  Eigen::MatrixXd left = own;
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, static_cast<int>(own.rows()), static_cast<int>(seen.rows()), -1,
+              seen_turns.data(), static_cast<int>(seen.rows()), 1, left.data(), static_cast<int>(own.rows()));
+  left.triangularView<Eigen::StrictlyUpper>() = left.transpose();
+  const auto count = static_cast<double>(turns.size());
+  Limits singles(probability / kKinds / count), pairs(probability / kKinds / (0.5 * count * (count - 1)));
+  std::array<Eigen::Index, 2 * kTurn> both;
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i) * kTurn;
+    std::iota(both.begin(), both.begin() + kTurn, row);
+    add(check_score<kTurn>(score.segment<kTurn>(row), own.block<kTurn, kTurn>(row, row),
+                           left.block<kTurn, kTurn>(row, row), variance_factor, singles),
+        turns[i].frame, {}, true);
+    for (std::size_t j = i + 1; j < turns.size(); ++j) {
+      std::iota(both.begin() + kTurn, both.end(), static_cast<Eigen::Index>(j) * kTurn);
+      add(check_score<2 * kTurn>(score(both), own(both, both), left(both, both), variance_factor, pairs),
+          turns[i].frame, turns[j].frame, true);
+    }
+  }
+  return checks;
+}
+
+std::vector<std::string> describe_noise(const std::vector<TileCheck>& tiles) {
+  const std::vector<NoisyTile> noisy = noisy_tiles(tiles);
+  std::vector<std::string> lines;
+  for (const NoisyTile& tile : noisy | std::views::take(kLines)) {
+    char line[120];
+    std::snprintf(line, sizeof line, "tile %lld disagrees with itself: residuals %.1f times those of the other tiles",
+                  static_cast<long long>(tile.tile), std::sqrt(tile.ratio));
+    lines.emplace_back(line);
+  }
+  if (noisy.size() > kLines)
+    lines.push_back(std::to_string(noisy.size() - kLines) + " more tiles that disagree with themselves");
+  return lines;
+}
+
+// The worst by excess that have no unknown in common.
+std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
+  std::stable_sort(checks.begin(), checks.end(),
+                   [](const UnknownCheck& a, const UnknownCheck& b) { return a.excess() > b.excess(); });
+  std::array<UnknownCheck, 4> worst;
+  auto free = worst.begin();
+  for (const UnknownCheck& check : checks) {
+    if (free == worst.end()) break;
+    if (std::none_of(worst.begin(), free, [&](const UnknownCheck& w) { return w.shares_unknown(check); }))
+      *free++ = check;
+  }
+  return worst;
+}
+
+}  // namespace
+
+// The scale leaves rank and minimum as they are.
+LeastSquares least_squares(const UpdateMatrix& condensed) {
+  const Eigen::Index n = total_dimension(condensed.unknowns);
+  Eigen::VectorXd scale(n);
+  std::int64_t entry = 0;  // of the diagonal
+  for (Eigen::Index k = 0; k < n; entry += n - k++) {
+    const double diagonal = condensed.matrix[static_cast<std::size_t>(entry)];
+    scale[k] = diagonal > 0 ? 1 / std::sqrt(diagonal) : 0;
+  }
+  if (n == 0 || scale.maxCoeff() == 0) return {};
+  const SemidefiniteFactor factor = semidefinite_factor([&] { return scaled(condensed, scale); });
+  return {factor.least_squares(scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(condensed.rhs.data(), n))),
+          factor.rank};
+}
+
+SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSquares& right,
+                      const Front::Result& together, double probability, double variance_factor) {
+  const FrontFactor& factor = together.factor;
+  const std::int64_t eliminated = total_dimension(factor.eliminated);
+  double squares = 0;  // of z, which has further columns in free blocks
+  for (std::int64_t i = 0; i < eliminated; ++i)
+    squares += factor.z[static_cast<std::size_t>(i)] * factor.z[static_cast<std::size_t>(i)];
+  const LeastSquares& rest = together.update.alone;
+  SeamReport report;
+  report.node = node;
+  report.degrees = left.rank + right.rank - (eliminated - std::ssize(factor.held)) - rest.rank;
+  report.statistic = std::max(0.0, left.value + right.value - squares - rest.value) / variance_factor;
+  if (report.degrees > 0) report.threshold = chi_square_quantile(probability, report.degrees);
+  return report;
+}
+
+TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
+                     double probability, double variance_factor) {
+  TileCheck check;
+  check.tile = tile;
+  const Quadratic own = unpacked(condensed);
+  const LeastSquares alone = least_squares(condensed);
+  const SubtreeSums& sums = condensed.sums;
+  check.own_chi2 = (sums.weighted_squares - sums.decrement_squared - alone.value) / variance_factor;
+  check.own_degrees =
+      sums.residuals - (sums.unknowns - static_cast<std::int64_t>(sums.held.size()) - sums.held_points) - alone.rank;
+
+  const Eigen::Index n = own.b.size();
+  if (n == 0) return check;
+  Eigen::MatrixXd seen;
+  {
+    const CovarianceRoot root(boundary.restricted_to(condensed.unknowns));
+    seen = root.transposed_times(own.s);
+    // The rest's normal equations on the boundary are C^-1 - S. With C = FF' and W = I - F'SF, which has their nullity,
+    // s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
+    const auto w = [&] {
+      Eigen::MatrixXd matrix = root.times(seen);
+      matrix = -matrix;
+      matrix.diagonal().array() += 1;
+      return matrix;
+    };
+    const SemidefiniteFactor rest = semidefinite_factor(w, kShared);
+    check.degrees = alone.rank - (n - rest.rank);
+    check.statistic = std::max(0.0, alone.value + rest.least_squares(root.transposed_times(own.b))) / variance_factor;
+    if (check.degrees > 0) check.threshold = chi_square_quantile(probability, check.degrees);
+  }
+
+  check.worst = worst_of(check_unknowns(own, seen, condensed.unknowns, probability, variance_factor));
+  return check;
+}
+
+bool UnknownCheck::shares_unknown(const UnknownCheck& check) const {
+  const auto among = [&](const UnknownId& u) { return u.index >= 0 && (u == check.id || u == check.other); };
+  return among(id) || among(other);
+}
+
+std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
+  std::vector<const TileCheck*> left;
+  double squares = 0, degrees = 0;  // of those
+  for (const TileCheck& tile : tiles) {
+    if (tile.own_degrees <= 0) continue;
+    left.push_back(&tile);
+    squares += tile.own_chi2;
+    degrees += static_cast<double>(tile.own_degrees);
+  }
+  const auto ratio = [&](const TileCheck* tile) {
+    const auto own = static_cast<double>(tile->own_degrees);
+    return tile->own_chi2 / own / std::max(kNoNoise, (squares - tile->own_chi2) / (degrees - own));
+  };
+  // Normal deviate of F (Paulson 1942): its third root is nearly normal.
+  const auto deviate = [&](const TileCheck* tile) {
+    const auto own = static_cast<double>(tile->own_degrees);
+    const double root = std::cbrt(ratio(tile) / kUsualVarianceRatio);
+    const double variance = 2 / (9 * own), others = 2 / (9 * (degrees - own));
+    return ((1 - others) * root - (1 - variance)) / std::sqrt(others * root * root + variance);
+  };
+  const double probability = kSeamAlarmProbability / static_cast<double>(tiles.size());
+  std::vector<NoisyTile> noisy;
+  while (left.size() > 1) {
+    const auto worst = std::ranges::max_element(left, {}, deviate);
+    if (!(normal_exceeds(deviate(*worst)) < probability)) break;
+    noisy.push_back({(*worst)->tile, ratio(*worst)});
+    squares -= (*worst)->own_chi2;
+    degrees -= static_cast<double>((*worst)->own_degrees);
+    left.erase(worst);
+  }
+  return noisy;
+}
+
+std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& tiles, const UnknownName& name) {
+  std::vector<std::pair<std::int64_t, UnknownCheck>> all;  // tile, what it disagrees about
+  for (const TileCheck& tile : tiles)
+    for (const UnknownCheck& check : tile.worst)
+      if (check.degrees > 0) all.emplace_back(tile.tile, check);
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.second.excess() > b.second.excess(); });
+
+  const double decisive = -2 * std::log(kSeamAlarmProbability);
+  std::vector<std::string> lines;
+  std::size_t more = 0;
+  std::vector<UnknownCheck> said;
+  for (const auto& [tile, check] : all) {
+    if (!check.alarm()) break;
+    if (std::any_of(said.begin(), said.end(), [&](const UnknownCheck& s) { return s.shares_unknown(check); })) continue;
+    said.push_back(check);
+    if (lines.size() == kLines) {
+      ++more;
+      continue;
+    }
+    std::set<std::int64_t> suspects{tile};
+    for (const auto& [rival, other] : all)
+      if (other.shares_unknown(check) && other.excess() > check.excess() - decisive) suspects.insert(rival);
+    std::string who, what = name(check.id);
+    for (const std::int64_t suspect : suspects) who += (who.empty() ? "" : " and ") + std::to_string(suspect);
+    if (check.other.index >= 0) what += " and " + name(check.other);
+    if (check.turn) what = "the turn of " + what;
+    char figures[120];
+    std::snprintf(figures, sizeof figures, ": T = %.0f with %lld degrees of freedom (limit %.0f)", check.statistic,
+                  static_cast<long long>(check.degrees), check.threshold);
+    lines.push_back((suspects.size() > 1
+                         ? "tiles " + who + " see " + what + " differently, one of them wrongly"
+                         : "tile " + who + " sees " + what + " differently from the rest of the block") +
+                    figures);
+  }
+  if (more > 0) lines.push_back(std::to_string(more) + " more unknowns that tiles see differently");
+  const std::vector<std::string> first = describe_noise(tiles);
+  lines.insert(lines.begin(), first.begin(), first.end());
+  return lines;
+}
+
+namespace {
+
+// Which tile explains the alarm of which node of the tree; -1: no alarm.
+std::vector<std::int64_t> explain(const MergeTree& tree, const std::vector<SeamReport>& seams,
+                                  const std::vector<TileCheck>& tiles) {
+  std::vector<std::int64_t> explained(tree.nodes.size(), -1), leaf(tiles.size(), -1);
+  std::vector<bool> alarm(tree.nodes.size(), false);
+  for (const SeamReport& seam : seams) alarm[at(seam.node)] = seam.alarm();
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n)
+    if (tree.nodes[n].tile.valid()) leaf[at(tree.nodes[n].tile.value)] = static_cast<std::int64_t>(n);
+
+  const auto alarms_above = [&](std::int64_t tile) {
+    std::int64_t count = 0;
+    for (std::int64_t n = leaf[at(tile)]; n >= 0; n = tree.nodes[at(n)].parent) count += alarm[at(n)];
+    return count;
+  };
+  const auto take_out = [&](std::int64_t tile) {
+    for (std::int64_t n = leaf[at(tile)]; n >= 0; n = tree.nodes[at(n)].parent) {
+      if (alarm[at(n)]) explained[at(n)] = tile;
+      alarm[at(n)] = false;
+    }
+  };
+  for (const NoisyTile& noisy : noisy_tiles(tiles)) take_out(noisy.tile);
+  for (;;) {
+    const TileCheck* best = nullptr;
+    std::pair<std::int64_t, double> most;
+    for (const TileCheck& tile : tiles) {
+      const std::int64_t seams_cleared = alarms_above(tile.tile);
+      if (seams_cleared == 0) continue;
+      const std::pair cleared(seams_cleared + tile.alarm(), tile.degrees > 0 ? tile.statistic / tile.threshold : 0);
+      if (best == nullptr || cleared > most) best = &tile, most = cleared;
+    }
+    if (best == nullptr) return explained;
+    take_out(best->tile);
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> describe_seams(const MergeTree& tree, const std::vector<SeamReport>& seams,
+                                        const std::vector<TileCheck>& tiles) {
+  const std::vector<std::int64_t> explained = explain(tree, seams, tiles);
+  const std::vector<NoisyTile> noisy = noisy_tiles(tiles);
+  std::vector<std::string> lines;
+  for (const SeamReport& seam : seams) {
+    if (!seam.alarm()) continue;
+    char line[240];
+    std::snprintf(
+        line, sizeof line,
+        "seam at node %lld: T = %.0f with %lld degrees of freedom (limit %.0f), its sides differ %.1f times what "
+        "their sigmas explain",
+        static_cast<long long>(seam.node), seam.statistic, static_cast<long long>(seam.degrees), seam.threshold,
+        std::sqrt(seam.statistic / static_cast<double>(seam.degrees)));
+    lines.emplace_back(line);
+    const std::int64_t tile = explained[at(seam.node)];
+    if (tile < 0) continue;
+    const bool by_itself = std::ranges::find(noisy, tile, &NoisyTile::tile) != noisy.end();
+    lines.back() += "; tile " + std::to_string(tile) +
+                    (by_itself ? " does not even agree with itself" : " disagrees most with the rest of the block");
+  }
+  return lines;
+}
+
+}  // namespace megablock

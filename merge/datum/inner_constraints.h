@@ -1,0 +1,29 @@
+// Covariances of a free block: the S-transformation (Baarda 1973)
+//
+//     C' = S C S',   S = I - N M^-1 N'W,   M = N'WN over the component's frames,  W = (1, 1, 1, 1/L^2, ...)
+//
+// moves them from the minimal constraints of gauge.h to inner constraints; C N W is formed by as many further
+// right-hand sides through the tree.
+#pragma once
+
+#include "merge/datum/gauge.h"
+
+namespace megablock {
+
+// Sums for the S-transformation over the frames that a tile owns; added in tile order.
+struct InnerSums {
+  Eigen::MatrixXd m, k;  // [defect x defect]: N'WN, N'W C W N
+  void add(const InnerSums& other);
+  Bytes to_bytes() const;
+  static InnerSums from_bytes(const Bytes& bytes);
+};
+InnerSums inner_sums(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
+                     const TileState& state, const Step& unknowns);
+
+// Moves a tile's covariances to inner constraints. `unknowns`: the tile's step with the further columns (TileStep),
+// which covariance_tile() had as `columns`.
+void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::int64_t tile, const TileProblem& problem,
+                          const TilePlan& plan, const TileState& state, const Step& unknowns,
+                          TileCovariance& covariance);
+
+}  // namespace megablock

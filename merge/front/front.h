@@ -1,0 +1,188 @@
+// Dense fronts: the elimination step shared by the cells of a tile and the nodes of the merge tree.
+//
+// A front holds the normal equations K x = b over the unknowns E that are eliminated here and the unknowns P that are
+// passed up. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update matrix is
+//
+//     S = K_PP - Y Y',   s = b_P - Y z,
+//
+// the Newton decrement grows by |z|^2, and on the way down x_E = L^-T (z - Y' x_P).
+//
+// A pivot below 1e-12 of the un-eliminated diagonal of J'J (of the damped one when lambda > 0) marks a direction that
+// the observations do not determine: the scalar unknown is held (x = 0: a minimal constraint) and reported.
+//
+// Sign: b = -J'r, so x is the step. Right-hand side 0 is b; further ones (inner constraints of a free block) ride
+// along. Everything is a pure function of its inputs; children are added in their order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "merge/plan/unknowns.h"
+#include "merge/scratch/bytes.h"
+
+namespace megablock {
+
+inline constexpr double kPivotTolerance = 1e-12;
+
+// A scalar unknown that was held because its pivot vanished.
+struct HeldUnknown {
+  UnknownId id;
+  std::int64_t component = 0;  // row inside the unknown
+  double ratio = 0;            // pivot / un-eliminated diagonal; 0 / 0 counts as 0
+};
+
+// What is summed up the tree besides the matrices.
+struct SubtreeSums {
+  double cost = 0;                // 1/2 sum rho(|r|^2)
+  double weighted_squares = 0;    // sum rho' |r|^2
+  double decrement_squared = 0;   // sum |L^-1 b|^2 over everything eliminated so far, points included
+  std::int64_t residuals = 0;     // scalar residuals
+  std::int64_t observations = 0;  // image observations among them
+  std::int64_t points = 0;
+  std::int64_t unknowns = 0;     // scalar unknowns eliminated, points included, held ones included
+  std::int64_t held_points = 0;  // scalar unknowns of points held for a vanishing pivot
+  std::vector<HeldUnknown> held;
+  void add(const SubtreeSums& other);  // in the order of the calls
+};
+
+// What x'Sx - 2 b'x can be lowered by from x = 0, b'S^+ b, and the rank of S.
+struct LeastSquares {
+  double value = 0;
+  std::int64_t rank = 0;
+};
+
+// Condensed normal equations on the passed unknowns: what a child hands to its parent.
+struct UpdateMatrix {
+  UnknownList unknowns;  // passed, ascending
+  std::int64_t right_hand_sides = 1;
+  std::vector<double> matrix;    // lower triangle column by column, packed: n (n + 1) / 2
+  std::vector<double> rhs;       // [n x right_hand_sides], column-major
+  std::vector<double> diagonal;  // [n] of the un-eliminated J'J below here: what lambda multiplies
+  SubtreeSums sums;
+  LeastSquares alone;  // of these equations by themselves; where seams are checked (seam_check.h)
+
+  std::int64_t byte_count() const;  // of its values
+  void write(ByteWriter& out) const;
+  static UpdateMatrix read(ByteReader& in);  // throws StoreError
+  Bytes to_bytes() const;
+  static UpdateMatrix from_bytes(const Bytes& bytes);
+};
+
+// What back-substitution and covariances need of an eliminated front.
+struct FrontFactor {
+  UnknownList eliminated, passed;  // each ascending
+  std::int64_t right_hand_sides = 1;
+  std::vector<double> factor;      // [(e + p) x e] column-major: L (lower triangle) above Y
+  std::vector<double> z;           // [e x right_hand_sides]
+  std::vector<std::int64_t> held;  // rows of E that are held
+
+  std::int64_t byte_count() const;
+  void write(ByteWriter& out) const;
+  static FrontFactor read(ByteReader& in);
+};
+
+// Values of a list of unknowns, e.g. a step.
+struct Step {
+  UnknownList unknowns;  // ascending
+  std::int64_t columns = 1;
+  std::vector<double> values;  // [n x columns], column-major
+
+  const double* find(const UnknownId& id, std::int64_t column = 0) const;  // nullptr when absent
+  Step restricted_to(const UnknownList& wanted) const;                     // throws ComputeError when one is missing
+  Bytes bytes_of(const UnknownList& wanted) const { return restricted_to(wanted).to_bytes(); }
+  Bytes to_bytes() const;
+  static Step from_bytes(const Bytes& bytes);
+};
+
+// Dense symmetric matrix over a list of unknowns (covariances).
+struct CovarianceMatrix {
+  UnknownList unknowns;        // ascending
+  std::vector<double> matrix;  // [n x n], column-major, full
+
+  CovarianceMatrix restricted_to(const UnknownList& wanted) const;
+  // Block (row unknown, column unknown) copied into out (column-major, rows = its dimension).
+  bool block(const UnknownId& row, const UnknownId& column, double* out) const;
+  Bytes to_bytes() const;
+  static CovarianceMatrix from_bytes(const Bytes& bytes);
+};
+
+// Memory of what small fronts leave behind, for the next ones: fetching it anew from the system costs as much as their
+// arithmetic.
+class FrontMemory {
+ public:
+  // Empty, with a capacity of at least `size` values.
+  std::vector<double> take(std::size_t size);
+  void give(std::vector<double> buffer);
+
+ private:
+  std::vector<std::vector<double>> free_;  // ascending by capacity
+};
+
+// A front being filled. Rows: eliminated unknowns first, then passed ones; the columns of the two lie apart, so that
+// the first become the factor as they are. Only the lower triangle is used.
+class Front {
+ public:
+  // `memory` (may be null) outlives the front.
+  Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1, FrontMemory* memory = nullptr);
+
+  std::int64_t dimension() const { return dimension_; }
+  std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
+  // A block of the lower triangle, whose columns belong to one unknown: its first element and what is between columns.
+  struct Place {
+    double* values;
+    std::int64_t stride;
+  };
+  Place place(std::int64_t row, std::int64_t column) {
+    const std::int64_t e = eliminated_dimension_, p = dimension_ - e;
+    if (column < e) return {factor_.data() + row + column * dimension_, dimension_};
+    return {update_.data() + (row - e) + (column - e) * p, p};
+  }
+  double* factor() { return factor_.data(); }  // columns of E [n x e], n between them
+  double* update() { return update_.data(); }  // of P, rows of P alone [p x p]
+  std::int64_t eliminated_dimension() const { return eliminated_dimension_; }
+  double* rhs() { return rhs_.data(); }            // [n x right_hand_sides]
+  double* diagonal() { return diagonal_.data(); }  // [n] of J'J
+  SubtreeSums& sums() { return sums_; }
+
+  void add(const UpdateMatrix& child);  // extend-add; right-hand sides beyond this front's are left out
+
+  struct Result;
+  // Adds lambda * diagonal to the eliminated rows, factorises them, leaves the update matrix. Consumes the front.
+  Result eliminate(double lambda) &&;
+
+ private:
+  UnknownList eliminated_, passed_;
+  std::vector<std::int64_t> eliminated_rows_, passed_rows_;
+  std::int64_t dimension_ = 0, eliminated_dimension_ = 0, right_hand_sides_ = 1;
+  std::vector<double> factor_;  // [n x e]
+  std::vector<double> update_;  // [p x p]
+  std::vector<double> rhs_, diagonal_;
+  FrontMemory* memory_;
+  SubtreeSums sums_;
+};
+
+struct Front::Result {
+  UpdateMatrix update;
+  FrontFactor factor;
+};
+
+// x over E and P (ascending) from x over at least P.
+Step back_substitute(const FrontFactor& factor, const Step& passed);
+
+// Covariance over E and P of a front, by its parts: the whole of an upper front is never put together.
+struct FrontCovariance {
+  UnknownList eliminated, passed;  // each ascending
+  std::vector<double> inner;       // C_EE [e x e] column-major, lower triangle
+  std::vector<double> cross;       // C_PE [p x e]
+  std::vector<double> outer;       // C_PP [p x p]
+
+  CovarianceMatrix restricted_to(const UnknownList& wanted) const;  // throws ComputeError when one is missing
+  Bytes bytes_of(const UnknownList& wanted) const;                  // of restricted_to(), which is not put together
+  CovarianceMatrix whole() const;                                   // of E and P, ascending
+};
+
+// From the covariance of P (all of it, nothing else):
+// C_EE = K_EE^-1 + K_EE^-1 K_EP C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
+FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix passed);
+
+}  // namespace megablock

@@ -1,0 +1,127 @@
+#include "merge/plan/plan.h"
+
+#include <algorithm>
+
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace {
+
+// An unknown of the table and how many leaves below a node touch it.
+struct Touched {
+  std::size_t unknown;
+  std::int64_t leaves;
+};
+using TouchedList = std::vector<Touched>;  // ascending
+
+TouchedList merged(const TouchedList& a, const TouchedList& b) {
+  TouchedList sum;
+  sum.reserve(a.size() + b.size());
+  auto left = a.begin(), right = b.begin();
+  while (left != a.end() || right != b.end()) {
+    if (right == b.end() || (left != a.end() && left->unknown < right->unknown)) {
+      sum.push_back(*left++);
+    } else if (left == a.end() || right->unknown < left->unknown) {
+      sum.push_back(*right++);
+    } else {
+      sum.push_back({left->unknown, left->leaves + right->leaves});
+      ++left, ++right;
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>& leaf_unknowns,
+                          const UnknownList& kept) {
+  std::vector<const UnknownList*> lists = {&kept};
+  for (const UnknownList& list : leaf_unknowns) lists.push_back(&list);
+  const UnknownList table = unite(lists);
+
+  std::vector<TouchedList> touched_by_leaf(leaf_unknowns.size());
+  std::vector<std::int64_t> leaves_of(table.size(), 0);
+  std::vector<UnknownList> owned(leaf_unknowns.size());
+  for (std::size_t leaf = 0; leaf < leaf_unknowns.size(); ++leaf) {
+    for (const Unknown& u : leaf_unknowns[leaf]) {
+      const auto row = static_cast<std::size_t>(find_unknown(table, u.id));
+      touched_by_leaf[leaf].push_back({row, 1});
+      if (leaves_of[row]++ == 0) owned[leaf].push_back(u);
+    }
+  }
+  for (const Unknown& u : kept) leaves_of[static_cast<std::size_t>(find_unknown(table, u.id))] = -1;  // never complete
+
+  EliminationPlan plan;
+  plan.nodes.resize(tree.nodes.size());
+  plan.node_of_leaf.assign(leaf_unknowns.size(), -1);
+  std::vector<TouchedList> open(tree.nodes.size());
+  for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
+    const MergeTree::Node& source = tree.nodes[i];
+    PlanNode& node = plan.nodes[i];
+    node.left = source.left;
+    node.right = source.right;
+    node.parent = source.parent;
+    if (node.parent < 0 && i + 1 != tree.nodes.size())
+      throw ComputeError("merge tree: node " + std::to_string(i) + " has no parent and is not the last node");
+    TouchedList here;
+    if (source.left < 0 && source.right < 0) {
+      node.leaf = source.tile.value;
+      const auto leaf = static_cast<std::size_t>(node.leaf);
+      plan.node_of_leaf.at(leaf) = static_cast<std::int64_t>(i);
+      here = std::move(touched_by_leaf[leaf]);
+      node.owned = std::move(owned[leaf]);
+    } else {
+      static const TouchedList kNothing;
+      here = merged(source.left < 0 ? kNothing : open[static_cast<std::size_t>(source.left)],
+                    source.right < 0 ? kNothing : open[static_cast<std::size_t>(source.right)]);
+    }
+    for (const Touched& t : here) {
+      if (t.leaves == leaves_of[t.unknown]) {
+        node.eliminated.push_back(table[t.unknown]);
+      } else {
+        node.passed.push_back(table[t.unknown]);
+        open[i].push_back(t);
+      }
+    }
+  }
+  for (std::size_t leaf = 0; leaf < plan.node_of_leaf.size(); ++leaf)
+    if (plan.node_of_leaf[leaf] < 0) throw ComputeError("merge tree: no leaf for tile " + std::to_string(leaf));
+  return plan;
+}
+
+void EliminationPlan::write(ByteWriter& out) const {
+  out.value<std::uint64_t>(nodes.size());
+  for (const PlanNode& node : nodes) {
+    for (const std::int64_t number : {node.left, node.right, node.parent, node.leaf}) out.value(number);
+    for (const UnknownList* list : {&node.eliminated, &node.passed, &node.owned}) out.values(*list);
+  }
+  out.values(node_of_leaf);
+}
+
+EliminationPlan EliminationPlan::read(ByteReader& in) {
+  EliminationPlan plan;
+  plan.nodes.resize(in.value<std::uint64_t>());
+  for (PlanNode& node : plan.nodes) {
+    for (std::int64_t* number : {&node.left, &node.right, &node.parent, &node.leaf}) *number = in.value<std::int64_t>();
+    for (UnknownList* list : {&node.eliminated, &node.passed, &node.owned}) *list = in.values<Unknown>();
+  }
+  plan.node_of_leaf = in.values<std::int64_t>();
+  return plan;
+}
+
+FrontCosts front_costs(const EliminationPlan& plan) {
+  FrontCosts costs;
+  for (const PlanNode& node : plan.nodes) {
+    if (node.leaf >= 0) continue;
+    const std::int64_t width = node.front_dimension();
+    costs.widest = std::max(costs.widest, width);
+    // Cholesky of e columns, their rows below, the update of the rest.
+    const auto e = static_cast<double>(total_dimension(node.eliminated)), p = static_cast<double>(width) - e;
+    costs.operations += e * e * e / 3 + p * e * e + p * p * e;
+  }
+  if (!plan.nodes.empty()) costs.root = plan.nodes.back().front_dimension();
+  return costs;
+}
+
+}  // namespace megablock

@@ -1,0 +1,44 @@
+// Symbolic plan of an elimination along a tree: which unknowns complete at which node.
+//
+// An unknown is eliminated at the lowest node that holds all leaves touching it; below that node it is passed up. The
+// same plan serves the merge tree (leaves = tiles) and the cells inside a tile (leaves = cells).
+#pragma once
+
+#include <vector>
+
+#include "io/block/image_graph.h"
+#include "merge/plan/unknowns.h"
+#include "merge/scratch/bytes.h"
+
+namespace megablock {
+
+struct PlanNode {
+  std::int64_t left = -1, right = -1, parent = -1;  // as in the tree; -1: none
+  std::int64_t leaf = -1;                           // leaf number (tile or cell), -1 for inner nodes
+  UnknownList eliminated;                           // completed here, ascending
+  UnknownList passed;                               // of the update matrix, ascending
+  UnknownList owned;                                // leaves: touched here and by no leaf with a lower number
+  std::int64_t front_dimension() const { return total_dimension(eliminated) + total_dimension(passed); }
+};
+
+struct EliminationPlan {
+  std::vector<PlanNode> nodes;             // children before parents; the last node is the root
+  std::vector<std::int64_t> node_of_leaf;  // [leaves]
+  std::int64_t root() const { return static_cast<std::int64_t>(nodes.size()) - 1; }
+  void write(ByteWriter& out) const;
+  static EliminationPlan read(ByteReader& in);
+};
+
+// What the inner nodes cost; the leaves' share is in their own plans.
+struct FrontCosts {
+  std::int64_t root = 0, widest = 0;  // unknowns of the root's front, of the largest one
+  double operations = 0;              // floating-point additions and multiplications of eliminating all of them once
+};
+FrontCosts front_costs(const EliminationPlan& plan);
+
+// leaf_unknowns: ascending list per leaf (of the unknowns its residuals touch). `kept`: ascending; these are never
+// eliminated but passed up beyond the root (a tile's boundary unknowns).
+EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>& leaf_unknowns,
+                          const UnknownList& kept = {});
+
+}  // namespace megablock

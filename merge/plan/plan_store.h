@@ -1,0 +1,43 @@
+// The plans of one rank's tiles: in memory, or in the rank's scratch directory beside the measurements of a tile that
+// is there (tile_store.h), read when they are asked for. What has no room there stays in memory; the choice never
+// changes bits.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "merge/plan/tile_plan.h"
+#include "merge/scratch/scratch_space.h"
+
+namespace megablock {
+
+class PlanStore {
+ public:
+  explicit PlanStore(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
+  ~PlanStore();  // removes its scratch files
+  PlanStore(const PlanStore&) = delete;
+  PlanStore& operator=(const PlanStore&) = delete;
+
+  // In the order of the tiles, `row` below counts them; `tile` is its number in the block.
+  void add(std::int64_t tile, TilePlan plan, bool to_scratch);
+  bool in_scratch(std::size_t row) const { return slots_[row].in_scratch; }
+  // The reference holds until another row is asked for that is in scratch.
+  const TilePlan& operator[](std::size_t row) const;
+
+ private:
+  struct Slot {
+    std::int64_t tile = -1;
+    bool in_scratch = false;
+    TilePlan plan;  // of a tile in memory
+  };
+
+  std::shared_ptr<ScratchSpace> scratch_;
+  std::vector<Slot> slots_;
+  // What was read last.
+  mutable TilePlan loaded_;
+  mutable std::int64_t loaded_row_ = -1;
+};
+
+}  // namespace megablock

@@ -1,0 +1,37 @@
+// The points of a tile in portions of some hundred, cell by cell, so that threads share a tile of few cells evenly.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "merge/plan/tile_plan.h"
+
+namespace megablock {
+
+class PointPortions {
+ public:
+  explicit PointPortions(const TilePlan& plan) {
+    constexpr std::size_t kPoints = 512;
+    rows_.reserve(plan.points.size());
+    for (const RowList& cell : plan.points) {
+      rows_.push_back(cell.rows());
+      for (std::span<const std::int32_t> rest = rows_.back(); !rest.empty();) {
+        portions_.push_back(rest.first(std::min(kPoints, rest.size())));
+        rest = rest.subspan(portions_.back().size());
+      }
+    }
+  }
+  PointPortions(const PointPortions&) = delete;
+  PointPortions& operator=(const PointPortions&) = delete;
+
+  std::int64_t size() const { return std::ssize(portions_); }
+  std::span<const std::int32_t> operator[](std::int64_t i) const { return portions_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::vector<std::vector<std::int32_t>> rows_;  // [cells]
+  std::vector<std::span<const std::int32_t>> portions_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,349 @@
+// Symbolic work of a tile: its unknowns, its cells and what each cell owns.
+#include "merge/plan/tile_plan.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "adjust/problem/owner.h"
+#include "io/base/disjoint_sets.h"
+#include "partition/tiles/separators.h"
+#include "partition/tiles/tiles.h"
+
+namespace megablock {
+
+namespace {
+
+// Which rows of the problem's tables a kept residual touches.
+struct TouchedRows {
+  std::vector<std::uint8_t> frames, cameras, mounts;
+};
+
+TouchedRows touched_rows(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
+  TouchedRows touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
+                      std::vector<std::uint8_t>(problem.cameras.size(), 0),
+                      std::vector<std::uint8_t>(problem.mounts.size(), 0)};
+  for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+    if (!problem.active(p)) continue;
+    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
+      if (!problem.kept[row]) continue;
+      const TileImage& image = problem.images[problem.image[row].value];
+      touched.frames[image.frame.value] = 1;
+      touched.cameras[image.camera.value] = camera_free[image.camera.value] != 0;
+      touched.mounts[image.mount] = problem.mount_free[image.mount] != 0;
+    }
+  }
+  for (const auto& term : problem.positions) touched.frames[term.frame.value] = 1;
+  for (const auto& term : problem.attitudes) touched.frames[term.frame.value] = 1;
+  for (const auto& term : problem.lines) touched.frames[term.frame.value] = touched.frames[term.seen_by().value] = 1;
+  for (const auto& term : problem.verticals) {
+    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
+    touched.frames[image.frame.value] = 1;
+    if (term.camera.size() > 0 && camera_free[image.camera.value]) touched.cameras[image.camera.value] = 1;
+    if (problem.mount_free[image.mount]) touched.mounts[image.mount] = 1;
+  }
+  for (const auto& term : problem.relatives) touched.frames[term.from.value] = touched.frames[term.to.value] = 1;
+  for (const auto& term : problem.intrinsic_priors)
+    if (camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
+  for (const auto& term : problem.mount_priors)
+    if (problem.mount_free[term.mount]) touched.mounts[term.mount] = 1;
+  return touched;
+}
+
+Unknown frame_unknown(const TileProblem& problem, std::size_t row) {
+  return {{UnknownKind::kFrame, 0, problem.frames[row].value}, 6};
+}
+Unknown camera_unknown(const TileProblem& problem, std::size_t row, ParameterMask free) {
+  return {{UnknownKind::kCamera, 0, problem.cameras[row].value}, count_of(free)};
+}
+Unknown mount_unknown(const TileProblem& problem, std::size_t row) {
+  return {{UnknownKind::kMount, problem.mounts[row].mount, problem.mounts[row].rig.value}, 6};
+}
+
+UnknownList listed(const TileProblem& problem, const TouchedRows& touched,
+                   const std::vector<ParameterMask>& camera_free) {
+  UnknownList unknowns;
+  for (std::size_t row = 0; row < touched.frames.size(); ++row)
+    if (touched.frames[row]) unknowns.push_back(frame_unknown(problem, row));
+  for (std::size_t row = 0; row < touched.cameras.size(); ++row)
+    if (touched.cameras[row]) unknowns.push_back(camera_unknown(problem, row, camera_free[row]));
+  for (std::size_t row = 0; row < touched.mounts.size(); ++row)
+    if (touched.mounts[row]) unknowns.push_back(mount_unknown(problem, row));
+  return unknowns;
+}
+
+// Distinct frame rows of an active point's kept observations, ascending.
+void frames_of_point(const TileProblem& problem, std::int64_t point, std::vector<std::int32_t>& frames) {
+  frames.clear();
+  for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
+    if (problem.kept[row]) frames.push_back(problem.images[problem.image[row].value].frame.value);
+  std::sort(frames.begin(), frames.end());
+}
+
+// Edges between frames that share points, relative poses or lines: ascending, weighted by how many they share. Pairs
+// are sorted by their lower frame by counting, and of each of these counted by their upper one: there are millions.
+FrameGraph graph_of(const TileProblem& problem) {
+  const std::size_t frame_count = problem.frames.size();
+  std::vector<std::int32_t> frames;
+  const auto visit_pairs = [&](auto&& visit) {
+    for (std::int64_t p = 0; p < problem.point_count(); ++p) {
+      if (!problem.active(p)) continue;
+      frames_of_point(problem, p, frames);
+      frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+      for (std::size_t a = 0; a < frames.size(); ++a)
+        for (std::size_t b = a + 1; b < frames.size(); ++b) visit(frames[a], frames[b]);
+    }
+    const auto visit_term = [&](LocalFrame a, LocalFrame b) {
+      if (a != b) visit(std::min(a, b).value, std::max(a, b).value);
+    };
+    for (const auto& term : problem.relatives) visit_term(term.from, term.to);
+    for (const auto& term : problem.lines) visit_term(term.frame, term.seen_by());
+  };
+  std::vector<std::size_t> end(frame_count + 1, 0);  // of each lower frame's pairs; first the end of those before
+  visit_pairs([&](std::int32_t a, std::int32_t) { ++end[static_cast<std::size_t>(a) + 1]; });
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<std::int32_t> upper(end.back());
+  visit_pairs([&](std::int32_t a, std::int32_t b) { upper[end[static_cast<std::size_t>(a)]++] = b; });
+
+  FrameGraph graph;
+  graph.frame_count = static_cast<std::int64_t>(frame_count);
+  std::vector<std::int32_t> met;
+  std::vector<std::int64_t> weight(frame_count, 0);
+  std::size_t row = 0;
+  for (std::size_t a = 0; a < frame_count; ++a) {
+    met.clear();
+    for (; row < end[a]; ++row)
+      if (weight[static_cast<std::size_t>(upper[row])]++ == 0) met.push_back(upper[row]);
+    std::sort(met.begin(), met.end());
+    for (const std::int32_t b : met)
+      graph.edges.push_back({FrameIndex(static_cast<std::int64_t>(a)), FrameIndex(b),
+                             std::exchange(weight[static_cast<std::size_t>(b)], 0)});
+  }
+  return graph;
+}
+
+void number_parts(const FrameGraph& graph, TilePlan& plan) {
+  DisjointSets sets(static_cast<std::int32_t>(graph.frame_count));
+  for (const auto& edge : graph.edges)
+    sets.unite(static_cast<std::int32_t>(edge.a.value), static_cast<std::int32_t>(edge.b.value));
+  plan.part_of_frame.assign(static_cast<std::size_t>(graph.frame_count), -1);
+  for (std::int32_t f = 0; f < graph.frame_count; ++f) {
+    if (plan.unknown_of_frame[static_cast<std::size_t>(f)] < 0) continue;
+    const std::int32_t lowest = sets.find(f);
+    plan.part_of_frame[static_cast<std::size_t>(f)] =
+        lowest == f ? plan.part_count++ : plan.part_of_frame[static_cast<std::size_t>(lowest)];
+  }
+}
+
+// Shares out points and the observations without a point, and notes which unknowns each cell touches.
+class CellPlanner {
+ public:
+  CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
+              const std::vector<std::int32_t>& depth_of_frame, std::size_t cells)
+      : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame), depth_of_frame_(depth_of_frame) {
+    plan.points.resize(cells);
+    for (auto* list : {&plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
+                       &plan.intrinsic_priors, &plan.mount_priors})
+      list->resize(cells);
+    touched_.assign(cells, std::vector<std::uint8_t>(plan.unknowns.size(), 0));
+  }
+
+  std::vector<UnknownList> run() {
+    share_points();
+    share_terms();
+    std::vector<UnknownList> lists(touched_.size());
+    for (std::size_t c = 0; c < touched_.size(); ++c)
+      for (std::size_t u = 0; u < plan_.unknowns.size(); ++u)
+        if (touched_[c][u]) lists[c].push_back(plan_.unknowns[u]);
+    return lists;
+  }
+
+ private:
+  void touch(std::size_t cell, std::int64_t unknown) {
+    if (unknown >= 0) touched_[cell][static_cast<std::size_t>(unknown)] = 1;
+  }
+  std::size_t cell_of(LocalFrame frame) const {
+    return static_cast<std::size_t>(cell_of_frame_[static_cast<std::size_t>(frame.value)]);
+  }
+  // Of frame rows, which may come several times.
+  std::size_t owner_of(const std::vector<std::int32_t>& frames) {
+    candidates_.clear();
+    for (const std::int32_t frame : frames) {
+      const auto row = static_cast<std::size_t>(frame);
+      candidates_.push_back({cell_of_frame_[row], depth_of_frame_[row]});
+    }
+    return static_cast<std::size_t>(owner_part(candidates_));
+  }
+
+  void share_points() {
+    std::vector<std::int32_t> frames;
+    for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
+      if (!problem_.active(p)) continue;
+      frames_of_point(problem_, p, frames);
+      const std::size_t cell = owner_of(frames);
+      plan_.points[cell].push_back(static_cast<std::int32_t>(p));
+      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
+        if (!problem_.kept[row]) continue;
+        const TileImage& image = problem_.images[problem_.image[row].value];
+        touch(cell, plan_.unknown_of_frame[image.frame.value]);
+        touch(cell, plan_.unknown_of_camera[image.camera.value]);
+        touch(cell, plan_.unknown_of_mount[image.mount]);
+      }
+    }
+    for (auto& points : plan_.points) points.shrink_to_fit();
+  }
+
+  void share_terms() {
+    for (std::size_t i = 0; i < problem_.positions.size(); ++i) {
+      const LocalFrame frame = problem_.positions[i].frame;
+      plan_.positions[cell_of(frame)].push_back(static_cast<std::int64_t>(i));
+      touch(cell_of(frame), plan_.unknown_of_frame[frame.value]);
+    }
+    for (std::size_t i = 0; i < problem_.attitudes.size(); ++i) {
+      const LocalFrame frame = problem_.attitudes[i].frame;
+      plan_.attitudes[cell_of(frame)].push_back(static_cast<std::int64_t>(i));
+      touch(cell_of(frame), plan_.unknown_of_frame[frame.value]);
+    }
+    for (std::size_t i = 0; i < problem_.relatives.size(); ++i) {
+      const auto& term = problem_.relatives[i];
+      const std::size_t cell = owner_of({term.from.value, term.to.value});
+      plan_.relatives[cell].push_back(static_cast<std::int64_t>(i));
+      touch(cell, plan_.unknown_of_frame[term.from.value]);
+      touch(cell, plan_.unknown_of_frame[term.to.value]);
+    }
+    for (std::size_t i = 0; i < problem_.lines.size(); ++i) {
+      const auto& term = problem_.lines[i];
+      const std::size_t cell = owner_of({term.frame.value, term.seen_by().value});
+      plan_.lines[cell].push_back(static_cast<std::int64_t>(i));
+      touch(cell, plan_.unknown_of_frame[term.frame.value]);
+      touch(cell, plan_.unknown_of_frame[term.seen_by().value]);
+    }
+    for (std::size_t i = 0; i < problem_.verticals.size(); ++i) {
+      const auto& term = problem_.verticals[i];
+      const TileImage& image = problem_.images[static_cast<std::size_t>(term.image.value)];
+      const std::size_t cell = cell_of(image.frame);
+      plan_.verticals[cell].push_back(static_cast<std::int64_t>(i));
+      touch(cell, plan_.unknown_of_frame[image.frame.value]);
+      touch(cell, plan_.unknown_of_mount[image.mount]);
+      if (term.camera.size() > 0) touch(cell, plan_.unknown_of_camera[image.camera.value]);
+    }
+    // Shared parameters' priors go where the first image of the camera or mount lies.
+    std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);
+    for (auto image = problem_.images.rbegin(); image != problem_.images.rend(); ++image)
+      camera_cell[image->camera.value] = mount_cell[static_cast<std::size_t>(image->mount)] = cell_of(image->frame);
+    for (std::size_t i = 0; i < problem_.intrinsic_priors.size(); ++i) {
+      const auto camera = static_cast<std::size_t>(problem_.intrinsic_priors[i].camera.value);
+      plan_.intrinsic_priors[camera_cell[camera]].push_back(static_cast<std::int64_t>(i));
+      touch(camera_cell[camera], plan_.unknown_of_camera[camera]);
+    }
+    for (std::size_t i = 0; i < problem_.mount_priors.size(); ++i) {
+      const auto mount = static_cast<std::size_t>(problem_.mount_priors[i].mount);
+      plan_.mount_priors[mount_cell[mount]].push_back(static_cast<std::int64_t>(i));
+      touch(mount_cell[mount], plan_.unknown_of_mount[mount]);
+    }
+  }
+
+  const TileProblem& problem_;
+  TilePlan& plan_;
+  const std::vector<std::int32_t>&cell_of_frame_, &depth_of_frame_;
+  std::vector<OwnerCandidate> candidates_;
+  std::vector<std::vector<std::uint8_t>> touched_;
+};
+
+}  // namespace
+
+UnknownList tile_unknowns(const TileProblem& problem) { return tile_unknowns(problem, problem.camera_free); }
+
+UnknownList tile_unknowns(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
+  UnknownList unknowns = listed(problem, touched_rows(problem, camera_free), camera_free);
+  std::sort(unknowns.begin(), unknowns.end());
+  return unknowns;
+}
+
+std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point) {
+  for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
+    if (problem.kept[row]) return problem.images[problem.image[row].value].frame.value;
+  return -1;
+}
+
+namespace {
+
+TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const UnknownList& unknowns,
+                 const std::vector<ParameterMask>& camera_free, std::int64_t cell_max_frames) {
+  TilePlan plan;
+  plan.unknowns = unknowns;
+  plan.camera_free = camera_free;
+  plan.boundary = node.passed;
+  plan.owned = node.owned;
+  const auto position = [&](const Unknown& u) { return find_unknown(plan.unknowns, u.id); };
+  for (std::size_t row = 0; row < problem.frames.size(); ++row)
+    plan.unknown_of_frame.push_back(position(frame_unknown(problem, row)));
+  for (std::size_t row = 0; row < problem.cameras.size(); ++row)
+    plan.unknown_of_camera.push_back(position(camera_unknown(problem, row, camera_free[row])));
+  for (std::size_t row = 0; row < problem.mounts.size(); ++row)
+    plan.unknown_of_mount.push_back(position(mount_unknown(problem, row)));
+
+  const FrameGraph graph = graph_of(problem);
+  number_parts(graph, plan);
+  BisectionTree cells = bisect(graph, cell_max_frames);
+  if (cells.tree.nodes.empty()) {  // a tile without frames: one empty cell
+    cells.tree.nodes.emplace_back();
+    cells.tree.nodes.back().tile = TileIndex(0);
+  }
+  std::size_t cell_count = 0;
+  for (const MergeTree::Node& n : cells.tree.nodes) cell_count += n.left < 0 && n.right < 0;
+  // What the tile passes on is cut off already, above the root of its cells.
+  std::vector<std::uint8_t> passed(problem.frames.size(), 0);
+  for (std::size_t row = 0; row < passed.size(); ++row)
+    passed[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
+  std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, passed);
+  for (std::size_t row = 0; row < passed.size(); ++row)
+    if (passed[row] || depth[row] >= 0) ++depth[row];
+  const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();
+  plan.cells = make_plan(cells.tree, lists, plan.boundary);
+  for (PlanNode& cell : plan.cells.nodes) cell.owned = {};  // of tiles alone somebody asks for it
+  return plan;
+}
+
+}  // namespace
+
+void TilePlan::write(ByteWriter& out) const {
+  for (const UnknownList* list : {&unknowns, &boundary, &owned}) out.values(*list);
+  cells.write(out);
+  for (const RowList& rows : points) rows.write(out);
+  for (const auto* lists : {&positions, &attitudes, &relatives, &lines, &verticals, &intrinsic_priors, &mount_priors})
+    for (const std::vector<std::int64_t>& rows : *lists) out.values(rows);
+  for (const auto* rows : {&part_of_frame, &unknown_of_frame, &unknown_of_camera, &unknown_of_mount}) out.values(*rows);
+  out.value(part_count);
+  out.values(camera_free);
+}
+
+TilePlan TilePlan::read(ByteReader& in) {
+  TilePlan plan;
+  for (UnknownList* list : {&plan.unknowns, &plan.boundary, &plan.owned}) *list = in.values<Unknown>();
+  plan.cells = EliminationPlan::read(in);
+  const std::size_t cell_count = plan.cells.node_of_leaf.size();
+  for (std::size_t cell = 0; cell < cell_count; ++cell) plan.points.push_back(RowList::read(in));
+  for (auto* lists : {&plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
+                      &plan.intrinsic_priors, &plan.mount_priors})
+    for (std::size_t cell = 0; cell < cell_count; ++cell) lists->push_back(in.values<std::int64_t>());
+  for (auto* rows : {&plan.part_of_frame, &plan.unknown_of_frame, &plan.unknown_of_camera, &plan.unknown_of_mount})
+    *rows = in.values<std::int64_t>();
+  plan.part_count = in.value<std::int64_t>();
+  plan.camera_free = in.values<ParameterMask>();
+  return plan;
+}
+
+TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames) {
+  return plan_of(problem, node, tile_unknowns(problem), problem.camera_free, cell_max_frames);
+}
+
+TilePlan make_lone_tile_plan(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
+  constexpr std::int64_t kCellMaxFrames = 32;
+  PlanNode node;
+  node.leaf = 0;
+  node.eliminated = node.owned = tile_unknowns(problem, camera_free);
+  return plan_of(problem, node, node.owned, camera_free, kCellMaxFrames);
+}
+
+}  // namespace megablock

@@ -1,0 +1,103 @@
+// Flat byte strings of plain values and vectors: what travels between ranks and to the scratch directory.
+// Host byte order: a job's ranks and its scratch live on machines of one kind.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <istream>
+#include <ostream>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "io/base/error.h"
+
+namespace megablock {
+
+using Bytes = std::string;
+
+// Into memory, or straight into a file, whose state says afterwards whether all of it went there.
+class ByteWriter {
+ public:
+  ByteWriter() = default;
+  explicit ByteWriter(std::ostream& file) : file_(&file) {}
+
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void value(const T& v) { append(&v, sizeof v); }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void values(const std::vector<T>& v) {
+    value<std::uint64_t>(v.size());
+    append(v.data(), v.size() * sizeof(T));
+  }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void elements(const T* first, std::size_t count) { append(first, count * sizeof(T)); }  // without their number
+  void bytes(const Bytes& b) {
+    value<std::uint64_t>(b.size());
+    append(b.data(), b.size());
+  }
+  void reserve(std::size_t size) { bytes_.reserve(size); }  // of what goes into memory
+  Bytes take() { return std::move(bytes_); }                // what went into memory
+
+ private:
+  void append(const void* data, std::size_t size) {
+    if (file_)
+      file_->write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
+    else
+      bytes_.append(static_cast<const char*>(data), size);
+  }
+  Bytes bytes_;
+  std::ostream* file_ = nullptr;
+};
+
+// From memory, or from the first `size` bytes of a file. Throws StoreError when they end too early.
+class ByteReader {
+ public:
+  explicit ByteReader(const Bytes& bytes) : data_(bytes.data()), size_(bytes.size()) {}
+  ByteReader(std::istream& file, std::size_t size) : file_(&file), size_(size) {}
+
+  template <typename T>
+  requires std::is_trivially_copyable_v<T> T value() {
+    T v;
+    copy(&v, sizeof v);
+    return v;
+  }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T> std::vector<T> values() {
+    std::vector<T> v(count_of(sizeof(T)));
+    copy(v.data(), v.size() * sizeof(T));
+    return v;
+  }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void elements(T* first, std::size_t count) { copy(first, count * sizeof(T)); }  // as many as the caller knows of
+  Bytes bytes() {
+    Bytes b(count_of(1), '\0');
+    copy(b.data(), b.size());
+    return b;
+  }
+  bool at_end() const { return position_ == size_; }
+
+ private:
+  std::size_t count_of(std::size_t size) {
+    const auto count = value<std::uint64_t>();
+    if (count > (size_ - position_) / size) fail();
+    return count;
+  }
+  void copy(void* target, std::size_t size) {
+    if (size > size_ - position_) fail();
+    if (file_ && !file_->read(static_cast<char*>(target), static_cast<std::streamsize>(size))) fail();
+    if (!file_ && size > 0) std::memcpy(target, data_ + position_, size);
+    position_ += size;
+  }
+  [[noreturn]] static void fail() { throw StoreError("merge: a message or spill file is truncated"); }
+
+  const char* data_ = nullptr;
+  std::istream* file_ = nullptr;
+  std::size_t size_ = 0, position_ = 0;
+};
+
+}  // namespace megablock

@@ -1,0 +1,57 @@
+// Ascending rows of a table, held as the distances between them: in a byte each while they are below 255, and that is
+// nearly always so where the rows of a table are dealt to some dozen lists. The plans of all tiles wait in memory while
+// their measurements are in scratch; of a million images their lists of points would take 80 MiB as numbers.
+#pragma once
+
+#include <cassert>
+#include <cstdint>
+#include <vector>
+
+#include "merge/scratch/bytes.h"
+
+namespace megablock {
+
+class RowList {
+ public:
+  // Larger than all before, and not the largest number there is.
+  void push_back(std::int32_t row) {
+    assert(row > last_);
+    std::int32_t distance = row - last_;
+    for (; distance >= kMore; distance -= kMore) distances_.push_back(kMore);
+    distances_.push_back(static_cast<std::uint8_t>(distance));
+    last_ = row;
+    ++size_;
+  }
+  void shrink_to_fit() { distances_.shrink_to_fit(); }
+  std::int64_t size() const { return size_; }
+  void write(ByteWriter& out) const {
+    out.values(distances_);
+    out.value(last_);
+    out.value(size_);
+  }
+  static RowList read(ByteReader& in) {
+    RowList list;
+    list.distances_ = in.values<std::uint8_t>();
+    list.last_ = in.value<std::int32_t>();
+    list.size_ = in.value<std::int32_t>();
+    return list;
+  }
+  std::vector<std::int32_t> rows() const {
+    std::vector<std::int32_t> rows;
+    rows.reserve(static_cast<std::size_t>(size_));
+    std::int32_t row = -1;
+    for (const std::uint8_t distance : distances_) {
+      row += distance;
+      if (distance < kMore) rows.push_back(row);
+    }
+    return rows;
+  }
+
+ private:
+  static constexpr std::uint8_t kMore = 255;  // the next byte goes on
+  std::vector<std::uint8_t> distances_;
+  std::int32_t last_ = -1;
+  std::int32_t size_ = 0;
+};
+
+}  // namespace megablock

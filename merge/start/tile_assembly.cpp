@@ -1,0 +1,121 @@
+#include "merge/start/tile_assembly.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "adjust/models/model_assembly.h"
+#include "io/base/error.h"
+
+namespace megablock {
+
+namespace {
+
+bool finite(const Pose& pose) { return pose.centre.allFinite() && pose.rotation.coeffs().allFinite(); }
+
+double extent_of(const AlignmentTile& tile) {
+  Eigen::AlignedBox3d box;
+  for (const Pose& pose : tile.poses)
+    if (finite(pose)) box.extend(pose.centre);
+  return box.isEmpty() ? 0 : box.diagonal().norm();
+}
+
+bool tells(const AlignmentTile& tile, std::size_t row) {
+  return tile.observations[row] >= kFewestAlignmentObservations && finite(tile.poses[row]);
+}
+
+// Frames that several tiles tell of, ascending.
+std::vector<FrameIndex> shared_frames(const std::vector<AlignmentTile>& tiles) {
+  std::vector<FrameIndex> all, shared;
+  for (const AlignmentTile& tile : tiles)
+    for (std::size_t i = 0; i < tile.frames.size(); ++i)
+      if (tells(tile, i)) all.push_back(tile.frames[i]);
+  std::sort(all.begin(), all.end());
+  for (std::size_t i = 1; i < all.size(); ++i)
+    if (all[i] == all[i - 1] && (shared.empty() || shared.back() != all[i])) shared.push_back(all[i]);
+  return shared;
+}
+
+// How good a frame is in its tile goes by its observations; how good all of them are each link finds by itself.
+Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<FrameIndex>& shared) {
+  constexpr double kOrder = 1e-6;  // of the extent, and rad: smaller than any misfit, as links only enlarge sigmas
+  Model model;
+  model.number = static_cast<std::int64_t>(number);
+  const double extent = extent_of(tile);
+  if (!(extent > 0) || !std::isfinite(extent)) return model;
+  for (std::size_t i = 0; i < tile.frames.size(); ++i) {
+    if (!tells(tile, i) || !std::binary_search(shared.begin(), shared.end(), tile.frames[i])) continue;
+    const double order = kOrder / std::sqrt(static_cast<double>(tile.observations[i]));
+    model.images.push_back({tile.frames[i].value, tile.poses[i], order * extent, order});
+  }
+  return model;
+}
+
+// The tiles of a part as assembled, back to where they were in the mean.
+class WayBack {
+ public:
+  void add(const AlignmentTile& tile, const Similarity& assembled) {
+    const Eigen::Vector4d turn = assembled.rotation.conjugate().coeffs();
+    for (const Pose& pose : tile.poses) {
+      if (!finite(pose)) continue;
+      turns_ += turn * turn.transpose();
+      from_.push_back(assembled(pose.centre));
+      to_.push_back(pose.centre);
+    }
+  }
+  Similarity similarity() const {
+    Similarity back;
+    if (from_.empty()) return back;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(turns_);
+    back.rotation = Eigen::Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3)));
+    const Eigen::Vector3d from = mean(from_), to = mean(to_);
+    const double size_from = size(from_, from), size_to = size(to_, to);
+    if (size_from > 0 && size_to > 0) back.scale = size_to / size_from;
+    back.translation = to - back.scale * (back.rotation * from);
+    return back;
+  }
+
+ private:
+  using Places = std::vector<Eigen::Vector3d>;
+  static Eigen::Vector3d mean(const Places& places) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& place : places) sum += place;
+    return sum / static_cast<double>(places.size());
+  }
+  static double size(const Places& places, const Eigen::Vector3d& middle) {
+    double sum = 0;
+    for (const Eigen::Vector3d& place : places) sum += (place - middle).norm();
+    return sum;
+  }
+
+  Eigen::Matrix4d turns_ = Eigen::Matrix4d::Zero();  // sum of q q' of unit quaternions
+  Places from_, to_;
+};
+
+}  // namespace
+
+std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles) {
+  const std::vector<FrameIndex> shared = shared_frames(tiles);
+  std::vector<Model> models;
+  for (std::size_t t = 0; t < tiles.size(); ++t) models.push_back(model_of(tiles[t], t, shared));
+  AssemblyOptions options;
+  options.covariances = false;
+  options.links.scale_sigmas = true;
+  AssembledModels assembled;
+  try {
+    assembled = assemble_models(models, options);
+  } catch (const ComputeError&) {  // all stay; they are aligned in any case
+    return std::vector<Similarity>(tiles.size());
+  }
+  std::map<std::int64_t, WayBack> parts;  // by the number of the part
+  for (std::size_t t = 0; t < tiles.size(); ++t) parts[assembled.part[t]].add(tiles[t], assembled.similarity[t]);
+  std::map<std::int64_t, Similarity> back;
+  for (const auto& [number, part] : parts) back[number] = part.similarity();
+  std::vector<Similarity> result;
+  for (std::size_t t = 0; t < tiles.size(); ++t) result.push_back(back.at(assembled.part[t]) * assembled.similarity[t]);
+  return result;
+}
+
+}  // namespace megablock

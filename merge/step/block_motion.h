@@ -1,0 +1,85 @@
+// Applying a step: what moves a whole component of the block is applied as a similarity, the rest along straight lines.
+//
+// Priors of metres fix the datum of a small block to fractions of a degree. A step that turns it by phi moves frames
+// and points along tangents, C + phi x (C - c): across the axis everything grows by 1 + phi^2 / 2, along it nothing.
+// Images see that as soon as phi^2 / 2 of their width exceeds the noise (phi = 0.3 degrees: 0.02 px), so that damping
+// holds every step down to it and the iteration creeps. The similarity (phi, t, s) nearest to a component's step,
+//
+//     min  sum over frames  |w + phi|^2 + |d - t - phi x (C - c) - s (C - c)|^2 / L^2,
+//
+// c the centroid, L the extent, is therefore split off and applied as X -> c + t + (1 + s) Exp(phi) (X' - c) to X'
+// moved by the rest of the step. To first order that is the step itself: the normal equations know nothing of it.
+//
+// Sums are formed per tile over the frames that it owns, and added in tile order.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "merge/datum/gauge.h"
+
+namespace megablock {
+
+// Sums of a tile over the step of its own frames, one row per component of the block that it touches.
+struct MotionSums {
+  // Frames, sums of C, C C' (row by row), d, w, C x d, C . d, about the ground origin.
+  static constexpr int kSize = 1 + 3 + 9 + 3 + 3 + 3 + 1;
+  using Row = Eigen::Matrix<double, kSize, 1>;
+  std::vector<std::int64_t> components;  // ascending
+  std::vector<Row> rows;
+  Bytes to_bytes() const;
+  static MotionSums from_bytes(const Bytes& bytes);
+};
+MotionSums motion_sums(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
+                       const TileState& state, const Step& step);
+
+// A similarity of the ground near the identity.
+struct BlockMotion {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  // phi, rad
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();     // m
+  double scale = 0;                                    // s
+
+  Eigen::Vector3d tangent(const Eigen::Vector3d& position) const {
+    const Eigen::Vector3d arm = position - centre;
+    return shift + rotation.cross(arm) + scale * arm;
+  }
+};
+// Of every component of the block, from the sums of all tiles, in tile order.
+std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vector<MotionSums>& tiles);
+
+// A step as it is applied to a tile, with the motions of the components of its parts; every tile that holds a frame
+// computes the same bits. Without motions: along straight lines.
+class TileMotion {
+ public:
+  // Problem and plan outlive it.
+  TileMotion(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
+             const TileProblem& problem, const TilePlan& plan);
+  // Everything but the points, which stay where they are.
+  TileState unknowns(const TileState& state, const Step& step) const;
+  Eigen::Vector3d point(const TileState& state, std::int64_t point, const Eigen::Vector3d& step) const {
+    const Mover& mover = movers_.size() == 1 ? movers_.front() : mover_of(point);
+    const Eigen::Vector3d& before = state.points[static_cast<std::size_t>(point)];
+    return mover.moved(before + (step - mover.motion.tangent(before)));
+  }
+
+ private:
+  struct Mover {  // a component's motion, ready to move things
+    BlockMotion motion;
+    Eigen::Quaterniond turn;
+    Eigen::Vector3d moved(const Eigen::Vector3d& position) const {
+      return motion.centre + motion.shift + (1 + motion.scale) * (turn * (position - motion.centre));
+    }
+    Pose pose(const Pose& before, PoseIncrement increment) const;
+  };
+  const Mover& mover_of(std::int64_t point) const;
+  const TileProblem& problem_;
+  const TilePlan& plan_;
+  std::vector<Mover> movers_;  // of the tile's parts
+};
+
+// state (+) step.
+TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
+                     const TileProblem& problem, const TilePlan& plan, const TileState& state, const TileStep& step);
+
+}  // namespace megablock

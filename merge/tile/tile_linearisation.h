@@ -1,0 +1,96 @@
+// Weights of the robust losses, and linearised residuals without a point of one cell: shared by condensation and
+// covariances (point_equations.h has those with one).
+//
+// Losses. The second derivative of 1/2 rho(|r|^2) by r is rho' (I + 2 rho''/rho' r r'): rho' across the residual, and
+// rho' (1 + 2 s rho''/rho') along it, s = |r|^2: nothing for Huber beyond its corner, less than nothing for Cauchy
+// beyond its scale. Normal equations with rho' I alone (iteratively reweighted least squares; they define decrement and
+// covariances) overestimate the curvature along such residuals and approach the optimum by a constant factor per step.
+// A pass with curvature takes the smaller value, but no less than kLeastCurvature rho', so that the normal equations
+// stay positive definite: J and r are scaled by sqrt(rho') and, along r, further by (1 - k) and 1 / (1 - k),
+// (1 - k)^2 = the value (Triggs et al. 2000, "Bundle adjustment", 4.3). The gradient stays what it is.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "adjust/terms/linearise.h"
+#include "io/base/error.h"
+#include "io/block/observation_statistics.h"
+#include "merge/tile/condense.h"
+
+namespace megablock {
+
+inline constexpr double kLeastCurvature = 0.1;
+
+// The largest squared norm s with rho(s) = s; -1: none.
+inline double end_of_squares(const RobustLoss& loss) {
+  if (loss.kind == RobustLoss::Kind::kNone) return std::numeric_limits<double>::max();
+  return loss.has_corner() ? loss.scale * loss.scale : -1;
+}
+
+// Weighting of a residual under a loss.
+struct LossWeight {
+  double rho = 0, first = 1;  // of the squared norm
+  double root = 1;            // sqrt(rho')
+  double along = 0;           // k / s: J is scaled by root (I - along r r')
+  double residual_scale = 1;  // of r
+  LossWeight(const RobustLoss& loss, double squared_norm, bool curvature) {
+    const auto values = loss.evaluate(squared_norm);
+    rho = values[0];
+    first = values[1];
+    if (first != 1) root = residual_scale = std::sqrt(first);
+    if (!curvature || values[2] >= 0 || squared_norm == 0) return;
+    const double left = std::sqrt(std::max(kLeastCurvature, 1 + 2 * squared_norm * values[2] / first));
+    along = (1 - left) / squared_norm;
+    residual_scale = root / left;
+  }
+  template <typename Jacobian, typename Residual>
+  auto weighted(const Jacobian& jacobian, const Residual& residual) const {
+    typename Jacobian::PlainObject result = root * jacobian;
+    if (along != 0) result -= residual * ((root * along) * (residual.transpose() * jacobian));
+    return result;
+  }
+};
+
+// Jacobian of a residual by one unknown (position in TilePlan::unknowns), weighted.
+template <typename Jacobian>
+struct JacobianBlock {
+  std::int64_t unknown = -1;
+  Jacobian jacobian;
+};
+
+// A residual without a point, divided by sigma and weighted by its loss.
+struct TermResidual {
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxIntrinsics>;
+  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
+  std::array<JacobianBlock<Jacobian>, 3> blocks;
+  int block_count = 0;
+  std::array<ObservationKind, 6> kinds{};  // [residual]
+  double rho = 0;                          // of the squared norm
+  double weighted_squares = 0;             // rho' |r|^2
+
+  void add_block(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& jacobian) {
+    if (unknown < 0) return;
+    blocks[static_cast<std::size_t>(block_count)].unknown = unknown;
+    blocks[static_cast<std::size_t>(block_count++)].jacobian = jacobian;
+  }
+  void weight(const RobustLoss& loss, const Pass& pass) {
+    const double squares = residual.squaredNorm();
+    const LossWeight w(loss, squares, pass.curvature);
+    rho = w.rho;
+    weighted_squares = w.first * squares;
+    for (int b = 0; b < block_count; ++b) {
+      auto& jacobian = blocks[static_cast<std::size_t>(b)].jacobian;
+      jacobian = w.weighted(jacobian, residual);
+    }
+    residual *= w.residual_scale;
+  }
+};
+
+// Calls visit for every observation without a point of a cell.
+void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                 std::size_t cell, const std::function<void(const TermResidual&)>& visit);
+
+}  // namespace megablock

@@ -1,0 +1,207 @@
+// Cameras of every model through files, project files, imports and exports.
+#include <gmock/gmock.h>
+
+#include "io/base/error.h"
+#include "io/exchange/bal/bal_camera.h"
+#include "io/exchange/export.h"
+#include "io/exchange/import.h"
+#include "io/project/project.h"
+#include "io/simulate/blocks/simulate.h"
+#include "io/store/units/unit_files.h"
+#include "tests/support/geometry/camera_samples.h"
+#include "tests/support/io/image_files.h"
+#include "tests/support/io/scratch_directory.h"
+#include "tests/support/io/small_result.h"
+
+namespace megablock {
+namespace {
+
+using fixture::message_of;
+using fixture::read_file;
+using fixture::small_result;
+using fixture::write_file;
+using fixture::write_picture;
+using ::testing::HasSubstr;
+
+Block every_camera() {
+  Block block;
+  for (const CameraModel& model : every_model()) {
+    Camera camera;
+    camera.name = model_name(model);
+    camera.width = kSampleWidth;
+    camera.height = kSampleHeight;
+    camera.intrinsics = sample_camera(model);
+    camera.prior_sigma = weak_sigmas(camera.intrinsics, 20, camera.width);
+    block.cameras.push_back(std::move(camera));
+  }
+  return block;
+}
+
+TEST(CameraModelFiles, KeepEveryModel) {
+  ScratchDirectory folder;
+  const Block block = every_camera();
+  EXPECT_NO_THROW(check(block));
+  write_block(folder.path("block.h5"), block);
+  const Block back = read_block(folder.path("block.h5"));
+  ASSERT_EQ(back.cameras.size(), block.cameras.size());
+  const BlockState state = initial_state(block);
+  write_state(folder.path("state.h5"), state);
+  EXPECT_EQ(read_state(folder.path("state.h5")).cameras, state.cameras);
+  TileAdjustment adjustment;
+  for (std::size_t c = 0; c < block.cameras.size(); ++c) {
+    const CameraIndex index(static_cast<std::int64_t>(c));
+    EXPECT_EQ(back.cameras[index].intrinsics, block.cameras[index].intrinsics);
+    EXPECT_EQ(back.cameras[index].prior_sigma, block.cameras[index].prior_sigma);
+    adjustment.cameras.push_back(index);
+    adjustment.intrinsics.push_back(block.cameras[index].intrinsics);
+    adjustment.camera_observations.push_back(1);
+  }
+  write_adjustment(folder.path("adjustment.h5"), adjustment);
+  EXPECT_EQ(read_adjustment(folder.path("adjustment.h5")).intrinsics, adjustment.intrinsics);
+}
+
+class CameraModelProject : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    write_picture(folder_.path("images/a.jpg"), 1920, 1080, 50);
+    write_picture(folder_.path("images/b.jpg"), 1920, 1080, 60);
+  }
+  Camera read(const std::string& camera) {
+    write_file(folder_.path("block.yaml"), "images: images\ncameras:\n  default:\n" + camera);
+    return read_project(folder_.path("block.yaml")).block.cameras[CameraIndex(0)];
+  }
+  std::string refusal(const std::string& camera) {
+    return message_of<InputError>([&] { read(camera); });
+  }
+  ScratchDirectory folder_;
+};
+
+TEST_F(CameraModelProject, TakesModelAndParameters) {
+  const Camera camera = read(
+      "    model: ign-radial\n    focal_px: 1400\n    principal_point_px: [961, 542]\n"
+      "    distortion: {a: -4.6e-8, b: 3.1e-14, c: -1.2e-21, sy: 545}\n    calibrate: [focal, a, sx]\n");
+  EXPECT_EQ(camera.intrinsics,
+            Intrinsics(*find_model("ign-radial"), {1400, 961, 542, 961, 545, -4.6e-8, 3.1e-14, -1.2e-21}));
+  IntrinsicSigmas expected{};
+  expected[kFocal] = 70;
+  expected[kSymmetryX] = 96;
+  expected[kRadialTerms] = 0.2 / (1400.0 * 1400.0);
+  for (std::size_t p = 0; p < expected.size(); ++p) EXPECT_DOUBLE_EQ(camera.prior_sigma[p], expected[p]);
+}
+
+TEST_F(CameraModelProject, KnowsEveryModel) {
+  for (const CameraModel& model : every_model()) {
+    const Camera camera = read("    model: " + model_name(model) + "\n");
+    EXPECT_EQ(camera.intrinsics, start_intrinsics(model, 1.2 * 1920, 1920, 1080)) << model_name(model);
+  }
+  EXPECT_EQ(read("    model: equirectangular\n    calibrate: [cx]\n").prior_sigma[kPrincipalX], 0.02 * 1920);
+}
+
+TEST_F(CameraModelProject, RefusesByLine) {
+  EXPECT_THAT(refusal("    model: ign\n"), HasSubstr("block.yaml:4: model: 'ign' is no camera model; they are brown,"));
+  EXPECT_THAT(refusal("    model: odd-radial-12\n"), HasSubstr("odd-radial-N (N = 1 to 9)"));
+  EXPECT_THAT(refusal("    model: ign-radial\n    distortion: {k1: 0.1}\n"),
+              HasSubstr("block.yaml:5: unknown key 'k1'"));
+  EXPECT_THAT(
+      refusal("    model: pinhole\n    calibrate: [k1]\n"),
+      HasSubstr("block.yaml:5: calibrate: 'k1' is no camera parameter; they are focal, principal_point, f, cx, cy"));
+  EXPECT_THAT(refusal("    model: legendre-2\n    calibrate: [width]\n"), HasSubstr("size of the image"));
+  EXPECT_THAT(refusal("    model: equirectangular\n    focal_px: 300\n"), HasSubstr("block.yaml:5: the focal length"));
+}
+
+// The result with another model for both cameras and observations that fit exactly.
+BlockResult result_with(const std::string& name) {
+  BlockResult result = small_result();
+  const CameraModel model = *find_model(name);
+  for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
+    const CameraIndex index(static_cast<std::int64_t>(c));
+    Camera& camera = result.block.cameras[index];
+    camera.intrinsics = sample_camera(model, camera.intrinsics[kFocal], camera.width, camera.height);
+    camera.prior_sigma = weak_sigmas(camera.intrinsics, 10, camera.width);
+    result.state.cameras[index] = camera.intrinsics;
+  }
+  result.camera_covariance.clear();
+  return result;
+}
+
+TEST(CameraModelExchange, ColmapKeepsPinholeAndFisheye) {
+  for (const char* model : {"pinhole", "opencv-fisheye", "brown"})
+    for (const char* format : {"colmap-text", "colmap-bin"}) {
+      ScratchDirectory folder;
+      const BlockResult result = result_with(model);
+      export_result(result, format, folder.path("model"));
+      const ImportedBlock imported = import_block(format, folder.path("model"));
+      EXPECT_EQ(imported.state.cameras, result.state.cameras) << model << " " << format;
+    }
+  ScratchDirectory folder;
+  export_result(result_with("opencv-fisheye"), "colmap-text", folder.path("model"));
+  EXPECT_THAT(read_file(folder.path("model/cameras.txt")), HasSubstr(" OPENCV_FISHEYE "));
+}
+
+TEST(CameraModelExchange, RefusesByCamera) {
+  ScratchDirectory folder;
+  const BlockResult panorama = result_with("equirectangular");
+  const std::string camera =
+      "camera '" + panorama.block.cameras[CameraIndex(0)].name + "' has the model equirectangular, ";
+  for (const char* format : {"colmap-text", "colmap-bin"})
+    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder.path("model")); }),
+                HasSubstr(camera + "which COLMAP does not have"));
+  for (const char* format : {"bal", "bundler"})
+    EXPECT_THAT(message_of<InputError>([&] { export_result(panorama, format, folder.path("file")); }),
+                HasSubstr("has the model equirectangular, whose images BAL"));
+}
+
+TEST(CameraModelExchange, BalTakesCorrectedPixels) {
+  const Intrinsics k = sample_camera(*find_model("ign-radial"));
+  const Eigen::Vector2d pixel(300, 900);
+  const auto image = to_bal_image(k, pixel);
+  ASSERT_TRUE(image);
+  const Eigen::Vector3d ray = *viewing_ray(k, pixel);
+  EXPECT_LT((*image - k[kFocal] * Eigen::Vector2d(ray.x() / ray.z(), -ray.y() / ray.z())).norm(), 1e-9);
+  EXPECT_EQ(to_bal(Pose(), k).k1, 0);
+}
+
+TEST(CameraModelExchange, CsvLeavesCellsOfOtherModelsEmpty) {
+  ScratchDirectory folder;
+  BlockResult result = result_with("pinhole");
+  Intrinsics& brown = result.state.cameras[CameraIndex(1)];
+  brown = result.block.cameras[CameraIndex(1)].intrinsics = {1000, 500, 400, -0.1, 0, 0, 0, 0};
+  export_result(result, "csv", folder.path("tables"));
+  const std::string text = read_file(folder.path("tables/cameras.csv"));
+  EXPECT_THAT(text, HasSubstr("name,width,height,model,f,cx,cy,k1,k2,k3,p1,p2\n"));
+  EXPECT_THAT(text, HasSubstr(",,,,,\n"));
+  EXPECT_THAT(text, HasSubstr(",brown,1000,500,400,-0.1,0,0,0,0\n"));
+}
+
+TEST(CameraModelSimulation, ObservesByTheModel) {
+  for (const char* model : {"ign-radial", "legendre-3", "opencv-fisheye", "equirectangular"}) {
+    SimulationOptions options;
+    options.scene = SimulationOptions::Scene::kStreet;
+    options.frames = 20;
+    options.rig_cameras = 2;
+    options.points_per_frame = 60;
+    options.camera_model = model;
+    const SimulatedBlock s = simulate_block(options);
+    double squares = 0;
+    int behind = 0, observations = 0;
+    for (std::int64_t t = 0; t < s.tracks.track_count(); ++t)
+      for (std::int64_t o = s.tracks.begin[t]; o < s.tracks.begin[t + 1]; ++o) {
+        const Image& image = s.block.images[s.tracks.image[o]];
+        const Pose& mount = s.truth.mounts[s.block.frames[image.frame].rig][static_cast<std::size_t>(image.mount)];
+        const Eigen::Vector3d inside = to_camera(s.truth.frames[image.frame], mount, s.points[t]);
+        const Eigen::Vector2d measured(from_fixed_pixel(s.tracks.x[o]), from_fixed_pixel(s.tracks.y[o]));
+        squares += reprojection(s.truth.cameras[s.block.camera_of(s.tracks.image[o])], inside, measured).squaredNorm();
+        behind += inside.z() < 0;
+        ++observations;
+      }
+    EXPECT_NEAR(std::sqrt(squares / (2 * observations)), options.image_noise_px, 0.05) << model;
+    EXPECT_EQ(behind > observations / 10, std::string(model) == "equirectangular") << model;
+    EXPECT_EQ(s.block.cameras[CameraIndex(0)].intrinsics.model(), s.truth.cameras[CameraIndex(0)].model());
+  }
+  SimulationOptions unknown;
+  unknown.camera_model = "fish";
+  EXPECT_THAT(message_of<InputError>([&] { unknown.check(); }), HasSubstr("camera_model 'fish' is none of: brown,"));
+}
+
+}  // namespace
+}  // namespace megablock
