@@ -13,6 +13,7 @@
 #include "adjust/calibration/rig_observations.h"
 #include "cluster/job/given_tracks.h"
 #include "cluster/job/job_json.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/arithmetic.h"
 #include "cluster/process/exit_codes.h"

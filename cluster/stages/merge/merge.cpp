@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "adjust/tile/image_sigma.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/outcome/diagnostics.h"
 #include "cluster/process/process_memory.h"

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "adjust/tile/image_sigma.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/units.h"

@@ -10,6 +10,7 @@
 #include "adjust/tile/image_sigma.h"
 #include "adjust/tile/tile_adjustment.h"
 #include "adjust/tile/track_parts.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/stages/common/problem_hash.h"
 #include "cluster/stages/common/units.h"

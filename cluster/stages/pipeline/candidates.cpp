@@ -1,5 +1,6 @@
 #include "cluster/stages/pipeline/candidates.h"
 
+#include "cluster/job/work_queue.h"
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/growth.h"
 #include "cluster/stages/common/units.h"

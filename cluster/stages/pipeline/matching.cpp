@@ -4,6 +4,7 @@
 #include <map>
 
 #include "adjust/orientation/vertical_check.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/units.h"
 #include "cluster/stages/pipeline/features.h"

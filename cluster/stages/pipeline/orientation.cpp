@@ -11,6 +11,7 @@
 #include "adjust/orientation/given_trajectories.h"
 #include "adjust/orientation/orientation.h"
 #include "adjust/orientation/vertical_check.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/growth.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cluster/job/given_tracks.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/growth.h"

@@ -13,6 +13,7 @@
 
 #include "adjust/problem/tile_problem.h"
 #include "cluster/job/given_tracks.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/block_hash.h"

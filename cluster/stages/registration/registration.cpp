@@ -10,6 +10,7 @@
 #include <set>
 
 #include "adjust/registration/frame_resection.h"
+#include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/units.h"
