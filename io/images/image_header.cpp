@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "io/base/error.h"
+#include "io/images/sensor_table.h"
 
 namespace megablock {
 

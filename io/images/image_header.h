@@ -44,7 +44,4 @@ ImageHeader read_image_header(const std::string& path);
 // for the larger side). Empty when the header does not tell.
 std::optional<double> focal_px(const ImageHeader& header);
 
-// Width of the sensor along its larger side in mm for well-known cameras; empty when not in the table.
-std::optional<double> sensor_width_mm(const std::string& make, const std::string& model);
-
 }  // namespace megablock
