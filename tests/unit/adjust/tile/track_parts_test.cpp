@@ -11,7 +11,7 @@
 namespace megablock {
 namespace {
 
-constexpr double kThreshold = 4;  // sigmas
+constexpr double kPartThreshold = 4;  // sigmas
 
 // Tracks that see parts of other points, at the true poses.
 class TrackPartsOf : public testing::Test {
@@ -21,7 +21,7 @@ class TrackPartsOf : public testing::Test {
     tile_.redirect(row, point);
     tile_.problem.kept[row] = 0;
   }
-  TrackParts parts() const { return find_track_parts(tile_.problem, tile_.state, kThreshold, tile_.options); }
+  TrackParts parts() const { return find_track_parts(tile_.problem, tile_.state, kPartThreshold, tile_.options); }
   std::vector<int> parts_of(std::int64_t p) const {
     const TrackParts all = parts();
     return {all.begin() + tile_.problem.begin[p], all.begin() + tile_.problem.begin[p + 1]};
