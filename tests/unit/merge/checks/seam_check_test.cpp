@@ -332,8 +332,8 @@ TEST(SeamCheck, NamesOneTileOfTenWithDoubledNoiseThoughItsSeamsAgree) {
 }
 
 // The first line names the tile that is wrong, alone or with another one; whether alone.
-bool expect_named(const TiledBlock& block, const std::vector<TileProblem>& problems, std::size_t wrong,
-                  const std::vector<TileState>& states) {
+bool expect_tile_named(const TiledBlock& block, const std::vector<TileProblem>& problems, std::size_t wrong,
+                       const std::vector<TileState>& states) {
   SerialRunner runner(block.tiles.tree, problems, states);
   adjust(runner);
   const std::vector<std::string> lines = describe_disagreements(runner.tile_checks());
@@ -357,7 +357,7 @@ TEST(SeamCheck, NamesTheTileWhoseMeasurementsOfTwoFramesAreTurned) {
     ASSERT_GE(shared.observations, 300);
     std::vector<TileProblem> problems = block.problems;
     for (const FrameIndex frame : shared.frames) turn_frame(block, frame, Eigen::Vector3d(0, 1e-4, 0), problems[wrong]);
-    alone += expect_named(block, problems, wrong, block.states);
+    alone += expect_tile_named(block, problems, wrong, block.states);
   }
   EXPECT_GE(alone, 2);  // where the frames are not shared by two tiles alone
 }
@@ -401,7 +401,7 @@ TEST(SeamCheck, NamesTheTileWhoseFocalLengthIsHeldWrong) {
   for (std::size_t wrong = 0; wrong < block.problems.size(); ++wrong) {
     std::vector<TileState> states = block.states;
     states[wrong].cameras[0][kFocal] *= 1.005;
-    expect_named(block, block.problems, wrong, states);
+    expect_tile_named(block, block.problems, wrong, states);
   }
 }
 
