@@ -1,4 +1,4 @@
-# Every package comes from Debian 12 (see .ci/packages).
+# Tools and packages of the build. Every package comes from Debian 12 (see .ci/packages).
 
 find_program(CCACHE ccache)
 if(CCACHE)
@@ -10,38 +10,12 @@ if(MOLD)
   add_link_options(-fuse-ld=mold)
 endif()
 
-find_package(Threads REQUIRED)
-find_package(OpenMP REQUIRED)
-find_package(MPI REQUIRED COMPONENTS CXX)
-find_package(Eigen3 3.4 REQUIRED)
-find_package(Ceres 2.1 REQUIRED)
-find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d ml)
-set(HDF5_PREFER_PARALLEL OFF)
-find_package(HDF5 REQUIRED COMPONENTS C)
-find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
-find_package(yaml-cpp REQUIRED)
-find_package(nlohmann_json REQUIRED)
-find_package(CLI11 REQUIRED)
-find_package(PROJ REQUIRED)
-find_package(exiv2 REQUIRED)
+# CMake passes over a dependency that is missing; here each is wanted.
+set(CMAKE_FIND_PACKAGE_NAME megablock)
+set(megablock_FIND_REQUIRED TRUE)
+include(${CMAKE_CURRENT_LIST_DIR}/dependencies.cmake)
 
-# Packages without a CMake configuration of their own.
-function(megablock_library target library header)
-  if(TARGET ${target})
-    return()
-  endif()
-  string(MAKE_C_IDENTIFIER "found_${library}" variable)
-  find_library(${variable} ${library} REQUIRED)
-  find_path(${variable}_include ${header} PATH_SUFFIXES ${ARGN} REQUIRED)
-  add_library(${target} UNKNOWN IMPORTED GLOBAL)
-  set_target_properties(${target} PROPERTIES IMPORTED_LOCATION ${${variable}}
-                        INTERFACE_INCLUDE_DIRECTORIES ${${variable}_include})
-endfunction()
-megablock_library(metis metis metis.h)
-megablock_library(xxHash::xxHash xxhash xxhash.h)
-megablock_library(SuiteSparse::CHOLMOD cholmod cholmod.h suitesparse)
-megablock_library(openblas openblas cblas.h x86_64-linux-gnu/openblas-pthread openblas-pthread)
-# CGAL is headers; its exact arithmetic is GMP and MPFR.
-megablock_library(gmp gmp gmp.h)
-megablock_library(mpfr mpfr mpfr.h)
+# What the program needs besides the library.
+find_package(MPI REQUIRED COMPONENTS CXX)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)

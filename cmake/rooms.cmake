@@ -4,11 +4,23 @@
 # hold raw-pointer kernels only, reached by run-time dispatch (no Eigen, Ceres or OpenCV types may cross into them:
 # their ABI depends on the flags). Without errno a square root is one instruction.
 
+# What everybody who links the library needs, in this tree and in others.
+add_library(megablock_base INTERFACE)
+add_library(megablock::base ALIAS megablock_base)
+target_compile_features(megablock_base INTERFACE cxx_std_20)
+# In the installed tree a program may write <megablock/io/result/result.h>; the headers name one another without the
+# first folder, as here.
+target_include_directories(megablock_base INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                           $<INSTALL_INTERFACE:include> $<INSTALL_INTERFACE:include/megablock>)
+target_link_libraries(megablock_base INTERFACE OpenMP::OpenMP_CXX)  # everywhere: precompiled headers are shared
+# Contraction off: a*b+c gives the same bits wherever the compiler could have fused it or not. Inline functions of the
+# headers are compiled by whoever includes them, so that this holds for the users of the library, too.
+target_compile_options(megablock_base INTERFACE -ffp-contract=off)
+
+# What is compiled in this tree has these options besides.
 add_library(megablock_options INTERFACE)
-target_include_directories(megablock_options INTERFACE ${PROJECT_SOURCE_DIR})
-target_link_libraries(megablock_options INTERFACE OpenMP::OpenMP_CXX)  # everywhere: precompiled headers are shared
-# Contraction off: a*b+c gives the same bits wherever the compiler could have fused it or not.
-target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow -ffp-contract=off)
+target_link_libraries(megablock_options INTERFACE megablock_base)
+target_compile_options(megablock_options INTERFACE -Wall -Wextra -Wshadow)
 # Programs start with the libraries they use: each test is a process.
 target_link_options(megablock_options INTERFACE LINKER:--as-needed)
 # GCC 12's false alarms on inlined copies of std::string and std::vector.
@@ -69,7 +81,8 @@ function(megablock_room name)
     endforeach()
     target_precompile_headers(megablock_${name} REUSE_FROM megablock_room_headers)
   endif()
-  target_link_libraries(megablock_${name} ${type} megablock_options ${ROOM_DEPENDS})
+  target_link_libraries(megablock_${name} ${type} megablock_base $<BUILD_INTERFACE:megablock_options> ${ROOM_DEPENDS})
+  set_target_properties(megablock_${name} PROPERTIES EXPORT_NAME ${name})
   add_library(megablock::${name} ALIAS megablock_${name})
 endfunction()
 

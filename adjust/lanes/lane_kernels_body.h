@@ -1,4 +1,5 @@
-// Included by lane_kernels_*.cpp, which set the width of vectors. Formulas: linearise.h, geometry/camera/projection.h.
+// Internal to adjust/lanes/: lane_kernels_*.cpp include it and set the width of vectors. Formulas: linearise.h,
+// geometry/camera/projection.h.
 #pragma once
 
 #include "adjust/lanes/lane_kernels.h"

@@ -14,6 +14,7 @@
 #include "geometry/transform/rotation.h"
 #include "io/base/disjoint_sets.h"
 #include "io/base/error.h"
+#include "io/evaluation/parts.h"
 
 namespace megablock {
 namespace {

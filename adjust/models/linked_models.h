@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "adjust/models/shared_places.h"
+#include "io/evaluation/parts.h"
 
 namespace megablock {
 

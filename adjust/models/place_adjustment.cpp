@@ -8,6 +8,7 @@
 #include "geometry/numbers/chi_square.h"
 #include "geometry/transform/rotation.h"
 #include "io/base/disjoint_sets.h"
+#include "io/evaluation/parts.h"
 
 namespace megablock {
 namespace {

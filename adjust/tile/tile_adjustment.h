@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "adjust/problem/tile_problem.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

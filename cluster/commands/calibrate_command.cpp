@@ -79,6 +79,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
       ->capture_default_str();
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(threads());
+  add_log_level(*command, options->log.level);
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   add_rig_options(*command, *settings);
   auto modes = std::make_shared<std::vector<CalibrateMode>>();  // each added here by a function of its own file

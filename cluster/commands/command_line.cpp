@@ -23,11 +23,12 @@
 #include "cluster/mpi/communicator.h"
 #include "cluster/outcome/diagnostics.h"
 #include "cluster/outcome/monolithic_comparison.h"
-#include "cluster/outcome/status.h"
 #include "cluster/process/arithmetic.h"
 #include "cluster/process/exit_codes.h"
 #include "cluster/process/version.h"
 #include "cluster/stages/pipeline.h"
+#include "cluster/stages/stages.h"
+#include "cluster/status/status.h"
 #include "cluster/terminal/help_text.h"
 #include "cluster/terminal/option_checks.h"
 #include "cluster/terminal/output_check.h"
@@ -38,9 +39,10 @@
 #include "io/exchange/export.h"
 #include "io/exchange/import.h"
 #include "io/project/project.h"
+#include "io/project/project_init.h"
 #include "io/report/report.h"
 #include "io/result/check.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/job/job_lock.h"
 #include "io/text/settings_reader.h"
 
 namespace megablock {
@@ -119,6 +121,7 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
                    "Of the whole job, avx2 or avx512: faster dense algebra, other last digits. Default: avx2")
       ->check(CLI::IsMember(std::vector<std::string>(std::begin(kArithmeticLevels), std::end(kArithmeticLevels))));
   command->add_flag("--strict", options->strict, "End at the first failed unit");
+  add_log_level(*command, options->log.level);
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   auto monolithic = std::make_shared<bool>(false);
   if (stage == "merge")
@@ -419,11 +422,8 @@ int command_line(int argc, char** argv) {
     Action by_one;  // of a command that knows nothing of ranks: the first one's
     add_init(app, by_one);
     add_run(app, action, ranks, "run", "", "Run all stages; the same command again resumes");
-    add_run(app, action, ranks, "partition", "partition", "Run as far as the candidate pairs and cells");
-    add_run(app, action, ranks, "match", "match", "Run as far as matches, tiles and tracks");
-    add_run(app, action, ranks, "orient", "orient", "Run as far as the initial orientation");
-    add_run(app, action, ranks, "adjust", "adjust", "Run as far as the adjustment of the tiles");
-    add_run(app, action, ranks, "merge", "merge", "Run as far as the merged block");
+    for (const Stage& stage : all_stages())
+      if (stage.help != nullptr) add_run(app, action, ranks, stage.command, stage.command, stage.help);
     add_calibrate(app, action, ranks);
     add_masks(app, by_one);
     add_verticals(app, by_one);

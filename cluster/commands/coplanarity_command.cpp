@@ -19,6 +19,7 @@
 #include "geometry/numbers/angles.h"
 #include "io/base/error.h"
 #include "io/project/inputs/pose_csv.h"
+#include "io/report/figures_json.h"
 #include "io/text/counted.h"
 
 namespace megablock {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "cluster/outcome/status.h"
+#include "cluster/status/status.h"
 #include "cluster/process/exit_codes.h"
 #include "cluster/terminal/option_checks.h"
 #include "cluster/terminal/output_check.h"

@@ -108,6 +108,7 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
       ->required();
   command->add_option("--threads", options->run.threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(threads());
+  add_log_level(*command, options->run.log.level);
   command->add_flag("-q,--quiet", options->run.quiet, "No progress");
   command->add_flag_callback(
       "--hold-rig", [options] { options->settings.estimate_rig = false; },

@@ -12,6 +12,8 @@
 #include "cluster/terminal/output_check.h"
 #include "io/base/error.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/simulate/files/write.h"
+#include "io/simulate/files/write_rendered.h"
 
 namespace megablock {
 

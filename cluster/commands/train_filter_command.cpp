@@ -12,8 +12,8 @@
 #include "io/base/error.h"
 #include "io/project/project.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/simulate/files/write.h"
 #include "io/store/job/job_store.h"
-#include "io/store/units/unit_files.h"
 #include "match/filter/filter_training.h"
 
 namespace megablock {

@@ -13,7 +13,7 @@
 #include "io/base/error.h"
 #include "io/block/track_rows.h"
 #include "io/store/units/track_reader.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/tracks_file.h"
 #include "merge/scratch/bytes.h"
 
 namespace megablock {

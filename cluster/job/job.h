@@ -10,6 +10,7 @@
 #include "cluster/job/paged_tables.h"
 #include "cluster/job/stage_record.h"
 #include "cluster/mpi/communicator.h"
+#include "cluster/process/job_log.h"
 #include "cluster/process/process_memory.h"
 #include "io/block/block.h"
 #include "io/result/result.h"
@@ -31,6 +32,7 @@ struct RunOptions {
   bool strict = false;      // a failed unit ends the run
   bool quiet = false;       // no progress
   std::string last_stage;   // stop after this stage; empty = all
+  JobLogOptions log;        // of the log of each rank
 };
 
 struct Job {
@@ -39,6 +41,7 @@ struct Job {
   JobStore store;
   JobOptions settings;
   EventLog events;
+  JobLog log;
   Block block;
   std::vector<std::int64_t> generations;                // image counts at which the block grew; the last is its size
   std::vector<StageRecord> records;                     // of the stages so far, in order

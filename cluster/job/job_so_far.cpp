@@ -4,7 +4,9 @@
 #include <optional>
 
 #include "io/base/error.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/state_file.h"
+#include "io/store/units/tracks_file.h"
 #include "partition/diagnostics/block_diagnostics.h"
 
 namespace megablock {

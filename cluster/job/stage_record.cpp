@@ -91,13 +91,11 @@ const char* name_of(StageState state) {
   return kNames[static_cast<int>(state)];
 }
 
-std::vector<StageStatus> stage_status(const JobStore& store, bool given_tie_points) {
-  std::vector<std::string> names{"tiles", "tracks", "orientation", "adjustment", "merge"};
-  if (!given_tie_points) names.insert(names.begin(), {"features", "candidates", "matching"});
+std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<ExpectedStage>& expected) {
   std::vector<StageStatus> stages;
   std::uint64_t basis = 0;
   bool stale = false;
-  for (const std::string& name : names) {
+  for (const auto& [name, optional] : expected) {
     StageStatus status;
     if (const auto record = read_record(store, name)) {
       status.record = *record;
@@ -115,10 +113,9 @@ std::vector<StageStatus> stage_status(const JobStore& store, bool given_tie_poin
     }
     stages.push_back(status);
   }
-  // Images that come with poses need no orientation.
-  const auto orientation =
-      std::find_if(stages.begin(), stages.end(), [](const StageStatus& s) { return s.record.stage == "orientation"; });
-  if (orientation->record.units.empty() && !std::next(orientation)->record.units.empty()) stages.erase(orientation);
+  for (std::size_t s = expected.size() - 1; s-- > 0;)
+    if (expected[s].optional && stages[s].record.units.empty() && !stages[s + 1].record.units.empty())
+      stages.erase(stages.begin() + static_cast<std::ptrdiff_t>(s));
   return stages;
 }
 

@@ -39,8 +39,12 @@ struct StageStatus {
   StageState state = StageState::kWaiting;
   std::int64_t done = 0;  // units that are there and up to date
 };
-// Of all stages of a job in the order they run. `given_tie_points`: the job has no features and matches of its own.
-std::vector<StageStatus> stage_status(const JobStore& store, bool given_tie_points);
+struct ExpectedStage {
+  std::string name;
+  bool optional = false;  // left out when it has no units and the stage behind it has some
+};
+// The states of these stages, which are in the order in which they run (cluster/stages/stages.h).
+std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<ExpectedStage>& expected);
 
 // Wall clock and memory of a stage: the time during which any rank worked on its units (each unit's latest event;
 // those of a merge since the one before), over all runs that took part.

@@ -1,15 +1,18 @@
 #include "cluster/job/work_queue.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "cluster/job/messages.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/process/progress.h"
 #include "cluster/process/signals.h"
 #include "io/base/error.h"
+#include "io/text/counted.h"
 
 namespace megablock {
 
@@ -56,6 +59,10 @@ void compute_unit(Job& job, const std::string& stage, const Unit& unit, double c
     event.seconds = monotonic_seconds() - start;
     event.peak_rss_mib = peak_rss_mib();
     job.events.append(event);
+    if (event.failure.empty())
+      job.log.write(LogLevel::kDebug, stage, unit.name, fmt::format("done in {:.3f} s", event.seconds));
+    else
+      job.log.write(LogLevel::kError, stage, unit.name, event.failure);
   };
   try {
     event.bytes = static_cast<std::int64_t>(job.store.write(unit.name, unit.fingerprint, unit.write).length);
@@ -75,15 +82,10 @@ void write_own_record(const Job& job) {
 
 }  // namespace
 
-void tell_of_damage(const JobStore& store, const std::string& unit, const std::string& problem) {
-  end_progress_line();
-  std::fprintf(stderr, "megablock: warning: %s: %s; it is computed again\n", store.path(unit).c_str(), problem.c_str());
-}
-
-bool is_current(const JobStore& store, const std::string& unit, std::uint64_t fingerprint) {
+bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerprint) {
   std::string damage;
-  const bool current = store.is_current(unit, fingerprint, damage);
-  if (!damage.empty()) tell_of_damage(store, unit, damage);
+  const bool current = job.store.is_current(unit, fingerprint, damage);
+  if (!damage.empty()) warn_of_damage(job.store, job.log, unit, damage);
   return current;
 }
 
@@ -112,6 +114,8 @@ void part_done(Job& job, std::int64_t parts) {
 
 StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units, const std::string& parts) {
   begin_stage(job, stage, units);
+  const double start_s = monotonic_seconds();
+  job.log.write(LogLevel::kInfo, stage, "", "begins: " + counted(std::ssize(units), "unit"));
   return_freed_memory();
   job.tables.release();
   job.peak_memory.begin_stage();
@@ -133,7 +137,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       const Unit& unit = units[index];
       job.parts_done = 0;
       try {
-        if (!is_current(job.store, unit.name, unit.fingerprint)) {
+        if (!is_current(job, unit.name, unit.fingerprint)) {
           compute_unit(job, stage, unit, claim_s);
           job.tables.release();
           ++mine.computed;
@@ -162,6 +166,10 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   }
   std::sort(failures.begin(), failures.end());
   for (const auto& [index, reason] : failures) outcome.failures.push_back({stage, units[index].name, reason});
+  job.log.write(
+      LogLevel::kInfo, stage, "",
+      fmt::format("ends after {:.3f} s: {} computed by this rank, {} by all, {} failed", monotonic_seconds() - start_s,
+                  mine.computed, counted(outcome.computed, "unit"), outcome.failures.size()));
   add_failures(job, outcome.failures);
   return outcome;
 }

@@ -38,9 +38,7 @@ void part_done(Job& job, std::int64_t parts = 1);
 
 // Whether a unit is there, whole and made of what it is to be made of now. One that is damaged is named on standard
 // error.
-bool is_current(const JobStore& store, const std::string& unit, std::uint64_t fingerprint);
-// Names a damaged file that is computed again; `problem`: JobStore::problem().
-void tell_of_damage(const JobStore& store, const std::string& unit, const std::string& problem);
+bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerprint);
 
 // What run_stage does around its units, for a stage that has another way of computing: its units join the record of
 // the stage, which rank 0 writes.

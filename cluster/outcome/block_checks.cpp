@@ -16,7 +16,6 @@
 #include "io/block/track_rows.h"
 #include "io/result/result.h"
 #include "io/result/track_batches.h"
-#include "io/store/units/unit_files.h"
 #include "merge/tree/tile_solver.h"
 #include "partition/views/flight_lines.h"
 

@@ -9,7 +9,8 @@
 #include "io/project/project.h"
 #include "io/result/result.h"
 #include "io/store/job/job_store.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/tracks_file.h"
 
 namespace megablock {
 

@@ -10,7 +10,6 @@
 #include "io/evaluation/remarks.h"
 #include "io/report/sections/sections.h"
 #include "io/result/track_batches.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

@@ -1,5 +1,6 @@
 #include "cluster/stages/pipeline.h"
 
+#include <fmt/core.h>
 #include <omp.h>
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "adjust/calibration/rig_observations.h"
 #include "cluster/job/given_tracks.h"
 #include "cluster/job/job_json.h"
+#include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/arithmetic.h"
@@ -28,14 +30,19 @@
 #include "cluster/stages/pipeline/orientation.h"
 #include "cluster/stages/pipeline/tiles.h"
 #include "cluster/stages/pipeline/tracks.h"
+#include "cluster/stages/stages.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/block/track_rows.h"
+#include "io/project/append.h"
 #include "io/project/project.h"
 #include "io/result/check.h"
 #include "io/result/measurement_index.h"
 #include "io/result/measurements.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/job/job_lock.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/tracks_file.h"
+#include "io/text/counted.h"
 
 namespace megablock {
 
@@ -72,20 +79,21 @@ void refuse_another_block(const JobStore& store, const Block& previous, const Pr
 }
 
 // Of the job's last run; empty: there is none, or it is damaged.
-std::optional<Block> previous_block(const JobStore& store) {
+std::optional<Block> previous_block(const JobStore& store, const JobLog& log) {
   if (!std::filesystem::exists(store.path("block.h5"))) return std::nullopt;
   const std::string damage = store.problem("block.h5");
   if (damage.empty()) return read_block(store.path("block.h5"));
-  tell_of_damage(store, "block.h5", damage);
+  warn_of_damage(store, log, "block.h5", damage);
   return std::nullopt;
 }
 
 // The images of an earlier run keep their indices; new ones follow. Records when the block grew.
-std::vector<std::int64_t> merge_with_previous(const JobStore& store, const std::optional<JobJson>& job,
-                                              PagedTables& tables, Project& project) {
+std::vector<std::int64_t> merge_with_previous(const JobStore& store, const JobLog& log,
+                                              const std::optional<JobJson>& job, PagedTables& tables,
+                                              Project& project) {
   Block& block = project.block;
   std::vector<std::int64_t> generations;
-  if (const std::optional<Block> previous = job ? previous_block(store) : std::nullopt) {
+  if (const std::optional<Block> previous = job ? previous_block(store, log) : std::nullopt) {
     PagedTables older(store.directory());
     page_tables(*previous, older);
     const auto release = [&] {  // of two blocks one table is there at a time
@@ -127,7 +135,7 @@ void refuse_other_folders(const JobStore& store) {
 }
 
 // Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
-std::string prepare(const RunOptions& options, const JobStore& store, Project project) {
+std::string prepare(const RunOptions& options, const JobStore& store, const JobLog& log, Project project) {
   store.remove_temporaries();
   PagedTables tables(store.directory());
   page_tables(project.block, tables);
@@ -135,7 +143,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, Project pr
   if (before) check_job_json(store, *before);
   if (project.block.images.empty())
     throw InputError(options.project + ": no readable image in the block; check the images folder");
-  const std::vector<std::int64_t> generations = merge_with_previous(store, before, tables, project);
+  const std::vector<std::int64_t> generations = merge_with_previous(store, log, before, tables, project);
   check(project.block);
   tables.release();
   Hasher fingerprint;
@@ -171,60 +179,21 @@ void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
   std::set<std::string> wanted(tracks.begin(), tracks.end());
   for (const StageRecord& record : job.records)
     for (const auto& unit : record.units) wanted.insert(unit.first);
-  for (const char* folder : {"features", "matches", "orient", "tracks", "adjust"})
-    for (const std::string& name : job.store.list(folder))
-      if (!wanted.contains(name)) job.store.remove(name);
-}
-
-void update_measurement_index(Job& job, const std::vector<std::string>& tracks) {
-  const std::string damage =
-      on_first_rank(job.ranks, [&] { return megablock::update_measurement_index(job.store, tracks); });
-  if (!damage.empty() && job.is_first_rank()) tell_of_damage(job.store, kMeasurementIndex, damage);
-}
-
-// An orientation that only takes over what the project gives has nothing to say of single images.
-bool orients_by_names(const Block& block) {
-  return !block.verticals.empty() ||
-         std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
+  for (const Stage& stage : all_stages())
+    if (stage.folder != nullptr)
+      for (const std::string& name : job.store.list(stage.folder))
+        if (!wanted.contains(name)) job.store.remove(name);
 }
 
 void run_stages(Job& job, const std::string& tie_points) {
-  const std::string& last = job.options.last_stage;
-  std::vector<std::string> matches;
-  Tiles tiles;
-  std::vector<std::string> tracks;
-  if (tie_points.empty()) {
-    const FeatureStage features = run_features(job);
-    const CandidateGraph graph = run_candidates(job, features);
-    if (last == "partition") return;
-    matches = run_matching(job, features, graph);
-    release_names(job);
-    use_memory_sparingly();
-    tiles = run_tiles(job, matches);
-    tracks = run_tracks(job, matches, tiles);
-  } else {
-    tiles = run_tiles_of_tracks(job, tie_points);
-    if (last == "partition") return;
-    tracks = run_given_tracks(job, tie_points, tiles);
+  StageResults results;
+  results.tie_points = tie_points;
+  for (const Stage& stage : all_stages()) {
+    if (!stage.runs(!tie_points.empty())) continue;
+    stage.run(job, results);
+    if (stage.ends(job.options.last_stage, !tie_points.empty()) && stage.name != all_stages().back().name) return;
   }
-  if (tiles.tile_count == 0)
-    throw AgreedError<ComputeError>(
-        "no two images could be matched: nothing to orient; check overlap, masks and the match options");
-  update_measurement_index(job, tracks);
-  if (last == "match") return;
-  return_freed_memory();  // of the tracks
-  job.tables.release();
-  if (orients_by_names(job.block)) restore_names(job);
-  BlockState oriented = run_orientation(job, matches);
-  release_names(job);
-  job.tables.release();
-  if (std::none_of(oriented.oriented.begin(), oriented.oriented.end(), [](auto o) { return o != 0; }))
-    throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
-  if (last == "orient") return;
-  const std::vector<std::string> adjusted = run_adjustment(job, oriented, tiles, tracks);
-  if (last == "adjust") return;
-  run_merge(job, std::move(oriented), tiles, tracks, adjusted);
-  remove_surplus(job, tracks);
+  remove_surplus(job, results.tracks);
 }
 
 // The tracks of all tiles, in the order of their indices.
@@ -257,7 +226,7 @@ TrackSource track_source(Job& job, const std::string& tie_points) {
   const std::vector<std::string> matches = run_matching(job, features, graph);
   const Tiles tiles = run_tiles(job, matches);
   const std::vector<std::string> tracks = run_tracks(job, matches, tiles);
-  update_measurement_index(job, tracks);
+  index_measurements(job, tracks);
   Hasher hasher;
   for (const std::string& unit : tracks) hasher.add(job.store.seal(unit)->content_hash);
   return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }, matches};
@@ -279,6 +248,28 @@ void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSe
   run_calibration(job, start, tracks, settings);
 }
 
+// The log of this rank. A log that cannot be written is said once and stops nothing.
+JobLog open_log(const RunOptions& options, int rank) {
+  JobLog log(options.directory, rank, options.log);
+  if (!log.problem().empty())
+    std::fprintf(stderr, "megablock: warning: no log is written for rank %d: %s\n", rank, log.problem().c_str());
+  return log;
+}
+
+// The error that ends a run is the last line of the log.
+void run_logged(const Job& job, const std::function<void()>& stages) {
+  try {
+    stages();
+    job.log.write(LogLevel::kInfo, "", "", "done, " + counted(std::ssize(job.failures), "failed unit"));
+  } catch (const Interrupted& stop) {
+    job.log.write(LogLevel::kInfo, "", "", stop.what());
+    throw;
+  } catch (const std::exception& error) {
+    job.log.write(LogLevel::kError, "", "", error.what());
+    throw;
+  }
+}
+
 using Stages = std::function<void(Job& job, const std::string& tie_points)>;
 
 // Opens the job, runs the stages and returns the exit code.
@@ -287,13 +278,16 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   use_memory_sparingly();
   JobStore store(run_options.directory);
   std::optional<JobLock> lock;
+  JobLog log;
   const std::string text = on_first_rank(ranks, [&] {
     Project project = read_whole_project(run_options);
     refuse_other_folders(store);
     store.create();
     lock.emplace(store);
-    return prepare(run_options, store, std::move(project));
+    log = open_log(run_options, ranks.rank());
+    return prepare(run_options, store, log, std::move(project));
   });
+  if (ranks.rank() != 0) log = open_log(run_options, ranks.rank());
   const JobJson written(store.path("job.json"), text);
   const auto tie_points = written.at<std::string>("tie_points");
   if (tie_points.empty())
@@ -305,6 +299,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
           .store = store,
           .settings = read_options(written.settings()),
           .events = EventLog(store, ranks.rank()),
+          .log = std::move(log),
           .block = read_block_without_names(store.verified_path("block.h5")),
           .generations = written.at<std::vector<std::int64_t>>("generations"),
           .records = {},
@@ -318,7 +313,11 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
   for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
     job.failures.push_back({"init", file, reason});
-  stages(job, tie_points);
+  job.log.write(LogLevel::kInfo, "", "",
+                fmt::format("{} works on {} as rank {} of {} with {}", kProgram, run_options.project, ranks.rank(),
+                            ranks.size(), counted(job.options.threads, "thread")));
+  for (const std::string& warning : job.notes) job.log.write(LogLevel::kWarning, "init", "", warning);
+  run_logged(job, [&] { stages(job, tie_points); });
   ranks.barrier();  // the lock is held until everybody is done
   return job.failures.empty() ? kExitDone : kExitFailedUnits;
 }

@@ -11,9 +11,6 @@
 
 namespace megablock {
 
-// The stages by the names of the command line, in order.
-inline constexpr const char* kStages[] = {"partition", "match", "orient", "adjust", "merge"};
-
 // Collective. Brings the job up to date as far as options.last_stage and returns the exit code (kExitDone or
 // kExitFailedUnits). Throws the project's errors, the same on every rank.
 int run_job(const RunOptions& options, Communicator& ranks);

@@ -3,9 +3,12 @@
 
 #include <fmt/core.h>
 
+#include <CLI/App.hpp>
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <string>
+
+#include "cluster/process/job_log.h"
 
 namespace megablock {
 
@@ -40,6 +43,16 @@ inline CLI::Validator positive() {
 // process without a word.
 inline CLI::Validator threads() {
   return number([](double value) { return value >= 0 && value <= 1024; }, "of 0 to 1024", "threads");
+}
+
+// Adds the option for the level of the log, which the environment variable MEGABLOCK_LOG_LEVEL sets, too.
+inline void add_log_level(CLI::App& command, LogLevel& level) {
+  command
+      .add_option_function<std::string>(
+          "--log-level", [&level](const std::string& name) { level = *log_level_of(name); },
+          "Level of the job's log, JOB/log/<host>-<rank>.log: debug, info, warning, error or off. Default: info")
+      ->envname("MEGABLOCK_LOG_LEVEL")
+      ->check(CLI::IsMember(log_level_names()));
 }
 
 // Of memory or of a disk.

@@ -1,6 +1,6 @@
-// Vectors of doubles, one value of several observations or points each ("lanes"), for kernels that are compiled once
-// per kind of processor. Included by those kernels only, behind a definition of MEGABLOCK_LANE_WIDTH (2, 4 or 8
-// doubles).
+// Internal to the kernels. Vectors of doubles, one value of several observations or points each ("lanes"), for kernels
+// that are compiled once per kind of processor. Included by those kernels only, behind a definition of
+// MEGABLOCK_LANE_WIDTH (2, 4 or 8 doubles).
 //
 // Everything is in an unnamed namespace: the same names stand for different instructions in each of these files. No
 // multiplication and addition are contracted (cmake/rooms.cmake), so that all widths give the same bits.

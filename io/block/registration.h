@@ -44,13 +44,4 @@ struct RegisteredTrajectory {
   std::vector<std::string> not_resected;     // why, of each other frame that sees control
 };
 
-void write_places(const std::string& path, const std::vector<Place>& places);
-std::vector<Place> read_places(const std::string& path);
-
-void write_registrations(const std::string& path, const std::vector<RegisteredPlace>& places);
-std::vector<RegisteredPlace> read_registrations(const std::string& path);
-
-void write_trajectory(const std::string& path, const RegisteredTrajectory& trajectory);
-RegisteredTrajectory read_trajectory(const std::string& path);
-
 }  // namespace megablock

@@ -12,8 +12,4 @@ std::string calibration_text(const RigCalibration& calibration);
 
 // All figures (keys carry their units; null where unknown).
 std::string calibration_json(const RigCalibration& calibration);
-
-// One self-contained page, as the report of a job. `block`: of the calibration.
-std::string calibration_html(const RigCalibration& calibration, const Block& block);
-
 }  // namespace megablock

@@ -15,7 +15,7 @@
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
 #include "io/result/result_option.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/state_file.h"
 
 namespace megablock {
 

@@ -9,6 +9,7 @@
 
 #include "geometry/numbers/angles.h"
 #include "io/block/prior_differences.h"
+#include "io/evaluation/parts.h"
 #include "io/evaluation/reliability.h"
 #include "io/result/result_option.h"
 

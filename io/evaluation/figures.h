@@ -138,9 +138,6 @@ Figures figures_of(
 
 bool oriented(const BlockResult& result, FrameIndex frame);
 
-// Fills in parts and part_of_frame.
-void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
-
 // Fills in near_limit.
 void find_near_limit(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
 

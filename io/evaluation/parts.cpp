@@ -1,10 +1,10 @@
 // Parts of the block that hang together: frames joined by a kept observation of the same tie, control or check point,
 // or by a relative pose.
+#include "io/evaluation/parts.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-
-#include "io/evaluation/figures.h"
 
 namespace megablock::report {
 

@@ -10,6 +10,7 @@
 #include "geometry/numbers/angles.h"
 #include "io/block/held_priors.h"
 #include "io/evaluation/figures.h"
+#include "io/evaluation/parts.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
 

@@ -8,7 +8,8 @@
 #include "io/base/file_error.h"
 #include "io/exchange/bal/import_bal.h"
 #include "io/exchange/colmap/import_colmap.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/tracks_file.h"
 #include "io/text/format_list.h"
 #include "io/text/text_writer.h"
 

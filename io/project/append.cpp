@@ -1,3 +1,5 @@
+#include "io/project/append.h"
+
 #include <algorithm>
 #include <functional>
 #include <map>
@@ -6,8 +8,6 @@
 #include <unordered_map>
 
 #include "io/block/ground_change.h"
-#include "io/project/project.h"
-
 namespace megablock {
 
 namespace {

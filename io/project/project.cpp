@@ -13,7 +13,7 @@
 #include "io/project/inputs/verticals.h"
 #include "io/project/project_sections.h"
 #include "io/store/hdf5/hdf5_file.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
 #include "io/text/settings_reader.h"
 #include "io/text/yaml_reader.h"
 

@@ -30,23 +30,4 @@ Project read_project(const std::string& path, const std::optional<GroundFrame>& 
 // Of a camera's mask in the folder `masks`: "<camera>.png", '/' in the name written '_'.
 std::string mask_file_name(const std::string& camera);
 
-// The block of a job that has grown: cameras, rigs, frames and images of `previous` keep their indices (matched by
-// name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
-// `previous` that are gone stay. The ground frame stays the previous one: positions, attitudes and control of `now` are
-// turned into it when it has another origin.
-// `after_table` is called behind a table of both that was gone through: it may leave memory.
-Block append_to(
-    const Block& previous, Block now, const std::function<void()>& after_table = [] {});
-// By name.
-bool has_all_images_of(const Block& previous, const Block& now);
-
-struct InitOptions {
-  std::string images;  // folder, searched recursively, names sorted
-  std::string output = "block.yaml";
-  std::string gcp_file, mask_folder;     // optional
-  std::string camera_grouping = "exif";  // "exif" (make, model, size, focal), "folder", "one"
-};
-// Scans the images and writes the project file. Returns its one-paragraph summary.
-std::string init_project(const InitOptions& options);
-
 }  // namespace megablock

@@ -1,4 +1,6 @@
 // `megablock init`: scans the images once and writes a project file that says what was found.
+#include "io/project/project_init.h"
+
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
@@ -8,7 +10,6 @@
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "io/project/project.h"
-
 namespace megablock {
 
 namespace fs = std::filesystem;

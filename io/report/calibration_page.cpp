@@ -1,4 +1,6 @@
 // The page of a rig calibration: mounts, residuals, and how the measurements cover each camera's sensor.
+#include "io/report/calibration_page.h"
+
 #include <fmt/core.h>
 
 #include <cmath>

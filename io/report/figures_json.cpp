@@ -1,3 +1,5 @@
+#include "io/report/figures_json.h"
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 

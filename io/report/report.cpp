@@ -10,6 +10,7 @@
 #include "io/evaluation/remarks.h"
 #include "io/report/drawing/html.h"
 #include "io/report/drawing/page.h"
+#include "io/report/figures_json.h"
 #include "io/report/sections/sections.h"
 
 namespace megablock {

@@ -16,7 +16,13 @@
 #include "io/result/track_batches.h"
 #include "io/store/hdf5/hdf5_file.h"
 #include "io/store/job/events.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/adjustment_file.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
+#include "io/store/units/registration_file.h"
+#include "io/store/units/state_file.h"
+#include "io/store/units/tracks_file.h"
 
 namespace megablock {
 
@@ -60,8 +66,9 @@ class Check {
     std::vector<std::string> names;
     for (const std::string& name : store_.list("")) {
       const bool top = name.find('/') == std::string::npos;
-      const bool text = name.starts_with("events/") || name.starts_with("stages/") || name.starts_with("scratch/") ||
-                        name.starts_with("merge/parts/") || (name.starts_with("result/") && name != kResult) ||
+      const bool text = name.starts_with("events/") || name.starts_with("log/") || name.starts_with("stages/") ||
+                        name.starts_with("scratch/") || name.starts_with("merge/parts/") ||
+                        (name.starts_with("result/") && name != kResult) ||
                         (name.starts_with("register/") && !name.ends_with(".h5"));
       if (top ? name.ends_with(".h5") : !text) names.push_back(name);
     }

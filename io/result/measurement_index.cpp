@@ -9,6 +9,7 @@
 
 #include "io/base/error.h"
 #include "io/base/hash.h"
+#include "io/project/append.h"
 #include "io/result/measurements.h"
 #include "io/store/units/track_reader.h"
 

@@ -1,4 +1,4 @@
-// Rows and triangles of fronts' matrices. Inner header of front.cpp and front_covariance.cpp.
+// Rows and triangles of fronts' matrices. Internal to merge/front/.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// Included by point_kernels_*.cpp, which set the width of vectors. Formulas: point_equations.h, cell_assembler.h.
+// Internal to merge/tile/: point_kernels_*.cpp include it and set the width of vectors. Formulas: point_equations.h,
+// cell_assembler.h.
 #pragma once
 
 #if MEGABLOCK_LANE_WIDTH == 8

@@ -49,7 +49,10 @@
 #include "cluster/tree/rank_runner.h"
 #include "io/result/result.h"
 #include "io/store/hdf5/hdf5_file.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/graph_files.h"
+#include "io/store/units/state_file.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/benchmark/scenes.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -28,7 +28,8 @@
 #include "io/base/descriptor.h"
 #include "io/base/error.h"
 #include "io/result/measurements.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace {

@@ -23,7 +23,7 @@
 #include <string>
 
 #include "io/base/error.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
 
 namespace megablock {
 

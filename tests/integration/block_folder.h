@@ -7,7 +7,8 @@
 
 #include "cluster/stages/pipeline.h"
 #include "io/simulate/blocks/simulate.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/block/crs.h"
+#include "io/project/project_init.h"
 #include "real_data.h"
 #include "tests/support/io/scratch_directory.h"
 

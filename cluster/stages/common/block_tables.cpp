@@ -1,6 +1,6 @@
 #include "cluster/stages/common/block_tables.h"
 
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
 
 namespace megablock {
 

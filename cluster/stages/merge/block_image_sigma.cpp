@@ -5,7 +5,7 @@
 
 #include "adjust/tile/image_sigma.h"
 #include "cluster/mpi/gather_by_tile.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/adjustment_file.h"
 #include "merge/scratch/bytes.h"
 
 namespace megablock {

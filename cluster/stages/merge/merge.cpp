@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "adjust/tile/image_sigma.h"
+#include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/outcome/diagnostics.h"
@@ -28,7 +29,6 @@
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/store/job/events.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 
@@ -90,11 +90,11 @@ GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool
 // Where a round before the last one ends by its own, looser limit, the line says so: "converged" alone would promise
 // that of the options.
 void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions& options) {
-  if (!job.is_first_rank() || job.options.quiet) return;
+  if (!job.is_first_rank()) return;
   std::string line = describe(state);
   if (state.outcome == GlobalOutcome::kConverged && options.max_decrement > job.settings.merge.decrement)
     line += fmt::format(" (limit {:.1e} of a round before the last)", options.max_decrement);
-  std::fprintf(stderr, "merge        %s\n", line.c_str());
+  say(job, "merge", line);
 }
 
 // This rank's tiles from their own adjustments, or from the checkpoint that was found, and the block's state.
@@ -167,7 +167,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
     if (last) {
       find_posterior(job, inputs, references, runner, adjusted);
       adjusted.costs = gather_costs(job, tiles, runner);
-      say(job, adjusted.costs);
+      say_costs(job, adjusted.costs);
       break;
     }
     bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
@@ -226,18 +226,18 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
                  UnitEvent& event) {
   if (!reason.empty()) {
     job.notes.push_back(reason);
-    std::fprintf(stderr, "merge        warning: %s\n", job.notes.back().c_str());  // --quiet or not
+    warn(job, "merge", reason);
   }
   const std::size_t notes_before = job.notes.size();
   for (const SeamCheck& seam : outcome.seams)
-    if (!seam.note.empty()) job.notes.push_back(seam.note);
+    if (!seam.note.empty()) add_note(job, "merge", seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
-    job.notes.push_back(line);
+    add_note(job, "merge", line);
   event.figures["seam_alarms"] = static_cast<double>(job.notes.size() - notes_before);
-  for (const std::string& line : judge_kept(parts)) job.notes.push_back(line);
+  for (const std::string& line : judge_kept(parts)) add_note(job, "merge", line);
   for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
     job.notes.push_back(line);
-    if (!job.options.quiet) std::fprintf(stderr, "merge        %s\n", line.c_str());
+    say(job, "merge", line);
   }
   job.tables.release();  // frames
   BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
@@ -260,7 +260,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   const std::string before = shortfall_before(job);
   begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
-    if (!is_current(job.store, kResult, fingerprint)) return "";
+    if (!is_current(job, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
   });
   if (!current.empty()) {  // a run that was killed behind its result may have left what led to it

@@ -9,13 +9,15 @@
 #include <tuple>
 
 #include "adjust/tile/image_sigma.h"
+#include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/units.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/adjustment_file.h"
+#include "io/store/units/state_file.h"
 
 namespace megablock {
 
@@ -120,7 +122,7 @@ std::optional<MergePosition> MergeCheckpoint::find() {
       if (valid)
         for (const auto& file : std::filesystem::directory_iterator(job_.store.path(name))) {
           const std::string unit = name + "/" + file.path().filename().string(), problem = job_.store.problem(unit);
-          if (!problem.empty()) tell_of_damage(job_.store, unit, problem);
+          if (!problem.empty()) warn_of_damage(job_.store, job_.log, unit, problem);
           valid = valid && problem.empty();
         }
       if (valid)
@@ -170,8 +172,7 @@ std::optional<MergePosition> MergeCheckpoint::find_pass(const MergePosition& sta
     std::memcpy(&position, there.data(), sizeof position);
     if (!furthest || order(furthest->global) < order(position.global)) furthest = position;
   }
-  if (furthest && job_.is_first_rank() && !job_.options.quiet)
-    std::fprintf(stderr, "merge        goes on within a pass: %lld tiles are done\n", static_cast<long long>(tiles));
+  if (furthest) say(job_, "merge", "goes on within a pass: " + std::to_string(tiles) + " tiles are done");
   return furthest;
 }
 

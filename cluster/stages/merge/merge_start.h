@@ -10,7 +10,6 @@
 #include "geometry/similarity/similarity.h"
 #include "io/block/image_graph.h"
 #include "io/block/tracks.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

@@ -1,5 +1,7 @@
 #include "cluster/stages/merge/merge_tiles.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <limits>
@@ -7,6 +9,7 @@
 
 #include "adjust/terms/build_problem.h"
 #include "adjust/tile/image_sigma.h"
+#include "cluster/job/messages.h"
 #include "cluster/mpi/matrix_bytes.h"
 #include "cluster/stages/merge/merge_start.h"
 
@@ -182,22 +185,20 @@ MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runn
   return all;
 }
 
-void say(const Job& job, const MergeCosts& costs) {
-  if (!job.is_first_rank() || job.options.quiet) return;
-  std::fprintf(stderr, "merge        fronts above the tiles: widest %lld unknowns, at the root %lld, %.3g operations\n",
-               static_cast<long long>(costs.fronts.widest), static_cast<long long>(costs.fronts.root),
-               costs.fronts.operations);
-  std::fprintf(
-      stderr,
-      "merge        last round: %.1f s, of them %.1f s on tiles and %.1f s on fronts above them (mean of the ranks)\n",
-      costs.seconds, costs.tile_seconds / job.ranks.size(), costs.front_seconds / job.ranks.size());
-  std::fprintf(stderr,
-               "merge        %lld of %lld tiles in scratch; factors: %lld made, %lld spilled to scratch, %lld subtrees "
-               "computed again, at most %.1f MiB on a rank\n",
-               static_cast<long long>(costs.tiles_in_scratch), static_cast<long long>(costs.tiles),
-               static_cast<long long>(costs.factors.put), static_cast<long long>(costs.factors.spilled),
-               static_cast<long long>(costs.factors.recomputed),
-               static_cast<double>(costs.factors.peak_bytes) / (1 << 20));
+void say_costs(const Job& job, const MergeCosts& costs) {
+  if (!job.is_first_rank()) return;
+  say(job, "merge",
+      fmt::format("fronts above the tiles: widest {} unknowns, at the root {}, {:.3g} operations", costs.fronts.widest,
+                  costs.fronts.root, costs.fronts.operations));
+  say(job, "merge",
+      fmt::format(
+          "last round: {:.1f} s, of them {:.1f} s on tiles and {:.1f} s on fronts above them (mean of the ranks)",
+          costs.seconds, costs.tile_seconds / job.ranks.size(), costs.front_seconds / job.ranks.size()));
+  say(job, "merge",
+      fmt::format("{} of {} tiles in scratch; factors: {} made, {} spilled to scratch, {} subtrees computed again, at "
+                  "most {:.1f} MiB on a rank",
+                  costs.tiles_in_scratch, costs.tiles, costs.factors.put, costs.factors.spilled,
+                  costs.factors.recomputed, static_cast<double>(costs.factors.peak_bytes) / (1 << 20)));
 }
 
 }  // namespace megablock

@@ -60,6 +60,6 @@ struct MergeCosts {
 // Collective.
 MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runner);
 // How large the fronts were, where the time went, and what `--memory` led to.
-void say(const Job& job, const MergeCosts& costs);
+void say_costs(const Job& job, const MergeCosts& costs);
 
 }  // namespace megablock

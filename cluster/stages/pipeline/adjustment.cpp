@@ -16,7 +16,8 @@
 #include "cluster/stages/common/units.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/adjustment_file.h"
+#include "io/store/units/tracks_file.h"
 #include "merge/scratch/bytes.h"
 #include "merge/tree/tile_solver.h"
 

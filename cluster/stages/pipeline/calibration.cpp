@@ -10,7 +10,7 @@
 #include "cluster/process/version.h"
 #include "io/evaluation/calibration_report.h"
 #include "io/project/project.h"
-#include "io/store/units/unit_files.h"
+#include "io/report/calibration_page.h"
 #include "merge/rig/rig_calibration.h"
 
 namespace megablock {

@@ -6,7 +6,8 @@
 #include "cluster/stages/common/units.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/base/hash.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
 #include "partition/candidates/candidates.h"
 
 namespace megablock {

@@ -13,7 +13,7 @@
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/images/picture_codec.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/features_file.h"
 #include "match/features/features.h"
 
 namespace megablock {
@@ -50,12 +50,12 @@ std::vector<std::uint64_t> image_fingerprints(const Job& job) {
 }
 
 // A shard that grew at its end keeps the features of its first images: as many as the file there was made of.
-std::vector<ImageFeatures> features_to_keep(const JobStore& store, const std::string& name,
+std::vector<ImageFeatures> features_to_keep(const Job& job, const std::string& name,
                                             const std::vector<std::uint64_t>& fingerprints) {
   for (std::size_t count = fingerprints.size() - 1; count > 0; --count) {
     const std::uint64_t fingerprint = shard_fingerprint({fingerprints.begin(), fingerprints.begin() + count});
-    if (store.up_to_date(name, fingerprint))
-      return is_current(store, name, fingerprint) ? read_features(store.path(name)) : std::vector<ImageFeatures>();
+    if (job.store.up_to_date(name, fingerprint))
+      return is_current(job, name, fingerprint) ? read_features(job.store.path(name)) : std::vector<ImageFeatures>();
   }
   return {};
 }
@@ -64,8 +64,8 @@ std::vector<ImageFeatures> features_to_keep(const JobStore& store, const std::st
 // an interruption costs seconds and not the whole unit: what is there is kept (features_to_keep).
 class GrowingShard {
  public:
-  GrowingShard(const JobStore& store, const Shard& shard)
-      : store_(store), shard_(shard), images_(features_to_keep(store, shard.name, shard.image_fingerprints)) {
+  GrowingShard(const Job& job, const Shard& shard)
+      : store_(job.store), shard_(shard), images_(features_to_keep(job, shard.name, shard.image_fingerprints)) {
     saved_ = images_.size();
     done_.assign(shard.image_fingerprints.size(), 0);
     std::fill_n(done_.begin(), saved_, 1);
@@ -111,7 +111,7 @@ class GrowingShard {
 };
 
 void write_shard(Job& job, const Shard& shard, const std::string& path) {
-  GrowingShard growing(job.store, shard);
+  GrowingShard growing(job, shard);
   const std::int64_t kept = growing.kept();
   part_done(job, kept);
   const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());

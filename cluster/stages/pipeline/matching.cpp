@@ -11,7 +11,7 @@
 #include "geometry/numbers/angles.h"
 #include "io/base/hash.h"
 #include "io/project/inputs/verticals.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/graph_files.h"
 #include "match/filter/match_filter.h"
 #include "match/pairs/pair_matching.h"
 #include "match/pairs/upright_matching.h"

@@ -3,6 +3,8 @@
 // Initial orientation, one unit per generation of the block: images that are added later are oriented with respect to
 // those that were there, whose orientation stays what it was.
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <map>
@@ -11,6 +13,7 @@
 #include "adjust/orientation/given_trajectories.h"
 #include "adjust/orientation/orientation.h"
 #include "adjust/orientation/vertical_check.h"
+#include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/stages/common/block_hash.h"
@@ -20,7 +23,10 @@
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/block/held_priors.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
+#include "io/store/units/state_file.h"
+#include "io/text/counted.h"
 #include "match/tracks/tracks.h"
 
 namespace megablock {
@@ -184,18 +190,17 @@ void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std
   const std::string text = set_aside_text(job.block, aside, all);
   if (text.empty()) return;
   job.notes.push_back(text);
-  if (job.is_first_rank() && !job.options.quiet) std::fprintf(stderr, "orientation  %s\n", text.c_str());
+  say(job, "orientation", text);
 }
 
 // Where every pose is given nothing is oriented; given poses may still be poor.
 BlockState given_orientation(const Job& job, BlockState given) {
   const GivenTrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
-  if (change.frames > 0 && job.is_first_rank() && !job.options.quiet)
-    std::fprintf(stderr,
-                 "orientation  given poses drift away from what was observed of their frames; adjusted to that as a "
-                 "start: %lld frames in %lld %s, moved by %.3g m rms, %.3g m at most\n",
-                 static_cast<long long>(change.frames), static_cast<long long>(change.trajectories),
-                 change.trajectories == 1 ? "drive" : "drives", change.rms_m, change.largest_m);
+  if (change.frames > 0)
+    say(job, "orientation",
+        fmt::format("given poses drift away from what was observed of their frames; adjusted to that as a start: {} "
+                    "frames in {}, moved by {:.3g} m rms, {:.3g} m at most",
+                    change.frames, counted(change.trajectories, "drive"), change.rms_m, change.largest_m));
   return held_in_place(job, std::move(given));
 }
 

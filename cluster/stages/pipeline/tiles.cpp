@@ -10,8 +10,8 @@
 #include "cluster/stages/common/units.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
+#include "io/store/units/graph_files.h"
 #include "io/store/units/track_reader.h"
-#include "io/store/units/unit_files.h"
 #include "partition/links/link_weights.h"
 #include "partition/tiles/tiles.h"
 

@@ -13,6 +13,7 @@
 
 #include "adjust/problem/tile_problem.h"
 #include "cluster/job/given_tracks.h"
+#include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
@@ -22,7 +23,11 @@
 #include "cluster/stages/pipeline/features.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
-#include "io/store/units/unit_files.h"
+#include "io/result/measurement_index.h"
+#include "io/result/measurements.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
+#include "io/store/units/tracks_file.h"
 #include "match/features/eccentricity.h"
 #include "match/tracks/tracks.h"
 
@@ -71,7 +76,7 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
     std::size_t t = 0;
     tracks_by_tile([&](const TrackSet& tracks) {
       const std::uint64_t fingerprint = content_fingerprint(tracks);
-      if (!is_current(job.store, names[t], fingerprint))
+      if (!is_current(job, names[t], fingerprint))
         job.store.write(names[t], fingerprint, [&](const std::string& p) { write_tracks(p, tracks); });
       out << names[t++] << ' ' << hex(fingerprint) << '\n';
       return_freed_memory();
@@ -233,6 +238,11 @@ std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_point
     deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take,
                       [&job] { job.tables.release(); });
   });
+}
+
+void index_measurements(Job& job, const std::vector<std::string>& tracks) {
+  const std::string damage = on_first_rank(job.ranks, [&] { return update_measurement_index(job.store, tracks); });
+  if (!damage.empty() && job.is_first_rank()) warn_of_damage(job.store, job.log, kMeasurementIndex, damage);
 }
 
 }  // namespace megablock

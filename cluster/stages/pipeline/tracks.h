@@ -14,4 +14,7 @@ namespace megablock {
 std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& matches, const Tiles& tiles);
 std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles);
 
+// Collective. Brings the index of the measurement store (io/result/measurements.h) up to date with the tracks.
+void index_measurements(Job& job, const std::vector<std::string>& tracks);
+
 }  // namespace megablock

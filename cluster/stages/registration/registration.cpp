@@ -18,7 +18,8 @@
 #include "cluster/stages/registration/registration_output.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/adjustment_file.h"
+#include "io/store/units/registration_file.h"
 
 namespace megablock {
 

@@ -6,7 +6,7 @@
 
 #include "geometry/numbers/angles.h"
 #include "io/project/inputs/pose_csv.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
 
 namespace megablock {
 

@@ -8,7 +8,8 @@
 #include "cluster/process/arithmetic.h"
 #include "cluster/process/version.h"
 #include "cluster/stages/pipeline/features.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
 
 namespace megablock {
 

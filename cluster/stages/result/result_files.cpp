@@ -11,7 +11,6 @@
 #include "cluster/process/process_memory.h"
 #include "io/report/report.h"
 #include "io/store/job/events.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

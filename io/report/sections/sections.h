@@ -41,6 +41,5 @@ std::string tiles_section(const BlockResult& result, const Figures& figures);
 std::string failures_section(const BlockResult& result, const Figures& figures);
 std::string stages_section(const BlockResult& result);
 std::string provenance_section(const BlockResult& result, const ReportContext& context);
-std::string figures_json(const BlockResult& result, const Figures& figures);  // safe inside <script>
 
 }  // namespace megablock::report

@@ -7,6 +7,9 @@
 
 namespace megablock {
 
+// What becomes of a block.yaml that is in the folder and differs from what would be written.
+enum class EditedProject { kRefuse, kOverwrite };
+
 // InputError when there is one with other contents, unless it may be overwritten. Asked before anything is written.
 void refuse_edited_project(const std::string& folder, const std::string& text, EditedProject edited);
 // Throws InputError when that is not possible.

@@ -1,4 +1,6 @@
 // The project files of a simulated block at the level of tie points.
+#include "io/simulate/files/write.h"
+
 #include <filesystem>
 
 #include "io/base/error.h"
@@ -7,8 +9,9 @@
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/project_text.h"
 #include "io/store/hdf5/hdf5_tables.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/state_file.h"
 #include "io/store/units/track_writer.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

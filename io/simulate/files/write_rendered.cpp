@@ -1,4 +1,6 @@
 // A simulated block as pictures with the project files around them.
+#include "io/simulate/files/write_rendered.h"
+
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
@@ -18,7 +20,7 @@
 #include "io/simulate/files/project_text.h"
 #include "io/simulate/pictures/image_file.h"
 #include "io/simulate/pictures/render.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/state_file.h"
 
 namespace megablock {
 

@@ -1,4 +1,4 @@
-// Inside of the simulator: where frames stand and which surfaces they see.
+// The inside of the simulator: the frames of a simulated block and the surfaces that they see.
 #pragma once
 
 #include <limits>

@@ -1,4 +1,4 @@
-// Lists of square matrices in HDF5 files. Inner header of io/.
+// Lists of square matrices in HDF5 files. Internal to io/.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,5 @@
-// What the HDF5 reader and writer share. Included by io/hdf5_*.cpp only.
+// Types and checks that the HDF5 reader and writer share. Internal to io/store/hdf5/: the only header that includes
+// HDF5.
 #pragma once
 
 #include <hdf5.h>

@@ -1,3 +1,5 @@
+#include "io/store/job/job_lock.h"
+
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/file.h>
@@ -11,8 +13,6 @@
 
 #include "io/base/error.h"
 #include "io/base/file_error.h"
-#include "io/store/job/job_store.h"
-
 namespace megablock {
 
 namespace {

@@ -1,6 +1,7 @@
 // What a tile's adjustment leaves: docs/job-format.md, "Adjustment".
+#include "io/store/units/adjustment_file.h"
+
 #include "io/store/hdf5/hdf5_cameras.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

@@ -1,4 +1,6 @@
 // The block as read from project file and image headers: docs/job-format.md, "Block".
+#include "io/store/units/block_file.h"
+
 #include <algorithm>
 #include <functional>
 
@@ -6,7 +8,6 @@
 #include "io/store/hdf5/hdf5_tables.h"
 #include "io/store/units/hdf5_block.h"
 #include "io/store/units/hdf5_block_observations.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

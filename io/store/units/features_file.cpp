@@ -1,9 +1,10 @@
 // Features of the images of a shard: docs/job-format.md, "Features".
+#include "io/store/units/features_file.h"
+
 #include <algorithm>
 
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_tables.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

@@ -1,9 +1,10 @@
 // Candidate pairs, verified matches and tiles: docs/job-format.md, "Candidates", "Matches", "Tiles".
+#include "io/store/units/graph_files.h"
+
 #include <algorithm>
 
 #include "io/store/hdf5/hdf5_tables.h"
 #include "io/store/units/hdf5_tiles.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

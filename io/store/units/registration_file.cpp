@@ -1,5 +1,6 @@
 // Places and registrations: docs/job-format.md, "Registration".
-#include "io/block/registration.h"
+#include "io/store/units/registration_file.h"
+
 #include "io/store/hdf5/hdf5_tables.h"
 
 namespace megablock {

@@ -1,11 +1,12 @@
 // Tracks: docs/job-format.md, "Tracks".
+#include "io/store/units/tracks_file.h"
+
 #include <algorithm>
 
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_tables.h"
 #include "io/store/units/track_reader.h"
 #include "io/store/units/track_writer.h"
-#include "io/store/units/unit_files.h"
 
 namespace megablock {
 

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "cluster/job/job_options.h"
-#include "cluster/outcome/status.h"
+#include "cluster/status/status.h"
 #include "io/base/error.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -7,7 +7,7 @@
 #include "cluster/job/given_tracks.h"
 #include "cluster/stages/common/problem_hash.h"
 #include "io/simulate/blocks/simulate.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/adjust/known_lines.h"
 #include "tests/support/adjust/seen_verticals.h"
 #include "tests/support/io/scratch_directory.h"

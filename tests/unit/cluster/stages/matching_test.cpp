@@ -8,7 +8,7 @@
 
 #include "adjust/orientation/vertical_check.h"
 #include "cluster/stages/common/units.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/features_file.h"
 #include "tests/support/adjust/seen_verticals.h"
 #include "tests/support/io/scratch_directory.h"
 

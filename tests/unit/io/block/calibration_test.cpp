@@ -9,8 +9,11 @@
 #include "io/base/error.h"
 #include "io/evaluation/calibration_report.h"
 #include "io/project/project.h"
+#include "io/report/calibration_page.h"
 #include "io/simulate/blocks/simulate.h"
-#include "io/store/units/unit_files.h"
+#include "io/simulate/files/write.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/state_file.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -11,8 +11,8 @@
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/simulate/files/write.h"
 #include "io/simulate/scene/random.h"
-#include "io/store/units/unit_files.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

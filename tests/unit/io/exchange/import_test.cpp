@@ -8,7 +8,7 @@
 #include "io/exchange/export.h"
 #include "io/exchange/model/export_view.h"
 #include "io/project/project.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/io/small_result.h"

@@ -1,3 +1,5 @@
+#include "io/project/append.h"
+
 #include <gmock/gmock.h>
 
 #include "io/base/error.h"

@@ -10,8 +10,9 @@
 
 #include "io/base/error.h"
 #include "io/result/result.h"
+#include "io/store/units/block_file.h"
 #include "io/store/units/track_reader.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

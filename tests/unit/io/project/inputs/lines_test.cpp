@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/base/error.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/block_file.h"
 #include "tests/support/io/example_block.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/scratch_directory.h"

@@ -12,8 +12,9 @@
 #include "io/base/error.h"
 #include "io/project/project.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/simulate/files/write_rendered.h"
 #include "io/simulate/scene/trajectory.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/state_file.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

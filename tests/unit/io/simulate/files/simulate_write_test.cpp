@@ -8,8 +8,12 @@
 #include "io/base/error.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/simulate/files/write.h"
+#include "io/simulate/files/write_rendered.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/state_file.h"
 #include "io/store/units/track_writer.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

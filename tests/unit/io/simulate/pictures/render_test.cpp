@@ -13,7 +13,8 @@
 #include "io/block/crs.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/project/project.h"
-#include "io/store/units/unit_files.h"
+#include "io/simulate/files/write_rendered.h"
+#include "io/store/units/state_file.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

@@ -16,8 +16,9 @@
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/store/hdf5/hdf5_file.h"
+#include "io/store/job/job_lock.h"
 #include "io/store/units/track_writer.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/example_block.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -1,4 +1,6 @@
 // Round trips of features, candidates, matches, tiles and adjustments, full and empty.
+#include "io/store/units/graph_files.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,7 +10,9 @@
 #include "cluster/stages/pipeline/features.h"
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_file.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/units/adjustment_file.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/state_file.h"
 #include "tests/support/io/same_bits.h"
 #include "tests/support/io/scratch_directory.h"
 

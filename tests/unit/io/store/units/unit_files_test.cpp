@@ -1,4 +1,3 @@
-#include "io/store/units/unit_files.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +7,9 @@
 
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_file.h"
+#include "io/store/units/block_file.h"
+#include "io/store/units/state_file.h"
+#include "io/store/units/tracks_file.h"
 #include "tests/support/io/example_block.h"
 #include "tests/support/io/same_bits.h"
 #include "tests/support/io/scratch_directory.h"

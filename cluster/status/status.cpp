@@ -1,4 +1,4 @@
-#include "cluster/outcome/status.h"
+#include "cluster/status/status.h"
 
 #include <fmt/core.h>
 
@@ -11,10 +11,12 @@
 #include "cluster/job/stage_record.h"
 #include "cluster/outcome/result_figures.h"
 #include "cluster/process/progress.h"
+#include "cluster/stages/stages.h"
 #include "io/base/error.h"
 #include "io/result/result.h"
 #include "io/store/job/events.h"
-#include "io/store/units/unit_files.h"
+#include "io/store/job/job_lock.h"
+#include "io/store/units/block_file.h"
 #include "io/text/counted.h"
 
 namespace megablock {
@@ -24,7 +26,7 @@ namespace {
 using Json = nlohmann::json;
 
 std::vector<StageStatus> stages_of(const JobStore& store, const JobJson& job) {
-  return stage_status(store, !job.value<std::string>("tie_points", "").empty());
+  return stage_status(store, expected_stages(!job.value<std::string>("tie_points", "").empty()));
 }
 
 Json stages_json(const JobStore& store, const std::vector<StageStatus>& stages) {

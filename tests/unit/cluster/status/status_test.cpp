@@ -1,4 +1,4 @@
-#include "cluster/outcome/status.h"
+#include "cluster/status/status.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cluster/job/stage_record.h"
+#include "io/store/job/job_lock.h"
 #include "tests/support/io/made_up_result.h"
 #include "tests/support/io/scratch_directory.h"
 

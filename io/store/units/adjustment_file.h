@@ -1,0 +1,38 @@
+// The adjustment of a tile in a file (shapes, types and units: docs/reference/file-formats.md, "Adjustment").
+//
+// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
+// file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/block/block.h"
+
+namespace megablock {
+
+// What a tile's adjustment leaves: its view of the unknowns, its points and the verdict on each observation, aligned
+// with the rows of the tile's track file (then its control points in block order).
+struct TileAdjustment {
+  std::vector<FrameIndex> frames;
+  std::vector<Pose> poses;                 // [frames]
+  std::vector<std::int64_t> observations;  // [frames], kept ones: the boundary frame starts from the richest tile
+  std::vector<CameraIndex> cameras;
+  std::vector<Intrinsics> intrinsics;             // [cameras]
+  std::vector<std::int64_t> camera_observations;  // [cameras]
+  std::vector<RigIndex> mount_rigs;
+  std::vector<std::int32_t> mount_numbers;       // [mount_rigs] of the mount in its rig
+  std::vector<Pose> mounts;                      // [mount_rigs]
+  std::vector<std::int64_t> mount_observations;  // [mount_rigs]
+  std::vector<std::uint8_t> parts;  // [rows of the track file] part of its track (adjust/tile/track_parts.h)
+  // Of the tracks split into these parts:
+  std::vector<Eigen::Vector3d> points;  // [tracks + control points]; NaN = not triangulated
+  std::vector<std::uint8_t> kept;       // [observations of tracks, then of control points] 1 = kept
+  double image_sigma_px = 0;            // of tie point measurements, with which the tile was adjusted
+  std::string summary;                  // one line for the log and the report
+};
+void write_adjustment(const std::string& path, const TileAdjustment& adjustment);
+TileAdjustment read_adjustment(const std::string& path);
+
+}  // namespace megablock

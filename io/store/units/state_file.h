@@ -1,0 +1,30 @@
+// Poses, intrinsics and mounts of the block in a file, and the initial orientation (shapes, types and units:
+// docs/reference/file-formats.md, "State").
+//
+// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
+// file.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/block/block.h"
+#include "io/block/set_aside_vertical.h"
+
+namespace megablock {
+
+// Poses, intrinsics and mounts of the whole block (after orientation, after each global iteration).
+void write_state(const std::string& path, const BlockState& state);
+BlockState read_state(const std::string& path);
+
+// The initial orientation: a state, why frames got no pose, and verticals that are not believed.
+struct InitialOrientation {
+  BlockState state;
+  std::vector<std::pair<FrameIndex, std::string>> failed;
+  std::vector<SetAsideVertical> verticals_aside;
+};
+void write_orientation(const std::string& path, const InitialOrientation& orientation);
+InitialOrientation read_orientation(const std::string& path);
+
+}  // namespace megablock
