@@ -11,34 +11,36 @@
 #include <string>
 #include <vector>
 
+#include "merge/tree/tree_communicator.h"
+
 namespace megablock {
 
-class Communicator {
+class Communicator : public TreeCommunicator {
  public:
   // Initialises MPI (MPI_THREAD_MULTIPLE) when the program was started by mpirun or srun.
   Communicator(int* argc, char*** argv);
-  ~Communicator();
+  ~Communicator() override;
   Communicator(const Communicator&) = delete;
   Communicator& operator=(const Communicator&) = delete;
 
-  int rank() const { return rank_; }
-  int size() const { return size_; }
+  int rank() const override { return rank_; }
+  int size() const override { return size_; }
   // Ranks on this rank's host, for sharing its cores.
   int ranks_on_host() const { return ranks_on_host_; }
 
   void barrier();
   // The root's bytes on every rank.
-  std::string broadcast(const std::string& bytes, int root = 0);
+  std::string broadcast(const std::string& bytes, int root = 0) override;
   // Every rank's bytes, in rank order, on every rank.
-  std::vector<std::string> gather_all(const std::string& bytes);
+  std::vector<std::string> gather_all(const std::string& bytes) override;
   // True everywhere when it is true on any rank.
   bool any(bool value);
 
   // Point to point, for the merge tree: messages between two other ranks are told apart by their tag (>= 0).
   // send() returns at once; flush_sends() waits for all of them.
-  void send(int to, int tag, std::string bytes);
-  std::string receive(int from, int tag);
-  void flush_sends();
+  void send(int to, int tag, std::string bytes) override;
+  std::string receive(int from, int tag) override;
+  void flush_sends() override;
 
   // The shared counter from which units are claimed. reset() is collective.
   void reset_counter();

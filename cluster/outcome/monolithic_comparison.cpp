@@ -13,7 +13,7 @@
 #include "io/base/error.h"
 #include "io/result/result.h"
 #include "merge/checks/monolithic.h"
-#include "merge/tree/serial_runner.h"
+#include "merge/tree/merge_in_memory.h"
 
 namespace megablock {
 
@@ -71,7 +71,7 @@ struct OwnRun {
 };
 
 OwnRun adjust_single_tile(const BlockResult& result, const ResultTile& tile) {
-  SerialRunner runner(single_tile(result.block).tree, {tile.problem}, {disturbed(result, tile)});
+  MergeInMemory runner(single_tile(result.block).tree, {tile.problem}, {disturbed(result, tile)});
   GlobalOptions options;
   options.max_decrement = 1e-6;
   OwnRun run;
@@ -96,7 +96,7 @@ std::string compare_with_monolithic(const JobStore& store) {
   if (!store.seal(kResult)) throw InputError(store.path(kResult) + ": the job has no result yet; run it to the end");
   const BlockResult result = read_result(store.verified_path(kResult));
   const ResultTile tile = tile_of_result(result, observation_options(store));
-  SerialRunner runner(single_tile(result.block).tree, {tile.problem}, {tile.state});
+  MergeInMemory runner(single_tile(result.block).tree, {tile.problem}, {tile.state});
   const SubtreeSums sums = runner.up(0).sums;
   Json json{{"images", tile.problem.images.size()},
             {"tiles", result.tiles.tile_count},

@@ -12,7 +12,7 @@
 #include "io/base/error.h"
 #include "merge/plan/unknowns.h"
 #include "merge/rig/rig_posterior.h"
-#include "merge/tree/serial_runner.h"
+#include "merge/tree/merge_in_memory.h"
 
 namespace megablock {
 
@@ -148,7 +148,7 @@ class RigCalibrator {
   // Of all measurements, to the optimum.
   WholeBlock adjust() {
     WholeBlock whole = adjust_whole(block_, result_.held_out > 0 ? warm_start_ : start_, *tracks_, options_.adjustment);
-    SerialRunner runner(single_tile(block_).tree, {whole.problem}, {whole.state});
+    MergeInMemory runner(single_tile(block_).tree, {whole.problem}, {whole.state});
     GlobalOptions global;
     global.max_iterations = options_.max_iterations;
     GlobalState progress = start_global(global);
@@ -327,7 +327,7 @@ class RigCalibrator {
     apply_calibration(calibration, true, block);
     const BlockState start = initial_state(block);
     WholeBlock whole = adjust_whole(block, start, site.tracks, options_.adjustment);
-    SerialRunner runner(single_tile(block).tree, {whole.problem}, {whole.state});
+    MergeInMemory runner(single_tile(block).tree, {whole.problem}, {whole.state});
     runner.final_up();
     const std::vector<TileCovariance> covariances = runner.covariances();
     RigFit fit;

@@ -84,7 +84,8 @@ void report_down(GlobalState& state, const GlobalOptions& options, const DownRep
 void report_accepted(GlobalState& state, const GlobalOptions& options);
 void report_rejected(GlobalState& state, const GlobalOptions& options);
 
-// What the driver needs of whoever runs the tree: SerialRunner (serial_runner.h) in one process, cluster/ over ranks.
+// What the global adjustment asks of the runner of the tree (merge_tree_runner.h), or of a single tile
+// (tile_solver.cpp).
 class TreeRunner {
  public:
   virtual ~TreeRunner() = default;

@@ -46,7 +46,7 @@
 #include "cluster/outcome/monolithic_comparison.h"
 #include "cluster/process/arithmetic.h"
 #include "cluster/process/process_memory.h"
-#include "cluster/tree/rank_runner.h"
+#include "merge/tree/merge_tree_runner.h"
 #include "io/result/result.h"
 #include "io/store/hdf5/hdf5_file.h"
 #include "io/store/units/block_file.h"
@@ -237,7 +237,7 @@ void run_ours(const Start& start, Communicator& ranks) {
       own += kept_observations(tiles.outline(tiles.size() - 1).problem);
     }
   omp_set_num_threads(kThreads / ranks.size());
-  RankRunner runner(ranks, inputs.tiles.tree, rank_of_tile, tiles, MemoryOptions());
+  MergeTreeRunner runner(ranks, inputs.tiles.tree, rank_of_tile, tiles, MemoryOptions());
   GlobalOptions options;
   options.max_decrement = 1e-6;
   GlobalState state = start_global(options);

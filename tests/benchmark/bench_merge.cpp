@@ -3,7 +3,7 @@
 //   scene 1  the same; eight intrinsics and six mount unknowns of every camera shared by all frames
 //   scene 2  500 aerial images, overlaps of 80 and 60 %, 300 observations each; the camera's eight intrinsics shared
 // Parts: condense (linearise, eliminate points, factorise the cells), down (back-substitute), evaluate (points in the
-// tail of the loss, cost of the new state); iteration: all of them, one after the other (SerialRunner), with the datum
+// tail of the loss, cost of the new state); iteration: all of them, one after the other (MergeInMemory), with the datum
 // and the new state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold
 // stands beside it). The counter is observations per second of processor time.
 //
@@ -20,7 +20,7 @@
 #include "io/simulate/blocks/simulate.h"
 #include "merge/step/tile_store.h"
 #include "merge/tile/point_refinement.h"
-#include "merge/tree/serial_runner.h"
+#include "merge/tree/merge_in_memory.h"
 #include "tests/support/io/scratch_directory.h"
 
 extern "C" void openblas_set_num_threads(int threads);
@@ -116,7 +116,7 @@ void evaluate(benchmark::State& state) {
 
 void iteration(benchmark::State& state) {
   const WholeTile& tile = tile_of(state);
-  SerialRunner runner(tile.tree, {tile.problem}, {tile.state});
+  MergeInMemory runner(tile.tree, {tile.problem}, {tile.state});
   for (auto _ : state) {
     benchmark::DoNotOptimize(runner.up(kLambda));
     benchmark::DoNotOptimize(runner.down(kLambda));

@@ -29,7 +29,7 @@ struct Count {
   double noncentrality = 0, deviate = 0, power = 0;                         // of the ideal test; sums
 };
 
-void adjust(SerialRunner& runner) {
+void adjust(MergeInMemory& runner) {
   GlobalOptions options;
   options.max_decrement = 1e-4;
   GlobalState state = start_global(options);
@@ -69,7 +69,7 @@ void add_ideal(const UpdateMatrix& condensed, const CovarianceMatrix& boundary, 
   count.power += 0.5 * std::erfc((limit - std::sqrt(information)) / std::sqrt(2.0));
 }
 
-std::vector<TileCheck> check(SerialRunner& runner, std::vector<UpdateMatrix>& condensed,
+std::vector<TileCheck> check(MergeInMemory& runner, std::vector<UpdateMatrix>& condensed,
                              std::vector<CovarianceMatrix>& boundary) {
   std::vector<TileCovariance> covariances = runner.covariances();
   std::vector<TileCheck> checks;
@@ -92,7 +92,7 @@ void turn_every_tile(const TiledBlock& block, std::uint64_t seed, Count& count) 
       turns[i] = kTurn * random.normal3().normalized();
       turn_frame(block, shared.frames[i], turns[i], problems[wrong]);
     }
-    SerialRunner runner(block.tiles.tree, problems, block.states);
+    MergeInMemory runner(block.tiles.tree, problems, block.states);
     adjust(runner);
     std::vector<UpdateMatrix> condensed;
     std::vector<CovarianceMatrix> boundary;
@@ -133,7 +133,7 @@ void clean(int blocks) {
     options.points_per_frame = 60;
     options.seed = static_cast<std::uint64_t>(seed);
     const TiledBlock block = tiled(options, options.frames / 5);
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     adjust(runner);
     alarms += !describe_disagreements(runner.tile_checks()).empty();
     tiles += block.problems.size();

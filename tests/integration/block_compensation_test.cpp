@@ -17,7 +17,7 @@ void expect_same_optimum(const SimulationOptions& options, std::int64_t tile_max
   const TiledBlock block(simulated, tile_max_frames, {}, 0.3);
   ASSERT_GE(block.tiles.tile_count, 8);
   ASSERT_GE(block.levels(), 3);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalOptions exact;
   exact.max_decrement = 1e-7;
   GlobalState state = start_global(exact);

@@ -41,7 +41,7 @@ SimulatedBlock seen_in_part(const KnownPositionsScene& scene, const std::vector<
   return block;
 }
 
-void adjust_exactly(SerialRunner& runner) {
+void adjust_exactly(MergeInMemory& runner) {
   GlobalOptions exact;
   exact.max_decrement = 1e-9;
   GlobalState state = start_global(exact);
@@ -68,11 +68,11 @@ TEST(KnownPositions, TKP16TilesGiveTheSameAsOneProblem) {
     block.points = lone.state.points;
     const TiledBlock tiled(block, 4, lone.options.observations, 0);
     ASSERT_GE(tiled.tiles.tile_count, 3);
-    SerialRunner several(tiled.tiles.tree, tiled.problems, tiled.states);
+    MergeInMemory several(tiled.tiles.tree, tiled.problems, tiled.states);
     adjust_exactly(several);
     MergeTree one;
     one.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
-    SerialRunner serial(one, {tiled.whole}, {tiled.whole_state});
+    MergeInMemory serial(one, {tiled.whole}, {tiled.whole_state});
     adjust_exactly(serial);
     const TileState together = tiled.gathered(several.problems(), several.states()), &whole = serial.states()[0];
     const std::string what = drone ? "drone, " : "satellite, ";
@@ -103,11 +103,11 @@ TEST(KnownPositions, TKP16TilesGiveTheSameAsOneProblem) {
 
 // A tile as the only one of its block, from the points' first intersection to the pass that covariances follow from;
 // null where it cannot be solved.
-std::unique_ptr<SerialRunner> adjusted_alone(SingleTile& tile) {
+std::unique_ptr<MergeInMemory> adjusted_alone(SingleTile& tile) {
   triangulate_points(tile.problem, tile.state, tile.options);
   if (!solve_by_condensation(tile.problem, tile.state, {}).usable) return nullptr;
   auto runner =
-      std::make_unique<SerialRunner>(single_tile(tile.simulated.block).tree, std::vector<TileProblem>{tile.problem},
+      std::make_unique<MergeInMemory>(single_tile(tile.simulated.block).tree, std::vector<TileProblem>{tile.problem},
                                      std::vector<TileState>{tile.state});
   adjust_exactly(*runner);
   runner->final_up();
@@ -140,7 +140,7 @@ TEST(KnownPositions, TKP20WithoutAttitudesDatumAndSigmasTell) {
         const MotionReference reference =
             motion_references(tile.simulated.block, single_tile(tile.simulated.block)).at(0);
         judged += !judge(common_motion(tile.problem, tile.state, reference), reference).sound();
-        const std::unique_ptr<SerialRunner> runner = adjusted_alone(tile);
+        const std::unique_ptr<MergeInMemory> runner = adjusted_alone(tile);
         ASSERT_TRUE(runner);
         free += runner->gauge().defect == 1;
         if (collinear) continue;
@@ -261,7 +261,7 @@ TEST(KnownPositions, TKP15TilesAgreeAboutTheCamerasTheyShare) {
       if (p % 2 != t)
         std::fill(tile.problem.kept.begin() + tile.problem.begin[p],
                   tile.problem.kept.begin() + tile.problem.begin[p + 1], 0);
-    const std::unique_ptr<SerialRunner> runner = adjusted_alone(tile);
+    const std::unique_ptr<MergeInMemory> runner = adjusted_alone(tile);
     ASSERT_TRUE(runner);
     covariances[t] = runner->covariances().at(0);
     states[t] = runner->states()[0];
@@ -283,7 +283,7 @@ TEST(KnownPositions, TKP15CorruptedTileIsNamed) {
   TiledBlock tiled(two.block, 5, lone.options.observations, 0);
   ASSERT_GE(tiled.tiles.tile_count, 2);
   const auto checked = [&] {
-    SerialRunner runner(tiled.tiles.tree, tiled.problems, tiled.states);
+    MergeInMemory runner(tiled.tiles.tree, tiled.problems, tiled.states);
     adjust_exactly(runner);
     runner.final_up();
     const bool alarm =

@@ -51,7 +51,7 @@ Adjusted adjusted(SimulatedBlock scene, double wrong_radial) {
   constexpr double kStartNoise = 0.5;  // metres and milliradians
   scene.block.cameras[CameraIndex(0)].intrinsics[kRadial1] += wrong_radial;
   const TiledBlock block(scene, 60, {}, kStartNoise);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalOptions options;
   GlobalState global = start_global(options);
   adjust_globally(runner, options, global);

@@ -23,7 +23,7 @@ match/images match/features match/nearest match/verification match/filter match/
 adjust/problem adjust/terms adjust/lanes adjust/resection adjust/tile adjust/models adjust/orientation/steps adjust/orientation
 adjust/calibration adjust/registration adjust/coplanarity adjust/checks
 merge/scratch merge/plan merge/front merge/tile merge/datum merge/step merge/checks merge/tree merge/start merge/rig
-cluster/process cluster/mpi cluster/job cluster/tree cluster/outcome
+cluster/process cluster/mpi cluster/job cluster/outcome
 cluster/stages/common cluster/stages/registration cluster/stages/pipeline cluster/stages/result cluster/stages/merge
 cluster/stages cluster/status cluster/terminal cluster/commands cluster/main
 """.split()

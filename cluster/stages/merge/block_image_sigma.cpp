@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "adjust/tile/image_sigma.h"
-#include "cluster/mpi/gather_by_tile.h"
 #include "io/store/units/adjustment_file.h"
 #include "merge/scratch/bytes.h"
+#include "merge/tree/gather_by_tile.h"
 
 namespace megablock {
 

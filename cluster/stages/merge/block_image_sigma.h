@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cluster/job/job.h"
-#include "cluster/tree/rank_runner.h"
+#include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {
 

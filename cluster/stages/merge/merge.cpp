@@ -25,10 +25,10 @@
 #include "cluster/stages/merge/merge_start.h"
 #include "cluster/stages/result/provenance.h"
 #include "cluster/stages/result/result_files.h"
-#include "cluster/tree/rank_runner.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/store/job/events.h"
+#include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {
 
@@ -128,7 +128,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   const MergePosition start =
       found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false)), {}};
   const MemoryOptions memory = memory_of_rank(job);
-  PassRecorder recorder(memory.scratch, job.options.record_s);
+  PassRecorder recorder(memory.scratch, job.options.record_s, stop_requested);
   const std::optional<MergePosition> within = checkpoint.find_pass(start, recorder);
   clear_scratch(job, true);  // a killed run may have had more ranks
   TileStore tiles(memory);
@@ -145,7 +145,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   for (;;) {
     const bool last = position.round >= most_rounds(job.settings.merge);
     const GlobalOptions options = options_of(job.settings.merge, frames, last);
-    RankRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
+    MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
     runner.record_passes(recorder);
     return_freed_memory();  // what the plans were made from
     if (last) runner.expect_posterior();

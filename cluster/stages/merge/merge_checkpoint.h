@@ -8,9 +8,9 @@
 #include "adjust/tile/sigma_scales.h"
 #include "cluster/job/job.h"
 #include "cluster/process/progress.h"
-#include "cluster/tree/pass_recorder.h"
-#include "cluster/tree/rank_runner.h"
 #include "merge/tree/global_adjustment.h"
+#include "merge/tree/merge_tree_runner.h"
+#include "merge/tree/pass_recorder.h"
 
 namespace megablock {
 

@@ -10,19 +10,19 @@
 #include <iterator>
 #include <ranges>
 
-#include "cluster/mpi/gather_by_tile.h"
 #include "cluster/mpi/matrix_bytes.h"
 #include "cluster/stages/merge/merge_start.h"
 #include "cluster/stages/result/provenance.h"
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "merge/datum/gauge.h"
+#include "merge/tree/gather_by_tile.h"
 
 namespace megablock {
 
 namespace {
 
-std::vector<SeamCheck> seam_checks(const MergeTree& tree, const RankRunner::Posterior& posterior) {
+std::vector<SeamCheck> seam_checks(const MergeTree& tree, const MergeTreeRunner::Posterior& posterior) {
   const std::vector<std::string> alarms = describe_seams(tree, posterior.seams, posterior.tile_checks);
   std::vector<SeamCheck> checks;
   std::size_t alarm = 0;
@@ -101,7 +101,7 @@ std::string covariance_path(const Job& job, std::int64_t tile) {
 }
 
 void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
-                    RankRunner& runner, Adjusted& adjusted) {
+                    MergeTreeRunner& runner, Adjusted& adjusted) {
   std::filesystem::create_directories(job.store.path("merge/parts"));
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
     write_covariances(covariance_path(job, tile.tile), tile.problem, covariance);

@@ -7,7 +7,7 @@
 #include "cluster/stages/merge/merge_checkpoint.h"
 #include "cluster/stages/merge/merge_tiles.h"
 #include "cluster/stages/result/result_parts.h"
-#include "cluster/tree/rank_runner.h"
+#include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {
 
@@ -31,7 +31,7 @@ struct MergeOutcome {
 
 // An adjusted block as a rank knows it.
 struct Adjusted {
-  RankRunner::Posterior posterior;
+  MergeTreeRunner::Posterior posterior;
   std::vector<TilePart> parts;  // of this rank's tiles
   double image_sigma_px = 0;    // of tie point measurements
   MergePosition position;
@@ -48,7 +48,7 @@ std::string covariance_path(const Job& job, std::int64_t tile);
 // Covariances at the solution; each tile's part of the result is written. `references` of the block's components.
 // Collective.
 void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
-                    RankRunner& runner, Adjusted& adjusted);
+                    MergeTreeRunner& runner, Adjusted& adjusted);
 
 // All tiles' parts, on every rank; collective.
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);

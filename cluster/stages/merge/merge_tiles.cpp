@@ -32,7 +32,7 @@ void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart&
   }
 }
 
-BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const RankRunner& runner) {
+BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner) {
   ByteWriter writer;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const RankTile& tile = tiles.outline(i);
@@ -97,7 +97,7 @@ void follow(const BlockState& state, TileStore& tiles) {
         row, [&](RankTile& tile) { tile.state = make_tile_state(tile.problem, state, std::move(tile.state.points)); });
 }
 
-bool adopt_sigma_scales(RankRunner& runner, TileStore& tiles, SigmaScales& scales) {
+bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales) {
   const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
   if (!change.matter()) return false;
   for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] *= change.of[k];
@@ -157,7 +157,7 @@ std::map<std::string, double> MergeCosts::figures() const {
           {"front_operations", fronts.operations}};
 }
 
-MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runner) {
+MergeCosts gather_costs(Job& job, const TileStore& tiles, const MergeTreeRunner& runner) {
   ByteWriter writer;
   writer.value(runner.memory());
   writer.value(runner.seconds());
@@ -179,7 +179,7 @@ MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runn
     all.tile_seconds += seconds.tiles;
     all.front_seconds += seconds.fronts;
     all.seconds = std::max(all.seconds, seconds.all);
-    all.passes = std::max(all.passes, seconds.passes);
+    all.passes = std::max(all.passes, seconds.sweeps_up);
   }
   all.fronts = front_costs(runner.plan());
   return all;

@@ -10,7 +10,7 @@
 #include "adjust/tile/sigma_scales.h"
 #include "cluster/job/job.h"
 #include "cluster/stages/merge/merge_start.h"
-#include "cluster/tree/rank_runner.h"
+#include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {
 
@@ -29,13 +29,13 @@ void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart&
 
 // The block's state from all ranks' tiles. Tiles hold the same bits of what they share, so their order does not matter.
 // Collective.
-BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const RankRunner& runner);
+BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner);
 
 // Every tile takes over what others have moved: before observations are tested against it.
 void follow(const BlockState& state, TileStore& tiles);
 
 // Whether the sigmas of positions, attitudes and relative poses have changed enough to matter. Collective.
-bool adopt_sigma_scales(RankRunner& runner, TileStore& tiles, SigmaScales& scales);
+bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales);
 
 // Re-tests every observation at the solution; how many verdicts changed in the whole block. Collective.
 std::int64_t screen(Job& job, TileStore& tiles);
@@ -58,7 +58,7 @@ struct MergeCosts {
   std::map<std::string, double> figures() const;  // by name, for the event of the merge
 };
 // Collective.
-MergeCosts gather_costs(Job& job, const TileStore& tiles, const RankRunner& runner);
+MergeCosts gather_costs(Job& job, const TileStore& tiles, const MergeTreeRunner& runner);
 // How large the fronts were, where the time went, and what `--memory` led to.
 void say_costs(const Job& job, const MergeCosts& costs);
 

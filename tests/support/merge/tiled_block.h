@@ -8,7 +8,7 @@
 #include "adjust/problem/tile_problem.h"
 #include "adjust/terms/build_problem.h"
 #include "io/simulate/blocks/simulate.h"
-#include "merge/tree/serial_runner.h"
+#include "merge/tree/merge_in_memory.h"
 #include "partition/tiles/tiles.h"
 
 namespace megablock {

@@ -19,7 +19,7 @@ SimulationOptions aerial_frames(std::int64_t frames) {
   return options;
 }
 
-GlobalState adjusted(SerialRunner& runner) {
+GlobalState adjusted(MergeInMemory& runner) {
   GlobalOptions exact;
   exact.max_decrement = 1e-7;
   GlobalState state = start_global(exact);
@@ -28,7 +28,7 @@ GlobalState adjusted(SerialRunner& runner) {
 }
 
 // The frames of the whole, each from a tile that has it as an unknown: the others do not follow it.
-TileState solution_of(const TiledBlock& block, const SerialRunner& runner) {
+TileState solution_of(const TiledBlock& block, const MergeInMemory& runner) {
   TileState solution = block.gathered(runner.problems(), runner.states());
   for (std::size_t t = 0; t < runner.problems().size(); ++t) {
     const TileProblem& problem = runner.problems()[t];
@@ -78,7 +78,7 @@ TEST(BadTiles, TileWithoutObservations) {
       block.problems[kEmpty].intrinsic_priors.clear();
     }
     follow(block);
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     const GlobalState state = adjusted(runner);
     EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
     const TileState solution = solution_of(block, runner);
@@ -105,7 +105,7 @@ TEST(BadTiles, FrameSeenByOnePoint) {
       if (problem.frames[static_cast<std::size_t>(image.frame.value)] != lonely) return false;
       return without || std::exchange(found, true);
     });
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     state = adjusted(runner);
     up = runner.final_up();
     for (const TileCovariance& tile : runner.covariances())
@@ -149,7 +149,7 @@ TEST(BadTiles, SingularTilesOfOneImage) {
   std::vector<int> frames(static_cast<std::size_t>(block.tiles.tile_count), 0);
   for (const TileIndex tile : block.tiles.tile_of_frame) ++frames[static_cast<std::size_t>(tile.value)];
   ASSERT_EQ(*std::min_element(frames.begin(), frames.end()), 1);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const GlobalState state = adjusted(runner);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
   const TileState solution = solution_of(block, runner);
@@ -167,7 +167,7 @@ TEST(BadTiles, BlockOfOneImageWithoutPriors) {
   TiledBlock block(simulate_block(options), 30, {}, 0);
   ASSERT_EQ(block.problems.size(), 1u);
   reject_if(block, [](const TileProblem& problem, std::size_t o, std::size_t) { return problem.image[o].value != 0; });
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const GlobalState state = adjusted(runner);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
   EXPECT_EQ(runner.final_up().sums.residuals, 0);
@@ -179,7 +179,7 @@ TEST(BadTiles, NumbersThatAreNoneAreRefused) {
     TiledBlock block(simulate_block(aerial_frames(20)), 10, {}, 0);
     TileProblem& problem = block.problems.back();
     problem.x[static_cast<std::size_t>(problem.begin[3])] = wrong;
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     try {
       runner.up(0);
       ADD_FAILURE() << "taken";

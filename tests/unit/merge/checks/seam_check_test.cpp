@@ -29,7 +29,7 @@ ObservationOptions without_loss() {
   return options;
 }
 
-void adjust(SerialRunner& runner) {
+void adjust(MergeInMemory& runner) {
   GlobalOptions options;
   options.max_decrement = 1e-4;
   GlobalState state = start_global(options);
@@ -39,11 +39,11 @@ void adjust(SerialRunner& runner) {
 }
 
 // As a job does: robust losses, the sigma of the measurements estimated from all residuals, observations tested again.
-std::unique_ptr<SerialRunner> adjusted_as_a_job(const TiledBlock& block, std::vector<TileProblem> problems) {
+std::unique_ptr<MergeInMemory> adjusted_as_a_job(const TiledBlock& block, std::vector<TileProblem> problems) {
   const AdjustOptions options;
   std::vector<TileState> states = block.states;
   for (int round = 0; round < 2; ++round) {
-    SerialRunner runner(block.tiles.tree, problems, states);
+    MergeInMemory runner(block.tiles.tree, problems, states);
     adjust(runner);
     states = runner.states();
     ImageResiduals residuals;
@@ -54,7 +54,7 @@ std::unique_ptr<SerialRunner> adjusted_as_a_job(const TiledBlock& block, std::ve
       screen_observations(problems[t], states[t], options.max_residual_sigmas, options);
     }
   }
-  auto runner = std::make_unique<SerialRunner>(block.tiles.tree, std::move(problems), std::move(states));
+  auto runner = std::make_unique<MergeInMemory>(block.tiles.tree, std::move(problems), std::move(states));
   adjust(*runner);
   return runner;
 }
@@ -66,7 +66,7 @@ TEST(SeamCheck, HasItsChiSquareMeanOnCleanData) {
     SimulationOptions options = clean_scene();
     options.seed = seed;
     const TiledBlock block(simulate_block(options), 12, without_loss(), 0.02);
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     adjust(runner);
     ASSERT_GE(runner.seams().size(), 4u);
     for (const SeamReport& seam : runner.seams()) {
@@ -87,7 +87,7 @@ TEST(SeamCheck, ComparesEachOfTwoTilesWithTheOtherAsTheirSeamDoes) {
     TiledBlock block(simulate_block(clean_scene()), 32, without_loss(), 0.02);
     ASSERT_EQ(block.problems.size(), 2u);
     if (free) block.problems[1].positions.clear();
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     adjust(runner);
     ASSERT_EQ(runner.seams().size(), 1u);
     const SeamReport& seam = runner.seams().front();
@@ -125,7 +125,7 @@ TEST(SeamCheck, NamesTheTileThatWasShifted) {
   constexpr std::size_t kWrong = 2;
   // All positions that this tile observes are 1.5 m off.
   for (auto& term : block.problems[kWrong].positions) term.prior.position.x() += 1.5;
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   adjust(runner);
   int alarms = 0;
   for (const SeamReport& seam : runner.seams()) alarms += seam.alarm();
@@ -142,7 +142,7 @@ TEST(SeamCheck, IsSilentOnACleanBlockOf200Tiles) {
   options.seed = 21;
   const TiledBlock block(simulate_block(options), 12, without_loss(), 0.02);
   ASSERT_GE(block.tiles.tile_count, 200);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   adjust(runner);
   EXPECT_TRUE(describe_seams(block.tiles.tree, runner.seams(), runner.tile_checks()).empty());
   EXPECT_TRUE(describe_disagreements(runner.tile_checks()).empty());
@@ -334,7 +334,7 @@ TEST(SeamCheck, NamesOneTileOfTenWithDoubledNoiseThoughItsSeamsAgree) {
 // The first line names the tile that is wrong, alone or with another one; whether alone.
 bool expect_tile_named(const TiledBlock& block, const std::vector<TileProblem>& problems, std::size_t wrong,
                        const std::vector<TileState>& states) {
-  SerialRunner runner(block.tiles.tree, problems, states);
+  MergeInMemory runner(block.tiles.tree, problems, states);
   adjust(runner);
   const std::vector<std::string> lines = describe_disagreements(runner.tile_checks());
   EXPECT_FALSE(lines.empty()) << "nothing is said of tile " << wrong;

@@ -63,7 +63,7 @@ class Motion : public testing::Test {
   }
 
   TiledBlock block_;
-  SerialRunner runner_;
+  MergeInMemory runner_;
   TileProblem problem_;
   BlockMotion wanted_;
 };
@@ -112,7 +112,7 @@ TEST(GlobalAdjustment, TurnsAWeaklyPlacedBlockInFewSteps) {
     for (Pose& pose : state.frames) pose = turned(pose);
     for (Eigen::Vector3d& point : state.points) point = turned(point);
   }
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalOptions exact;
   exact.max_decrement = 1e-6;
   GlobalState state = start_global(exact);

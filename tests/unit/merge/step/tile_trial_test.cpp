@@ -13,7 +13,7 @@ namespace {
 void expect_parts(const SimulationOptions& options, const RobustLoss& loss) {
   TiledBlock block(simulate_block(options), 12, {}, 0.05);
   for (TileProblem& problem : block.problems) problem.image_loss = loss;
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const Pass pass(1e-3, true);
   runner.up(pass);
   runner.down(pass);

@@ -67,7 +67,7 @@ TEST_P(CameraModels, AdjustAsOneCeresProblem) {
   GlobalOptions options;
   options.max_decrement = 1e-7;
   options.max_iterations = 80;
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalState state = start_global(options);
   adjust_globally(runner, options, state);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);

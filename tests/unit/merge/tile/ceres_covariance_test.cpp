@@ -65,7 +65,7 @@ TEST_P(CeresCovariance, EqualsOurs) {
     }
   const TiledBlock block(std::move(simulated), 8, {}, 0.01);
   ASSERT_GE(block.tiles.tile_count, 3);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   EXPECT_TRUE(runner.final_up().sums.held.empty());
   const std::vector<TileCovariance> tiles = runner.covariances();
 

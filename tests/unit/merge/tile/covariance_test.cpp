@@ -78,7 +78,7 @@ void expect_covariances(const TiledBlock& block, const std::vector<TileCovarianc
 }
 
 // Dimension of the null space, and C = S H^+ S' with S from the same inner constraints, by eigenvalues of the dense H.
-void expect_inner_covariances(const TiledBlock& block, SerialRunner& runner, Eigen::Index defect, double tolerance) {
+void expect_inner_covariances(const TiledBlock& block, MergeInMemory& runner, Eigen::Index defect, double tolerance) {
   ASSERT_EQ(runner.gauge().defect, defect);
   const std::vector<TileCovariance> covariances = runner.covariances();
   const MonolithicSystem system = monolithic_system(block.whole, block.gathered(runner.problems(), runner.states()));
@@ -114,7 +114,7 @@ class Covariances : public testing::TestWithParam<SimulationOptions::Scene> {};
 TEST_P(Covariances, EqualTheInverse) {
   const TiledBlock block(simulate_block(small_overlapping(GetParam(), 30, 24)), 8, {}, 0.02);
   ASSERT_GE(block.tiles.tile_count, 4);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const UpReport up = runner.final_up();
   EXPECT_TRUE(up.sums.held.empty());
   EXPECT_EQ(runner.gauge().text, "fixed by priors");
@@ -131,7 +131,7 @@ TEST_P(Covariances, OfAFreeBlockEqualThePseudoInverse) {
   options.gps_sigma_m = 0;
   options.calibrate = false;
   const TiledBlock block(simulate_block(options), 6, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const UpReport up = runner.final_up();
   EXPECT_NE(runner.gauge().text.find("free"), std::string::npos);
   EXPECT_TRUE(up.sums.held.empty());
@@ -153,7 +153,7 @@ TEST(Gauge, PositionsOnOneLineLeaveOneRotation) {
   for (Frame& frame : simulated.block.frames)
     if (kept++ >= 2) frame.position_prior.reset();
   const TiledBlock block(std::move(simulated), 12, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const UpReport up = runner.final_up();
   EXPECT_EQ(runner.gauge().defect, 1);
   EXPECT_TRUE(up.sums.held.empty());
@@ -176,7 +176,7 @@ TEST(Gauge, PositionsNearOneLineLeaveOneRotation) {
       if (kept++ >= 2 && off > 3) simulated.block.frames[frame].position_prior.reset();
     }
     const TiledBlock block(std::move(simulated), 12, {}, 0);
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     runner.final_up();
     EXPECT_EQ(runner.gauge().defect, sigma > 1 ? 1 : 0) << "sigma " << sigma;
   }
@@ -187,7 +187,7 @@ TEST(Gauge, AttitudesLeaveShiftAndScale) {
   options.gps_sigma_m = 0;
   options.attitude_sigma_deg = 0.1;
   const TiledBlock block(simulate_block(options), 12, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   runner.final_up();
   EXPECT_EQ(runner.gauge().defect, 4);
 }
@@ -199,7 +199,7 @@ TEST(Gauge, LinesLeaveShiftScaleAndHeading) {
   SimulatedBlock simulated = simulate_block(options);
   add_known_lines(simulated, 10, 1);
   const TiledBlock block(std::move(simulated), 12, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   runner.final_up();
   EXPECT_EQ(runner.gauge().defect, 5);
 }
@@ -210,7 +210,7 @@ TEST(Gauge, VerticalsLeaveShiftScaleAndHeading) {
   SimulatedBlock simulated = simulate_block(options);
   add_seen_verticals(simulated, {.by_radial = 0.02, .every = 3});
   const TiledBlock block(std::move(simulated), 12, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   runner.final_up();
   EXPECT_EQ(runner.gauge().defect, 5);
 }
@@ -220,7 +220,7 @@ TEST(Gauge, FreeBlockReachesTheOptimum) {
   SimulationOptions options = small(SimulationOptions::Scene::kAerial, 60, 60);
   options.gps_sigma_m = 0;
   const TiledBlock block(simulate_block(options), 12, {}, 0.05);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalOptions exact;
   exact.max_decrement = 1e-6;
   GlobalState state = start_global(exact);
@@ -258,7 +258,7 @@ SimulatedBlock two_free_cities(double rotation_sigma_rad, double position_sigma_
 
 constexpr double kFree = std::numeric_limits<double>::infinity();
 
-void adjust_exactly(SerialRunner& runner, int most_steps) {
+void adjust_exactly(MergeInMemory& runner, int most_steps) {
   GlobalOptions exact;
   exact.max_decrement = 1e-6;
   GlobalState state = start_global(exact);
@@ -271,7 +271,7 @@ void adjust_exactly(SerialRunner& runner, int most_steps) {
 TEST(Gauge, FreeMountsLeaveTheScale) {
   const TiledBlock block(free_streets(kFree, kFree), 6, {}, 0.02);
   ASSERT_GT(block.simulated.truth.mounts.front()[0].centre.norm(), 0.1);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   adjust_exactly(runner, 6);
   EXPECT_TRUE(runner.final_up().sums.held.empty());
   expect_inner_covariances(block, runner, 7, 1e-5);
@@ -281,7 +281,7 @@ TEST(Gauge, FreeMountsLeaveTheScale) {
 TEST(Gauge, CitiesThatShareFreeMountsHaveOneScale) {
   const TiledBlock block(two_free_cities(kFree, kFree), 6, {}, 0.02);
   ASSERT_GE(block.tiles.tile_count, 4);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   adjust_exactly(runner, 6);
   EXPECT_TRUE(runner.final_up().sums.held.empty());
   ASSERT_EQ(runner.block_gauge().components.size(), 2u);
@@ -308,7 +308,7 @@ TEST(Gauge, CitiesThatShareAKnownScale) {
       cities.block.frames[frame].position_prior = {cities.truth.frames[frame].centre, Eigen::Vector3d::Constant(0.05)};
     }
     const TiledBlock block(std::move(cities), 6, {}, 0.02);
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     adjust_exactly(runner, 6);
     EXPECT_TRUE(runner.final_up().sums.held.empty());
     expect_inner_covariances(block, runner, positions ? 6 : 12, 1e-5);

@@ -84,7 +84,7 @@ double cost_of(const TileProblem& problem, const TileState& state, std::int64_t 
 
 TEST(PointRefinement, EndsWhereEveryPointIsAtItsOptimum) {
   const TiledBlock block(simulate_block(heavy_tailed()), 12, {}, 0.05);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const TileProblem& problem = runner.problems().front();
   const TilePlan& plan = runner.tile_plans().front();
   const TileState before = runner.states().front();
@@ -114,7 +114,7 @@ TEST(PointRefinement, EndsWhereEveryPointIsAtItsOptimum) {
 // A step through the cameras is no reason to give up the points that it has turned behind them.
 TEST(PointRefinement, BringsPointsBackFromBehindTheirCameras) {
   const TiledBlock block(simulate_block(heavy_tailed()), 12, {}, 0.05);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const TileProblem& problem = runner.problems().front();
   const TilePlan& plan = runner.tile_plans().front();
   TileState expected = runner.states().front(), state = expected;
@@ -138,7 +138,7 @@ TEST(PointRefinement, LeavesPointsWithoutTailAlone) {
   SimulationOptions options = heavy_tailed();
   options.image_noise_px = 0.05;
   const TiledBlock block(simulate_block(options), 12, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   TileState state = runner.states().front();
   refine_points(runner.problems().front(), runner.tile_plans().front(), state);
   EXPECT_EQ(state.points, runner.states().front().points);
@@ -162,7 +162,7 @@ TEST(GlobalAdjustment, TakesFewStepsWithAttitudes) {
       return !block.whole.attitude_loss.squares(s);
     });
     ASSERT_GE(beyond, 10);
-    SerialRunner runner(block.tiles.tree, block.problems, block.states);
+    MergeInMemory runner(block.tiles.tree, block.problems, block.states);
     GlobalOptions global;
     global.max_decrement = 1e-6;
     GlobalState state = start_global(global);
@@ -174,7 +174,7 @@ TEST(GlobalAdjustment, TakesFewStepsWithAttitudes) {
 
 TEST(GlobalAdjustment, TakesFewStepsWithHeavyTails) {
   const TiledBlock block(simulate_block(heavy_tailed()), 12, {}, 0.05);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalOptions options;
   options.max_decrement = 1e-4;
   GlobalState state = start_global(options);

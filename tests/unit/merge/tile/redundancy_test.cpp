@@ -62,7 +62,7 @@ class Redundancy : public testing::TestWithParam<SimulationOptions::Scene> {};
 TEST_P(Redundancy, EqualsTheDenseSystem) {
   const TiledBlock block(simulate_block(small_controlled(GetParam(), 24, 24)), 8, {}, 0.02);
   ASSERT_GE(block.tiles.tile_count, 3);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const UpReport up = runner.final_up();
   const ObservationTable table = table_of(runner.covariances());
   const Expected expected(monolithic_system(block.whole, block.whole_state), 0);
@@ -96,7 +96,7 @@ TEST_P(Redundancy, DoesNotDependOnTheDatum) {
   options.control_points = 0;
   options.calibrate = false;
   const TiledBlock block(simulate_block(options), 6, {}, 0);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   runner.final_up();
   ASSERT_GT(runner.gauge().defect, 0);
   const ObservationTable table = table_of(runner.covariances());
@@ -120,7 +120,7 @@ TEST_P(Redundancy, OfEveryImageObservationEqualsTheDenseSystem) {
           block.whole.kept[static_cast<std::size_t>(block.whole.begin[block.point_row(problem.points[p])])] = 0;
         }
       }
-      SerialRunner runner(block.tiles.tree, block.problems, block.states);
+      MergeInMemory runner(block.tiles.tree, block.problems, block.states);
       runner.final_up();
       ASSERT_EQ(runner.gauge().defect > 0, free);
       const std::vector<TileCovariance> tiles = runner.covariances();
@@ -179,7 +179,7 @@ TEST(SigmaFactor, ShowsTheTrueNoise) {
   ObservationOptions options;
   options.image_loss.kind = options.position_loss.kind = RobustLoss::Kind::kNone;
   const TiledBlock block(std::move(simulated), 40, options, 0.01);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   const GlobalOptions global;
   GlobalState state = start_global(global);
   adjust_globally(runner, global, state);

@@ -36,7 +36,7 @@ class SameOptimum : public testing::TestWithParam<SimulationOptions::Scene> {};
 TEST_P(SameOptimum, AsOneCeresProblem) {
   const TiledBlock block(simulate_block(scene(GetParam(), 100)), 14, {}, 0.3);
   ASSERT_GE(block.tiles.tile_count, 8);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalState state = start_global(exact());
   adjust_globally(runner, exact(), state);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
@@ -52,7 +52,7 @@ TEST(MonolithicReference, DividesByTheSigmasThatAreGiven) {
   MergeTree alone;
   alone.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
   const TileState start = block.gathered(block.problems, block.states);
-  SerialRunner whole(alone, {block.whole}, {start});
+  MergeInMemory whole(alone, {block.whole}, {start});
   whole.up(0);
   const auto largest = [&](const std::optional<FrameSigmas>& sigmas) {
     return max_pose_difference_sigmas(block.whole, start, whole.block_gauge(), whole.tile_plans().front(), sigmas);
@@ -71,7 +71,7 @@ TEST(MonolithicReference, DividesByTheSigmasThatAreGiven) {
 
 TEST_P(SameOptimum, BoundaryFramesAgreeToTheBit) {
   const TiledBlock block(simulate_block(scene(GetParam(), 60)), 14, {}, 0.1);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalState state = start_global(exact());
   adjust_globally(runner, exact(), state);
   std::map<FrameIndex, Pose> seen;
@@ -124,7 +124,7 @@ TEST_P(EveryOptimum, AsOneCeresProblem) {
   observations.position_loss = {GetParam().loss, 3};
   const TiledBlock block(block_of(GetParam()), 14, observations, 0.02);
   ASSERT_GE(block.tiles.tile_count, 5);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalState state = start_global(exact());
   adjust_globally(runner, exact(), state);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged) << describe(state);
@@ -133,7 +133,7 @@ TEST_P(EveryOptimum, AsOneCeresProblem) {
   const TileState solution = block.gathered(runner.problems(), runner.states());
   MergeTree alone;
   alone.nodes.push_back({-1, -1, -1, TileIndex(0), 0});
-  SerialRunner whole(alone, {block.whole}, {solution});
+  MergeInMemory whole(alone, {block.whole}, {solution});
   whole.up(0);
   EXPECT_LE(max_pose_difference_sigmas(block.whole, solution, whole.block_gauge(), whole.tile_plans().front()), 1e-6);
   const double cost = evaluate_cost(block.whole, solution);
@@ -167,14 +167,14 @@ bool same_bits(const TileState& a, const TileState& b) {
 class MemoryTest : public testing::Test {
  protected:
   MemoryTest() : block_(simulate_block(scene(SimulationOptions::Scene::kAerial, 90)), 12, {}, 0.1) {}
-  std::unique_ptr<SerialRunner> run(const MemoryOptions& memory) {
-    auto runner = std::make_unique<SerialRunner>(block_.tiles.tree, block_.problems, block_.states, memory);
+  std::unique_ptr<MergeInMemory> run(const MemoryOptions& memory) {
+    auto runner = std::make_unique<MergeInMemory>(block_.tiles.tree, block_.problems, block_.states, memory);
     GlobalState state = start_global({});
     adjust_globally(*runner, {}, state);
     EXPECT_EQ(state.outcome, GlobalOutcome::kConverged);
     return runner;
   }
-  void expect_same(SerialRunner& a, SerialRunner& b) {
+  void expect_same(MergeInMemory& a, MergeInMemory& b) {
     const std::vector<TileCovariance> ca = a.covariances(), cb = b.covariances();
     for (std::size_t t = 0; t < a.states().size(); ++t) {
       EXPECT_TRUE(same_bits(a.states()[t], b.states()[t])) << "tile " << t;
@@ -209,7 +209,7 @@ TEST_F(MemoryTest, RecomputingGivesTheBitsOfKeep) {
 
 // Stopping after any accepted iteration and starting again from the stored state gives the same bits.
 TEST_F(MemoryTest, ResumesFromAStoredState) {
-  SerialRunner whole(block_.tiles.tree, block_.problems, block_.states);
+  MergeInMemory whole(block_.tiles.tree, block_.problems, block_.states);
   GlobalState end = start_global(exact());
   adjust_globally(whole, exact(), end);
   ASSERT_GE(end.accepted, 3);
@@ -217,7 +217,7 @@ TEST_F(MemoryTest, ResumesFromAStoredState) {
   GlobalState state = start_global(exact());
   auto tiles = block_.states;
   for (bool running = true; running;) {
-    SerialRunner part(block_.tiles.tree, block_.problems, tiles);
+    MergeInMemory part(block_.tiles.tree, block_.problems, tiles);
     try {
       adjust_globally(part, exact(), state, [&](const GlobalState& s) {
         if (s.next != GlobalAction::kStop) throw Stop();

@@ -4,7 +4,7 @@
 
 #include <Eigen/Dense>
 
-#include "merge/tree/serial_runner.h"
+#include "merge/tree/merge_in_memory.h"
 #include "tests/support/merge/tiled_block.h"
 
 namespace megablock {
@@ -64,8 +64,8 @@ TEST(NodeSolver, AnotherOneLeadsToTheSameSolution) {
   options.points_per_frame = 60;
   const TiledBlock block(simulate_block(options), 12, {}, 0.05);
   const EigenNodeSolver other;
-  SerialRunner dense(block.tiles.tree, block.problems, block.states);
-  SerialRunner by_eigen(block.tiles.tree, block.problems, block.states, {}, other);
+  MergeInMemory dense(block.tiles.tree, block.problems, block.states);
+  MergeInMemory by_eigen(block.tiles.tree, block.problems, block.states, {}, other);
   GlobalState first = start_global({}), second = start_global({});
   adjust_globally(dense, {}, first);
   adjust_globally(by_eigen, {}, second);

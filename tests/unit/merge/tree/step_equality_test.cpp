@@ -126,7 +126,7 @@ SimulatedBlock simulated(const StepCase& scene) {
 class StepEquality : public testing::TestWithParam<StepCase> {};
 
 // Largest difference between the tiles' step and the monolithic one, in units of `sigma` [columns].
-double difference(const TiledBlock& block, const SerialRunner& runner, const MonolithicSystem& system,
+double difference(const TiledBlock& block, const MergeInMemory& runner, const MonolithicSystem& system,
                   const Eigen::VectorXd& expected, const Eigen::VectorXd& sigma) {
   double largest = 0;
   const auto compare = [&](std::int64_t column, const double* values, std::int64_t count) {
@@ -177,7 +177,7 @@ TEST_P(StepEquality, OverEightTilesAndThreeLevels) {
   ASSERT_GE(block.levels(), 3);
   const MonolithicSystem system = monolithic_system(block.whole, block.whole_state);
   const Eigen::VectorXd sigma = sigmas(system);
-  SerialRunner runner(block.tiles.tree, block.problems, block.states);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   for (const double lambda : {0.0, 1e-4, 1.0}) {
     const UpReport up = runner.up(lambda);
     const DownReport down = runner.down(lambda);

@@ -32,8 +32,10 @@ class PassRecorder {
     bool seams = false, columns = false;
   };
 
-  // `seconds` between records; 0: one after every subtree.
-  PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds);
+  // `seconds` between records; 0: one after every subtree. `stop_requested`: whether the process is asked to stop.
+  PassRecorder(
+      std::shared_ptr<ScratchSpace> scratch, double seconds,
+      std::function<bool()> stop_requested = [] { return false; });
 
   // The record that is there, of whatever pass.
   const std::optional<PassRecord>& found() const { return found_; }
@@ -58,6 +60,7 @@ class PassRecorder {
  private:
   PassRecordFiles files_;
   double seconds_;
+  std::function<bool()> stop_requested_;
   std::function<Position()> position_;
   std::optional<PassRecord> found_;
   // Of the pass at hand.

@@ -1,11 +1,16 @@
-// The merge tree over ranks: each rank condenses its own tiles; an inner node is eliminated by the rank of its left
-// child; update matrices go up and steps, covariances come down as messages. All sums are formed in tile or child
-// order, so that the bits do not depend on the ranks.
+// The runner of the merge tree: one for any number of ranks, one process being the trivial case.
 //
-// Tiles lie in a store of their own, partly out of core (merge/step/tile_store.h): each pass asks for a tile as a whole
-// once. Factors wait for the way down within the rank's memory, else in its scratch, else they are computed again
-// (merge/step/memory.h). Those of a node whose subtree lies on several ranks are never given up: computing them again
-// would need the other ranks.
+// Each rank condenses its own tiles. An inner node is eliminated by the rank of its left child. A sweep up moves update
+// matrices from children to parents; a sweep down moves steps, or covariances, from parents to children. Where parent
+// and child are on different ranks they travel as messages (tree_communicator.h). All sums are formed in the order of
+// the tiles or of the children, so that the bits do not depend on the ranks.
+//
+// Tiles lie in a store of their own, partly out of core (merge/step/tile_store.h): a sweep asks once for each tile as a
+// whole. Factors wait for the sweep down in memory, else in the rank's scratch, else they are computed again
+// (merge/step/memory.h). The factors of a node whose subtree lies on several ranks are never given up: to compute them
+// again would need the other ranks.
+//
+// The code: merge_tree_runner.cpp (plans and datum), sweep_up.cpp, sweep_down.cpp, posterior.cpp.
 #pragma once
 
 #include <functional>
@@ -16,8 +21,6 @@
 #include <string>
 #include <vector>
 
-#include "cluster/mpi/communicator.h"
-#include "cluster/tree/pass_recorder.h"
 #include "merge/checks/seam_check.h"
 #include "merge/datum/inner_constraints.h"
 #include "merge/plan/plan_store.h"
@@ -28,26 +31,29 @@
 #include "merge/tile/condense.h"
 #include "merge/tree/global_adjustment.h"
 #include "merge/tree/node.h"
+#include "merge/tree/pass_recorder.h"
+#include "merge/tree/tree_communicator.h"
 
 namespace megablock {
 
-// On this rank's clock, of all passes up and down: work on its tiles, on fronts above them, and everything, waiting for
-// other ranks included.
-struct PassSeconds {
-  double tiles = 0, fronts = 0, all = 0;
-  std::int64_t passes = 0;  // upwards
+// Wall clock of this rank in all sweeps up and down, seconds.
+struct SweepSeconds {
+  double tiles = 0;   // work on its tiles
+  double fronts = 0;  // work on the fronts above its tiles
+  double all = 0;     // everything, waiting for other ranks included
+  std::int64_t sweeps_up = 0;
 };
 
 // Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
 std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
 
-class RankRunner : public TreeRunner {
+class MergeTreeRunner : public TreeRunner {
  public:
   // `tiles`: this rank's, ascending, longer-lived than the runner, as is `solver`; rank_of_tile: of all tiles.
   // Collective.
-  RankRunner(Communicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
-             const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
-  ~RankRunner() override;
+  MergeTreeRunner(TreeCommunicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
+                  const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
+  ~MergeTreeRunner() override;
 
   UpReport up(const Pass& pass) override;
   DownReport down(const Pass& pass) override;
@@ -77,7 +83,13 @@ class RankRunner : public TreeRunner {
   // The unknowns that a tile's kept residuals touch; until another tile is asked for.
   const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
   const EliminationPlan& plan() const { return plan_; }
-  const PassSeconds& seconds() const { return seconds_; }
+  const SweepSeconds& seconds() const { return seconds_; }
+  const BlockGauge& gauge() const { return gauge_; }                             // of the last sweep up
+  const TilePlan& tile_plan(std::size_t row) const { return tile_plans_[row]; }  // until another one is asked for
+  // Called in down() with the step of each tile's unknowns, by row, before the trial state is formed.
+  void on_step(std::function<void(std::size_t row, const Step&)> visit) { on_step_ = std::move(visit); }
+  // The datum of a tile in the last sweep up.
+  TileDatum datum_of(std::size_t row) const;
   const MemoryStatistics& memory() const { return factors_.statistics(); }
   // The most that a front above the tiles, its children's updates and what waited for others took at a time.
   std::int64_t peak_front_bytes() const { return peak_front_bytes_; }
@@ -85,7 +97,7 @@ class RankRunner : public TreeRunner {
  private:
   bool mine(std::int64_t node) const;
   UpdateMatrix child_update(std::int64_t child);
-  void pass_up(std::int64_t node, UpdateMatrix update);
+  void deliver_update(std::int64_t node, UpdateMatrix update);
   // The part of a front's values that each child needs, and a node's from its parent.
   template <typename Values>
   void pass_down(std::int64_t node, const Values& front);
@@ -96,44 +108,43 @@ class RankRunner : public TreeRunner {
   }
   // Tile and plan of this row are there beside those of any other. A tile may leave scratch without its plan.
   bool in_memory(std::size_t row) const { return !tiles_.in_scratch(row) && !tile_plans_.in_scratch(row); }
-  UpdateMatrix keep(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
+  UpdateMatrix store_factors(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
   // Tiles of these nodes, ascending; `take` gets one after the other.
-  using TakeCondensation = std::function<void(std::size_t i, TileCondensation)>;
-  void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const TakeCondensation& take);
+  using VisitCondensation = std::function<void(std::size_t i, TileCondensation)>;
+  void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const VisitCondensation& visit);
   UpdateMatrix join_children(std::int64_t node, const Pass& pass);
-  void hand_on(std::int64_t node, UpdateMatrix update);  // records it, too
+  void send_update(std::int64_t node, UpdateMatrix update);  // records it, too
   UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
                                bool check_seam_here);
   // Bytes of a node's front at work, whether its unknowns or their covariances; of what waits for a parent or a child.
   std::int64_t front_bytes(std::int64_t node) const;
-  std::int64_t waiting_bytes() const;
+  std::int64_t pending_update_bytes() const;
   // The subtree of a node that lies on this rank alone, once more.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
   // Nodes of these subtrees. [nodes]
   std::vector<bool> nodes_of(const std::vector<std::int64_t>& subtrees) const;
   // Takes over what a killed run did of the pass; the nodes that are done.
-  std::vector<bool> go_on(const PassRecord& record);
+  std::vector<bool> resume(const PassRecord& record);
   // Records the pass, if it is time to, once a node's front is eliminated.
   void record(std::int64_t node, const UpdateMatrix& update);
   // The node's update goes where no other subtree of this rank alone holds it.
-  bool leaves(std::int64_t node) const;
+  bool update_leaves(std::int64_t node) const;
   // One upward pass with the datum in gauge_.
   UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   void find_gauges();
   double seam_probability() const;  // of a false alarm at one seam
   BlockGauge gather_gauge() const;
-  TileDatum datum_of(std::size_t row) const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
   // Down with the current factors: steps of this rank's tiles without those of their points.
   std::vector<TileStep> steps_down(const Pass& pass);
   // Where they lead to, tile by tile; `take` gets one after the other.
-  using TakeTrial = std::function<void(std::size_t row, TileTrial)>;
+  using VisitTrial = std::function<void(std::size_t row, TileTrial)>;
   void try_steps(const std::vector<BlockMotion>& motions, const Pass& pass, const std::vector<TileStep>& steps,
-                 const TakeTrial& take);
+                 const VisitTrial& visit);
 
-  Communicator& ranks_;
+  TreeCommunicator& ranks_;
   TileStore& tiles_;
   const NodeSolver& solver_;
   PlanStore tile_plans_;                          // of tiles_
@@ -152,8 +163,9 @@ class RankRunner : public TreeRunner {
   bool posterior_expected_ = false;
   std::optional<SubtreeSums> last_pass_;  // of a pass at the present state with what the posterior needs
   std::vector<SeamReport> seams_;
-  PassSeconds seconds_;
+  SweepSeconds seconds_;
   std::int64_t peak_front_bytes_ = 0;
+  std::function<void(std::size_t, const Step&)> on_step_;
   std::map<std::int64_t, Bytes> downward_;  // what a parent on this rank left for its child
 };
 

@@ -1,11 +1,10 @@
-#include "cluster/tree/pass_recorder.h"
+#include "merge/tree/pass_recorder.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "cluster/process/progress.h"
-#include "cluster/process/signals.h"
 #include "io/base/hash.h"
+#include "merge/tree/stopwatch.h"
 
 namespace megablock {
 
@@ -21,8 +20,11 @@ std::uint64_t hash_of(std::uint64_t state, const PassRecorder::Kind& kind) {
 
 }  // namespace
 
-PassRecorder::PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds)
-    : files_(std::move(scratch)), seconds_(seconds), found_(files_.read()) {}
+PassRecorder::PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds, std::function<bool()> stop_requested)
+    : files_(std::move(scratch)),
+      seconds_(seconds),
+      stop_requested_(std::move(stop_requested)),
+      found_(files_.read()) {}
 
 void PassRecorder::keep_found(std::uint64_t state) {
   if (found_ && found_->state != state) found_.reset();
@@ -32,7 +34,7 @@ void PassRecorder::keep_found(std::uint64_t state) {
 PassRecord PassRecorder::begin(const Kind& kind) {
   at_ = position_();
   pass_ = hash_of(at_.state, kind);
-  begin_s_ = last_s_ = monotonic_seconds();
+  begin_s_ = last_s_ = clock_seconds();
   given_up_ = false;
   const std::optional<PassRecord> found = std::exchange(found_, std::nullopt);
   if (found && found->pass == pass_) {
@@ -48,8 +50,8 @@ PassRecord PassRecorder::begin(const Kind& kind) {
 
 bool PassRecorder::due(std::int64_t bytes, bool leaves) const {
   if (given_up_) return false;
-  if (seconds_ <= 0 || stop_requested()) return true;
-  const double worked = monotonic_seconds() - (leaves ? begin_s_ : last_s_);
+  if (seconds_ <= 0 || stop_requested_()) return true;
+  const double worked = clock_seconds() - (leaves ? begin_s_ : last_s_);
   return worked >= std::max(seconds_, static_cast<double>(bytes) / kBytesPerSecond);
 }
 
@@ -72,7 +74,7 @@ void PassRecorder::write(PassRecord record) {
     files_.remove_update(node);
     return true;
   });
-  last_s_ = monotonic_seconds();
+  last_s_ = clock_seconds();
 }
 
 }  // namespace megablock

@@ -1,13 +1,13 @@
-// What ranks know of their tiles, one value a tile, brought together on every rank in the order of tiles: sums over it
-// have the same bits whatever the ranks.
+// Gathers one value for each tile on every rank, in the order of the tiles. Sums over the result have the same bits
+// on any number of ranks.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "cluster/mpi/communicator.h"
 #include "merge/scratch/bytes.h"
 #include "merge/step/tile_store.h"
+#include "merge/tree/tree_communicator.h"
 
 namespace megablock {
 
@@ -40,7 +40,7 @@ inline void read(ByteReader& reader, UnknownList& unknowns) { unknowns = reader.
 
 // [tiles] all tiles of the block, each held by one rank or none; `tile_of(i)`: number of the tile of values[i].
 template <typename Value, typename TileOf>
-std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const std::vector<Value>& values,
+std::vector<Value> gather_by_tile(TreeCommunicator& ranks, std::size_t tiles, const std::vector<Value>& values,
                                   const TileOf& tile_of) {
   ByteWriter writer;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -59,7 +59,7 @@ std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const 
 }
 
 template <typename Value>
-std::vector<Value> gather_by_tile(Communicator& ranks, std::size_t tiles, const TileStore& own,
+std::vector<Value> gather_by_tile(TreeCommunicator& ranks, std::size_t tiles, const TileStore& own,
                                   const std::vector<Value>& values) {
   return gather_by_tile(ranks, tiles, values, [&](std::size_t i) { return own.number(i); });
 }

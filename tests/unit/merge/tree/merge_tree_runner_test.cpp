@@ -1,5 +1,5 @@
 // Passes of one rank within a budget of scratch: its directory never holds more, and no bit changes.
-#include "cluster/tree/rank_runner.h"
+#include "merge/tree/merge_tree_runner.h"
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ class ScratchBudgetTest : public testing::Test {
       tiles.add({static_cast<std::int64_t>(t), block_.problems[t], block_.states[t]});
     End end;
     for (int round = 0; round < 2; ++round) {
-      RankRunner runner(ranks_, block_.tiles.tree, std::vector<int>(tiles.size(), 0), tiles, memory);
+      MergeTreeRunner runner(ranks_, block_.tiles.tree, std::vector<int>(tiles.size(), 0), tiles, memory);
       runner.record_passes(recorder);
       GlobalState state = start_global({});
       adjust_globally(runner, {}, state, [&](const GlobalState&) { look(); });
@@ -62,9 +62,7 @@ class ScratchBudgetTest : public testing::Test {
     return end;
   }
 
-  int no_arguments_ = 0;
-  char** none_ = nullptr;
-  Communicator ranks_{&no_arguments_, &none_};
+  OneProcess ranks_;
   TiledBlock block_;
 };
 

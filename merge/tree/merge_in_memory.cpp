@@ -1,0 +1,69 @@
+#include "merge/tree/merge_in_memory.h"
+
+#include <limits>
+#include <utility>
+
+namespace megablock {
+
+namespace {
+
+// All tiles stay in memory.
+MemoryOptions with_all_tiles(MemoryOptions memory) {
+  memory.tile_bytes = std::numeric_limits<std::int64_t>::max();
+  return memory;
+}
+
+void add_tiles(const std::vector<TileProblem>& problems, const std::vector<TileState>& states, TileStore& tiles) {
+  for (std::size_t t = 0; t < problems.size(); ++t) tiles.add({static_cast<std::int64_t>(t), problems[t], states[t]});
+}
+
+TileStore& filled(TileStore& tiles, const std::vector<TileProblem>& problems, const std::vector<TileState>& states) {
+  add_tiles(problems, states, tiles);
+  return tiles;
+}
+
+}  // namespace
+
+MergeInMemory::MergeInMemory(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
+                             MemoryOptions memory, const NodeSolver& solver)
+    : tiles_(with_all_tiles(memory)),
+      runner_(process_, tree, std::vector<int>(problems.size(), 0), filled(tiles_, problems, states), memory, solver),
+      problems_(std::move(problems)),
+      states_(std::move(states)),
+      unknown_steps_(problems_.size()) {
+  for (std::size_t t = 0; t < problems_.size(); ++t) tile_plans_.push_back(runner_.tile_plan(t));
+  runner_.on_step([this](std::size_t row, const Step& step) { unknown_steps_[row] = step; });
+}
+
+void MergeInMemory::read_states() {
+  for (std::size_t t = 0; t < states_.size(); ++t) states_[t] = tiles_.outline(t).state;
+}
+
+DownReport MergeInMemory::down(const Pass& pass) {
+  pass_ = pass;
+  return runner_.down(pass);
+}
+
+void MergeInMemory::accept() {
+  runner_.accept();
+  read_states();
+}
+
+UpReport MergeInMemory::final_up() {
+  covariances_.assign(problems_.size(), {});
+  posterior_ = runner_.posterior([this](const RankTile& tile, const TileCovariance& covariance) {
+    covariances_[static_cast<std::size_t>(tile.tile)] = covariance;
+  });
+  gauge_ = judge_gauge(posterior_.sums, posterior_.gauge);
+  return {posterior_.sums};
+}
+
+std::vector<TileStep> MergeInMemory::steps() const {
+  std::vector<TileStep> steps;
+  for (std::size_t t = 0; t < problems_.size(); ++t)
+    steps.push_back(solve_tile_down(problems_[t], tile_plans_[t], states_[t], pass_, TileFactor(),
+                                    unknown_steps_[t].restricted_to(tile_plans_[t].boundary), runner_.datum_of(t)));
+  return steps;
+}
+
+}  // namespace megablock

@@ -1,0 +1,58 @@
+// The merge of a block whose tiles are all in memory, in one process: for blocks of one tile, for comparisons and for
+// tests. It is the runner of the merge tree (merge_tree_runner.h) with one rank, together with its tiles and its
+// results.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "merge/tree/merge_tree_runner.h"
+
+namespace megablock {
+
+class MergeInMemory : public TreeRunner {
+ public:
+  // problems[t] and states[t] of tile t; the states' common unknowns must agree. `solver` outlives the object.
+  MergeInMemory(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
+                MemoryOptions memory = {}, const NodeSolver& solver = dense_node_solver());
+
+  UpReport up(const Pass& pass) override { return runner_.up(pass); }
+  DownReport down(const Pass& pass) override;
+  void accept() override;
+  void reject() override { runner_.reject(); }
+
+  // At the solution: a sweep up with lambda = 0, seams, datum and covariances.
+  UpReport final_up();
+  // From final_up(). Covariances by tile, with inner constraints where the datum is free; seams of all inner nodes in
+  // the order of the nodes; every tile against the rest of the block; the datum.
+  const std::vector<TileCovariance>& covariances() const { return covariances_; }
+  const std::vector<SeamReport>& seams() const { return posterior_.seams; }
+  const std::vector<TileCheck>& tile_checks() const { return posterior_.tile_checks; }
+  const GaugeReport& gauge() const { return gauge_; }
+
+  const EliminationPlan& plan() const { return runner_.plan(); }
+  const std::vector<TilePlan>& tile_plans() const { return tile_plans_; }
+  const std::vector<TileProblem>& problems() const { return problems_; }
+  const std::vector<TileState>& states() const { return states_; }
+  const BlockGauge& block_gauge() const { return runner_.gauge(); }  // of the last sweep up
+  const MemoryStatistics& memory() const { return runner_.memory(); }
+  // Of the last down(), points included, until accept().
+  std::vector<TileStep> steps() const;
+
+ private:
+  void read_states();
+
+  OneProcess process_;
+  TileStore tiles_;
+  MergeTreeRunner runner_;
+  std::vector<TileProblem> problems_;
+  std::vector<TileState> states_;
+  std::vector<TilePlan> tile_plans_;
+  Pass pass_ = 0;                    // of the last down()
+  std::vector<Step> unknown_steps_;  // [tiles] of the last down()
+  MergeTreeRunner::Posterior posterior_;
+  std::vector<TileCovariance> covariances_;
+  GaugeReport gauge_;
+};
+
+}  // namespace megablock

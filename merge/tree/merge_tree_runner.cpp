@@ -1,0 +1,104 @@
+// Plans, ranks and datum of the merge tree.
+#include "merge/tree/merge_tree_runner.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "merge/tree/gather_by_tile.h"
+
+namespace megablock {
+
+std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks) {
+  std::int64_t total = 0;
+  for (const std::int64_t count : observations) total += count + 1;
+  std::vector<int> rank_of_tile(observations.size(), 0);
+  std::int64_t before = 0;
+  for (const MergeTree::Node& node : tree.nodes) {
+    if (!node.tile.valid()) continue;
+    const auto tile = static_cast<std::size_t>(node.tile.value);
+    const std::int64_t middle = before + (observations[tile] + 1) / 2;
+    rank_of_tile[tile] = static_cast<int>(std::min<std::int64_t>(ranks - 1, middle * ranks / total));
+    before += observations[tile] + 1;
+  }
+  return rank_of_tile;
+}
+
+MergeTreeRunner::MergeTreeRunner(TreeCommunicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile,
+                                 TileStore& tiles, const MemoryOptions& memory, const NodeSolver& solver)
+    : ranks_(ranks), tiles_(tiles), solver_(solver), tile_plans_(memory.scratch), factors_(memory) {
+  rank_of_node_.assign(tree.nodes.size(), 0);
+  own_tile_of_node_.assign(tree.nodes.size(), -1);
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    const MergeTree::Node& node = tree.nodes[n];
+    rank_of_node_[n] = node.tile.valid() ? rank_of_tile[static_cast<std::size_t>(node.tile.value)]
+                                         : rank_of_node_[static_cast<std::size_t>(node.left)];
+    for (std::size_t i = 0; i < tiles_.size(); ++i)
+      if (node.tile.valid() && tiles_.number(i) == node.tile.value) own_tile_of_node_[n] = static_cast<std::int64_t>(i);
+  }
+  make_plans(tree, rank_of_tile.size());
+  find_gauges();
+}
+
+MergeTreeRunner::~MergeTreeRunner() = default;
+
+void MergeTreeRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
+  std::vector<UnknownList> own;
+  for (std::size_t row = 0; row < tiles_.size(); ++row) own.push_back(tile_unknowns(tiles_.whole(row).problem));
+  plan_ = make_plan(tree, gather_by_tile(ranks_, tile_count, tiles_, own));
+  on_one_rank_.assign(plan_.nodes.size(), false);
+  for (std::size_t n = 0; n < plan_.nodes.size(); ++n) {
+    const PlanNode& node = plan_.nodes[n];
+    on_one_rank_[n] =
+        mine(static_cast<std::int64_t>(n)) && (node.leaf >= 0 || (on_one_rank_[static_cast<std::size_t>(node.left)] &&
+                                                                  on_one_rank_[static_cast<std::size_t>(node.right)]));
+  }
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const std::int64_t node = plan_.node_of_leaf[static_cast<std::size_t>(tiles_.number(row))];
+    tile_plans_.add(tiles_.number(row),
+                    make_tile_plan(tiles_.whole(row).problem, plan_.nodes[static_cast<std::size_t>(node)]),
+                    tiles_.in_scratch(row));
+  }
+  for (PlanNode& node : plan_.nodes)
+    if (node.leaf >= 0) node.eliminated = node.owned = {};  // the tiles' own plans have it
+}
+
+double MergeTreeRunner::seam_probability() const {
+  const auto inner =
+      std::count_if(plan_.nodes.begin(), plan_.nodes.end(), [](const PlanNode& n) { return n.leaf < 0; });
+  return kSeamAlarmProbability / static_cast<double>(std::max<std::ptrdiff_t>(1, inner));
+}
+
+void MergeTreeRunner::find_gauges() {
+  gauges_.clear();
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const RankTile& tile = tiles_.whole(row);
+    gauges_.push_back(tile_gauge(tile.problem, tile_plans_[row], tile.state));
+  }
+}
+
+BlockGauge MergeTreeRunner::gather_gauge() const {
+  return make_gauge(gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, gauges_));
+}
+
+TileDatum MergeTreeRunner::datum_of(std::size_t row) const {
+  const RankTile& tile = tiles_.outline(row);
+  return tile_datum(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, with_columns_);
+}
+
+InnerSums MergeTreeRunner::gather_inner_sums(const std::vector<TileStep>& steps) const {
+  std::vector<InnerSums> own;
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const RankTile& tile = tiles_.outline(row);
+    own.push_back(inner_sums(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, steps[row].unknowns));
+  }
+  const std::vector<InnerSums> all = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own);
+  InnerSums sums = all.front();
+  for (std::size_t t = 1; t < all.size(); ++t) sums.add(all[t]);
+  return sums;
+}
+
+bool MergeTreeRunner::mine(std::int64_t node) const {
+  return rank_of_node_[static_cast<std::size_t>(node)] == ranks_.rank();
+}
+
+}  // namespace megablock

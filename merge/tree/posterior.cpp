@@ -1,0 +1,75 @@
+// At the solution: seams, datum, covariances and the checks of tiles.
+#include <algorithm>
+#include <utility>
+
+#include "merge/tree/gather_by_tile.h"
+#include "merge/tree/merge_tree_runner.h"
+#include "merge/tree/sweep_values.h"
+
+namespace megablock {
+
+MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& visit) {
+  Posterior posterior;
+  check_seams_ = true;
+  if (last_pass_) {
+    posterior.sums = *std::exchange(last_pass_, std::nullopt);
+  } else {
+    find_gauges();  // states may have followed what other tiles moved
+    gauge_ = gather_gauge();
+    with_columns_ = gauge_.free();
+    posterior.sums = condense_all(0).sums;
+  }
+  posterior.gauge = gauge_;
+  std::vector<TileStep> steps(tiles_.size());
+  InnerSums inner_constraints;
+  if (with_columns_) {
+    steps = steps_down(0);
+    inner_constraints = gather_inner_sums(steps);
+  }
+
+  std::vector<TileCheck> checks(tiles_.size());
+  std::vector<ObservationTable> tables(tiles_.size());
+  for (std::int64_t n = plan_.root(); n >= 0; --n) {
+    if (!mine(n)) continue;
+    CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
+    const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+    factors_.leave_room(pending_update_bytes() + front_bytes(n));
+    const NodeFactors& factors = factors_of(n, 0);
+    if (node.leaf < 0) {
+      const FrontCovariance covariance = solver_.covariance(factors.front, std::move(passed));
+      factors_.discard(n);
+      pass_down(n, covariance);
+      continue;
+    }
+    const std::size_t row = row_of_leaf(n);
+    const RankTile& tile = tiles_.whole(row);
+    const TilePlan& plan = tile_plans_[row];
+    const Step& step = steps[row].unknowns;
+    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability());
+    TileCovariance covariance =
+        covariance_tile(tile.problem, plan, tile.state, factors.tile, std::move(passed), datum_of(row), step);
+    factors_.discard(n);
+    if (with_columns_)
+      to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);
+    tables[row] = covariance.observations;
+    if (visit) visit(tile, covariance);
+  }
+  ranks_.flush_sends();
+  with_columns_ = check_seams_ = false;
+  posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
+  for (const ObservationTable& table : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, tables))
+    posterior.observations.add(table);
+
+  ByteWriter writer;
+  writer.values(seams_);
+  for (const Bytes& bytes : ranks_.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    const std::vector<SeamReport> some = reader.values<SeamReport>();
+    posterior.seams.insert(posterior.seams.end(), some.begin(), some.end());
+  }
+  std::sort(posterior.seams.begin(), posterior.seams.end(),
+            [](const SeamReport& a, const SeamReport& b) { return a.node < b.node; });
+  return posterior;
+}
+
+}  // namespace megablock

@@ -1,0 +1,26 @@
+// Wall clock of the sweeps over the merge tree.
+#pragma once
+
+#include <chrono>
+
+namespace megablock {
+
+// Seconds on a clock that only goes forward.
+inline double clock_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Adds the time of its life to a sum, seconds.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& sum) : sum_(sum), start_(clock_seconds()) {}
+  ~Stopwatch() { sum_ += clock_seconds() - start_; }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& sum_;
+  const double start_;
+};
+
+}  // namespace megablock

@@ -1,0 +1,222 @@
+// The sweep up: tiles are condensed and fronts eliminated, children before parents.
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <utility>
+
+#include "geometry/threads/rounds.h"
+#include "merge/plan/unknowns.h"
+#include "merge/tree/merge_tree_runner.h"
+#include "merge/tree/stopwatch.h"
+
+namespace megablock {
+
+void MergeTreeRunner::deliver_update(std::int64_t node, UpdateMatrix update) {
+  const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(node)].parent;
+  if (parent < 0 || mine(parent)) {
+    updates_[node] = std::move(update);
+  } else {
+    ranks_.send(rank_of_node_[static_cast<std::size_t>(parent)], static_cast<int>(node), update.to_bytes());
+  }
+}
+
+UpdateMatrix MergeTreeRunner::child_update(std::int64_t child) {
+  if (!mine(child))
+    return UpdateMatrix::from_bytes(
+        ranks_.receive(rank_of_node_[static_cast<std::size_t>(child)], static_cast<int>(child)));
+  UpdateMatrix update = std::move(updates_.at(child));
+  updates_.erase(child);
+  return update;
+}
+
+UpdateMatrix MergeTreeRunner::store_factors(std::int64_t leaf, TileCondensation condensed) {
+  if (check_seams_) condensed.update.alone = least_squares(condensed.update);
+  factors_.put(leaf, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
+               FactorStore::Loss::kRecompute);
+  return std::move(condensed.update);
+}
+
+UpdateMatrix MergeTreeRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right,
+                                              const Pass& pass, bool check_seam_here) {
+  const auto n = static_cast<std::size_t>(node);
+  const Stopwatch watch(seconds_.fronts);
+  const LeastSquares left_alone = left.alone, right_alone = right.alone;
+  Front::Result result = solver_.eliminate(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
+  if (check_seam_here) {
+    result.update.alone = least_squares(result.update);
+    seams_.push_back(check_seam(node, left_alone, right_alone, result, seam_probability()));
+  }
+  factors_.put(node, {{}, std::move(result.factor)},
+               on_one_rank_[n] ? FactorStore::Loss::kRecompute : FactorStore::Loss::kNever);
+  return std::move(result.update);
+}
+
+UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass) {
+  const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
+  if (plan.leaf >= 0) {
+    const Stopwatch watch(seconds_.tiles);
+    const std::size_t row = row_of_leaf(node);
+    const RankTile& tile = tiles_.whole(row);
+    return store_factors(node, condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row)));
+  }
+  UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
+  return eliminate_inner(node, std::move(left), std::move(right), pass, false);
+}
+
+// The eliminated columns, and the rest once whole and once as a triangle; of the covariances as much. A seam's check
+// works on a copy of the rest. What a tile eliminates never stands in one front: its cells' fronts are small.
+std::int64_t MergeTreeRunner::front_bytes(std::int64_t node) const {
+  const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
+  const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
+  const std::int64_t rests = check_seams_ ? 2 : 1;
+  return static_cast<std::int64_t>(sizeof(double)) * ((e + p) * e + rests * p * p + p * p / 2);
+}
+
+std::int64_t MergeTreeRunner::pending_update_bytes() const {
+  std::int64_t bytes = 0;
+  for (const auto& [node, update] : updates_) bytes += update.byte_count();
+  for (const auto& [node, values] : downward_) bytes += static_cast<std::int64_t>(values.size());
+  return bytes;
+}
+
+const NodeFactors& MergeTreeRunner::factors_of(std::int64_t node, const Pass& pass) {
+  if (const NodeFactors* kept = factors_.get(node)) return *kept;
+  factors_.note_recomputed();
+  condense_again(node, pass);
+  return *factors_.get(node);
+}
+
+UpReport MergeTreeRunner::up(const Pass& pass) {
+  const Stopwatch watch(seconds_.all);
+  ++seconds_.sweeps_up;
+  // Of the state at hand, not of the first one: a resumed run gets the same bits.
+  gauge_ = gather_gauge();
+  last_pass_.reset();
+  check_seams_ = posterior_expected_ && pass.lambda == 0 && !pass.curvature && !gauge_.free();
+  const UpReport report = condense_all(pass);
+  if (check_seams_) last_pass_ = report.sums;
+  check_seams_ = false;
+  return report;
+}
+
+std::vector<bool> MergeTreeRunner::nodes_of(const std::vector<std::int64_t>& subtrees) const {
+  std::vector<bool> nodes(plan_.nodes.size(), false);
+  for (const std::int64_t top : subtrees) nodes[static_cast<std::size_t>(top)] = true;
+  for (std::int64_t n = plan_.root(); n >= 0; --n) {
+    const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(n)].parent;
+    if (parent >= 0 && nodes[static_cast<std::size_t>(parent)]) nodes[static_cast<std::size_t>(n)] = true;
+  }
+  return nodes;
+}
+
+bool MergeTreeRunner::update_leaves(std::int64_t node) const {
+  const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(node)].parent;
+  return parent < 0 || !on_one_rank_[static_cast<std::size_t>(parent)];
+}
+
+std::vector<bool> MergeTreeRunner::resume(const PassRecord& record) {
+  factors_.adopt(record.factors);
+  seams_ = record.seams;
+  std::ranges::copy_if(record.subtrees, std::back_inserter(left_), [&](std::int64_t n) { return update_leaves(n); });
+  return nodes_of(record.subtrees);
+}
+
+void MergeTreeRunner::record(std::int64_t node, const UpdateMatrix& update) {
+  if (recorder_ == nullptr || !on_one_rank_[static_cast<std::size_t>(node)]) return;
+  const std::int64_t bytes = update.byte_count() + pending_update_bytes() + factors_.bytes_without_copy();
+  if (!recorder_->due(bytes, update_leaves(node))) return;
+  std::map<std::int64_t, const UpdateMatrix*> updates{{node, &update}};
+  for (const auto& [n, waiting] : updates_)
+    if (on_one_rank_[static_cast<std::size_t>(n)]) updates[n] = &waiting;
+  if (!factors_.copy_to_scratch() || !recorder_->write_updates(updates)) return recorder_->give_up();
+  if (update_leaves(node)) left_.push_back(node);
+
+  PassRecord record;
+  std::set<std::int64_t> subtrees(left_.begin(), left_.end());
+  for (const auto& [n, waiting] : updates) subtrees.insert(n);
+  record.subtrees.assign(subtrees.begin(), subtrees.end());
+  const std::vector<bool> done = nodes_of(record.subtrees);
+  for (std::size_t n = 0; n < done.size(); ++n) record.tiles += done[n] && plan_.nodes[n].leaf >= 0;
+  const auto is_done = [&](std::int64_t n) { return done[static_cast<std::size_t>(n)]; };
+  std::ranges::copy_if(factors_.nodes_in_scratch(), std::back_inserter(record.factors), is_done);
+  std::ranges::copy_if(seams_, std::back_inserter(record.seams), is_done, &SeamReport::node);
+  recorder_->write(std::move(record));
+}
+
+void MergeTreeRunner::send_update(std::int64_t node, UpdateMatrix update) {
+  record(node, update);
+  deliver_update(node, std::move(update));
+}
+
+UpdateMatrix MergeTreeRunner::join_children(std::int64_t n, const Pass& pass) {
+  const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
+  UpdateMatrix left = child_update(node.left), right = child_update(node.right);
+  const std::int64_t at_work = pending_update_bytes() + left.byte_count() + right.byte_count() + front_bytes(n);
+  peak_front_bytes_ = std::max(peak_front_bytes_, at_work);
+  factors_.leave_room(at_work);
+  return eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
+}
+
+// Records, messages and fronts above the tiles come one after the other, in the order of the nodes; meanwhile other
+// threads are ahead at the next tile.
+void MergeTreeRunner::condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass,
+                                     const VisitCondensation& visit) {
+  std::vector<std::unique_ptr<TileCondenser>> tiles(leaves.size());
+  double elsewhere = 0;
+  const auto prepare = [&](std::int64_t i) {
+    const std::size_t row = row_of_leaf(leaves[at(i)]);
+    const RankTile& tile = tiles_.whole(row);
+    tiles[at(i)] = std::make_unique<TileCondenser>(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
+    return tiles[at(i)]->cells();
+  };
+  const auto finish = [&](std::int64_t i) {
+    TileCondensation condensed = std::exchange(tiles[at(i)], nullptr)->take();
+    const Stopwatch watch(elsewhere);
+    visit(at(i), std::move(condensed));
+  };
+  {
+    const Stopwatch watch(seconds_.tiles);
+    visit_in_rounds({std::ssize(leaves), prepare,
+                     [&](std::int64_t i, std::int64_t cell) { tiles[at(i)]->condense(cell); }, finish,
+                     [&](std::int64_t i) { return in_memory(row_of_leaf(leaves[at(i)])); }});
+  }
+  seconds_.tiles -= elsewhere;
+}
+
+UpReport MergeTreeRunner::condense_all(const Pass& pass) {
+  updates_.clear();
+  factors_.clear();
+  seams_.clear();
+  left_.clear();
+  const PassRecord before = recorder_ ? recorder_->begin({pass, check_seams_, with_columns_}) : PassRecord();
+  const std::vector<bool> done = resume(before);
+  std::vector<std::int64_t> leaves;
+  for (std::int64_t n = 0; n < std::ssize(plan_.nodes); ++n)
+    if (mine(n) && plan_.nodes[static_cast<std::size_t>(n)].leaf >= 0 && !done[static_cast<std::size_t>(n)])
+      leaves.push_back(n);
+  leaves.push_back(std::ssize(plan_.nodes));
+  std::int64_t next = 0;  // node
+  // What is between two tiles: nodes above tiles, and those that the record has.
+  const auto advance_to = [&](std::int64_t leaf) {
+    for (; next < leaf; ++next) {
+      if (!mine(next)) continue;
+      if (!done[static_cast<std::size_t>(next)])
+        send_update(next, join_children(next, pass));
+      else if (std::ranges::binary_search(before.subtrees, next))
+        deliver_update(next, recorder_->read_update(next));
+    }
+  };
+  advance_to(leaves.front());
+  condense_tiles(std::span(leaves).first(leaves.size() - 1), pass, [&](std::size_t i, TileCondensation condensed) {
+    factors_.leave_room(pending_update_bytes());
+    send_update(next++, store_factors(leaves[i], std::move(condensed)));
+    advance_to(leaves[i + 1]);
+  });
+  ranks_.flush_sends();
+  const std::int64_t root = plan_.root();
+  const std::string at_root = mine(root) ? updates_.at(root).to_bytes() : std::string();
+  updates_.clear();
+  return {UpdateMatrix::from_bytes(ranks_.broadcast(at_root, rank_of_node_[static_cast<std::size_t>(root)])).sums};
+}
+
+}  // namespace megablock
