@@ -6,7 +6,8 @@ namespace megablock {
 
 namespace {
 
-// Regularised upper incomplete gamma function Q(a, x): series below a + 1, continued fraction above.
+// Regularised upper incomplete gamma function Q(a, x) = Gamma(a, x) / Gamma(a). The power series of 1 - Q converges
+// fast for x < a + 1, the continued fraction of Q above. The fraction is evaluated by the modified method of Lentz.
 double upper_gamma(double a, double x) {
   if (x <= 0) return 1;
   const double log_front = a * std::log(x) - x - std::lgamma(a);
@@ -32,6 +33,7 @@ double upper_gamma(double a, double x) {
 
 double chi_square_exceeds(double statistic, double degrees) { return upper_gamma(0.5 * degrees, 0.5 * statistic); }
 
+// The tail probability falls monotonically, so doubling finds an upper bound and bisection the value.
 double chi_square_quantile(double probability, std::int64_t degrees) {
   const double a = 0.5 * static_cast<double>(degrees);
   double low = 0, high = static_cast<double>(degrees) + 10;

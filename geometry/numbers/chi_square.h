@@ -1,15 +1,17 @@
-// The chi-square distribution, by the regularised incomplete gamma function (series and continued fraction; Press et
-// al., Numerical Recipes, 6.2).
+// Tail probabilities and quantiles of the chi-square distribution, for tests of variances and of squared residuals.
+//
+// With d degrees of freedom, P(X > s) = Q(d / 2, s / 2), where Q is the regularised upper incomplete gamma function
+// (Press et al., Numerical Recipes, section 6.2).
 #pragma once
 
 #include <cstdint>
 
 namespace megablock {
 
-// Probability that a chi-square variable of these degrees of freedom (> 0) is above `statistic`.
+// Returns the probability that a chi-square variable with `degrees` degrees of freedom (> 0) exceeds `statistic`.
 double chi_square_exceeds(double statistic, double degrees);
 
-// The value that is exceeded with this probability.
+// Returns the value that such a variable exceeds with this probability, 0 < probability < 1; relative error 1e-12.
 double chi_square_quantile(double probability, std::int64_t degrees);
 
 }  // namespace megablock

@@ -54,7 +54,8 @@ PivotedQr pivoted_qr(const NineRows& a, const NineRows& vectors) {
   const NineRows& factors = qr.matrixQR();
   const Eigen::Index last = a.cols() - 1;
   PivotedQr result{vectors, std::abs(factors(0, 0)), std::abs(factors(last, last))};
-  // One reflection after the other: Eigen's product with Q brings along blocks of reflections, for large matrices.
+  // Q is the product of the Householder reflections H_0 H_1 ... They are applied one by one, last first. Eigen's own
+  // product groups reflections into blocks, which is meant for large matrices and instantiates much more code.
   Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 7> workspace(vectors.cols());
   for (Eigen::Index k = last; k >= 0; --k)
     result.q_times.bottomRows(9 - k).applyHouseholderOnTheLeft(factors.col(k).tail(8 - k), qr.hCoeffs()(k),

@@ -1,11 +1,15 @@
-// Internal to the kernels. Vectors of doubles, one value of several observations or points each ("lanes"), for kernels
-// that are compiled once per kind of processor. Included by those kernels only, behind a definition of
-// MEGABLOCK_LANE_WIDTH (2, 4 or 8 doubles).
+// Vectors of doubles for kernels that treat several observations or points at once. Each element of a vector (a "lane")
+// holds the same quantity of another observation.
 //
-// Everything is in an unnamed namespace: the same names stand for different instructions in each of these files. No
-// multiplication and addition are contracted (cmake/rooms.cmake), so that all widths give the same bits.
+// The kernels are compiled several times, once for each kind of processor. A kernel's source defines
+// MEGABLOCK_LANE_WIDTH (2, 4 or 8 doubles) and then includes this file; no other file may include it. All names are in
+// an unnamed namespace, because the same name stands for different instructions in each of the compiled files.
 //
-// Loops of a fixed length are to be unrolled, or what they index stays in memory: hence the many pragmas.
+// All widths give the same bits: every lane performs the same operations in the same order, and the compiler may not
+// contract a multiplication and an addition into one instruction (see cmake/rooms.cmake).
+//
+// The loops over lanes have a fixed length and must be unrolled; otherwise the compiler keeps the arrays they index in
+// memory instead of registers. Hence the many pragmas.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +22,7 @@ constexpr int kWidth = MEGABLOCK_LANE_WIDTH;
 typedef double Lanes __attribute__((vector_size(8 * kWidth)));
 typedef long long LaneMask __attribute__((vector_size(8 * kWidth)));
 
+// load and store accept addresses of any alignment.
 [[gnu::always_inline]] inline Lanes load(const double* p) {
   Lanes v;
   __builtin_memcpy(&v, p, sizeof v);
@@ -31,7 +36,7 @@ typedef long long LaneMask __attribute__((vector_size(8 * kWidth)));
   return root;
 }
 
-// Exchanges the odd groups of `kStep` lanes of a with the even ones of b.
+// One step of a transposition by butterflies: exchanges the odd groups of `kStep` lanes of a with the even groups of b.
 template <int kStep, int... kLane>
 [[gnu::always_inline]] inline void exchange(Lanes& a, Lanes& b, std::integer_sequence<int, kLane...>) {
   const LaneMask first{((kLane & kStep) == 0 ? kLane : kWidth + kLane - kStep)...};
@@ -40,6 +45,7 @@ template <int kStep, int... kLane>
   a = left;
   b = right;
 }
+// Transposes a square block of kWidth vectors in log2(kWidth) such steps.
 template <int kStep>
 [[gnu::always_inline]] inline void exchange_all(Lanes (&rows)[kWidth]) {
   if constexpr (kStep < kWidth) {
@@ -51,7 +57,9 @@ template <int kStep>
 }
 [[gnu::always_inline]] inline void transpose(Lanes (&rows)[kWidth]) { exchange_all<1>(rows); }
 
-// values[v]: of kWidth records, whose values lie side by side; `kCount` is a multiple of kWidth.
+// Reads kWidth records into lanes: afterwards lane i of values[v] holds value v of record i. record(i) returns the
+// address of the first of kCount adjacent doubles of record i; kCount must be a multiple of kWidth. Blocks of kWidth
+// values are loaded from every record and transposed in registers.
 template <int kCount, typename Record>
 [[gnu::always_inline]] inline void read_records(Record record, Lanes (&values)[kCount]) {
 #pragma GCC unroll 64

@@ -1,6 +1,17 @@
-// LSQR: least squares of a sparse matrix by products with it and its transpose alone (C. C. Paige and M. A. Saunders,
-// ACM TOMS 8, 1982). From zero, it goes to the solution of least norm; stopped early, it stays nearer to zero along
-// what the matrix hardly determines.
+// LSQR solves the least-squares problem min |A x - b| of a large sparse matrix. It needs only products of A and A' with
+// vectors (C. C. Paige and M. A. Saunders, "LSQR: an algorithm for sparse linear equations and sparse least squares",
+// ACM TOMS 8(1), 1982).
+//
+// It runs the bidiagonalisation of Golub and Kahan,
+//
+//     beta u' = A v - alpha u,     alpha' v' = A' u' - beta v,
+//
+// from u = b / |b|, and reduces the bidiagonal matrix to a triangular one by one plane rotation in each iteration.
+// Mathematically it equals conjugate gradients on the normal equations, but it does not square the condition number.
+//
+// The iteration starts at x = 0 and therefore converges to the solution of least norm where A has not full rank.
+// Stopped early, it leaves x close to zero along directions that A hardly determines; `max_condition` uses this to
+// regularise.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,19 +22,22 @@
 namespace megablock {
 
 struct LsqrOptions {
-  double tolerance = 1e-8;          // of |A'r| / |A||r| and, where a solution is exact, of |r| / (|b| + |A||x|)
-  double max_condition = 1e8;       // ends when the estimated condition of A is beyond
-  std::int64_t max_iterations = 0;  // 0: twice the number of columns
+  double tolerance = 1e-8;          // on |A'r| / (|A| |r|), and for consistent systems on |r| / (|b| + |A| |x|)
+  double max_condition = 1e8;       // the iteration ends when the estimated condition number of A exceeds this
+  std::int64_t max_iterations = 0;  // 0 means twice the number of columns
 };
 
 struct LsqrResult {
+  // Why the iteration ended: b or A'b is zero, the system is solved exactly, the residual is perpendicular to the
+  // columns, the condition limit was reached, or the number of iterations.
   enum class Stop { kZero, kExact, kLeastSquares, kCondition, kIterations } stop = Stop::kZero;
   Eigen::VectorXd x;
   std::int64_t iterations = 0;
-  double condition = 0;  // estimate, in the norm of Frobenius
+  double condition = 0;  // estimate of the condition number of A in the Frobenius norm
 };
 
-// Least |A x - b|. Matrix: anything with rows(), cols(), A * v and A.transpose() * v.
+// Minimises |A x - b|. `Matrix` is any type with rows(), cols(), A * v and A.transpose() * v. Does not throw; the
+// caller reads from `stop` whether the iteration converged (kExact or kLeastSquares).
 template <typename Matrix>
 LsqrResult lsqr(const Matrix& a, const Eigen::VectorXd& b, const LsqrOptions& options = {}) {
   LsqrResult result;
@@ -51,6 +65,7 @@ LsqrResult lsqr(const Matrix& a, const Eigen::VectorXd& b, const LsqrOptions& op
       alpha = v.norm();
       if (alpha > 0) v /= alpha;
     }
+    // A plane rotation removes beta from the bidiagonal matrix and extends the solution along w.
     const double rho = std::hypot(rho_bar, beta), c = rho_bar / rho, s = beta / rho, phi = c * phi_bar;
     squared_directions += w.squaredNorm() / (rho * rho);
     result.x += (phi / rho) * w;
@@ -58,6 +73,7 @@ LsqrResult lsqr(const Matrix& a, const Eigen::VectorXd& b, const LsqrOptions& op
     rho_bar = -c * alpha;
     phi_bar = s * phi_bar;
 
+    // Estimates of |A|, |r| and |A'r| come out of the recurrence at no cost.
     const double norm = std::sqrt(squared_norm), residual = phi_bar, gradient = alpha * std::abs(s * phi);
     result.condition = norm * std::sqrt(squared_directions);
     if (residual <= options.tolerance * (b_norm + norm * result.x.norm())) {

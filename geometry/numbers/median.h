@@ -1,4 +1,5 @@
-// Median of a list: its upper middle value; 0 of an empty one.
+// Median of a list of values. For an even number of values it is the upper of the two middle ones, not their mean; the
+// result is therefore always one of the values. Returns 0 for an empty list.
 #pragma once
 
 #include <algorithm>

@@ -8,9 +8,10 @@ namespace {
 
 struct Value {
   double f = 0, slope = 0, magnitude = 0;  // magnitude: sum of the terms' absolute values
-};
+};                                         // magnitude: sum of |c_i x^i|, which bounds the rounding error of f
 
 Value value_of(std::span<const double> c, double x) {
+  // Horner's scheme for the value, its derivative and the sum of magnitudes.
   Value v;
   for (std::size_t i = c.size(); i-- > 0;) {
     v.slope = v.slope * x + v.f;
@@ -20,7 +21,8 @@ Value value_of(std::span<const double> c, double x) {
   return v;
 }
 
-// The root between two places of different sign; a step shorter than `settled` (relative) is the last.
+// The root between `low` and `high`, where the values have different signs. Newton's step is taken where it stays
+// inside the bracket, bisection otherwise. A step shorter than `settled` (relative to x) is the last.
 double root_between(std::span<const double> c, double low, double high, bool rising, double settled) {
   double x = 0.5 * (low + high);
   for (int iteration = 0; iteration < 200; ++iteration) {
@@ -39,11 +41,13 @@ double root_between(std::span<const double> c, double low, double high, bool ris
   return x;
 }
 
-// Roots to the last bit. Extrema only tell the roots apart, and a value there moves with the square of the place's
-// error, which after a last step of Newton's is that of the step squared.
+// The roots of the polynomial itself are found to the last bit. The extrema only separate the roots, so they need less:
+// the error of a value at an extremum grows with the square of the extremum's error, and Newton's last step leaves an
+// error of about the square of that step.
 constexpr double kRootSettled = 1e-16, kExtremumSettled = 1e-6;
 
-// Of the coefficients, against the largest of them: a double root at zero leaves nothing else.
+// Rounding of a value, relative to the largest coefficient. The bound by the sum of magnitudes is not enough at a
+// double root at zero, where all terms vanish.
 constexpr double kRounding = 1e-14;
 
 using Binomials = std::array<std::array<double, detail::kMaxDegree + 1>, detail::kMaxDegree + 1>;
@@ -62,9 +66,12 @@ double evaluate_polynomial(std::span<const double> c, double x) { return value_o
 
 std::size_t detail::roots_within(std::span<const double> c, double low, double high, double double_root,
                                  double* roots) {
+  // The loop runs over the derivatives from the one of degree 1 up to the polynomial itself. `roots` holds the roots of
+  // the previous derivative, which are the extrema of the current one and split the interval into monotonic pieces.
   const std::size_t degree = c.size() - 1;
-  std::array<double, kMaxDegree + 1> derivative;  // of order m, divided by m!
-  std::array<double, kMaxDegree + 1> places;      // its extrema between the ends
+  std::array<double, kMaxDegree + 1>
+      derivative;                             // the derivative of order m, divided by m! to keep the coefficients small
+  std::array<double, kMaxDegree + 1> places;  // ends of the monotonic pieces
   std::size_t count = 0;
   for (std::size_t k = 1; k <= degree; ++k) {
     const std::size_t order = degree - k;
@@ -80,12 +87,14 @@ std::size_t detail::roots_within(std::span<const double> c, double low, double h
     const double tolerance = k == degree ? double_root : kDoubleRoot;
     const double settled = k == degree ? kRootSettled : kExtremumSettled;
     count = 0;
-    bool crossed = false;  // the sign changed in the interval before
+    bool crossed = false;  // the sign changed in the piece before
     double start = low;
     Value left = value_of(d, low);
     for (std::size_t i = 0; i < intervals; ++i) {
       const Value right = value_of(d, places[i]);
       const bool crosses = (left.f < 0) != (right.f < 0);
+      // An extremum that touches zero within rounding is a double root. It counts only if neither of the adjacent
+      // pieces has a crossing, which would be the same root.
       if (i > 0 && !crossed && !crosses && std::abs(left.f) < tolerance * left.magnitude + kRounding * largest)
         roots[count++] = start;
       if (crosses) roots[count++] = root_between(d, start, places[i], left.f < 0, settled);

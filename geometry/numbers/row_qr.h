@@ -1,6 +1,8 @@
-// Triangular factor of a matrix with few columns that is read row by row (Givens rotations), in place: the singular
-// values and right singular vectors of any number of equations without forming normal equations, which would square
-// the condition.
+// Least squares by rows: the triangular factor R of a matrix A with few columns, whose rows arrive one by one.
+//
+// Givens rotations merge each row into R, so memory does not grow with the number of rows. R has the singular values
+// and right singular vectors of A. Normal equations A'A would give them too, but would square the condition number;
+// null vectors of nearly singular systems would then lose half of their digits.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,6 +18,7 @@ class RowQr {
   using Row = Eigen::Matrix<double, 1, Columns>;
   using Square = Eigen::Matrix<double, Columns, Columns, Eigen::RowMajor>;
 
+  // Adds one row of A. Each rotation eliminates one element of the row against the diagonal of R.
   void add(Row row) {
     for (int i = 0; i < Columns; ++i) {
       if (row[i] == 0) continue;
@@ -28,11 +31,11 @@ class RowQr {
       }
     }
   }
-  // Upper triangular, R'R = A'A.
+  // R, upper triangular, with R'R = A'A.
   const Square& factor() const { return factor_; }
 
-  // The unit vector that the rows leave shortest. `rank`: how many singular values exceed `tolerance` times the first;
-  // the vector is unique where that is Columns - 1 at least. Zero rank where something is not a number.
+  // The unit vector x that minimises |A x|. `rank` counts the singular values above `tolerance` times the largest; x is
+  // unique where rank >= Columns - 1. rank is 0 where an element of A is not a finite number.
   struct NullVector {
     Eigen::Matrix<double, Columns, 1> vector;
     int rank = 0;

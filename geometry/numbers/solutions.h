@@ -1,5 +1,5 @@
-// The solutions of a minimal problem, a list of at most Capacity entries held in place: solvers run millions of times
-// and must not allocate.
+// A list of at most Capacity solutions of a minimal problem, held in place. A solver runs millions of times in RANSAC
+// and must not allocate memory. The interface is the part of std::vector that callers need.
 #pragma once
 
 #include <array>
@@ -14,7 +14,8 @@ class Solutions {
   using value_type = T;
   using const_iterator = const T*;
 
-  // No solver finds more than its problem has. What exceeds the capacity is dropped.
+  // Capacity is the largest number of solutions that the problem can have, so a solver never exceeds it. A release
+  // build ignores a solution beyond it; a debug build stops.
   void push_back(const T& solution) {
     assert(count_ < Capacity);
     if (count_ < Capacity) entries_[count_++] = solution;

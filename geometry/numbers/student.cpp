@@ -7,17 +7,20 @@ namespace megablock {
 
 namespace {
 
-// log B(a, 1/2); with many degrees of freedom the difference of two gamma functions would be lost in rounding.
+// log B(a, 1/2) = log Gamma(a) + log Gamma(1/2) - log Gamma(a + 1/2). For large a the difference of the two logarithms
+// would cancel, so their asymptotic series is used.
 double log_beta_half(double a) {
   const double ratio =
       a < 100 ? std::lgamma(a + 0.5) - std::lgamma(a) : 0.5 * std::log(a) - 1 / (8 * a) + 1 / (192 * a * a * a);
   return 0.5 * std::log(std::numbers::pi) - ratio;
 }
 
-// Regularised incomplete beta function I_x(a, b) for x <= (a + 1) / (a + b + 2), where the fraction converges fast.
+// Regularised incomplete beta function I_x(a, b), by its continued fraction and the modified method of Lentz. The
+// caller ensures x <= (a + 1) / (a + b + 2), where the fraction converges fast.
 double lower_beta(double a, double b, double log_beta, double x) {
   if (x <= 0) return 0;
   const double log_front = a * std::log(x) + b * std::log1p(-x) - log_beta;
+  // Lentz's method divides by c and d; a tiny value replaces zero.
   const auto not_zero = [](double v) { return std::abs(v) < 1e-300 ? 1e-300 : v; };
   double c = 1, d = 1 / not_zero(1 - (a + b) * x / (a + 1)), h = d;
   for (int m = 1; m < 100000; ++m) {
@@ -34,7 +37,8 @@ double lower_beta(double a, double b, double log_beta, double x) {
   return std::exp(log_front) * h / a;
 }
 
-// The value whose probability of being exceeded, which falls, is the wanted one.
+// The value that is exceeded with the given probability. `exceeds` falls monotonically and is symmetric about 0, so
+// doubling finds an upper bound and bisection the value.
 template <typename Exceeds>
 double quantile(double probability, const Exceeds& exceeds) {
   if (probability > 0.5) return -quantile(1 - probability, exceeds);
@@ -57,6 +61,7 @@ double student_exceeds(double value, double degrees) {
   if (value < 0) return 1 - student_exceeds(-value, degrees);
   const double a = 0.5 * degrees, square = value * value, x = degrees / (degrees + square);
   const double log_beta = log_beta_half(a);
+  // I_x(a, 1/2) is computed directly or as 1 - I_{1-x}(1/2, a), whichever fraction converges fast.
   return 0.5 * (x <= (a + 1) / (a + 2.5) ? lower_beta(a, 0.5, log_beta, x)
                                          : 1 - lower_beta(0.5, a, log_beta, square / (degrees + square)));
 }
