@@ -18,6 +18,7 @@ std::optional<Ray> ground_ray(const Pose& camera, const Intrinsics& intrinsics, 
 
 std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays) {
   if (rays.size() < 2) return std::nullopt;
+  // Sums are taken relative to the mean of the centres, because ground coordinates are large.
   Eigen::Vector3d reference = Eigen::Vector3d::Zero();
   double weights = 0;
   for (const Ray& ray : rays) {
@@ -36,10 +37,10 @@ std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays) {
     normal += across;
     right += across * (ray.origin - reference);
   }
-  // One centre but for rounding: no base, and chance decides what is in front.
+  // If all centres coincide up to rounding there is no base, and chance would decide on which side the point lies.
   constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
   if (!(farthest > kRounding * kRounding * reference.squaredNorm())) return std::nullopt;
-  // Smallest eigenvalue / weights ~ (spread of the directions)^2.
+  // The smallest eigenvalue over the sum of weights is about the square of the spread of the directions (radians).
   const SymmetricEigen3 eigen = symmetric_eigen3(normal);
   constexpr double kParallel = 1e-12;
   if (!(eigen.values(0) > kParallel * weights)) return std::nullopt;
@@ -51,13 +52,14 @@ std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays) {
 
 namespace {
 
+// Normal equations of a Gauss-Newton iteration for the three coordinates of the point.
 struct PointEquations {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  // J' r
   double squared_error = 0;
 };
 
-// False when the point is not in front of every camera.
+// Returns false when the point is not in front of every camera.
 bool linearise(const Eigen::Vector3d& point, std::span<const PointView> views, PointEquations& equations) {
   equations = {};
   for (const PointView& view : views) {
@@ -90,6 +92,7 @@ std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span
 
     PointEquations next;
     double length = 1;
+    // Halve the step until the cost does not rise.
     constexpr int kMaxHalvings = 10;
     int halvings = 0;
     while (!linearise(result.position + length * step, views, next) || next.squared_error > equations.squared_error) {
@@ -101,7 +104,8 @@ std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span
       result.position += length * step;
       equations = next;
     }
-    // A short step, or a cost that rounding no longer lets fall.
+    // Converged: either the step is short, or rounding prevents a further fall of the cost and the step is nearly
+    // short.
     if (decrement < settled * settled || (!improved && decrement < 1e-8 * (1 + equations.squared_error))) {
       result.squared_error = equations.squared_error;
       return result;

@@ -1,15 +1,17 @@
-// Intersection of the two or more rays of one point: one solution (B. Cannelle 2013, CN-18, for the linear start; R.
-// Hartley and P. Sturm, "Triangulation", CVIU 68(2), 1997, for what it leaves to the refinement).
+// Intersection of the rays of one tie point from two or more images. There is one solution. The linear start follows
+// Cannelle (2013, appendix C); R. Hartley and P. Sturm, "Triangulation", CVIU 68(2), 1997, show what it lacks and why a
+// refinement follows.
 //
-// Linear start: every ray gives M - lambda_i v_i = A_i with the point M, the projection centre A_i, the unit direction
-// v_i and the unknown distance lambda_i. Least squares eliminates lambda_i = v_i' (M - A_i) and leaves
+// Linear start. With the point M, the projection centre A_i, the unit direction v_i and the unknown distance lambda_i,
+// every ray gives M - lambda_i v_i = A_i. Elimination of lambda_i = v_i' (M - A_i) leaves in least squares
 //
 //     sum_i w_i (I - v_i v_i') (M - A_i) = 0,
 //
-// a 3x3 system in M, solved relative to the mean of the A_i. The residual of a ray is the distance of the point from
-// it, in metres: near rays weigh too little, so the refinement follows, Gauss-Newton on the pixel residuals.
+// a 3 x 3 system, solved relative to the mean of the A_i. This minimises distances of the point from the rays in
+// metres, so that near rays count too little. The refinement therefore minimises the residuals in the images (pixels)
+// by Gauss-Newton.
 //
-// Degenerate: all rays parallel: the point is far away, or on the line of the centres; all from one centre.
+// Degenerate cases: parallel rays (the point is far away or on the line of the centres); a common centre of all rays.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,22 +23,25 @@
 
 namespace megablock {
 
+// A ray in the ground frame.
 struct Ray {
   Eigen::Vector3d origin;     // projection centre, ground frame, metres
   Eigen::Vector3d direction;  // unit, from the projection centre towards the point
-  double weight = 1;          // of the squared distance; > 0
+  double weight = 1;          // weight of the squared distance from this ray, > 0
 };
 
-// Ray of a pixel in the ground frame, `camera` from camera_pose(); empty where the distortion cannot be inverted.
+// Returns the ray of a pixel in the ground frame. `camera` is the pose from camera_pose(). Empty where the distortion
+// cannot be inverted.
 std::optional<Ray> ground_ray(const Pose& camera, const Intrinsics& intrinsics, const Eigen::Vector2d& pixel);
 
-// The point nearest to all rays; empty with fewer than two rays, rays parallel within about 1e-6 rad, one centre for
-// all but for rounding, or a point behind one of the projection centres.
+// Returns the point with the smallest weighted sum of squared distances from the rays, in the ground frame. Empty for
+// fewer than two rays, for rays parallel within about 1e-6 rad, for a common centre of all rays (up to rounding), and
+// for a point behind one of the centres.
 std::optional<Eigen::Vector3d> intersect_rays(std::span<const Ray> rays);
 
-// One image measurement of a point.
+// One observation of the point.
 struct PointView {
-  Pose camera;  // of the single camera, from camera_pose()
+  Pose camera;  // pose of the camera in the ground frame, from camera_pose()
   const Intrinsics* intrinsics = nullptr;
   Eigen::Vector2d pixel;
   double inverse_sigma = 1;  // 1/px
@@ -44,20 +49,22 @@ struct PointView {
 
 struct RefinedPoint {
   Eigen::Vector3d position;
-  double squared_error = 0;  // sum of squared residuals, each divided by its sigma
+  double squared_error = 0;  // sum of squared residuals, each in units of its sigma
 };
 
-// Minimises the squared pixel residuals over the point, by Gauss-Newton with step halving. Empty when a view sees the
-// point behind it, the normal matrix is singular or the iterations do not converge: to a step shorter than `settled`
-// sigmas.
+// Minimises the sum of squared pixel residuals over the three coordinates, by Gauss-Newton with step halving. It
+// converges when a step is shorter than `settled` (in standard deviations of the point). Empty for fewer than two
+// views, when a camera has the point behind it, when the normal matrix is singular, and when the iterations do not
+// converge.
 inline constexpr double kSettledPoint = 1e-6;
 std::optional<RefinedPoint> refine_point(const Eigen::Vector3d& start, std::span<const PointView> views,
                                          int max_iterations = 20, double settled = kSettledPoint);
 
-// Linear intersection and refinement.
+// Linear intersection followed by the refinement. Empty where either is.
 std::optional<RefinedPoint> triangulate(std::span<const PointView> views, double settled = kSettledPoint);
 
-// Largest angle at the point between two of its rays, radians in [0, pi].
+// Returns the largest angle at the point between two of its rays, radians in [0, pi]. It tells how well the distance of
+// the point is determined.
 double max_intersection_angle(const Eigen::Vector3d& point, std::span<const Eigen::Vector3d> centres);
 
 }  // namespace megablock

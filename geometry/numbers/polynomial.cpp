@@ -69,8 +69,8 @@ std::size_t detail::roots_within(std::span<const double> c, double low, double h
   // The loop runs over the derivatives from the one of degree 1 up to the polynomial itself. `roots` holds the roots of
   // the previous derivative, which are the extrema of the current one and split the interval into monotonic pieces.
   const std::size_t degree = c.size() - 1;
-  std::array<double, kMaxDegree + 1>
-      derivative;                             // the derivative of order m, divided by m! to keep the coefficients small
+  // The derivative of order m, divided by m! to keep the coefficients small.
+  std::array<double, kMaxDegree + 1> derivative;
   std::array<double, kMaxDegree + 1> places;  // ends of the monotonic pieces
   std::size_t count = 0;
   for (std::size_t k = 1; k <= degree; ++k) {

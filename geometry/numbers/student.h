@@ -1,8 +1,9 @@
 // Tail probabilities and quantiles of the normal distribution and of Student's distribution, for confidence limits of
 // single values.
 //
-// The normal tail is erfc(v / sqrt 2) / 2. With d degrees of freedom, Student's tail is I_x(d / 2, 1 / 2) / 2 at x = d
-// / (d + v^2), where I is the regularised incomplete beta function (Press et al., Numerical Recipes, section 6.4).
+// The normal tail is erfc(v / sqrt 2) / 2. With d degrees of freedom, Student's tail is I_x(d / 2, 1 / 2) / 2 at
+// x = d / (d + v^2), where I is the regularised incomplete beta function (Press et al., Numerical Recipes, section
+// 6.4).
 #pragma once
 
 namespace megablock {

@@ -10,17 +10,18 @@ namespace megablock {
 
 namespace {
 
+// A pair of lines in homogeneous coordinates.
 using Lines = std::array<Eigen::Vector3d, 2>;
 
-// Coefficients of det(a + x b), ascending.
+// Coefficients of det(a + x b) in ascending order.
 std::array<double, 4> determinant(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   const Eigen::Vector3d aa = a.col(1).cross(a.col(2)), bb = b.col(1).cross(b.col(2));
   const Eigen::Vector3d ab = a.col(1).cross(b.col(2)) + b.col(1).cross(a.col(2));
   return {a.col(0).dot(aa), b.col(0).dot(aa) + a.col(0).dot(ab), a.col(0).dot(bb) + b.col(0).dot(ab), b.col(0).dot(bb)};
 }
 
-// The real root of x^3 + b x^2 + c x + d that lies apart from the others: beyond the inflection on the side where
-// Newton's iterations run towards it without crossing it.
+// The real root of x^3 + b x^2 + c x + d that is the farthest from the inflection point. The start lies beyond it, so
+// Newton's iteration approaches it from outside and cannot cross it.
 double outer_root(double b, double c, double d) {
   const double inflection = -b / 3, p = c - b * b / 3;
   const double value = ((inflection + b) * inflection + c) * inflection + d;
@@ -35,16 +36,18 @@ double outer_root(double b, double c, double d) {
   return x;
 }
 
-// A singular one among the conics a + x b.
+// A singular conic of the pencil a + x b. The cubic det(a + x b) is divided by the larger of its two outer
+// coefficients, which keeps the root finite.
 Eigen::Matrix3d degenerate_conic(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   const auto [k0, k1, k2, k3] = determinant(a, b);
-  if (k0 == 0 && k3 == 0) return a;  // from the axis of an equilateral triangle
+  if (k0 == 0 && k3 == 0) return a;  // a camera on the axis of an equilateral triangle
   if (std::abs(k3) >= std::abs(k0)) return a + outer_root(k2 / k3, k1 / k3, k0 / k3) * b;
   return b + outer_root(k1 / k0, k2 / k0, k3 / k0) * a;
 }
 
-// A symmetric matrix C of rank two is l m' + m l'. With p = l x m, -adj C = p p', and C + [p]x is a multiple of l m'.
-// Empty where the lines are not real.
+// Splits a singular conic into its lines. A symmetric matrix C of rank two is l m' + m l'. With p = l x m, -adj
+// C = p p', and C + [p]x is a multiple of l m', whose rows and columns are the lines. Empty where the lines are
+// complex.
 std::optional<Lines> lines_of(const Eigen::Matrix3d& conic) {
   Eigen::Matrix3d square;
   square << -conic.col(1).cross(conic.col(2)), -conic.col(2).cross(conic.col(0)), -conic.col(0).cross(conic.col(1));
@@ -60,19 +63,20 @@ std::optional<Lines> lines_of(const Eigen::Matrix3d& conic) {
   return Lines{product.row(row).transpose(), product.col(column)};
 }
 
-// Where a line of the singular conic meets both others, up to size and sign. What rounding leaves of a double point
-// counts as one.
+// Intersects a line of the singular conic with the other two conics. Returns points up to size and sign. A discriminant
+// that is negative only by rounding counts as zero, which gives one (double) point.
 Solutions<Eigen::Vector3d, 2> meet(const Eigen::Vector3d& line, const Eigen::Matrix3d& first,
                                    const Eigen::Matrix3d& second) {
   constexpr double kDoublePoint = 1e-9;
   int m = 0;
   line.cwiseAbs().maxCoeff(&m);
-  Eigen::Vector3d u = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero();  // two of its points
+  Eigen::Vector3d u = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero();  // two points of the line
   const int i = (m + 1) % 3, j = (m + 2) % 3;
   u[i] = v[j] = 1;
   u[m] = -line[i] / line[m];
   v[m] = -line[j] / line[m];
-  // On the line they are multiples of each other, one perhaps zero: a + 2 b x + c x^2 = 0 at u + x v.
+  // On the line both conics are the same quadratic up to a factor (which may be zero for one of them): with a point
+  // u + x v of the line, a + 2 b x + c x^2 = 0. The one with larger coefficients is solved.
   const auto along = [&](const Eigen::Matrix3d& conic) {
     const Eigen::Vector3d cu = conic * u;
     return Eigen::Vector3d(u.dot(cu), v.dot(cu), v.dot(conic * v));
@@ -82,15 +86,17 @@ Solutions<Eigen::Vector3d, 2> meet(const Eigen::Vector3d& line, const Eigen::Mat
   const double a = q[0], b = q[1], c = q[2];
   const double discriminant = b * b - a * c;
   if (!(discriminant >= -kDoublePoint * (b * b + std::abs(a * c)))) return {};
-  const double root = std::sqrt(std::max(0.0, discriminant)), w = -b - std::copysign(root, b);  // x = w / c, a / w
+  // Avoids cancellation; x = w / c or a / w.
+  const double root = std::sqrt(std::max(0.0, discriminant)), w = -b - std::copysign(root, b);
   Solutions<Eigen::Vector3d, 2> points;
   points.push_back(c * u + w * v);
   if (root > 0) points.push_back(w * u + a * v);
   return points;
 }
 
-// The three cosine laws of the distances s along the rays, by pairs (1, 2), (0, 2), (0, 1). With the chords of the unit
-// vectors, s_i^2 + s_j^2 - 2 s_i s_j cos = (s_i - s_j)^2 + s_i s_j chord^2: of far points the cosines tell nothing.
+// The three cosine laws of the distances s along the rays, for the pairs (1, 2), (0, 2), (0, 1). They are written with
+// the chords of the unit vectors, s_i^2 + s_j^2 - 2 s_i s_j cos = (s_i - s_j)^2 + s_i s_j chord^2: for narrow angles
+// the cosine is one to rounding and would lose the angle.
 struct CosineLaws {
   Eigen::Vector3d chord_squared, side_squared;
 
@@ -100,10 +106,10 @@ struct CosineLaws {
     return difference.cwiseAbs2() + product.cwiseProduct(chord_squared);
   }
 
-  // By Newton's iterations; false when they end elsewhere.
+  // Newton's iteration. Returns false when it does not converge to a solution in front of the camera.
   bool polish(Eigen::Vector3d& s) const {
-    constexpr double kSettled = 1e-9;  // relative; the step after it is the square
-    constexpr int kIterations = 20;    // two or three, but where two solutions coincide, to which steps only halve
+    constexpr double kSettled = 1e-9;  // relative; the error after such a step is about its square
+    constexpr int kIterations = 20;  // two or three suffice; towards a double solution each step only halves the error
     for (int iteration = 0; iteration < kIterations; ++iteration) {
       const Eigen::Vector3d f = sides_squared(s) - side_squared;
       // The Jacobian's rows are (0, a, b), (c, 0, d), (e, g, 0).
@@ -136,7 +142,9 @@ Solutions<Pose, 4> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const s
   const auto [a, b, c] =
       std::array{laws.side_squared[0] / size, laws.side_squared[1] / size, laws.side_squared[2] / size};
   const auto [ca, cb, cg] = std::array{rays[1].dot(rays[2]), rays[0].dot(rays[2]), rays[0].dot(rays[1])};
-  Eigen::Matrix3d second, third;  // the second and the third law less the first, so that the right sides vanish
+  // A times the law of (0, 2) minus b times that of (1, 2), and likewise with (0, 1): combinations without constant
+  // term.
+  Eigen::Matrix3d second, third;
   second << a, 0, -a * cb, 0, -b, b * ca, -a * cb, b * ca, a - b;
   third << a, -a * cg, 0, -a * cg, a - c, c * ca, 0, c * ca, -c;
   const std::optional<Lines> lines = lines_of(degenerate_conic(second, third));
@@ -145,6 +153,8 @@ Solutions<Pose, 4> solve_p3p(const std::array<Eigen::Vector3d, 3>& rays, const s
   Solutions<Pose, 4> poses;
   for (const Eigen::Vector3d& line : *lines)
     for (Eigen::Vector3d s : meet(line, second, third)) {
+      // The conics are homogeneous: the sum of the three laws gives the size of s, and its sign must make all distances
+      // positive.
       s *= std::copysign(std::sqrt(size / laws.sides_squared(s).sum()), s.sum());
       if (!(s.array() > 0).all() || !laws.polish(s)) continue;
       if (const auto pose = triangle_pose({s[0] * rays[0], s[1] * rays[1], s[2] * rays[2]}, points))

@@ -11,6 +11,7 @@ Solutions<Pose, 8> ResectionEstimator::solve(const std::array<std::size_t, 3>& r
                     {a.point, b.point, c.point});
 }
 
+// Truncated squares, shifted so that outliers contribute zero: sum over r < t of (r / t)^2 - 1. Lower is better.
 double ResectionEstimator::cost(const Pose& pose, double threshold) const {
   const auto squared_residual = squared_residuals(pose);
   const double limit = threshold * threshold;
@@ -27,6 +28,8 @@ Pose ResectionEstimator::adjusted(Pose pose, double threshold, int max_iteration
     const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
     Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
     PoseIncrement right = PoseIncrement::Zero();
+    // Normal equations of the unknown increment (w, d) of the pose, from the residual u - v, where u is the unit
+    // direction to the point and v the measured one. d(u) / d(point in the rig) = (I - u u') / distance.
     for (const RaySight& sight : sights_) {
       const Eigen::Vector3d difference = sight.point - pose.centre;
       const Eigen::Vector3d inside = rotation * difference - sight.origin;

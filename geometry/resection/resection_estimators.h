@@ -1,9 +1,11 @@
-// Estimator of ransac.h for the pose of a camera, or of a rig of cameras, from points seen along rays.
+// The estimator that ransac.h uses for the pose of a camera, or of a rig of cameras, from rays to known points.
 //
-//     ResectionEstimator      3 sights; angle between a ray and the direction to its point, points in front
+//     ResectionEstimator      3 rays; residual: angle between a ray and the direction to its point
 //
-// Rays of one projection centre make the three-point problem (p3p.h), others the generalised one (gp3p.h). Refined by
-// Gauss-Newton on the differences of unit directions, with the weights 1 / (1 + 4 r^2 / t^2) up to 2 t.
+// Rays from one projection centre make the three-point problem (p3p.h), other rays the generalised one (gp3p.h). Local
+// optimisation is Gauss-Newton on the differences of unit directions, with weights 1 / (1 + 4 r^2 / t^2) for residuals
+// r up to 2 t, where t is the threshold: the weights suppress outliers, and the cut at 2 t still admits inliers that
+// the minimal sample missed.
 #pragma once
 
 #include <array>
@@ -16,21 +18,22 @@
 
 namespace megablock {
 
+// One measured ray and the point it is directed to.
 struct RaySight {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // projection centre in the rig
-  Eigen::Vector3d direction;                         // unit, rig axes
-  Eigen::Vector3d point;                             // ground frame
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // projection centre in the rig, metres
+  Eigen::Vector3d direction;                         // unit vector, rig axes
+  Eigen::Vector3d point;                             // ground frame, metres
 };
 
 class ResectionEstimator {
  public:
   using Model = Pose;  // ground -> rig
   static constexpr std::size_t kSampleSize = 3;
-  // The sights must outlive it. Those that are not numbers are no inliers.
+  // `sights` must outlive the estimator. Elements that are not finite never count as inliers.
   explicit ResectionEstimator(std::span<const RaySight> sights) : sights_(sights) {}
   std::size_t size() const { return sights_.size(); }
   Solutions<Pose, 8> solve(const std::array<std::size_t, 3>& rows) const;
-  // Of the difference of the unit directions, which is an angle in radians where it is small.
+  // Squared length of the difference of two unit directions; for small differences its root is the angle in radians.
   auto squared_residuals(const Pose& pose) const {
     return [sights = sights_, centre = pose.centre,
             rotation = Eigen::Matrix3d(pose.rotation.toRotationMatrix())](std::size_t i) {
@@ -40,7 +43,8 @@ class ResectionEstimator {
     };
   }
   std::optional<Pose> refine(const Pose& pose, double threshold) const { return adjusted(pose, threshold, 3); }
-  // Ends earlier where the truncated squares do not fall any more.
+  // Gauss-Newton from `pose`, up to `max_iterations` iterations; ends earlier when the sum of truncated squares does
+  // not fall.
   Pose adjusted(Pose pose, double threshold, int max_iterations) const;
 
  private:

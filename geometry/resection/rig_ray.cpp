@@ -7,7 +7,7 @@ namespace megablock {
 std::optional<RigRay> rig_ray(const Pose& mount, const Intrinsics& intrinsics, const Eigen::Vector2d& pixel) {
   const auto ray = viewing_ray(intrinsics, pixel);
   if (!ray) return std::nullopt;
-  Eigen::Matrix<double, 3, 2> by_pixel;  // central differences over one pixel: exact to 1e-7
+  Eigen::Matrix<double, 3, 2> by_pixel;  // central differences over one pixel, exact to about 1e-7
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d half = 0.5 * Eigen::Vector2d::Unit(axis);
     const auto before = viewing_ray(intrinsics, pixel - half), after = viewing_ray(intrinsics, pixel + half);
@@ -30,6 +30,7 @@ RigRay carried(const RigRay& ray, const Pose& inner) {
           ray.to_pixels * to_inner};
 }
 
+// The limit of the cosine keeps the derivative bounded near 90 degrees.
 std::optional<RayResidual> ray_residual(const RigRay& ray, const Eigen::Vector3d& in_rig) {
   const Eigen::Vector3d sight = in_rig - ray.origin;
   const double distance = sight.norm();

@@ -1,8 +1,12 @@
-// An image measurement as a ray of its rig, with residuals in pixels for any camera model.
+// An observation as a ray of its rig, with residuals in pixels for every camera model.
 //
-// A pixel is seen along the unit vector v of its camera; B holds two axes across v. The small difference of a direction
-// u from v is, in pixels, J^-1 B' (u - v) with J = B' dv/dpixel. To first order that is the reprojection error, and it
-// exists wherever the pixel has a ray: no division by depth, so wide and panoramic cameras are no special case.
+// The pixel is seen along the unit vector v. B has two unit axes perpendicular to v as columns, and J = B' dv/dpixel is
+// how fast the ray turns with the pixel. A direction u that differs a little from v then has the residual, in pixels,
+//
+//     J^-1 B' (u - v).
+//
+// To first order this is the reprojection error. It exists wherever the pixel has a ray, as it does not divide by
+// depth; wide-angle and panoramic cameras are no special case.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,25 +19,26 @@ namespace megablock {
 
 struct RigRay {
   Eigen::Vector3d origin;                 // projection centre in the rig, metres
-  Eigen::Vector3d direction;              // unit, rig axes
-  Eigen::Matrix<double, 2, 3> to_pixels;  // of a difference of directions, rig axes
+  Eigen::Vector3d direction;              // unit vector, rig axes
+  Eigen::Matrix<double, 2, 3> to_pixels;  // J^-1 B' in rig axes: turns a difference of directions into pixels
 };
 
-// Empty where the distortion cannot be inverted.
+// Returns the ray of a pixel of the camera with this mount. Empty where the distortion cannot be inverted.
 std::optional<RigRay> rig_ray(const Pose& mount, const Intrinsics& intrinsics, const Eigen::Vector2d& pixel);
 
-// The ray as one of a larger rig, in which `inner` is the pose of the smaller one (larger -> smaller).
+// The same ray in the axes of a larger rig; `inner` is the pose of the smaller rig in it (larger -> smaller).
 RigRay carried(const RigRay& ray, const Pose& inner);
 
 struct RayResidual {
   Eigen::Vector2d pixels;                // predicted minus measured
-  Eigen::Matrix<double, 2, 3> by_point;  // by the point's rig coordinates, px/m
+  Eigen::Matrix<double, 2, 3> by_point;  // derivative by the point's rig coordinates, px/m
 };
 
-// Residual of a point given in rig coordinates; empty when it does not lie in front (90 degrees or more off the ray).
+// Returns the residual of a point in rig coordinates. Empty when the point is not in front: 90 degrees or more off the
+// ray.
 std::optional<RayResidual> ray_residual(const RigRay& ray, const Eigen::Vector3d& in_rig);
 
-// Derivative of a point's rig coordinates by the increment of the rig's pose (PoseIncrement): 3x6.
+// Derivative of a point's rig coordinates by the increment of the rig's pose (PoseIncrement): -R [X - C]x, -R.
 Eigen::Matrix<double, 3, 6> in_rig_by_pose(const Pose& rig, const Eigen::Vector3d& point);
 
 }  // namespace megablock

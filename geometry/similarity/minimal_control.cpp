@@ -11,7 +11,7 @@ namespace megablock {
 
 namespace {
 
-// The plane of three points by two sides: a vector in it with given products with the sides.
+// The plane of a triangle, by two of its sides.
 struct TrianglePlane {
   Eigen::Vector3d first, second, normal;  // normal: unit
   double squared_area = 0;                // |first x second|^2
@@ -26,13 +26,14 @@ struct TrianglePlane {
     plane.squared_area = area * area;
     return plane;
   }
+  // Returns the vector in the plane whose scalar products with the two sides have the given values.
   Eigen::Vector3d with_products(double by_first, double by_second) const {
     const Eigen::Vector3d cross = std::sqrt(squared_area) * normal;
     return (by_first * second.cross(cross) + by_second * cross.cross(first)) / squared_area;
   }
 };
 
-// Similarity without translation from the rows of its rotation; empty where they are not numbers.
+// A similarity without translation, from its scale and the rows of its rotation. Empty where these are not finite.
 std::optional<Similarity> from_rows(double scale, const Eigen::Vector3d& r1, const Eigen::Vector3d& r2,
                                     const Eigen::Vector3d& r3) {
   Eigen::Matrix3d rotation;
@@ -44,7 +45,8 @@ std::optional<Similarity> from_rows(double scale, const Eigen::Vector3d& r1, con
   return s;
 }
 
-// The mean misfit becomes the translation.
+// Sets the translation to the mean misfit: of the planimetric points in X and Y, of the height points in Z. Returns
+// false where it is not finite.
 template <std::size_t Places, std::size_t Heights>
 bool translate(const std::array<PlaceControl, Places>& places, const std::array<HeightControl, Heights>& heights,
                Similarity& s) {
@@ -67,7 +69,7 @@ Solutions<Similarity, 2> solve_minimal_control(const std::array<PlaceControl, 2>
   const Eigen::Vector3d d = places[1].model - places[0].model;
   const Eigen::Vector2d across = places[1].ground - places[0].ground;
   const double distance = across.norm();
-  // In units that make the quadratic's coefficients comparable: k in expected scales.
+  // k is counted in units of the expected scale, which makes the coefficients of the quadratic comparable.
   const double unit = distance / d.norm();
   const Eigen::Vector3d constant = u0.cross(d) / distance, slope = unit * plane->normal.cross(d) / distance;
   if (!(slope.squaredNorm() > 1e-12)) return found;
@@ -87,6 +89,7 @@ Solutions<Similarity, 2> solve_minimal_control(const std::array<PlaceControl, 3>
   Solutions<Similarity, 2> found;
   const auto plane = TrianglePlane::of(places[0].model, places[1].model, places[2].model);
   if (!plane) return found;
+  // p and q are found in the plane of the points first; the complex root then gives their components along the normal.
   const Eigen::Vector2d first = places[1].ground - places[0].ground, second = places[2].ground - places[0].ground;
   const Eigen::Vector3d p0 = plane->with_products(first.x(), second.x()),
                         q0 = plane->with_products(first.y(), second.y());
@@ -97,7 +100,7 @@ Solutions<Similarity, 2> solve_minimal_control(const std::array<PlaceControl, 3>
     const double scale = std::sqrt(0.5 * (p.squaredNorm() + q.squaredNorm()));
     auto s = from_rows(scale, p / scale, q / scale, (p / scale).cross(q / scale));
     if (s && translate(places, std::array{height}, *s)) found.push_back(*s);
-    if (std::abs(root) < 1e-9 * scale) break;  // both are one
+    if (std::abs(root) < 1e-9 * scale) break;  // both solutions are one
   }
   return found;
 }

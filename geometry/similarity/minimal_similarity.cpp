@@ -28,12 +28,13 @@ std::optional<Similarity> solve_similarity(const std::array<Eigen::Vector3d, 3>&
     squares_to += e[i].squaredNorm();
   }
   const double scale = std::sqrt(squares_to / squares_from);
-  // None and the half turns about the axes.
+  // No turn, and the half turns about the three axes, as signs of the coordinates.
   static constexpr double kTurns[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   Eigen::Matrix3d best = Eigen::Matrix3d::Zero();
   double largest = 0;
   int chosen = -1;
   for (int k = 0; k < 4; ++k) {
+    // With m = e + s d the equation is -[m]x v = e - s d; the normal matrix is the sum of [m]x' [m]x = |m|^2 I - m m'.
     const Eigen::Vector3d turn = scale * Eigen::Vector3d(kTurns[k][0], kTurns[k][1], kTurns[k][2]);
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     for (std::size_t i = 0; i < 3; ++i) {

@@ -48,7 +48,7 @@ std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector3d> from, 
   if (!covariance.allFinite()) return std::nullopt;
   const SingularValues3 svd = singular_values3(covariance);
   if (!(spread > 0) || !(svd.values(0) > 0)) return std::nullopt;
-  Eigen::Vector3d sign(1, 1, 1);  // a reflection would fit better: give up the weakest axis
+  Eigen::Vector3d sign(1, 1, 1);  // if a reflection fits better, the axis with the smallest singular value is reversed
   if (svd.u.determinant() * svd.v.determinant() < 0) sign.z() = -1;
 
   Similarity result;
@@ -84,8 +84,9 @@ std::optional<SimilarityCovariance> similarity_covariance(const Similarity& fitt
   const double squares = fitted.scale * fitted.scale;
   const Eigen::Matrix3d turns = squares * (moments.trace() * Eigen::Matrix3d::Identity() - moments);
   const SymmetricEigen3 eigen = symmetric_eigen3(turns);
-  constexpr double kLine = 1e-12;  // moment of inertia about a line through the points, of the largest
+  constexpr double kLine = 1e-12;  // smallest over largest moment of inertia; zero for points on one line
   if (!(eigen.values(0) > kLine * eigen.values(2)) || !turns.allFinite()) return std::nullopt;
+  // About the centre the three groups of unknowns are uncorrelated (see the head of similarity.h).
   SimilarityCovariance about_centre = SimilarityCovariance::Zero();
   about_centre.topLeftCorner<3, 3>() =
       eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
@@ -96,6 +97,7 @@ std::optional<SimilarityCovariance> similarity_covariance(const Similarity& fitt
 
 SimilarityCovariance covariance_about_origin(const Similarity& similarity, const Eigen::Vector3d& centre,
                                              const SimilarityCovariance& about_centre) {
+  // t = u - s R c gives dt = du + s R [c]x w - s R c q.
   const Eigen::Matrix3d turn = similarity.scale * similarity.rotation.toRotationMatrix();
   SimilarityCovariance about_origin = SimilarityCovariance::Identity();
   about_origin.bottomLeftCorner<3, 3>() = turn * skew(centre);
@@ -105,7 +107,7 @@ SimilarityCovariance covariance_about_origin(const Similarity& similarity, const
 
 namespace {
 
-// Also of points on one line, whose samples leave the rotation about it arbitrary.
+// Unlike its base, this estimator also takes samples on one line. They leave the rotation about the line arbitrary.
 class PlacesEstimator : public SimilarityEstimator {
  public:
   explicit PlacesEstimator(std::span<const SimilarityPair> pairs) : SimilarityEstimator(pairs), pairs_(pairs) {}
@@ -121,6 +123,7 @@ class PlacesEstimator : public SimilarityEstimator {
   std::span<const SimilarityPair> pairs_;
 };
 
+// The robust cost: sum of log(1 + (|r| / sigma)^2).
 double cauchy_cost(const Similarity& s, std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                    std::span<const double> sigma) {
   double cost = 0;
@@ -152,7 +155,8 @@ std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d>
 
   std::vector<SimilarityPair> pairs;
   for (std::size_t i = 0; i < count; ++i) pairs.push_back({from[i], to[i], 0, sigma[i]});
-  // Where sigmas are too small few points agree with any sample, and the best few are as good as chance made them.
+  // Where the sigmas are too small, few points agree with any sample, and chance decides which of the best samples is
+  // first. So the ten best enter the robust cost.
   constexpr std::size_t kKeep = 10;
   const RansacOptions options{
       .threshold = threshold_of_sigma(1, 3), .max_draws = max_draws, .keep = kKeep, .seed = seed};
@@ -160,6 +164,7 @@ std::optional<Similarity> fit_similarity_robust(std::span<const Eigen::Vector3d>
     consider(found->model);
     for (const Similarity& other : found->others) consider(other);
   }
+  // Iterated reweighting. The derivative of Cauchy's loss gives the weight 1 / (sigma^2 + r^2).
   constexpr int kIterations = 100;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     for (std::size_t i = 0; i < count; ++i)

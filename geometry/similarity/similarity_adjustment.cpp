@@ -6,6 +6,7 @@ namespace megablock {
 
 namespace {
 
+// The Gauss-Helmert model: s R x + t - y = 0 for every point.
 struct SimilarityEquations {
   static constexpr int kUnknowns = 7, kEquations = 3, kMeasurements = 6, kConstraints = 0;
   using State = Similarity;
@@ -25,6 +26,7 @@ struct SimilarityEquations {
 
 std::optional<AdjustedSimilarity> adjust_similarity(const Similarity& start, std::span<const PointPair> pairs) {
   if (pairs.size() < 3) return std::nullopt;
+  // The coordinates are reduced to the two centroids; the result is moved back at the end.
   Eigen::Vector3d from_centre = Eigen::Vector3d::Zero(), to_centre = Eigen::Vector3d::Zero();
   for (const PointPair& pair : pairs) {
     from_centre += pair.from / static_cast<double>(pairs.size());

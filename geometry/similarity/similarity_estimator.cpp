@@ -20,7 +20,8 @@ SimilarityEstimator::SimilarityEstimator(std::span<const SimilarityPair> pairs) 
     sigma_to.push_back(p.sigma_to);
   }
   if (to.isEmpty() || !(from.diagonal().norm() > 0)) return;
-  const double scale = to.diagonal().norm() / from.diagonal().norm();  // about
+  // Approximate scale, good enough to weigh the two sigmas.
+  const double scale = to.diagonal().norm() / from.diagonal().norm();
   sides_ = to.sizes() / std::hypot(median(std::move(sigma_to)), scale * median(std::move(sigma_from)));
 }
 

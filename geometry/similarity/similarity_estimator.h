@@ -1,8 +1,9 @@
-// Estimator of ransac.h for a similarity between two sets of points of which many may not belong together.
+// The estimator that ransac.h uses for a similarity between two sets of points with many wrong pairs.
 //
-//     SimilarityEstimator      3 points (minimal_similarity.h); |y - S x| in sigmas
+//     SimilarityEstimator      3 points (minimal_similarity.h); residual: |y - S x| in standard deviations
 //
-// sigma^2 = sigma_y^2 + s^2 sigma_x^2, of each coordinate. Wrong points are taken to lie anywhere in the box of the y.
+// The variance of each coordinate of a residual is sigma_y^2 + s^2 sigma_x^2. A wrong pair is taken to have its y
+// anywhere in the bounding box of all y.
 #pragma once
 
 #include <array>
@@ -14,16 +15,17 @@
 
 namespace megablock {
 
+// A pair of corresponding points.
 struct SimilarityPair {
   Eigen::Vector3d from, to;
-  double sigma_from = 0, sigma_to = 0;  // of a coordinate, in the units of each; not both zero
+  double sigma_from = 0, sigma_to = 0;  // standard deviation of a coordinate, in the units of each set; not both zero
 };
 
 class SimilarityEstimator {
  public:
   using Model = Similarity;
   static constexpr std::size_t kSampleSize = 3;
-  // The pairs must outlive it. Those that are not numbers are no inliers.
+  // `pairs` must outlive the estimator. Pairs that are not finite never count as inliers.
   explicit SimilarityEstimator(std::span<const SimilarityPair> pairs);
   std::size_t size() const { return pairs_.size(); }
   Solutions<Similarity, 1> solve(const std::array<std::size_t, 3>& rows) const;
@@ -35,16 +37,16 @@ class SimilarityEstimator {
              (p.sigma_to * p.sigma_to + square * p.sigma_from * p.sigma_from);
     };
   }
-  // Least squares over the pairs within the threshold.
+  // Least squares over the pairs within the threshold. Empty for fewer than three.
   std::optional<Similarity> refine(const Similarity& s, double threshold) const;
-  // Probability that a wrong pair comes within so many sigmas of a coordinate.
+  // Probability that a wrong pair has all three residuals within so many standard deviations.
   double chance(double sigmas) const;
-  // Largest size of the box of the y, in sigmas.
+  // Largest side of the bounding box of the y, in standard deviations.
   double extent() const { return sides_.maxCoeff(); }
 
  private:
   std::span<const SimilarityPair> pairs_;
-  Eigen::Vector3d sides_ = Eigen::Vector3d::Zero();  // of the box, in median sigmas
+  Eigen::Vector3d sides_ = Eigen::Vector3d::Zero();  // sides of the box, in median standard deviations
 };
 
 }  // namespace megablock

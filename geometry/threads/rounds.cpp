@@ -11,12 +11,15 @@ namespace megablock {
 
 namespace {
 
+// All threads share this object and its mutex. Each thread repeatedly takes the most urgent piece of work: finishing
+// the first open round, then preparing an open round, then a part of one. A thread waits only if there is none of
+// these.
 class RoundWorkers {
  public:
   explicit RoundWorkers(const Rounds& rounds)
       : rounds_(rounds), states_(static_cast<std::size_t>(rounds.count)), threads_(omp_get_max_threads()) {}
 
-  // Of one thread, until nothing is left to do.
+  // The loop of one thread. It ends when all rounds are finished or one has failed.
   void work() {
     std::unique_lock lock(mutex_);
     while (first_ < rounds_.count && !error_)
@@ -28,8 +31,8 @@ class RoundWorkers {
 
  private:
   struct State {
-    bool taken = false;       // somebody makes it ready or has done so
-    std::int64_t parts = -1;  // -1: not ready
+    bool taken = false;       // a thread prepares the round or has prepared it
+    std::int64_t parts = -1;  // number of parts; -1 before the round is prepared
     std::int64_t begun = 0, done = 0;
     std::exception_ptr error;
     std::int64_t error_part = 0;
@@ -37,13 +40,14 @@ class RoundWorkers {
   using Lock = std::unique_lock<std::mutex>;
 
   State& state(std::int64_t round) { return states_[static_cast<std::size_t>(round)]; }
-  // Of the rounds that are open. One thread alone never lacks work.
+  // One past the last round that may be worked on: the first unfinished round and, if `ahead` permits, the next. A
+  // single thread never works ahead; it would only hold two rounds in memory.
   std::int64_t end() const {
     const std::int64_t next = first_ + 1;
     return next < rounds_.count && threads_ > 1 && rounds_.ahead(next) ? next + 1 : next;
   }
 
-  // Runs `call` without the lock; its error.
+  // Runs `call` with the mutex released and returns its exception, if any.
   template <typename Call>
   static std::exception_ptr unlocked(Lock& lock, const Call& call) {
     std::exception_ptr error;
@@ -57,7 +61,7 @@ class RoundWorkers {
     return error;
   }
 
-  // These three take what there is to do of one kind; false: nothing.
+  // Each of the following functions does one piece of work of its kind. They return false if there is none.
 
   bool finish_first(Lock& lock) {
     State& round = state(first_);
@@ -91,6 +95,8 @@ class RoundWorkers {
       if (round.begun >= round.parts) continue;
       const std::int64_t part = round.begun++;
       const std::exception_ptr error = unlocked(lock, [&] { rounds_.visit(r, part); });
+      // The error of the lowest part wins, whatever the order in which the parts ended; the message is then the same in
+      // every run.
       if (error && (!round.error || part < round.error_part)) {
         round.error = error;
         round.error_part = part;
@@ -106,7 +112,7 @@ class RoundWorkers {
   std::condition_variable changed_;
   std::vector<State> states_;
   const int threads_;
-  std::int64_t first_ = 0;  // round that is to be finished next
+  std::int64_t first_ = 0;  // the round to be finished next
   bool finishing_ = false;
   std::exception_ptr error_;
 };

@@ -1,7 +1,11 @@
-// The threads of the process at work on what comes in rounds, as tiles do: a round is made ready, worked on in parts
-// and finished, and rounds are finished in their order. Threads that one round leaves without work, when its last parts
-// run or while it is finished, begin the next: they are never more than one round ahead, so that two are in memory at
-// most. As in workers.h no bit depends on the number of threads.
+// Runs work that comes in rounds on all threads of the process. The tiles of a block are such rounds: each is prepared,
+// worked on in independent parts, and finished; rounds are finished in order.
+//
+// When the last parts of a round run, or while one thread finishes it, the other threads would be idle. They begin the
+// next round instead. They are never more than one round ahead, so at most two rounds are in memory.
+//
+// As in workers.h, the results do not depend on the number of threads, bit for bit, provided that every part writes to
+// its own place.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +15,15 @@ namespace megablock {
 
 struct Rounds {
   std::int64_t count = 0;
-  std::function<std::int64_t(std::int64_t round)> prepare;           // the number of its parts
-  std::function<void(std::int64_t round, std::int64_t part)> visit;  // any number at once
-  std::function<void(std::int64_t round)> finish;                    // one at a time, in order, all parts visited
-  std::function<bool(std::int64_t round)> ahead;                     // whether it may begin before the one before ends
+  std::function<std::int64_t(std::int64_t round)> prepare;  // prepares a round and returns the number of its parts
+  // Works on one part; called from many threads at once.
+  std::function<void(std::int64_t round, std::int64_t part)> visit;
+  std::function<void(std::int64_t round)> finish;  // called once all parts are done, in order, by one thread at a time
+  std::function<bool(std::int64_t round)> ahead;   // whether the round may begin before the previous one is finished
 };
 
-// Calls them on all threads. An error ends all: that of the first round that has one, in it that of the lowest part;
-// the round is not finished, those before it are.
+// Runs all rounds. If a call throws, no further round is finished and the exception is rethrown: that of the first
+// round that failed, and in it that of the lowest part. All rounds before it have been finished.
 void visit_in_rounds(const Rounds& rounds);
 
 }  // namespace megablock

@@ -1,6 +1,8 @@
-// The threads of the process at work on what does not depend on one another. There are as many as OpenMP gives
-// (omp_set_num_threads, by the program's `--threads`). What they make goes to a place of its own for every part and is
-// summed up in the order of the parts, so that no bit depends on their number.
+// Runs independent pieces of work on all threads of the process. OpenMP decides their number (omp_set_num_threads, from
+// the option `--threads`).
+//
+// Results must not depend on the number of threads. Every piece therefore writes to its own place, and the caller sums
+// up in the order of the pieces.
 #pragma once
 
 #include <omp.h>
@@ -14,8 +16,8 @@
 
 namespace megablock {
 
-// Calls visit(i) for all i below `count`, on all threads. Exceptions wait until all have ended; the lowest i's is
-// thrown.
+// Calls visit(i) for all i in [0, count), on all threads, in no particular order. If calls throw, all others still run;
+// then the exception of the lowest i is rethrown, so that the same error is reported in every run.
 template <typename Visit>
 void visit_in_parallel(std::int64_t count, Visit&& visit) {
   std::vector<std::exception_ptr> errors(static_cast<std::size_t>(count));
@@ -31,7 +33,8 @@ void visit_in_parallel(std::int64_t count, Visit&& visit) {
     if (error) std::rethrow_exception(error);
 }
 
-// One T for each thread, made when it first asks for it.
+// One object of type T for each thread, for buffers that calls of visit_in_parallel reuse. mine() makes the object of
+// the calling thread with `make` when the thread first asks for it.
 template <typename T>
 class PerThread {
  public:

@@ -1,13 +1,15 @@
-// Attitude of the aircraft that carries a camera, as mapping programs exchange it.
+// Attitude of the aircraft that carries a camera, as yaw, pitch and roll. Many mapping programs exchange attitudes in
+// this form.
 //
-// The body (x forward, y right, z down) belongs to the camera as that of a nadir photo whose top is forward: body x is
-// the camera's -y, body y its x, body z its viewing direction. The angles turn the body from north, east, down, with
-// body -> NED  B = Rz(yaw) Ry(pitch) Rx(roll):
+// The body axes are x forward, y right, z down. The camera is taken as mounted like a nadir camera whose image has its
+// top forward: body x is the camera's -y, body y the camera's x, body z its viewing direction. The angles turn the body
+// from north, east, down (NED); with B the rotation body -> NED,
 //
-//     yaw clockwise from north, pitch nose up, roll right wing down
+//     B = Rz(yaw) Ry(pitch) Rx(roll):    yaw clockwise from north, pitch nose up, roll right wing down.
 //
-// so a nadir photo has pitch = roll = 0 and its yaw is where the image's top points. Singular where the camera looks
-// along the horizon (pitch +-90 deg); the gimbal angles of rotation.h are singular at nadir instead.
+// A nadir image has pitch = roll = 0, and its yaw is the direction of the image's top. The angles are singular where
+// the camera looks along the horizon (pitch +-90 deg). The angles of a gimbal (YawPitchRoll in rotation.h) are singular
+// at nadir instead, which makes them unsuitable for aerial images.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -17,6 +19,7 @@ namespace megablock {
 struct BodyAttitude {
   double yaw = 0, pitch = 0, roll = 0;  // radians; yaw and roll in (-pi, pi], pitch in [-pi/2, pi/2]
 };
+// Both convert between the angles and the rotation R_cw: ground (east, north, up) -> camera.
 BodyAttitude body_attitude(const Eigen::Quaterniond& rotation_cw);
 Eigen::Quaterniond rotation_from(const BodyAttitude& angles);
 

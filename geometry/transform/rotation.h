@@ -1,12 +1,13 @@
-// Rotations: unit quaternions in storage, tangent increments in estimation.
+// Rotations: unit quaternions for storage, tangent increments (rotation vectors) for estimation. A quaternion has four
+// numbers for three degrees of freedom; an increment has three and needs no constraint.
 //
-// Convention, stated here once for the whole project. A frame's rotation R is R_cw: world -> camera (or rig).
-// An increment w (3-vector, radians) acts by the RIGHT perturbation
+// This convention holds in the whole project. The rotation R of a frame is R_cw: world -> camera (or rig). An increment
+// w (3-vector, radians) acts as a RIGHT perturbation:
 //
 //     R(w) = R * Exp(w),      Exp(w) = I + [w]x + ...   (Rodrigues)
 //
-// so w is a rotation of the world axes, and d(R X)/dw = -R [X]x at w = 0. Quaternions are (w, x, y, z) in files;
-// Eigen's constructor takes the same order, its .coeffs() does not (x, y, z, w).
+// So w turns the world axes, and the derivative of R X by w is -R [X]x at w = 0. Files store quaternions as (w, x, y,
+// z). Eigen's constructor takes the same order; its .coeffs() returns (x, y, z, w).
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +16,7 @@
 
 namespace megablock {
 
-// The cross-product matrix: skew(a) * b = a x b.
+// Cross-product matrix: skew(a) * b = a x b.
 template <typename Scalar>
 Eigen::Matrix<Scalar, 3, 3> skew(const Eigen::Matrix<Scalar, 3, 1>& a) {
   Eigen::Matrix<Scalar, 3, 3> m;
@@ -23,7 +24,8 @@ Eigen::Matrix<Scalar, 3, 3> skew(const Eigen::Matrix<Scalar, 3, 1>& a) {
   return m;
 }
 
-// Quaternion of the rotation vector w; series near zero, so that it is exact and differentiable there.
+// Unit quaternion of the rotation vector w (radians): (cos |w|/2, sin(|w|/2) w / |w|). Near zero a series replaces the
+// quotient, so that the function and its derivatives are exact there; automatic differentiation needs this.
 template <typename Scalar>
 Eigen::Quaternion<Scalar> rotation_exp(const Eigen::Matrix<Scalar, 3, 1>& w) {
   using std::cos;
@@ -42,7 +44,8 @@ Eigen::Quaternion<Scalar> rotation_exp(const Eigen::Matrix<Scalar, 3, 1>& w) {
   return Eigen::Quaternion<Scalar>(real, factor * w.x(), factor * w.y(), factor * w.z());
 }
 
-// Rotation vector of a unit quaternion, |w| <= pi. Inverse of rotation_exp.
+// Rotation vector of a unit quaternion, with |w| <= pi; the inverse of rotation_exp. A negative real part is made
+// positive first: q and -q are the same rotation, and the shorter way is wanted.
 template <typename Scalar>
 Eigen::Matrix<Scalar, 3, 1> rotation_log(const Eigen::Quaternion<Scalar>& q) {
   using std::atan2;
@@ -56,31 +59,34 @@ Eigen::Matrix<Scalar, 3, 1> rotation_log(const Eigen::Quaternion<Scalar>& q) {
   return imaginary * (Scalar(2) * atan2(norm, real) / norm);
 }
 
-// R * Exp(w), normalised: the one way an estimated rotation is updated.
+// R Exp(w), normalised. Every estimated rotation is updated by this function.
 inline Eigen::Quaterniond rotation_update(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& w) {
   return (rotation * rotation_exp<double>(w)).normalized();
 }
 
-// Inverse of the right Jacobian of SO(3): Log(R Exp(d)) ~ Log(R) + right_jacobian_inverse(Log(R)) d.
+// Inverse of the right Jacobian of SO(3): Log(R Exp(d)) = Log(R) + right_jacobian_inverse(Log(R)) d + O(d^2). With
+// k = [w]x and the angle t = |w| it is I + k / 2 + (1 / t^2 - (1 + cos t) / (2 t sin t)) k^2.
 Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& w);
 
-// Angle of the rotation between two attitudes, radians in [0, pi].
+// Angle of the rotation that turns one attitude into the other, radians in [0, pi].
 double rotation_angle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
-// East, north, up of north, east, down.
+// Turns coordinates north, east, down (NED) into east, north, up (ENU), the axes of the ground frame. It is its own
+// inverse.
 extern const Eigen::Matrix3d kEnuFromNed;
 
-// Photogrammetric omega-phi-kappa (radians): R_cw(photo, y up, looking along -z) = Rk Rp Ro; and the navigation
-// yaw-pitch-roll of a body (x forward, y right, z down) in NED. Both refer to the camera of architecture.md
-// (x right, y down, looking along +z); see rotation.cpp for the axis changes.
+// Photogrammetric angles omega, phi, kappa in radians: Rx(omega) Ry(phi) Rz(kappa) turns the photo axes (x right, y up,
+// looking along -z) into the ground axes. The functions convert from and to R_cw, whose camera axes are x right, y
+// down, z along the view. Singular at phi = +-90 deg.
 struct OmegaPhiKappa {
   double omega, phi, kappa;
 };
 OmegaPhiKappa omega_phi_kappa(const Eigen::Quaterniond& rotation_cw);
 Eigen::Quaterniond rotation_from(const OmegaPhiKappa& angles);
 
-// yaw clockwise from north, pitch up positive, roll right wing down positive; of the camera's viewing direction as
-// a gimbal reports it: yaw = pitch = roll = 0 looks north along the horizon, pitch = -90 deg is nadir.
+// Angles of the camera's viewing direction as a gimbal reports them, radians: yaw clockwise from north, pitch upward,
+// roll right side down. With yaw = pitch = roll = 0 the camera looks north along the horizon; pitch = -90 deg is nadir.
+// There the angles are singular; body_attitude.h has angles for nadir images.
 struct YawPitchRoll {
   double yaw, pitch, roll;
 };

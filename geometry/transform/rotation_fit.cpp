@@ -11,10 +11,12 @@ namespace megablock {
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized(), b = to.normalized();
   const double cosine = b.dot(a);
-  if (cosine < -1 + 1e-12) {  // the axis is lost in rounding: two quarter turns
+  // Opposite: rounding decides the axis, so two quarter turns by way of a perpendicular vector.
+  if (cosine < -1 + 1e-12) {
     const Eigen::Vector3d across = a.unitOrthogonal();
     return rotation_between(across, b) * rotation_between(a, across);
   }
+  // The half-angle quaternion without trigonometric functions: cos(t/2) = sqrt((1 + cos t) / 2).
   const double length = std::sqrt((1 + cosine) * 2);
   Eigen::Quaterniond rotation;
   rotation.vec() = a.cross(b) * (1 / length);
@@ -30,6 +32,7 @@ Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span
   for (std::size_t i = 0; i < from.size(); ++i) sum += (weights.empty() ? 1 : weights[i]) * to[i] * from[i].transpose();
   if (!sum.allFinite()) return unknown;
   const SingularValues3 svd = singular_values3(sum);
+  // U V' may be a reflection. The best rotation then gives up the axis with the smallest singular value.
   Eigen::Matrix3d middle = Eigen::Matrix3d::Identity();
   middle(2, 2) = (svd.u * svd.v.transpose()).determinant() < 0 ? -1 : 1;
   return Eigen::Quaterniond(Eigen::Matrix3d(svd.u * middle * svd.v.transpose())).normalized();

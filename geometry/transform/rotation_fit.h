@@ -1,5 +1,7 @@
-// Rotation between two directions, and between two sets of them, y = R x: least squares in closed form (Kabsch 1976)
-// and a robust variant.
+// Rotations that turn one direction, or one set of directions, into another.
+//
+// fit_rotation() minimises sum w |y - R x|^2 in closed form: with the singular value decomposition sum w y x' = U S V',
+// the best rotation is R = U diag(1, 1, det(U V')) V' (W. Kabsch, Acta Crystallographica A32, 1976).
 #pragma once
 
 #include <Eigen/Core>
@@ -8,18 +10,21 @@
 
 namespace megablock {
 
-// The least rotation that turns `from` into `to`, sure to rounding / (1 + cosine of the angle between them); where they
-// are opposite to 1e-6 rad, where Eigen's FromTwoVectors takes other axes, a half turn about any axis across them, sure
-// to rounding.
+// Returns the rotation by the smallest angle that turns `from` into `to`; the vectors need not be unit vectors. Its
+// error is rounding / (1 + cosine of the angle between them). For vectors opposite to within 1e-6 rad the axis is
+// undetermined; the function then returns a half turn about an axis perpendicular to them, accurate to rounding.
+// (Eigen's FromTwoVectors chooses another axis there.)
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-// Minimises sum w |y - R x|^2; weights empty = all one. Directions all on one line leave the rotation about it
-// arbitrary (but proper). Not a number where some of them is not, or there are not equally many of each.
+// Least squares over pairs (x, y); empty `weights` means equal weights. If all directions lie on one line, the rotation
+// about it is arbitrary, but the result is a rotation. Returns a quaternion of NaN for lists of different length and
+// for input that is not finite.
 Eigen::Quaterniond fit_rotation(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                                 std::span<const double> weights = {});
 
-// By iterated reweighting with Geman-McClure weights 1 / (1 + (r / s)^2)^2, s three times the median residual: up to
-// about a third of the pairs may be wrong.
+// The same with outliers among the pairs: iterated reweighting with Geman-McClure weights 1 / (1 + (r / s)^2)^2, where
+// r is the residual |y - R x| and s three times its median. It tolerates outliers up to about a third of the pairs.
+// `from` and `to` must be unit vectors of equal number.
 Eigen::Quaterniond fit_rotation_robust(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to);
 
 }  // namespace megablock

@@ -1,9 +1,13 @@
-// Parameters of rotations and of unit bases in which relative orientation and similarity become polynomials (Kalantari
-// 2009, M37, M38). rotation.h is what everything else uses.
+// Parameters of a rotation and of a unit base that turn the equations of relative orientation and of similarity into
+// polynomials (Kalantari 2009, chapter 7). Only minimal solvers need them; all other code uses the increments of
+// rotation.h.
 //
-// Cayley, (x, y, z) = axis tan(angle / 2), R = (I - [v]x)^-1 (I + [v]x); Thompson (1959), twice that. Both are the
-// vector part of the quaternion over its real part, and infinite for half turns. A unit base t is (u, v) by
-// stereographic projection from the pole (0, 0, 1), which itself is at infinity:
+// Cayley's parameters are v = axis * tan(angle / 2), with R = (I - [v]x)^-1 (I + [v]x). Thompson's parameters (1959)
+// are twice those of Cayley. Both are the vector part of the quaternion over its real part, and become infinite for a
+// rotation by 180 degrees.
+//
+// A unit base t has the parameters (u, v) by stereographic projection from the pole (0, 0, 1), which itself maps to
+// infinity:
 //
 //     t = (2u, 2v, u^2 + v^2 - 1) / (u^2 + v^2 + 1),      (u, v) = (t_x, t_y) / (1 - t_z).
 #pragma once

@@ -1,4 +1,5 @@
-// Pose between two positions of one triangle, in closed form.
+// The pose that moves one triangle onto a congruent one, in closed form. Resection solvers end here: they know the
+// three points in camera axes and in the ground frame.
 #pragma once
 
 #include <array>
@@ -8,10 +9,11 @@
 
 namespace megablock {
 
-// Twice the triangle's area, against the sum of its squared sides: below it the corners count as lying on one line.
+// Limit for |(b - a) x (c - a)| (twice the area) over the sum of the squared sides. Corners below it count as lying on
+// one line.
 inline constexpr double kMinTriangleArea = 1e-9;
 
-// Orthonormal axes of a triangle.
+// Orthonormal axes of a triangle as columns: along the first side, in the plane across it, along the normal.
 inline Eigen::Matrix3d triangle_axes(const std::array<Eigen::Vector3d, 3>& p) {
   Eigen::Matrix3d axes;
   axes.col(0) = (p[1] - p[0]).normalized();
@@ -20,7 +22,8 @@ inline Eigen::Matrix3d triangle_axes(const std::array<Eigen::Vector3d, 3>& p) {
   return axes;
 }
 
-// Pose outside -> inside that puts the corners `outside` on those `inside`; empty for corners on one line.
+// Returns the pose outside -> inside that moves the corners `outside` to the corners `inside`. The first corners
+// coincide exactly, which is enough because the triangles are congruent. Empty for corners on one line.
 inline std::optional<Pose> triangle_pose(const std::array<Eigen::Vector3d, 3>& inside,
                                          const std::array<Eigen::Vector3d, 3>& outside) {
   const Eigen::Matrix3d rotation = triangle_axes(inside) * triangle_axes(outside).transpose();
