@@ -6,6 +6,7 @@ namespace megablock {
 
 std::optional<CameraMatrixParts> decompose_camera_matrix(const CameraMatrix& matrix,
                                                          const std::optional<Eigen::Vector3d>& visible) {
+  // Scale P so that the third row of K R has length one; K33 is then one.
   CameraMatrix p = matrix / matrix.row(2).head<3>().norm();
   const auto behind = [&] { return p.row(2).dot(visible->homogeneous()) < 0; };
   if (visible ? behind() : p.leftCols<3>().determinant() < 0) p = -p;
@@ -17,7 +18,7 @@ std::optional<CameraMatrixParts> decompose_camera_matrix(const CameraMatrix& mat
   }
   CameraMatrixParts parts;
   parts.calibration << p1.dot(r1), p1.dot(r2), p1.dot(r3), 0, p2.dot(r2), p2.dot(r3), 0, 0, 1;
-  // The rows as long as one another.
+  // Rows of equal length make the pivots of the solution for C comparable.
   Eigen::Matrix<double, 3, 4> system = p;
   for (int i = 0; i < 2; ++i) system.row(i) /= p.row(i).head<3>().norm();
   const Eigen::FullPivLU<Eigen::Matrix3d> lu(Eigen::Matrix3d(system.leftCols<3>()));

@@ -1,10 +1,12 @@
-// Camera matrix P ~ K R [I | -C] into calibration, rotation and centre (KP-02; A. Barrier and S. Martin, "Bundle
-// adjustment with known positions", appendix A; R. Hartley and A. Zisserman, "Multiple view geometry", 2004, 6.2.4).
+// Splits a camera matrix P ~ K R [I | -C] into calibration, rotation and centre (A. Barrier and S. Martin, "Bundle
+// adjustment with known positions", report, ENS Paris-Saclay, appendix A; R. Hartley and A. Zisserman, "Multiple view
+// geometry", 2004, section 6.2.4).
 //
-// The rows of the left block are taken from the last to the first: r3 along the third, r2 along what the second has
-// across r3, r1 = r2 x r3, so that det R = +1 whatever the matrix. K is upper triangular with K33 = 1 and K11 > 0. Two
-// signs are left, of P and of K22, of which one is free: a matrix whose image has its y reversed has K22 < 0, or, times
-// -1, K22 > 0 and everything behind the camera. A point that the camera sees decides.
+// The rows of R come from the left 3 x 3 block, last row first: r3 along its third row, r2 along the part of its second
+// row that is perpendicular to r3, and r1 = r2 x r3, which makes det R = +1 for every matrix. K is upper triangular
+// with K33 = 1 and K11 > 0. Two signs remain, that of P and that of K22, and one of them is free. A matrix for an image
+// with y upwards has K22 < 0; multiplied by -1 it has K22 > 0 and everything behind the camera. A point that the camera
+// sees decides.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,14 +21,15 @@ using CameraMatrix = Eigen::Matrix<double, 3, 4>;
 
 struct CameraMatrixParts {
   Eigen::Matrix3d calibration;  // K, pixels
-  Pose pose;                    // looking along +z
+  Pose pose;                    // ground -> camera, looking along +z
 };
 
-// `visible`: a point in front of the camera; without one K22 > 0 is taken. Empty for a camera without centre or with
-// rows that are multiples of one another, and where something is not a number.
+// `visible` is a point in front of the camera; without one, K22 > 0 is assumed. Empty for a camera without a centre,
+// for rows that are multiples of one another, and for input that is not finite.
 std::optional<CameraMatrixParts> decompose_camera_matrix(const CameraMatrix& matrix,
                                                          const std::optional<Eigen::Vector3d>& visible = {});
 
+// The matrix K R [I | -C].
 CameraMatrix camera_matrix(const CameraMatrixParts& parts);
 
 }  // namespace megablock

@@ -13,13 +13,14 @@ namespace megablock {
 
 namespace {
 
+// Turns the camera axes (y down, z forward) into the photo axes (y up, looking along -z), and back.
 const Eigen::Matrix3d kHalfTurnAboutX = Eigen::Vector3d(1, -1, -1).asDiagonal();
 
-// Of the extent: what points must be apart, or off their plane, to count.
+// Relative to the extent of the points: how far two points must be apart, or off a common plane, to count as different.
 constexpr double kApart = 1e-5;
 
-// Whether so many of the points are apart from one another. A point measured twice gives two more equations, which its
-// errors make look independent, and says nothing new.
+// Whether at least `Needed` of the points are different. A point measured twice adds two equations that errors make
+// look independent, but no information.
 template <std::size_t Needed>
 bool has_distinct(std::span<const Eigen::Vector3d> points) {
   double extent = 0;
@@ -85,12 +86,12 @@ std::optional<PhysicalParameters> nine_from(const ElevenParameters& e) {
   const Eigen::Vector3d normal = rows.row(0).cross(rows.row(1));
   result.skew = std::asin(rows.row(0).dot(rows.row(1)));
   result.distance_ratio = py / px;
-  // Not regular: rows along one another, or none.
+  // Rows that are parallel or zero have no inverse.
   if (!(length > 0) || !rows.allFinite() || !(normal.norm() > 1e-9)) return std::nullopt;
   if (rows.determinant() < 0) rows = -rows;
   const SingularValues3 svd = singular_values3(rows);
   image.rotation = svd.u * svd.v.transpose();
-  // The rows of the system, each scaled to one.
+  // Each row of the system is scaled to length one.
   Eigen::Matrix3d system;
   system << e.a.transpose() / e.a.norm(), e.b.transpose() / e.b.norm(), unit.transpose();
   image.centre =
@@ -109,16 +110,18 @@ std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> grou
     origin += ground[i] / static_cast<double>(count);
     middle += image[i] / static_cast<double>(count);
   }
-  double extent = 0, size = 0;  // both sets are scaled to about one, so that the equations are comparable
+  double extent = 0, size = 0;  // ground and image are scaled to about one, which makes the equations comparable
   for (std::size_t i = 0; i < count; ++i) {
     extent = std::max(extent, (ground[i] - origin).norm());
     size = std::max(size, (image[i] - middle).norm());
   }
-  // Of the ground alone: errors of the image hide that points in one plane leave the equations open.
+  // The test uses the ground coordinates only. Errors of the image coordinates would hide that points in one plane
+  // leave the equations singular.
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& m : ground) scatter += (m - origin) * (m - origin).transpose() / (extent * extent);
   const double thinnest = symmetric_eigen3(scatter).values(0);
   if (!(thinnest > kApart * kApart * static_cast<double>(count))) return std::nullopt;
+  // The equations (2) times their denominator, A.m + a_4 - x (C.m + 1) = 0, as a null vector of twelve elements.
   RowQr<12> equations;
   for (std::size_t i = 0; i < count; ++i) {
     Eigen::Vector4d m;
@@ -136,6 +139,7 @@ std::optional<ElevenParameters> fit_eleven(std::span<const Eigen::Vector3d> grou
   if (null.rank < 11 || !(std::abs(one) > 1e-6)) return std::nullopt;
   const Eigen::Vector3d a = null.vector.segment<3>(0) / one, b = null.vector.segment<3>(4) / one,
                         c = null.vector.segment<3>(8) / one;
+  // Undo the scaling of ground and image.
   ElevenParameters e{origin, (size * a + middle.x() * c) / extent, (size * b + middle.y() * c) / extent, c / extent};
   e.a4 = size * null.vector[3] / one + middle.x();
   e.b4 = size * null.vector[7] / one + middle.y();
@@ -153,7 +157,8 @@ struct NineEquations {
   double squares = 0;
 };
 
-// False where a point lies behind the image.
+// Normal equations of (1) for the increments of rotation (3), S, x_p, y_p, p. Returns false where a point lies behind
+// the image.
 bool linearise_nine(const NineParameters& image, std::span<const Eigen::Vector3d> ground,
                     std::span<const Eigen::Vector2d> measured, NineEquations& equations) {
   equations = {};
@@ -185,7 +190,7 @@ std::optional<FittedNine> fit_nine(const NineParameters& start, std::span<const 
   double damping = 1e-6;
   constexpr int kMaxIterations = 100;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    // Angles, metres and pixels differ by orders: the diagonal is scaled to one.
+    // Angles, metres and pixels differ by orders of magnitude; scaling makes the diagonal one.
     const Vector9 scale = equations.normal.diagonal().cwiseSqrt().cwiseInverse();
     Matrix9 scaled = scale.asDiagonal() * equations.normal * scale.asDiagonal();
     if (!scaled.allFinite()) return std::nullopt;
@@ -225,7 +230,7 @@ std::optional<Eigen::Vector3d> restitute(std::span<const ElevenParameters> image
                                          std::span<const Eigen::Vector2d> coordinates) {
   if (images.size() < 2 || coordinates.size() != images.size()) return std::nullopt;
   const Eigen::Vector3d reference = images.front().origin;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // relative to it
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // relative to `reference`
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
     RowQr<4> equations;

@@ -10,16 +10,18 @@ namespace megablock {
 
 namespace {
 
+// Angle from the nadir beyond which the formulas are not used any more.
 constexpr double kLargestAngle = 80 * kDegree;
 
 double refraction_term(double height_km) { return 2410 * height_km / (height_km * height_km - 6 * height_km + 250); }
 
+// seen_angle() for an angle below the limit.
 double seen_within(const EnvironmentEffect& effect, double angle) {
   const double t = std::tan(angle), true_t = t / (1 + effect.curvature * t * t);
   return std::atan(true_t) + effect.refraction * true_t;
 }
 
-// theta + K tan(theta) = seen.
+// Solves theta + K tan(theta) = seen by Newton's method. K is of the order of 1e-5, so five iterations reach rounding.
 double without_refraction(double constant, double seen) {
   double angle = seen;
   for (int i = 0; i < 5; ++i) {
@@ -31,6 +33,7 @@ double without_refraction(double constant, double seen) {
 
 using AngleChange = double (*)(const EnvironmentEffect&, double);
 
+// Turns a unit ray in its vertical plane so that its angle from the nadir becomes change(angle).
 Eigen::Vector3d turned(const EnvironmentEffect& effect, const Eigen::Vector3d& ray, const Eigen::Vector3d& down,
                        AngleChange change) {
   const double along = ray.dot(down);

@@ -1,27 +1,32 @@
-// Least squares where several measurements, all with errors, stand in one equation (Gauss-Helmert model; Kalantari
-// 2009, M31).
+// Least squares for equations that contain several observations, all with errors (the Gauss-Helmert model, also called
+// condition adjustment with unknowns; Kalantari 2009, chapter 5). Typical uses are a similarity between two sets of
+// measured points and the direction that measured planes have in common.
 //
-// Unknowns x and measurements l with covariance S satisfy f(x, l + v) = 0 and, where there are constraints, g(x) = 0;
-// sought is the x for which v' S^-1 v is least. At x0 and l0 = l + v0, with A = df/dx, B = df/dl, C = dg/dx:
+// The unknowns x and the observations l with covariance S satisfy f(x, l + v) = 0 and, where there are constraints,
+// g(x) = 0. Sought are the x and the corrections v for which v' S^-1 v is least. Linearised at x0 and l0 = l + v0, with
+// A = df/dx, B = df/dl and C = dg/dx:
 //
 //     A dx + B v = b,     b = -f(x0, l0) - B (l - l0),     C dx = -g(x0)
 //     N = (B S B')^-1
 //     | A'NA  C' | |dx|   | A'Nb |
 //     | C     0  | |k | = | -g   |,     v = S c,  c = B'N (b - A dx),     v' S^-1 v = (b - A dx)' N (b - A dx)
 //
-// and both x and l0 move on. That b refers to the measurements as they were, not to l0, is what makes the end of the
-// iteration the minimum and not a point that depends on the way there. S is never inverted: it may be singular, as that
-// of unit vectors is, as long as B S B' is not. The covariance of x is the upper left block of the inverse of the
-// bordered matrix, for measurements whose covariances are S; times weighted_squares / redundancy where those are
-// known up to a factor only.
+// Each iteration moves both x and l0. The b above refers to the original observations l, not to l0; this makes the
+// iteration converge to the minimum, where another b would make it stop at a point that depends on the path.
 //
-// Measurements come in groups that are independent of one another, each with its own equations, so that B S B' is
-// block diagonal. Measurements that are correlated make one group.
+// S is never inverted. It may be singular, as the covariance of a unit vector is, as long as B S B' is regular.
 //
-// The iteration ends when a step moves unknowns and measurements by less than `step_sigmas` together, in their own
-// metric: dx' A'NA dx + sum (c - c0)' S (c - c0); or when a small one does not shrink any more, which is rounding.
+// The covariance of x is the upper left block of the inverse of the bordered matrix. Where S is known only up to a
+// factor, multiply it by the variance factor weighted_squares / redundancy.
 //
-// A model says how many there are of each, and what they are:
+// The observations come in groups that are independent of one another, each with its own equations; B S B' is then
+// block diagonal, and only small blocks are inverted. Correlated observations must be in one group.
+//
+// The iteration ends when a step moves unknowns and observations together by less than `step_sigmas`, measured in their
+// own standard deviations: dx' A'NA dx + sum (c - c0)' S (c - c0). It also ends when a small step does not get shorter
+// any more, which is the effect of rounding.
+//
+// A model states the numbers of unknowns, equations and observations, and evaluates the equations:
 //
 //     struct Model {
 //       static constexpr int kUnknowns, kEquations, kMeasurements;   // the last two of one group
@@ -46,12 +51,14 @@
 
 namespace megablock {
 
+// Value f and derivatives A and B of the equations of one group; the model fills it in.
 template <typename Model>
 struct GroupEquations {
   Eigen::Matrix<double, Model::kEquations, 1> value;
   Eigen::Matrix<double, Model::kEquations, Model::kUnknowns> by_unknowns;
   Eigen::Matrix<double, Model::kEquations, Model::kMeasurements> by_measurements;
 };
+// Value g and derivative C of the constraints.
 template <typename Model>
 struct ConstraintEquations {
   Eigen::Matrix<double, Model::kConstraints, 1> value;
@@ -60,22 +67,23 @@ struct ConstraintEquations {
 
 struct GaussHelmertOptions {
   int max_iterations = 50;
-  double step_sigmas = 1e-6;
+  double step_sigmas = 1e-6;  // a step shorter than this, in standard deviations, ends the iteration
 };
 
+// Result of an adjustment.
 template <typename Model>
 struct GaussHelmertFit {
   using Measured = Eigen::Matrix<double, Model::kMeasurements, 1>;
 
   typename Model::State state;
   Eigen::Matrix<double, Model::kUnknowns, Model::kUnknowns> covariance;
-  std::vector<Measured> corrections;  // v, one per group
-  double weighted_squares = 0;
+  std::vector<Measured> corrections;  // v, one for each group
+  double weighted_squares = 0;        // v' S^-1 v
   std::int64_t redundancy = 0;
   int iterations = 0;
 };
 
-// Covariance of y = h(x) with the derivatives J = dh/dx.
+// Covariance J Sigma J' of y = h(x), with the derivatives J = dh/dx, made exactly symmetric.
 template <typename Jacobian, typename Covariance>
 auto propagated(const Eigen::MatrixBase<Jacobian>& j, const Eigen::MatrixBase<Covariance>& covariance) {
   constexpr int kRows = Jacobian::RowsAtCompileTime;
@@ -95,9 +103,10 @@ struct Group {
 
 }  // namespace gauss_helmert
 
-// `covariances`: of the measurements of each group, or a single one for all. Empty where the groups do not determine
-// the unknowns (fewer equations than unknowns, dependent equations), a number is not finite, or the iteration does not
-// end.
+// Adjusts from the approximation `start`. `covariances` holds the covariance S of the observations of each group, or a
+// single one for all groups. Empty where the observations do not determine the unknowns (fewer equations than unknowns,
+// dependent equations), where an equation contains no error, where a value is not finite, and where the iteration does
+// not converge.
 template <typename Model>
 std::optional<GaussHelmertFit<Model>> fit_gauss_helmert(
     const Model& model, const typename Model::State& start,
@@ -125,7 +134,7 @@ std::optional<GaussHelmertFit<Model>> fit_gauss_helmert(
       const auto& [value, a, b] = g.at;
       const Eigen::Matrix<double, kE, kE> variance = b * covariance_of(i) * b.transpose();
       g.weight = variance.inverse();
-      if (!g.weight.allFinite()) return std::nullopt;  // no error in this equation, or something not finite
+      if (!g.weight.allFinite()) return std::nullopt;  // an equation without error, or a value that is not finite
       g.right = b * correction - value;
       const Eigen::Matrix<double, kU, kE> weighted = a.transpose() * g.weight;
       matrix.template topLeftCorner<kU, kU>() += weighted * a;
@@ -141,7 +150,8 @@ std::optional<GaussHelmertFit<Model>> fit_gauss_helmert(
     }
     if (!matrix.allFinite() || !right.allFinite()) return std::nullopt;
 
-    // Unknowns of all units beside constraints: one size, so that what is dependent shows.
+    // The unknowns have different units, and the constraints others again. Scaling gives all of them the size one; only
+    // then does a small pivot mean a dependent equation.
     Eigen::Matrix<double, kAll, 1> scale;
     const double largest = normal.diagonal().maxCoeff();
     if (!(largest > 0)) return std::nullopt;

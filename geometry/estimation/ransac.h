@@ -1,29 +1,33 @@
-// Random sample consensus with local optimisation: a model from observations of which many may be wrong (Kalantari
-// 2009, M42, M49, M55).
+// Random sample consensus (RANSAC) with local optimisation: estimates a model from observations with many outliers
+// (Kalantari 2009, chapters 7 and 8 and annex A).
 //
-// Samples of as few observations as give a model are drawn until it is unlikely that none was free of wrong ones. Of a
-// share w of right observations a sample of n is right with probability w^n, so that
+// It draws minimal samples, computes a model from each, and keeps the model with most support, until it is unlikely
+// that no sample was free of outliers. With a share w of inliers, a sample of n is free of outliers with probability
+// w^n, so that
 //
 //     k = log(1 - p) / log(1 - w^n)
 //
-// draws hold a right one with probability p (M. Fischler and R. Bolles, CACM 24(6), 1981). w is that of the best model
-// so far: k falls as better ones are found. A model is scored by its truncated quadratic support
+// draws contain such a sample with probability p (M. Fischler and R. Bolles, CACM 24(6), 1981). w is taken from the
+// best model so far; k falls as better models are found. The score of a model is its truncated quadratic support
+// (MSAC),
 //
 //     sum over |r_i| <= t of 1 - (r_i / t)^2              (P. Torr and A. Zisserman, CVIU 78, 2000),
 //
-// and given up as soon as it cannot exceed the best one's any more, or is unlikely to by a hundred observations. Every
-// new best model is refined over its inliers before the draws go on (O. Chum, J. Matas and J. Kittler, "Locally
-// optimized RANSAC", DAGM 2003): the model of a minimal sample misses inliers, and w with them.
+// Scoring of a model stops as soon as it cannot exceed the best score any more, or when a hundred of the observations
+// show that it is unlikely to. Every new best model is refined with its inliers before the draws go on (O. Chum, J.
+// Matas and J. Kittler, "Locally optimized RANSAC", DAGM 2003): the model of a minimal sample misses inliers, so it
+// would underestimate w and draw too often.
 //
-// Without a threshold it is chosen a contrario (L. Moisan and B. Stival, IJCV 57(3), 2004): of thresholds in steps of
-// sqrt(2) the one at which so many observations agree the least by accident. With a(t) the probability that a wrong
-// observation lies within t, the number of models as good as this one that N wrong observations would give is
+// Without a given threshold, the threshold is chosen a contrario (L. Moisan and B. Stival, IJCV 57(3), 2004). It is the
+// one, from a series in steps of sqrt(2), at which the agreement of so many observations is least likely to be an
+// accident. Let a(t) be the probability that an outlier lies within t. Then the number of models as good as this one
+// that N outliers would give (number of false alarms) is
 //
 //     NFA(k, t) = (N - n) C(N, k) C(k, n) a(t)^(k - n),
 //
 // and the score is -log10 of its minimum over t.
 //
-// An estimator has a Model, kSampleSize, and
+// An estimator provides a type Model, a constant kSampleSize, and the functions
 //     size()                        number of observations
 //     solve(rows)                   models of a sample: a list (optional results are lists of one, see solutions.h)
 //     squared_residuals(model)      a function of the row; infinite or not a number where it cannot be an inlier
@@ -31,7 +35,7 @@
 //     chance(residual)              a(t), where thresholds are to be chosen a contrario
 //     apart(row, row)               whether they are far enough apart for a sample, where that matters
 //
-// Nothing is allocated in a draw. The outcome depends on the estimator and the seed alone.
+// A draw allocates no memory. The result depends only on the estimator and the seed.
 #pragma once
 
 #include <algorithm>
@@ -49,34 +53,35 @@
 namespace megablock {
 
 struct RansacOptions {
-  double threshold = 0;      // of the residuals of inliers, in their units; 0: chosen a contrario
-  double max_threshold = 0;  // largest one that is tried a contrario; must then be given
-  double confidence = 0.99;  // p
-  double inlier_share = 0;   // w is known to be at least this; 0: not known
+  double threshold = 0;      // largest residual of an inlier, in the units of the estimator; 0: chosen a contrario
+  double max_threshold = 0;  // largest threshold tried a contrario; required if threshold = 0
+  double confidence = 0.99;  // p, probability that one of the samples was free of outliers
+  double inlier_share = 0;   // w is at least this, known beforehand; 0: not known
   int max_draws = 5000;
-  int min_draws = 0;     // where a single right sample may not be enough
-  double enumerate = 0;  // all samples are taken, one after the other, where there are no more than these
-  std::size_t keep = 1;  // models in the result: the best ones
+  int min_draws = 0;     // lower limit, for data where one sample free of outliers may not be enough
+  double enumerate = 0;  // if there are no more samples than this, all are taken, without chance
+  std::size_t keep = 1;  // number of models in the result, the best ones
   std::uint64_t seed = 0;
   void check() const;  // throws std::invalid_argument
 };
 
-// Draws after which one of `sample_size` right observations was among them with the probability `confidence`; at least
-// one, infinite for a share of zero.
+// Number of draws after which, with probability `confidence`, one sample of `sample_size` observations was free of
+// outliers. At least one; infinite for a share of zero.
 double draws_needed(std::size_t sample_size, double inlier_share, double confidence);
 
-// Of distinct observations, in any order.
+// Number of samples of `sample_size` different observations, in any order.
 double number_of_samples(std::size_t observations, std::size_t sample_size);
 
-// Threshold below which a right observation's residual lies with this probability, when each of its `components` has
-// the standard deviation `sigma`.
+// Threshold that the residual of an inlier stays below with this probability, if each of its `components` is normally
+// distributed with standard deviation `sigma` (chi-square distribution of the squared length).
 double threshold_of_sigma(double sigma, int components, double probability = 0.99);
 
-// Logarithms of factorials for the number of false alarms.
+// The number of false alarms. A table of log10 of factorials makes each evaluation cheap.
 class FalseAlarms {
  public:
   FalseAlarms(std::size_t observations, std::size_t sample_size);
-  // log10 NFA of k agreeing observations where a wrong one agrees with this probability.
+  // log10 NFA of `agreeing` observations when an outlier agrees with probability `chance`. Infinite where no more
+  // observations agree than a sample has.
   double log10_nfa(std::size_t agreeing, double chance) const;
 
  private:
@@ -85,6 +90,7 @@ class FalseAlarms {
   std::vector<double> log10_factorial_;
 };
 
+// The functions that every estimator must have. chance() and apart() are optional.
 template <typename Estimator>
 concept SampleEstimator = requires(const Estimator& e, const typename Estimator::Model& model,
                                    const std::array<std::size_t, Estimator::kSampleSize>& rows) {
@@ -94,12 +100,13 @@ concept SampleEstimator = requires(const Estimator& e, const typename Estimator:
   { e.refine(model, 1.0) } -> std::convertible_to<std::optional<typename Estimator::Model>>;
 };
 
-// What agrees with a model.
+// The observations that agree with a model.
 struct Consensus {
-  std::vector<std::uint8_t> inlier;  // [observations]
+  std::vector<std::uint8_t> inlier;  // one for each observation
   int count = 0;
   double score = 0;  // truncated quadratic support
 };
+// The consensus of a model at a threshold.
 template <typename Estimator>
 Consensus consensus_of(const Estimator& estimator, const typename Estimator::Model& model, double threshold) {
   Consensus result{std::vector<std::uint8_t>(estimator.size(), 0)};
@@ -119,15 +126,15 @@ template <typename Model>
 struct RansacResult {
   Model model;
   Consensus consensus;
-  double threshold = 0;  // the one given, or chosen
-  double log10_nfa = 0;  // where it was chosen
+  double threshold = 0;  // the given threshold, or the chosen one
+  double log10_nfa = 0;  // of the model, where the threshold was chosen
   int draws = 0;
-  std::vector<Model> others{};  // the next best in order, of those that were scored; options.keep - 1 at most
+  std::vector<Model> others{};  // the next best models in order, at most options.keep - 1
 };
 
 namespace ransac_detail {
 
-// The next one of the ascending samples of `size` observations; false after the last.
+// Advances to the next sample in lexicographic order, each in ascending order; false after the last.
 template <std::size_t N>
 bool next_sample(std::array<std::size_t, N>& rows, std::size_t size) {
   for (std::size_t k = N; k-- > 0;) {
@@ -139,10 +146,11 @@ bool next_sample(std::array<std::size_t, N>& rows, std::size_t size) {
   return false;
 }
 
-// Distinct observations, apart from one another where the estimator knows what that is.
+// Draws a sample of different observations. Where the estimator has apart(), they are far enough apart from one
+// another.
 template <typename Estimator>
 std::array<std::size_t, Estimator::kSampleSize> draw(const Estimator& estimator, std::mt19937_64& random) {
-  constexpr int kTries = 20;  // an observation that is too near to others; where all crowd, any must do
+  constexpr int kTries = 20;  // tries per observation; if all are crowded, a near one must do
   std::array<std::size_t, Estimator::kSampleSize> rows;
   int tries = 0;
   for (std::size_t k = 0; k < rows.size();) {
@@ -159,13 +167,14 @@ std::array<std::size_t, Estimator::kSampleSize> draw(const Estimator& estimator,
   return rows;
 }
 
+// Score of a model with the threshold and inliers that belong to it.
 struct Score {
   double value = 0, threshold = 0;
   std::size_t inliers = 0;
 };
 
-// Whether so few of some hundred observations agree that a model as good as the best has them once in five thousand
-// times at most.
+// Checks a hundred evenly spaced observations. Returns true if so few of them agree that a model as good as the best so
+// far would show so few at most once in five thousand times (3.5 standard deviations of the binomial distribution).
 template <typename Residual>
 bool hopeless(const Residual& squared_residual, std::size_t size, double limit, const Score& best) {
   constexpr std::size_t kLooked = 100;
@@ -177,9 +186,10 @@ bool hopeless(const Residual& squared_residual, std::size_t size, double limit, 
   return static_cast<double>(agreeing) < expected - 3.5 * std::sqrt(expected * (1 - share));
 }
 
-// By the support within a given threshold; empty where that of the best is not exceeded.
+// Scores a model by its support within a given threshold. Returns an empty score where it does not exceed the best.
 template <typename Residual>
 Score supported(const Residual& squared_residual, std::size_t size, double threshold, const Score& best) {
+  // The score is size - lost, so a model is hopeless once it has lost size - best.
   const double limit = threshold * threshold, most_lost = static_cast<double>(size) - best.value;
   if (hopeless(squared_residual, size, limit, best)) return {};
   double lost = 0;
@@ -196,12 +206,12 @@ Score supported(const Residual& squared_residual, std::size_t size, double thres
   return {static_cast<double>(size) - lost, threshold, inliers};
 }
 
-// By the number of false alarms at the best of kSteps thresholds.
+// Scores a model by -log10 NFA at the best of kSteps thresholds, which fall from the largest by factors of sqrt(2).
 template <typename Residual, typename Chance>
 Score meaningful(const Residual& squared_residual, std::size_t size, std::size_t sample_size, double max_threshold,
                  const FalseAlarms& alarms, const Chance& chance) {
   constexpr std::size_t kSteps = 24;
-  std::array<std::size_t, kSteps> within{};  // [i]: observations between the thresholds i + 1 and i
+  std::array<std::size_t, kSteps> within{};  // [i]: number of observations between thresholds i + 1 and i
   const double scale = 1 / (max_threshold * max_threshold);
   for (std::size_t i = 0; i < size; ++i) {
     const double share = squared_residual(i) * scale;
@@ -223,9 +233,9 @@ Score meaningful(const Residual& squared_residual, std::size_t size, std::size_t
 
 }  // namespace ransac_detail
 
-// The best model, refined; empty for fewer observations than a sample needs, where no sample gives a model that more
-// than none agree with, and where what agrees may do so by accident (a contrario). `starts`: models to begin with, such
-// as those of a simpler kind.
+// Returns the best model, refined. Models in `starts` are scored before the first draw, for example models of a simpler
+// kind. Empty for fewer observations than a sample needs, where no sample gives a model with more support than none,
+// and (a contrario) where the agreement may be an accident. Throws std::invalid_argument for impossible options.
 template <SampleEstimator Estimator>
 std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator, const RansacOptions& options,
                                                               std::span<const typename Estimator::Model> starts = {}) {
@@ -233,7 +243,7 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
   using Rows = std::array<std::size_t, Estimator::kSampleSize>;
   using ransac_detail::Score;
   constexpr std::size_t kSize = Estimator::kSampleSize;
-  constexpr int kRounds = 4;  // of local optimisation
+  constexpr int kRounds = 4;  // of local optimisation, for each new best model
   options.check();
   const std::size_t size = estimator.size();
   if (size < kSize) return std::nullopt;
@@ -244,9 +254,9 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
     Score score;
     Found model;
   };
-  std::vector<Scored> best;  // first
+  std::vector<Scored> best;  // sorted, best first
   best.reserve(options.keep + 1);
-  // True where the model is the best one now.
+  // Scores a model and keeps it if it is among the best. Returns true if it is now the best one.
   const auto consider = [&](const Found& model) {
     const Score to_beat = best.size() < options.keep ? Score{} : best.back().score;
     Score score;
@@ -271,7 +281,7 @@ std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& e
     for (int round = 0; round < kRounds && best.front().score.inliers > kSize; ++round) {
       const std::optional<Found> refined = estimator.refine(best.front().model, best.front().score.threshold);
       if (!refined || !consider(*refined)) break;
-      if (best.size() > 1) best.erase(best.begin() + 1);  // what it was refined from is no model of its own
+      if (best.size() > 1) best.erase(best.begin() + 1);  // the refined model replaces the one it came from
     }
     draws_suffice(static_cast<double>(best.front().score.inliers) / static_cast<double>(size));
   };

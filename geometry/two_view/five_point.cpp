@@ -12,8 +12,8 @@ namespace megablock {
 
 namespace {
 
-// Polynomials in x, y, z of degree 1 (x, y, z, 1), 2 (x2, xy, y2, xz, yz, z2, x, y, z, 1) and 3 (in the order of the
-// elimination).
+// Polynomials in x, y, z as vectors of coefficients: of degree 1 (x, y, z, 1), of degree 2 (x2, xy, y2, xz, yz, z2, x,
+// y, z, 1) and of degree 3 (in the order of the elimination, see add_product).
 using LinearForm = Eigen::Matrix<double, 1, 4>;
 using QuadraticForm = Eigen::Matrix<double, 1, 10>;
 using CubicForm = Eigen::Matrix<double, 1, 20>;
@@ -25,7 +25,7 @@ QuadraticForm product(const LinearForm& p, const LinearForm& q) {
   return r;
 }
 
-// x3, y3, x2y, xy2, x2z, x2, y2z, y2, xyz, xy, xz2, xz, x, yz2, yz, y, z3, z2, z, 1.
+// Adds p q to r. Order of a cubic: x3, y3, x2y, xy2, x2z, x2, y2z, y2, xyz, xy, xz2, xz, x, yz2, yz, y, z3, z2, z, 1.
 void add_product(const QuadraticForm& p, const LinearForm& q, CubicForm& r) {
   r[0] += p[0] * q[0];
   r[1] += p[2] * q[1];
@@ -49,16 +49,18 @@ void add_product(const QuadraticForm& p, const LinearForm& q, CubicForm& r) {
   r[19] += p[9] * q[3];
 }
 
-using CoplanarityBasis = Eigen::Matrix<double, 9, 4>;  // of the matrices, by rows, that satisfy the five equations
+using CoplanarityBasis = Eigen::Matrix<double, 9, 4>;  // E1 to E4, each by rows
 
-// False where the equations are not independent.
+// Basis of the matrices E with b_i' E a_i = 0 for the five pairs. Returns false where the equations are not
+// independent.
 bool coplanarity_basis(const FiveRays& a, const FiveRays& b, CoplanarityBasis& basis) {
   NineRows equations(9, 5), vectors = NineRows::Zero(9, 4);
   for (int i = 0; i < 5; ++i) {
     const Eigen::Vector3d &p = a[static_cast<std::size_t>(i)], &q = b[static_cast<std::size_t>(i)];
     for (int r = 0; r < 3; ++r) equations.block<3, 1>(3 * r, i) = q[r] * p;
   }
-  // Four numbers that no structured scene brings together: a rotation of four dimensions.
+  // A rotation in four dimensions mixes the basis. Its numbers are arbitrary, so that no structured scene has a
+  // solution at infinity.
   const Eigen::Vector4d q = Eigen::Vector4d(0.3127, 0.4891, 0.6533, 0.4172).normalized();
   vectors.bottomRows<4>() << q[0], q[1], q[2], q[3], -q[1], q[0], -q[3], q[2], -q[2], q[3], q[0], -q[1], -q[3], -q[2],
       q[1], q[0];
@@ -67,15 +69,16 @@ bool coplanarity_basis(const FiveRays& a, const FiveRays& b, CoplanarityBasis& b
   return qr.smallest > 1e-12;
 }
 
-// Multiple roots suffer from the rounding of the elimination. What is none is found out by polishing.
+// Tolerance for double roots, which the rounding of the elimination perturbs. Polishing rejects the roots that are not
+// real solutions.
 constexpr double kMultipleRoot = 1e-4, kComplexPair = 0.01;
-// Coefficients of the reduced system, against one, beyond which its determinant would have lost too many digits.
+// Largest coefficient of the reduced system (against one) for which the determinant keeps enough digits.
 constexpr double kWellReduced = 1000;
 
 using ConstraintSystem = Eigen::Matrix<double, 10, 20, Eigen::RowMajor>;
 using LeadingBlock = Eigen::Matrix<double, 10, 10>;
 
-// The ten cubics.
+// The ten cubics: nine elements of 2 E E' E - tr(E E') E = 0 (divided by two), and det E = 0.
 ConstraintSystem essential_constraints(const CoplanarityBasis& basis) {
   const auto entry = [&](int r, int c) -> LinearForm { return basis.row(3 * r + c); };
   // E E' - tr(E E') / 2.
@@ -108,30 +111,32 @@ ConstraintSystem essential_constraints(const CoplanarityBasis& basis) {
   return system;
 }
 
-// The rows x2z, x2, y2z, y2, xyz, xy of the reduced system: their coefficients by xz2, xz, x, yz2, yz, y, z3, z2, z, 1.
+// Rows x2z, x2, y2z, y2, xyz, xy of the system after the elimination; columns: their coefficients of xz2, xz, x, yz2,
+// yz, y, z3, z2, z, 1.
 Eigen::Matrix<double, 6, 10> reduced_rows(const ConstraintSystem& system) {
   const Eigen::PartialPivLU<LeadingBlock> lu(LeadingBlock(system.leftCols<10>()));
   return lu.solve(LeadingBlock(system.rightCols<10>())).bottomRows<6>();
 }
 
-// One of the three equations linear in x and y: coefficients in z.
+// One of the three equations that are linear in x and y; their coefficients are polynomials in z.
 struct LinearInXy {
   Polynomial<3> x, y;
   Polynomial<4> one;
 };
 
-// upper: of the row with the monomial times z, lower: without.
+// The row of a monomial times z (`upper`) minus z times the row of the monomial (`lower`).
 LinearInXy equation_from(const Eigen::Matrix<double, 1, 10>& upper, const Eigen::Matrix<double, 1, 10>& lower) {
   return {{upper[2], upper[1] - lower[2], upper[0] - lower[1], -lower[0]},
           {upper[5], upper[4] - lower[5], upper[3] - lower[4], -lower[3]},
           {upper[9], upper[8] - lower[9], upper[7] - lower[8], upper[6] - lower[7], -lower[6]}};
 }
 
-constexpr double kSolved = 1e-10;  // of the sines of the angles between rays and epipolar planes
+constexpr double kSolved = 1e-10;  // limit for the sines of the angles between rays and epipolar planes
 
-// Newton on b' [t]x R a = 0, five equations in rotation and base. False where it does not end at a solution. One step
-// does for simple roots. Towards double ones (a plane seen along its normal) each only halves the distance and leaves a
-// quarter of the residuals: where the last one did, the next is twice as long, which restores quadratic convergence.
+// Newton's iteration on b' [t]x R a = 0, five equations in rotation and base. Returns false where it does not converge
+// to a solution. One step is enough for a simple root. Towards a double root (the base along the normal of a plane)
+// each step only halves the distance and leaves a quarter of the residuals. Where the last step did so, the next is
+// taken twice as long, which restores quadratic convergence.
 bool polish_orientation(const FiveRays& a, const FiveRays& b, RelativeOrientation& o) {
   const auto residuals = [&](const RelativeOrientation& at) {
     const Eigen::Matrix3d essential = essential_from(at);
@@ -147,7 +152,7 @@ bool polish_orientation(const FiveRays& a, const FiveRays& b, RelativeOrientatio
     const Eigen::Vector3d first = o.base.unitOrthogonal(), second = o.base.cross(first);
     Eigen::Matrix<double, 5, 5> jacobian;
     for (int i = 0; i < 5; ++i) {
-      // b . (t x R a): by the rotation -(b x t)' R [a]x, by the base t -> (R a x b)'.
+      // Residual b . (t x R a); its derivatives are -(b x t)' R [a]x by the rotation and (R a x b)' by the base.
       const Eigen::Vector3d &p = a[static_cast<std::size_t>(i)], &q = b[static_cast<std::size_t>(i)];
       const Eigen::Vector3d normal = (rotation * p).cross(q);
       jacobian.block<1, 3>(i, 0) = p.cross(rotation.transpose() * q.cross(o.base)).transpose();
@@ -178,6 +183,7 @@ bool polish_orientation(const FiveRays& a, const FiveRays& b, RelativeOrientatio
 
 using EssentialCoefficients = Solutions<Eigen::Vector4d, 10>;  // (x, y, z, 1) up to scale
 
+// The essential matrices by the determinant of degree ten, the fast way.
 EssentialCoefficients by_determinant(const Eigen::Matrix<double, 6, 10>& rows) {
   EssentialCoefficients found;
   const LinearInXy k = equation_from(rows.row(0), rows.row(1)), l = equation_from(rows.row(2), rows.row(3)),
@@ -190,7 +196,8 @@ EssentialCoefficients by_determinant(const Eigen::Matrix<double, 6, 10>& rows) {
   for (const ProjectiveRoot& root : projective_roots(determinant, kMultipleRoot)) {
     if (!(root.denominator > 1e-12)) continue;
     const double z = root.numerator / root.denominator;
-    // (x, y, 1) is perpendicular to the three equations: the longest cross product of two.
+    // (x, y, 1) is perpendicular to the coefficients of all three equations. The longest cross product of two is the
+    // most accurate.
     std::array<Eigen::Vector3d, 3> e;
     for (std::size_t i = 0; i < 3; ++i) {
       const LinearInXy& equation = i == 0 ? k : i == 1 ? l : m;
@@ -206,10 +213,10 @@ EssentialCoefficients by_determinant(const Eigen::Matrix<double, 6, 10>& rows) {
   return found;
 }
 
-// By the eigenvectors of the multiplication with z in the basis x2, xy, y2, xz, yz, z2, x, y, z, 1, to which all cubic
-// monomials are reduced.
+// The essential matrices by eigenvectors. All cubic monomials are reduced to the basis x2, xy, y2, xz, yz, z2, x, y, z,
+// 1; multiplication by z is then a 10 x 10 matrix, whose eigenvectors are the values of the basis at the solutions.
 EssentialCoefficients by_eigenvectors(const ConstraintSystem& system) {
-  // Columns of x3, x2y, xy2, y3, x2z, xyz, y2z, xz2, yz2, z3 and of the basis.
+  // Columns of the cubic monomials x3, x2y, xy2, y3, x2z, xyz, y2z, xz2, yz2, z3 and of the basis in the system.
   static constexpr std::array<int, 10> kCubic = {0, 2, 3, 1, 4, 8, 6, 10, 13, 16},
                                        kRest = {5, 9, 7, 11, 14, 17, 12, 15, 18, 19};
   LeadingBlock cubic, rest;
@@ -226,7 +233,8 @@ EssentialCoefficients by_eigenvectors(const ConstraintSystem& system) {
   const std::optional<GeneralEigen> eigen = general_eigen(times_z);
   if (!eigen) return found;
   for (int i = 0; i < 10; ++i) {
-    // The pair of a double root may come out complex by rounding: its real part is as good a start.
+    // Rounding may turn a double root into a complex pair. The real part is a start that polishing brings to the
+    // solution.
     const std::complex<double> value = eigen->values[i];
     if (!(std::abs(value.imag()) <= kComplexPair * std::abs(value)) || value.imag() < 0) continue;
     found.push_back(eigen->vectors.col(i).tail<4>().real());
@@ -234,7 +242,7 @@ EssentialCoefficients by_eigenvectors(const ConstraintSystem& system) {
   return found;
 }
 
-// One polished orientation of every real essential matrix.
+// One polished orientation for each real essential matrix.
 Solutions<RelativeOrientation, 10> one_of_each(const FiveRays& a, const FiveRays& b) {
   Solutions<RelativeOrientation, 10> found;
   CoplanarityBasis basis;
@@ -254,7 +262,7 @@ Solutions<RelativeOrientation, 10> one_of_each(const FiveRays& a, const FiveRays
   return found;
 }
 
-// The rotation turned by 180 deg about the base.
+// The other rotation of the same essential matrix: turned by 180 degrees about the base.
 RelativeOrientation twin_of(const RelativeOrientation& o) {
   return {Eigen::Quaterniond(0, o.base.x(), o.base.y(), o.base.z()) * o.rotation, o.base};
 }

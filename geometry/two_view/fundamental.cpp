@@ -12,9 +12,10 @@ namespace megablock {
 
 namespace {
 
+// Relative size below which a singular value of the equations counts as zero.
 constexpr double kRankTolerance = 1e-9;
 
-// b' F a as a row of the entries of F, by rows.
+// Coefficients of the elements of F, by rows, in b' F a.
 Eigen::Matrix<double, 1, 9> epipolar_row(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   Eigen::Matrix<double, 1, 9> row;
   row << b.x() * a.transpose(), b.y() * a.transpose(), b.z() * a.transpose();
@@ -52,11 +53,12 @@ Solutions<Eigen::Matrix3d, 3> solve_seven_point(const std::array<Eigen::Vector2d
     equations.col(i) = epipolar_row(*normal_a * a[static_cast<std::size_t>(i)].homogeneous(),
                                     *normal_b * b[static_cast<std::size_t>(i)].homogeneous())
                            .transpose();
-  vectors.bottomRows<2>() << 0.8, 0.6, -0.6, 0.8;  // mixed, so that structured scenes do not lie at infinity
+  // An arbitrary rotation, so that no structured scene has its solution at infinity.
+  vectors.bottomRows<2>() << 0.8, 0.6, -0.6, 0.8;
   const PivotedQr qr = pivoted_qr(equations, vectors);
   if (!(qr.smallest > kRankTolerance * qr.largest)) return found;
   const Eigen::Matrix3d f1 = matrix_from_rows(qr.q_times.col(0)), f2 = matrix_from_rows(qr.q_times.col(1));
-  // det(F1 + s F2): the middle terms by the cofactors.
+  // The coefficients of det(F1 + s F2); the middle ones come from the cofactors.
   const Polynomial<3> cubic = {f1.determinant(), cofactors(f1).cwiseProduct(f2).sum(),
                                cofactors(f2).cwiseProduct(f1).sum(), f2.determinant()};
   for (const ProjectiveRoot& root : projective_roots(cubic)) {
@@ -76,6 +78,7 @@ std::optional<Eigen::Matrix3d> fit_fundamental(std::span<const Eigen::Vector2d> 
   const auto null = equations.null_vector(kRankTolerance);
   if (null.rank < 8) return std::nullopt;
   const SingularValues3 svd = singular_values3(matrix_from_rows(null.vector));
+  // The nearest matrix of rank two in the Frobenius norm.
   Eigen::Vector3d values = svd.values;
   values.z() = 0;
   const Eigen::Matrix3d f = normal_b->transpose() * (svd.u * values.asDiagonal() * svd.v.transpose()) * *normal_a;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kHomographyRank = 1e-9;
 
-// The least squares solution of p . (H a) = 0 for two directions p across each b; of Frobenius norm one.
+// Least-squares solution of p . (H a) = 0 for two directions p perpendicular to each b, with Frobenius norm one.
+// `ray_a` and `ray_b` return the i-th vector.
 template <typename RayA, typename RayB>
 std::optional<Eigen::Matrix3d> algebraic_homography(std::size_t count, const RayA& ray_a, const RayB& ray_b) {
   RowQr<9> equations;
@@ -48,8 +49,9 @@ std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector3d> a
 
 std::optional<Eigen::Matrix3d> solve_four_point_homography(const std::array<Eigen::Vector3d, 4>& a,
                                                            const std::array<Eigen::Vector3d, 4>& b) {
-  constexpr double kOneLine = 1e-9;  // of determinants, against the lengths of their columns
-  // det(A) and det(A) l; the columns of the cofactors are those of the inverse, transposed.
+  constexpr double kOneLine = 1e-9;  // limit of a determinant, relative to the lengths of its columns
+  // Returns det(A) l and det(A) of a_4 = sum l_i a_i, or zeros where three points lie on one line. The columns of the
+  // cofactor matrix are the rows of the inverse times det(A).
   const auto coordinates = [&](const std::array<Eigen::Vector3d, 4>& p, Eigen::Matrix3d& cofactor) {
     Eigen::Matrix3d m;
     m << p[0], p[1], p[2];
@@ -64,7 +66,7 @@ std::optional<Eigen::Matrix3d> solve_four_point_homography(const std::array<Eige
   const Eigen::Vector4d l = coordinates(a, cofactor_a), m = coordinates(b, cofactor_b);
   if (!(l.w() * m.w() != 0)) return std::nullopt;
   const Eigen::Vector3d ratio = m.head<3>().cwiseQuotient(l.head<3>());
-  // All points are taken to positive multiples, the fourth to itself.
+  // H takes a_1 to a_3 to positive multiples of b_1 to b_3 and a_4 to b_4; all signs must agree.
   const double sign = l.w() * m.w() > 0 ? 1 : -1;
   if (!((sign * ratio).minCoeff() > 0) || !ratio.allFinite()) return std::nullopt;
   Eigen::Matrix3d from;

@@ -14,27 +14,28 @@ namespace megablock {
 
 namespace {
 
-constexpr double kFarthest = 75 * kDegree;  // what may be so far from the estimate is open
-constexpr double kHardlyAny = 10;           // exponent, times -2, at which a ray ends
-constexpr double kChosen = 4;               // standard deviations: open_base.h
+constexpr double kFarthest = 75 * kDegree;  // a base that may be this far from the estimate is undetermined
+constexpr double kHardlyAny = 10;           // a ray ends where D S / (S + K) exceeds this
+constexpr double kChosen = 4;               // standard deviations of the errors' part in K, see open_base.h
 constexpr int kRays = 8;
-constexpr double kStep = 0.9, kGrowth = 1.15;  // from place to place, in units of the rays
+constexpr double kStep = 0.9, kGrowth = 1.15;  // step along a ray in units of the ray, and the factor by which it grows
 
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 
 double square(double x) { return x * x; }
 
-// The odds along the directions of the base.
+// The odds of other bases against the estimate.
 class BaseOdds {
  public:
+  // A base, with all that is evaluated there.
   struct Place {
-    RelativeOrientation orientation;               // with the best rotation for its base
-    Eigen::Matrix<double, 3, 2> rotation_by_base;  // along axes_across of the base
-    Eigen::Matrix3d rotation_covariance;           // with the base held
+    RelativeOrientation orientation;               // with the best rotation for this base
+    Eigen::Matrix<double, 3, 2> rotation_by_base;  // derivative of that rotation along axes_across of the base
+    Eigen::Matrix3d rotation_covariance;           // with the base held fixed
     double cost = 0;                               // C
     double told = 0;                               // S / (S + K)
-    double exponent = 0;                           // D S / (S + K)
+    double exponent = 0;                           // D S / (S + K), minus twice the logarithm of the odds
   };
 
   BaseOdds(const RelativeOrientation& estimate, const PointPairs& points, std::span<const double> weights,
@@ -56,7 +57,8 @@ class BaseOdds {
   }
   const Place& estimate() const { return estimate_; }
 
-  // The base turned from the estimate's by these angles along its axes_across; the rotation follows that of `near`.
+  // Evaluates the base that is turned from the estimate by `angles` along axes_across of the estimate. Its rotation is
+  // predicted from the place `near`.
   Place at(const Eigen::Vector2d& angles, const Place& near) const {
     const double angle = angles.norm(), along = angle > 0 ? std::sin(angle) / angle : 1;
     RelativeOrientation o;
@@ -68,7 +70,7 @@ class BaseOdds {
     return place;
   }
 
-  // From the estimate.
+  // Difference of a place from the estimate: rotation vector (3) and turn of the base (2), radians.
   Vector5 difference(const Place& place, const Eigen::Vector2d& angles) const {
     Vector5 e;
     e << rotation_log<double>((estimate_.orientation.rotation.conjugate() * place.orientation.rotation).normalized()),
@@ -79,13 +81,13 @@ class BaseOdds {
  private:
   struct Match {
     Eigen::Vector2d a, b, corrected_a, corrected_b;
-    Eigen::Vector4d m;  // at the estimate
+    Eigen::Vector4d m;  // unit derivative of the residual at the estimate
     double weight;
   };
 
   double tail(double residual) const { return 1 + square(residual / cost_.scale); }
 
-  // After the step of the rotation, all but the exponent.
+  // Improves the rotation by one Newton step and evaluates everything except the exponent.
   Place evaluated(const RelativeOrientation& o) const {
     SampsonEquations equations(o);
     Eigen::Matrix<double, 3, 5> normal = Eigen::Matrix<double, 3, 5>::Zero();
@@ -127,14 +129,15 @@ class BaseOdds {
   double noise_ = 0;  // variance of an image coordinate
 };
 
-// The angle at which the exponent, times -2, is about one in this direction; `about` is a guess. At most kFarthest.
+// The angle in this direction at which D S / (S + K) is about one, at most kFarthest. `about` is a first guess.
 double unit_along(const BaseOdds& odds, const Eigen::Vector2d& direction, double about) {
   constexpr int kRounds = 5;
-  constexpr double kLargest = 10 * kDegree;  // to begin with
+  constexpr double kLargest = 10 * kDegree;  // for the first guess
   double unit = std::min(about, kLargest);
   for (int round = 0; round < kRounds; ++round) {
     const double exponent = odds.at(unit * direction, odds.estimate()).exponent;
-    const double factor = std::cbrt(1 / std::clamp(exponent, 1.0 / 64, 64.0));  // it rises by the 2nd to the 4th power
+    // The exponent rises with the 2nd to 4th power of the angle.
+    const double factor = std::cbrt(1 / std::clamp(exponent, 1.0 / 64, 64.0));
     unit *= factor;
     if (factor > 0.6 && factor < 1.6) break;
     if (unit > kFarthest) return kFarthest;
@@ -142,7 +145,7 @@ double unit_along(const BaseOdds& odds, const Eigen::Vector2d& direction, double
   return unit;
 }
 
-// The sums over a ray; false where it is open.
+// Sums of the second moment over the rays. add_ray() returns false where a ray does not end before kFarthest.
 class Moment {
  public:
   bool add_ray(const BaseOdds& odds, const Eigen::Vector2d& direction) {
@@ -158,7 +161,7 @@ class Moment {
       if (!(angles.norm() < kFarthest)) return false;
       step *= kGrowth;
       const Vector5 e = odds.difference(place, angles);
-      // Of polar coordinates. No place counts for more than the estimate.
+      // The weight is the area in polar coordinates times the odds. No base may count for more than the estimate.
       const double weight = distance * 0.5 * (distance + step - last) * std::exp(-0.5 * std::max(0.0, place.exponent));
       sum_.noalias() += weight * e * e.transpose();
       weights_ += weight;

@@ -18,11 +18,11 @@ namespace megablock {
 
 namespace {
 
-// Pairs that local optimisation looks at, at most: its cost stays that of a few draws, its loss of accuracy is below
-// the threshold's.
+// Largest number of pairs in a local optimisation. It keeps its cost at that of a few draws; the loss of accuracy is
+// small against the threshold.
 constexpr std::size_t kLocalPairs = 128;
 
-// Inliers, evenly taken from all, in place.
+// A selection of inliers, evenly spaced, held in place.
 template <typename Vector>
 struct LocalPairs {
   std::array<Vector, kLocalPairs> a, b;

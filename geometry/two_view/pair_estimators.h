@@ -1,6 +1,5 @@
-// Estimators of ransac.h for two images: their models, samples and residuals. Points are normalised image points, so
-// residuals are in pixels over the focal length, and the accuracy of an image coordinate is that of a residual
-// component.
+// Estimators that ransac.h uses for pairs of images. Points are normalised image points (X/Z, Y/Z), so residuals are in
+// units of the focal length, and one residual component has the standard deviation of an image coordinate.
 //
 //     FivePointEstimator      relative orientation        5 matches   Sampson distance, points in front of both
 //     VerticalPairEstimator   the same, verticals known   3 matches   the same; refined with free verticals
@@ -8,7 +7,8 @@
 //     RotationPairEstimator   one centre, x_b ~ R x_a     2 matches   distance in b
 //     FundamentalEstimator    not calibrated              7 matches   Sampson distance
 //
-// Wrong matches are taken to lie anywhere in the box of the points of b. They keep references to the points.
+// An outlier is taken to lie anywhere in the bounding box of the points of b. The estimators keep references to the
+// points.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -20,11 +20,13 @@
 
 namespace megablock {
 
-// Shares of the image of b that lie within a distance of a line through it, and of a point.
+// Share of the image of b that lies within a distance of a line or of a point: the probability that an outlier agrees
+// with a model.
 class ImageShares {
  public:
   explicit ImageShares(const PointPairs& points);
-  // A line that a Sampson distance r leaves is at most sqrt(2) r away, where both images have equal parts in it.
+  // A match with the Sampson distance r is at most sqrt(2) r away from its epipolar line; the limit is reached where
+  // both images contribute equally. The line is taken as long as the diagonal.
   double near_line(double sampson) const;
   double near_point(double distance) const;
 
@@ -32,23 +34,25 @@ class ImageShares {
   double area_ = 0, diagonal_ = 0;
 };
 
-// What five points and three with verticals share.
+// Common part of the estimators for five points and for three points with verticals.
 class OrientationEstimator {
  public:
   using Model = RelativeOrientation;
-  // `parallel`: rays closer to parallel than this count as in front [rad]; the threshold of the residuals, or the
-  // largest one. `spacing`: least distance between the points of a sample in the image a.
+  // `parallel` (radians) is the threshold of the residuals, or the largest one: points whose rays are closer to
+  // parallel count as in front, because errors decide their sign. `spacing` is the least distance in image a between
+  // points of a sample.
   OrientationEstimator(const PointPairs& points, double parallel, double spacing = 0)
       : points_(&points), shares_(points), parallel_(parallel), spacing_(spacing) {}
   std::size_t size() const { return points_->size(); }
   double chance(double residual) const { return shares_.near_line(residual); }
 
-  // Squared Sampson distance; infinite for a point behind an image.
+  // Squared Sampson distance; infinite for a point behind an image. The depth test is left out where the residual alone
+  // excludes the point.
   struct Residuals {
     const PointPairs& points;
     Eigen::Matrix3d essential, rotation;
     Eigen::Vector3d base;
-    double limit;  // parallel^2; beyond it nothing need be in front
+    double limit;  // parallel^2; above it the depths are not tested
     double operator()(std::size_t i) const;
   };
   Residuals squared_residuals(const RelativeOrientation& o) const;
@@ -77,7 +81,7 @@ class FivePointEstimator : public OrientationEstimator {
 class VerticalPairEstimator : public OrientationEstimator {
  public:
   static constexpr std::size_t kSampleSize = 3;
-  // Unit, both up or both down, in the axes of their images.
+  // Unit vectors in camera axes, both up or both down.
   VerticalPairEstimator(const PointPairs& points, double parallel, const Eigen::Vector3d& vertical_a,
                         const Eigen::Vector3d& vertical_b, double spacing = 0)
       : OrientationEstimator(points, parallel, spacing), vertical_a_(vertical_a), vertical_b_(vertical_b) {}
@@ -101,7 +105,7 @@ class HomographyEstimator {
     double operator()(std::size_t i) const;
   };
   Residuals squared_residuals(const Eigen::Matrix3d& h) const { return {*points_, h}; }
-  // As fit_homography has it: of rays, scaled.
+  // Least squares over inliers, by fit_homography: of rays, scaled as there.
   std::optional<Eigen::Matrix3d> refine(const Eigen::Matrix3d& h, double threshold) const;
 
  private:
@@ -148,7 +152,8 @@ class FundamentalEstimator {
   ImageShares shares_;
 };
 
-// Squared Sampson distance of a match; matrix essential or fundamental.
+// Squared Sampson distance of a match: n^2 / d with n = b' E a and d the sum of the squared first two elements of E a
+// and E' b. The matrix may be essential or fundamental.
 inline double squared_sampson(const Eigen::Matrix3d& e, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const double bx = e(0, 0) * a.x() + e(0, 1) * a.y() + e(0, 2), by = e(1, 0) * a.x() + e(1, 1) * a.y() + e(1, 2),
                bz = e(2, 0) * a.x() + e(2, 1) * a.y() + e(2, 2);

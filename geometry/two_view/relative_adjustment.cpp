@@ -12,7 +12,7 @@ namespace megablock {
 
 namespace {
 
-// Of the base's direction: where least squares give more than that, their curvature may tell little.
+// Standard deviation of the base (radians) above which the curvature may misrepresent it; then open_base.h decides.
 constexpr double kLinear = 0.5 * kDegree;
 
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
@@ -24,7 +24,8 @@ struct NormalEquations {
   double cost = 0;
 };
 
-// Geman-McClure: rho(r) = r^2 / (1 + r^2/s^2), weight 1 / (1 + r^2/s^2)^2; its reach is about 3 s.
+// Normal equations with the Geman-McClure loss rho(r) = r^2 / (1 + r^2/s^2) and its weight 1 / (1 + r^2/s^2)^2.
+// Residuals above about 5 s have no influence any more.
 NormalEquations normal_equations(const RelativeOrientation& o, const PointPairs& points, double scale,
                                  std::size_t stride, std::span<const double> weights) {
   SampsonEquations equations(o);
@@ -50,8 +51,10 @@ RelativeOrientation updated(const RelativeOrientation& o, const Vector5& step) {
   return {rotation_update(o.rotation, step.head<3>()), (o.base + axes_across(o.base) * step.tail<2>()).normalized()};
 }
 
+// Covariance from a normal matrix and the variance of a residual.
 OrientationPrecision precision_from(const Matrix5& normal, double variance) {
-  constexpr double kOpen = 1 / (std::numbers::pi * std::numbers::pi);  // weight of a direction that is open
+  // Weight of an undetermined direction: sigma = pi.
+  constexpr double kOpen = 1 / (std::numbers::pi * std::numbers::pi);
   OrientationPrecision result;
   result.sigma = std::sqrt(variance);
   const SymmetricEigen eigen = symmetric_eigen(normal / variance);
@@ -84,6 +87,7 @@ RelativeOrientation adjust_orientation(const RelativeOrientation& start, const P
   RelativeOrientation o = start;
   NormalEquations current = normal_equations(o, points, by.scale, stride, weights);
   double damping = 1e-6;
+  // Levenberg-Marquardt; the small multiple of the trace keeps the matrix regular where the base is undetermined.
   for (int iteration = 0; iteration < by.max_iterations; ++iteration) {
     Matrix5 damped = current.normal;
     damped.diagonal() *= 1 + damping;
@@ -107,7 +111,7 @@ RelativeOrientation adjust_orientation(const RelativeOrientation& start, const P
 
 std::vector<double> leverage_weights(const RelativeOrientation& orientation, const PointPairs& points,
                                      std::span<const std::uint8_t> inlier) {
-  constexpr double kMost = 3;  // times the median
+  constexpr double kMost = 3;  // limit, as a multiple of the median leverage
   SampsonEquations equations(orientation);
   std::vector<Vector5> derivatives(points.size(), Vector5::Zero());
   Matrix5 normal = Matrix5::Zero();
@@ -116,6 +120,7 @@ std::vector<double> leverage_weights(const RelativeOrientation& orientation, con
     derivatives[i] = equations.derivative();
     normal.noalias() += derivatives[i] * derivatives[i].transpose();
   }
+  // A small diagonal keeps the factorisation regular where a direction is undetermined.
   normal.diagonal().array() += 1e-12 * normal.trace();
   const Eigen::LDLT<Matrix5> factor(normal);
   std::vector<double> weights(points.size(), 0), leverages;
@@ -153,11 +158,14 @@ OrientationPrecision precision_of(const RelativeOrientation& orientation, const 
     count += weight;
   }
   if (!(count >= 6) || !(slopes > 0)) return {};
+  // Huber's estimate of the variance: mean(psi^2) / mean(psi')^2, corrected for the five unknowns.
   const double variance = std::max(min_sigma * min_sigma, squares * count / (slopes * slopes) * count / (count - 5));
   const Matrix5 with_noise = normal;
   normal.bottomRightCorner<2, 2>() -= variance * noise;
   OrientationPrecision result = precision_from(normal, variance);
   if (result.base_sigma() <= kLinear) return result;
+  // A rough covariance of the base tells the search how far to look. The normal matrix before the correction gives one
+  // that is always positive.
   const Eigen::Matrix2d about = precision_from(with_noise, variance).covariance.bottomRightCorner<2, 2>();
   if (!about.allFinite()) return result;
   std::vector<double> of_inliers(points.size(), 0);

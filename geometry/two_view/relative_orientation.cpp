@@ -43,6 +43,7 @@ double mean_depth(const RelativeOrientation& o, std::span<const Eigen::Vector3d>
   return sum / static_cast<double>(a.size());
 }
 
+// Support of a candidate: the sum of 1 - (r / threshold)^2 over inliers in front of both images, or with parallel rays.
 namespace {
 
 struct SupportOfOrientation {
@@ -79,6 +80,7 @@ std::optional<ChosenOrientation> choose_orientation(std::span<const RelativeOrie
                                                     std::span<const Eigen::Vector3d> b, const OrientationChoice& by) {
   const RelativeOrientation *best = nullptr, *second = nullptr;
   SupportOfOrientation of_best, of_second;
+  // Equal support (to one per cent) leaves the choice to the depths; otherwise more support wins.
   const auto better = [&](const SupportOfOrientation& p, const SupportOfOrientation& q) {
     const bool same = std::abs(p.support - q.support) <= 0.01 * std::max(p.support, q.support);
     const bool p_far = p.depth >= by.min_mean_depth, q_far = q.depth >= by.min_mean_depth;

@@ -1,14 +1,15 @@
-// Relative orientation of two images: what its solvers share.
+// Relative orientation of two images: the type, and what all of its solvers need.
 //
 //     X_b = R X_a + t,  |t| = 1:    E = [t]x R,    b' E a = 0    for the rays a, b of one point (coplanarity)
 //
-// An essential matrix has four orientations: t and -t, R and its twin, turned by 180 deg about t. With |t| = 1
+// An essential matrix belongs to four orientations: with t or -t, and with R or its twin, which is turned by 180
+// degrees about t. With |t| = 1
 //
 //     R = cof(E) - [t]x E,    twin: cof(E) + [t]x E                        (cof([t]x) = t t')
 //
-// (B. K. P. Horn, "Relative orientation", IJCV 4, 1990), t being the longest cross product of two columns of E. Which
-// one is meant the points tell: they lie in front of both images. For a ray pair, with u = R a and n = b x u, the
-// depths along the rays are  -n.(b x t) / n.n  and  n.(t x u) / n.n.
+// (B. K. P. Horn, "Relative orientation", IJCV 4, 1990). t is the longest cross product of two columns of E. The right
+// one of the four has the points in front of both images. For a pair of rays, with u = R a and n = b x u, the depths
+// along the rays are -n.(b x t) / n.n in a and n.(t x u) / n.n in b.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,11 +28,12 @@ struct RelativeOrientation {
   Eigen::Vector3d base = Eigen::Vector3d::UnitX();               // t: centre of a in the axes of b, unit
 };
 
+// E = [t]x R.
 inline Eigen::Matrix3d essential_from(const RelativeOrientation& o) {
   return skew<double>(o.base) * o.rotation.toRotationMatrix();
 }
 
-// Cofactors: the columns are cross products of the columns of m.
+// Matrix of cofactors, det(m) m^-T; its columns are cross products of the columns of m.
 inline Eigen::Matrix3d cofactors(const Eigen::Matrix3d& m) {
   Eigen::Matrix3d c;
   c.col(0) = m.col(1).cross(m.col(2));
@@ -40,15 +42,15 @@ inline Eigen::Matrix3d cofactors(const Eigen::Matrix3d& m) {
   return c;
 }
 
-// (R, t), (R, -t), (twin, t), (twin, -t). Of a matrix that is not quite essential approximately those of the nearest
-// one. Empty for a matrix of rank one or zero or with what is not a number.
+// Returns (R, t), (R, -t), (twin, t), (twin, -t). For a matrix that is not exactly essential, the result is close to
+// that of the nearest essential matrix. Empty for a matrix of rank zero or one and for input that is not finite.
 Solutions<RelativeOrientation, 4> orientations_of_essential(const Eigen::Matrix3d& essential);
 
-// The essential matrix nearest to m (singular values s, s, 0 with s = 1/sqrt(2)): of the sum of squares.
+// Essential matrix nearest to m in the Frobenius norm, scaled to the singular values s, s, 0 with s = 1/sqrt(2).
 Eigen::Matrix3d nearest_essential(const Eigen::Matrix3d& m);
 
-// Distances along the rays (in units of the base) to where they are nearest one another; times sin^2 of the angle
-// between them, so that parallel rays give zeros rather than infinities.
+// Depths of a point along its rays in units of the base, multiplied by the squared sine of the angle between the rays.
+// Parallel rays thus give zeros instead of infinities.
 struct ScaledDepths {
   double a, b, sine_squared;
 };
@@ -58,7 +60,7 @@ inline ScaledDepths scaled_depths(const Eigen::Matrix3d& rotation, const Eigen::
   return {-n.dot(ray_b.cross(base)), n.dot(base.cross(u)), n.squaredNorm()};
 }
 
-// Whether all points lie in front of both images.
+// Returns whether all points lie in front of both images.
 template <typename Rays>
 bool all_in_front(const RelativeOrientation& o, const Rays& a, const Rays& b) {
   const Eigen::Matrix3d rotation = o.rotation.toRotationMatrix();
@@ -69,25 +71,26 @@ bool all_in_front(const RelativeOrientation& o, const Rays& a, const Rays& b) {
   return true;
 }
 
-// Mean depth of the points in image a, in units of the base.
+// Mean distance of the points from the centre of image a, in units of the base. `a` need not be unit vectors.
 double mean_depth(const RelativeOrientation& o, std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b);
 
-// Distance of a ray pair from the nearest one that is coplanar with the base, to first order (Sampson), radians: both
-// rays move across themselves.
+// Sampson distance of a pair of rays: the angle, to first order, by which both rays together must move to become
+// coplanar with the base. Radians.
 inline double coplanarity_residual(const Eigen::Matrix3d& essential, const Eigen::Vector3d& ray_a,
                                    const Eigen::Vector3d& ray_b) {
   const Eigen::Vector3d in_b = essential * ray_a, in_a = essential.transpose() * ray_b;
   const double n = ray_b.dot(in_b);
-  // The components along the rays (n itself, for unit rays) do not move them.
+  // A movement of a ray along itself changes nothing, so the components along the rays (n, for unit rays) are
+  // subtracted.
   return n / std::sqrt(in_a.squaredNorm() + in_b.squaredNorm() - 2 * n * n);
 }
 
-// Choice among the solutions of a minimal problem by two images alone (Kalantari 2009, M41): of the candidates whose
-// supporting points lie in front of both images, the one with most support, a point giving 1 - (r / threshold)^2 where
-// its residual r is below `threshold` [rad] and it lies in front (or its rays are parallel to within the threshold).
-// Candidates whose support is the same to a hundredth are told apart by the mean depth of these points: below
-// `min_mean_depth` bases the axes would converge strongly, which wrong solutions do. The second best is the twin that a
-// plane leaves open when it has more than 95 % of the support.
+// Chooses among the solutions of a minimal problem, with two images alone (Kalantari 2009, chapter 7). A point supports
+// a candidate with 1 - (r / threshold)^2 if its residual r is below `threshold` (radians) and it lies in front of both
+// images (or its rays are parallel to within the threshold). The candidate with most support wins. Candidates with
+// equal support, to one per cent, are told apart by the mean depth of these points: wrong solutions tend to have
+// strongly converging axes and points closer than `min_mean_depth` bases. The second best candidate is returned as the
+// twin, which a plane leaves possible, if it has more than 95 % of the best support. Empty if no candidate has support.
 struct ChosenOrientation {
   RelativeOrientation orientation;
   double support = 0;
@@ -95,8 +98,8 @@ struct ChosenOrientation {
   std::optional<RelativeOrientation> twin;
 };
 struct OrientationChoice {
-  double threshold = 1e-3;    // rad, of the coplanarity residual
-  double min_mean_depth = 1;  // in bases; 0: close-range images whose axes converge strongly are as likely
+  double threshold = 1e-3;    // of the coplanarity residual, radians
+  double min_mean_depth = 1;  // in bases; 0 where strongly converging close-range images are as likely
 };
 std::optional<ChosenOrientation> choose_orientation(std::span<const RelativeOrientation> candidates,
                                                     std::span<const Eigen::Vector3d> a,

@@ -1,11 +1,13 @@
-// Rotation between two images from one centre (or of points very far away): two rays in each, b = R a. One solution.
+// Rotation between two images with a common centre (or of very distant points) from two rays in each, b = R a. There is
+// one solution.
 //
-// Each pair spans the axes: bisector, normal, and what completes them. That shares the misfit of the angle between the
-// two rays, as least squares over both does (rotation_fit.h takes more than two). H. D. Black, "A passive system for
-// determining the attitude of a satellite", AIAA Journal 2(7), 1964, has axes from two directions; both alike: F. L.
-// Markley, "Attitude determination using two vector measurements", Flight Mechanics Symposium, NASA, 1999.
+// Each pair of rays spans an orthonormal system: their bisector, their normal, and the third axis. To turn one system
+// onto the other shares the misfit between both rays, as least squares does (rotation_fit.h takes more than two rays).
+// Axes from two directions: H. D. Black, "A passive system for determining the attitude of a satellite", AIAA Journal
+// 2(7), 1964; with equal weights: F. L. Markley, "Attitude determination using two vector measurements", Flight
+// Mechanics Symposium, NASA, 1999.
 //
-// Degenerate: two rays along one line; the nearer they are, the less certain is the turn about them.
+// Degenerate case: two rays on one line. The closer they are to it, the less certain is the rotation about them.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,11 +16,13 @@
 
 namespace megablock {
 
-// Unit rays; empty where the two of an image are on one line within a microradian, or something is not a number.
+// Takes unit rays and returns the rotation a -> b. Empty where two rays of an image are on one line within a
+// microradian, and for input that is not finite.
 inline std::optional<Eigen::Quaterniond> solve_rotation_pair(const Eigen::Vector3d& a1, const Eigen::Vector3d& a2,
                                                              const Eigen::Vector3d& b1, const Eigen::Vector3d& b2) {
   const auto axes = [](const Eigen::Vector3d& first, const Eigen::Vector3d& second) {
-    // Sum and difference of unit vectors are perpendicular; the shorter of both is the less accurate.
+    // The sum and the difference of unit vectors are perpendicular. The longer of the two is used, as it is more
+    // accurate.
     const Eigen::Vector3d sum = first + second, difference = second - first;
     Eigen::Matrix3d m;
     m.col(1) = first.cross(second).normalized();

@@ -1,12 +1,14 @@
-// Residuals of P. D. Sampson, "Fitting conic sections to 'very scattered' data", CGIP 18, 1982, for the coplanarity of
-// matches, and their derivatives by a relative orientation.
+// The Sampson residual of a match for a relative orientation, with its derivatives (P. D. Sampson, "Fitting conic
+// sections to 'very scattered' data", CGIP 18, 1982). It needs no object point, so an adjustment has only five
+// unknowns.
 //
 //     E = [t]x R,  n = x_b' E x_a,  d = |(E x_a)_{1,2}|^2 + |(E' x_b)_{1,2}|^2,  r = n / sqrt(d)   (Sampson)
 //
-// for normalised image points x (X/Z, Y/Z, 1). r is the distance of the match from the nearest one that satisfies the
-// coplanarity equation, to first order; its standard deviation is that of an image coordinate. Unknowns: increment w of
-// the rotation, R Exp(w) (rotation.h), and the base t on the unit sphere, along two axes p across it. With u = R x_a,
-// the epipolar lines l_b = E x_a and l_a = E' x_b, and l' the vectors with a zero as third component
+// for normalised image points x = (X/Z, Y/Z, 1). To first order r is the distance of the match from the nearest one
+// that satisfies the coplanarity equation n = 0; its standard deviation is that of an image coordinate. The unknowns
+// are the increment w of the rotation, R Exp(w) (rotation.h), and the base t on the unit sphere, along two axes p
+// across it. With u = R x_a, the epipolar lines l_b = E x_a and l_a = E' x_b, and l' a line with its third element set
+// to zero,
 //
 //     dn/dw = x_a x l_a,        (dd/dw)/2 = x_a x E' l_b' + l_a' x l_a,
 //     dn/dp = p . (u x x_b),    (dd/dp)/2 = p . (u x l_b' - x_b x R l_a').
@@ -19,13 +21,14 @@
 
 namespace megablock {
 
+// The residual r alone.
 inline double sampson_residual(const Eigen::Matrix3d& essential, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector3d line_b = essential * a.homogeneous(), line_a = essential.transpose() * b.homogeneous();
   const double d = line_b.head<2>().squaredNorm() + line_a.head<2>().squaredNorm();
   return b.homogeneous().dot(line_b) / std::sqrt(d);
 }
 
-// Two unit axes across the base.
+// Two unit axes perpendicular to the base, as columns. They are the tangent plane in which the base moves.
 inline Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base) {
   Eigen::Matrix<double, 3, 2> axes;
   axes.col(0) = base.unitOrthogonal();
@@ -33,7 +36,7 @@ inline Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& base) {
   return axes;
 }
 
-// Residual of a pair with its derivatives.
+// The residual of a match and its derivatives.
 class SampsonEquations {
  public:
   explicit SampsonEquations(const RelativeOrientation& o)
@@ -41,7 +44,7 @@ class SampsonEquations {
         essential_(skew<double>(o.base) * rotation_),
         across_(axes_across(o.base)) {}
 
-  // False where the residual is not defined.
+  // Evaluates the residual of a match. Returns false where it is not defined (both points in the epipoles).
   bool at(const Eigen::Vector2d& point_a, const Eigen::Vector2d& point_b) {
     a_ = point_a.homogeneous();
     b_ = point_b.homogeneous();
@@ -55,13 +58,14 @@ class SampsonEquations {
   }
   double residual = 0;
 
-  // Of the residual by b's and a's coordinates, to first order: a unit vector.
+  // Derivative of the residual by the coordinates of b, then of a, to first order; a unit vector.
   Eigen::Vector4d by_points() const {
     Eigen::Vector4d normal;
     normal << line_b_.head<2>(), line_a_.head<2>();
     return normal / std::sqrt(square_);
   }
 
+  // Derivative by w (3) and by the base along axes_across (2): d(n / sqrt(d)) = (dn - (n / d) (dd / 2)) / sqrt(d).
   Eigen::Matrix<double, 5, 1> derivative() const {
     const Eigen::Vector3d flat_b(line_b_.x(), line_b_.y(), 0), flat_a(line_a_.x(), line_a_.y(), 0);
     const Eigen::Vector3d turned = rotation_ * a_;
@@ -75,8 +79,8 @@ class SampsonEquations {
     return j;
   }
 
-  // What the errors of both points add to the square of the derivative by the base, over those of a coordinate: the
-  // parallax that determines the base has the points' own errors in it, and without a base nothing else.
+  // Contribution of the errors of both points to the squared derivative by the base, for an image coordinate of
+  // variance one. The parallax that determines the base contains these errors; without a base it contains nothing else.
   Eigen::Matrix2d base_noise() const {
     const Eigen::Matrix<double, 2, 3> in_b = skew<double>(rotation_ * a_).topRows<2>(),
                                       in_a = rotation_.leftCols<2>().transpose() * skew<double>(b_);

@@ -10,15 +10,17 @@ namespace megablock {
 
 namespace {
 
-constexpr double kSameRay = 1e-20;   // squared distance of unit vectors
-constexpr double kFulfilled = 1e-6;  // sine of a ray's angle from the plane of the base and its other ray
+constexpr double kSameRay = 1e-20;   // squared distance of unit vectors that count as equal
+constexpr double kFulfilled = 1e-6;  // sine of the angle between a ray and the plane of base and other ray
 
+// Whether two of the rays coincide, or one is not finite.
 bool any_same(const std::array<Eigen::Vector3d, 3>& rays) {
   return !((rays[0] - rays[1]).squaredNorm() > kSameRay && (rays[1] - rays[2]).squaredNorm() > kSameRay &&
            (rays[2] - rays[0]).squaredNorm() > kSameRay);
 }
 
-// The quartic det(c_1, c_2, c_3) / (1 + s^2) of levelled rays.
+// The quartic det(c_1, c_2, c_3) / (1 + s^2) for levelled rays. Polynomial division by 1 + s^2 needs only differences
+// of coefficients.
 Polynomial<4> turn_quartic(const std::array<Eigen::Vector3d, 3>& a, const std::array<Eigen::Vector3d, 3>& b) {
   std::array<std::array<Polynomial<2>, 3>, 3> c;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -62,10 +64,10 @@ Solutions<RelativeOrientation, 4> solve_vertical_pair(const std::array<Eigen::Ve
     for (const Eigen::Vector3d& other : {Eigen::Vector3d(c1.cross(c2)), Eigen::Vector3d(c2.cross(c0))})
       if (other.squaredNorm() > base.squaredNorm()) base = other;
     const double length = base.norm();
-    // Of the order of the sine of the angle between two epipolar planes times two parallaxes.
+    // The length is of the order of the sine of the angle between two epipolar planes times two parallaxes.
     if (!(length > 1e-15)) continue;
     base /= length;
-    // Where all rows are parallel, their cross products are those of their errors.
+    // If all rows are parallel, their cross products contain only errors.
     if (!(std::max({std::abs(base.dot(c0)), std::abs(base.dot(c1)), std::abs(base.dot(c2))}) < kFulfilled)) continue;
     int front = 0, behind = 0;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -19,7 +19,7 @@ std::optional<ImageLine> fit_image_line(std::span<const Eigen::Vector2d> points,
     c += e.y() * e.y();
   }
   const double elongation = (a - c) * (a - c) + b * b;
-  // Points that scatter alike in all directions, as those of one place do, have no direction.
+  // Points that scatter equally in all directions, or that coincide, have no direction.
   if (!centre.allFinite() || !std::isfinite(elongation) || !(elongation > 1e-12 * (a + c) * (a + c)) ||
       !(a + c > 1e-24 * centre.squaredNorm()))
     return std::nullopt;
@@ -41,7 +41,8 @@ ImageLine line_about(const ImageLine& line, const Eigen::Vector2d& origin) {
 
 LinePoints independent_points(const ImageLine& line) {
   const Eigen::Matrix2d& c = line.covariance;
-  // The place where the line is known best, and the distance from it at which the turn doubles the variance.
+  // `middle` is where on the line its position across is most certain (the minimum of the variance along the line). At
+  // the distance `half` from it, the uncertainty of the direction doubles the variance.
   const double middle = -c(0, 1) / c(0, 0), variance = std::max(0.0, c(1, 1) - c(0, 1) * c(0, 1) / c(0, 0));
   const double half = std::sqrt(variance / c(0, 0));
   const Eigen::Vector2d foot = line.rho * line.across();

@@ -57,7 +57,7 @@ std::optional<InterpretationPlane> interpretation_plane(const ImageLine& line, c
 }
 
 AxisDirection seen_from(const AxisDirection& axis, const PerspectiveCentre& from, const PerspectiveCentre& to) {
-  // The point of the image, homogeneous about the other centre.
+  // Homogeneous coordinates of the vanishing point about the other centre.
   Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
   map.topLeftCorner<2, 2>() *= from.distance;
   map.topRightCorner<2, 1>() = from.centre - to.centre;

@@ -1,19 +1,20 @@
-// The plane through a perspective centre and a line of the image, by its unit normal (Kalantari 2009, M32, M34).
+// The interpretation plane of a line in an image: the plane through a perspective centre and the line, given by its
+// unit normal with covariance (Kalantari 2009, chapter 6).
 //
-// All planes of lines that are parallel in space hold their common direction V: V'N = 0. This is so for any centre on
-// the normal of the image plane, as the planes of lines that meet in a vanishing point P hold the line to P wherever
-// they come from; so neither the focal length nor the principal point is needed to find P. For a centre at the distance
-// D over `centre` (x right, y down, the image plane at z = D), with the line rho = -x sin(theta) + y cos(theta) about
-// `centre`:
+// The planes of parallel lines all contain their common direction V, so V'N = 0. This holds for every centre on a
+// perpendicular to the image plane: lines that meet in a vanishing point P have planes that contain the line from the
+// centre to P, wherever the centre is. So neither the focal length nor the principal point is needed to find P. For a
+// centre at the distance D above the image point `centre` (x right, y down, image plane at z = D) and a line rho = -x
+// sin(theta) + y cos(theta) about `centre`:
 //
 //     N = (-D sin(theta), D cos(theta), -rho) / s,   s = sqrt(D^2 + rho^2)
 //     dN / d(theta, rho) = | -D cos(theta) / s    D rho sin(theta) / s^3 |
 //                          | -D sin(theta) / s   -D rho cos(theta) / s^3 |
 //                          |  0                  -D^2 / s^3              |
 //
-// With D = focal length and `centre` = principal point the axes are the camera's. Cameras of any model give planes by
-// the rays to the two ends of a segment, N = a x b / |a x b|. A normal's covariance has rank two: a unit vector has no
-// error along itself.
+// If D is the focal length and `centre` the principal point, the axes are those of the camera. For other camera models
+// the plane comes from the rays a, b to two points of the line: N = a x b / |a x b|. The covariance of a normal has
+// rank two, since a unit vector has no error along itself.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,40 +25,43 @@
 
 namespace megablock {
 
-// Where planes start from: a distance over a place of the image, px.
+// A perspective centre: its foot in the image and its distance from the image plane, both in pixels.
 struct PerspectiveCentre {
   Eigen::Vector2d centre;
   double distance = 1;
 };
-// Of an image about whose camera nothing is known: the larger side over the middle. Nearer, normals meet the image at
-// grazing angles; farther, all planes are nearly parallel to it.
+// The centre for an image of an unknown camera: as high above the middle as the longer side. Closer centres let normals
+// meet the image at grazing angles; more distant ones make all planes nearly parallel to the image.
 PerspectiveCentre perspective_centre(int width, int height);
 
+// Unit normal and its covariance (rank two).
 struct InterpretationPlane {
   Eigen::Vector3d normal;
   Eigen::Matrix3d covariance;
 };
 
+// The plane of a line for a given centre.
 InterpretationPlane interpretation_plane(const ImageLine& line, const PerspectiveCentre& from);
 
-// Of the rays to two points, with their covariances (geometry/camera/camera.h: RayJacobian). Empty for one and the same
-// ray.
+// The plane of the rays to two points, with the covariances of the rays (see RayJacobian in geometry/camera/camera.h).
+// Empty where both rays are the same.
 std::optional<InterpretationPlane> interpretation_plane(const Eigen::Vector3d& a, const Eigen::Matrix3d& a_covariance,
                                                         const Eigen::Vector3d& b, const Eigen::Matrix3d& b_covariance);
 
-// Of a line in an image of this camera, by its independent points. Empty where the model has no rays.
+// The plane of a line in an image of this camera, from its two independent points. Empty where the camera model has no
+// ray for one of them.
 std::optional<InterpretationPlane> interpretation_plane(const ImageLine& line, const Intrinsics& camera);
 
-// A unit vector, or its negative: what lines of one direction have in common.
+// The common direction of parallel lines: a unit vector of undefined sign.
 struct AxisDirection {
   Eigen::Vector3d direction;
   Eigen::Matrix3d covariance;  // of rank two
 };
 
-// The direction as seen from another centre: that of the camera, above all, once it is known.
+// The direction as seen from another centre, for example from that of the camera once it is known.
 AxisDirection seen_from(const AxisDirection& axis, const PerspectiveCentre& from, const PerspectiveCentre& to);
 
-// The vanishing point in the image; empty at infinity.
+// The vanishing point of the direction in the image, in pixels. Empty at infinity.
 struct ImagePoint {
   Eigen::Vector2d pixel;
   Eigen::Matrix2d covariance;

@@ -15,16 +15,19 @@ namespace megablock {
 
 namespace {
 
+// |K - H| - |K|, in the form that does not cancel (see the head of vanishing_circles.h).
 double circle_residual(const Eigen::Vector2d& centre, const Eigen::Vector2d& foot) {
   return (foot.squaredNorm() - 2 * centre.dot(foot)) / ((centre - foot).norm() + centre.norm());
 }
 
-// A vanishing point P = e / c by the direction e = (cos phi, sin phi) from the origin and the inverse c of its
-// distance, which passes zero where P passes through infinity. With u = c |H|^2 - e'H and g = e - 2 c H, |g|^2 = 1 + 4
-// c u, the residual is 2 u / (|g| + 1), up to the sign of c, and d(residual) = (du - residual^2 dc) / |g|.
+// A vanishing point P = e / c, given by its direction e = (cos phi, sin phi) from the origin and the inverse c of its
+// distance, which passes through zero where P passes through infinity. With u = c |H|^2 - e'H and g = e - 2 c H, where
+// |g|^2 = 1 + 4 c u, the residual is 2 u / (|g| + 1), up to the sign of c; its differential is (du - residual^2
+// dc) / |g|.
 //
-// By (theta, rho) of the line, H = rho (-sin theta, cos theta): a foot near its vanishing point moves along the circle
-// when the line turns, farther than the circle is straight, so that a tangent there would mislead.
+// The observations are (theta, rho) of the line, with H = rho (-sin theta, cos theta). Where a foot is close to its
+// vanishing point, a turn of the line moves it along the circle by more than the range in which the circle is straight;
+// a covariance of H would be misleading.
 struct CircleEquation {
   static constexpr int kUnknowns = 2, kEquations = 1, kMeasurements = 2, kConstraints = 0;
   using State = Eigen::Vector2d;  // phi, c
@@ -40,6 +43,7 @@ struct CircleEquation {
   }
   void move(State& state, const Eigen::Vector2d& step) const { state += step; }
 
+  // P in pixels, and P with its covariance propagated from (phi, c).
   static Eigen::Vector2d pixel(const State& state) {
     return Eigen::Vector2d(std::cos(state(0)), std::sin(state(0))) / state(1);
   }
@@ -51,8 +55,9 @@ struct CircleEquation {
   }
 };
 
-// Null vector (w, w P) of rows [|H|^2, -H'], each over the sigma that the line's own errors give |H|^2 - P'H for the P
-// before; the first time over |H|, so that the residual is rho - n'P, a distance. Result: the state of CircleEquation.
+// Algebraic fit: the null vector (w, w P) of the rows [|H|^2, -H']. Each row is divided by the standard deviation that
+// the errors of the line give |H|^2 - P'H with the previous P. In the first round it is divided by |H|, which makes the
+// residual the distance rho - n'P. Returns the state of CircleEquation.
 std::optional<Eigen::Vector2d> null_vector_fit(std::span<const LineFoot> feet, int rounds) {
   if (feet.size() < 2) return std::nullopt;
   double size = 0;
@@ -81,11 +86,12 @@ std::optional<Eigen::Vector2d> null_vector_fit(std::span<const LineFoot> feet, i
   return Eigen::Vector2d(std::atan2(solution(2), solution(1)), solution(0) / away / size);
 }
 
-// Closer, a line may pass on either side of the origin (M35).
+// A line closer to the origin than this may pass on either side of it, and then its foot is meaningless.
 bool is_clear_of_origin(const ImageLine& line) {
   return std::abs(line.rho) > 3 * std::sqrt(std::max(0.0, line.covariance(1, 1)));
 }
 
+// Feet of the lines that are clear of the origin.
 std::vector<LineFoot> feet_of(std::span<const ImageLine> lines) {
   std::vector<LineFoot> feet;
   for (const ImageLine& line : lines)
@@ -93,12 +99,14 @@ std::vector<LineFoot> feet_of(std::span<const ImageLine> lines) {
   return feet;
 }
 
+// The larger half axis of an error ellipse.
 double larger_half_axis(const Eigen::Matrix2d& c) {
   const double sum = c.trace(), difference = std::hypot(c(0, 0) - c(1, 1), 2 * c(0, 1));
   return std::sqrt(0.5 * (sum + difference));
 }
 
-// Share of theta in (0, 2 pi) and rho in (0, reach) for which rho |rho - n'P| < band |P|.
+// Probability that an arbitrary line lies in the band of the circle: the share of theta in (0, 2 pi) and rho in (0,
+// reach) with rho |rho - n'P| < band |P|.
 double share_of_band(const Eigen::Vector2d& point, double band, double reach) {
   constexpr int kDirections = 64;
   const double limit = band * point.norm();
@@ -109,7 +117,8 @@ double share_of_band(const Eigen::Vector2d& point, double band, double reach) {
   for (int k = 0; k < kDirections; ++k) {
     const double angle = 2 * std::numbers::pi * (k + 0.5) / kDirections;
     const double c = std::cos(angle) * point.x() + std::sin(angle) * point.y();
-    // rho^2 - c rho within +-limit: from the roots of the upper bound without what lies between those of the lower.
+    // -limit < rho^2 - c rho < limit: the interval between the roots of the upper bound, less the interval between the
+    // roots of the lower bound, if it has any.
     const double outer = std::sqrt(c * c + 4 * limit), inner = c * c > 4 * limit ? std::sqrt(c * c - 4 * limit) : 0;
     share += covered(0.5 * (c - outer), 0.5 * (c + outer)) - covered(0.5 * (c - inner), 0.5 * (c + inner));
   }
@@ -122,7 +131,7 @@ struct FoundCircle {
   std::vector<int> lines;
 };
 
-// One pass about one origin; `use`: the lines to look at.
+// The search about one origin. `left` are the lines to use; `reach` is the largest rho in the image.
 std::vector<FoundCircle> search_circles(const std::vector<LineFoot>& feet, std::vector<int> left, double reach,
                                         const CircleOptions& options) {
   std::vector<FoundCircle> found;
@@ -229,7 +238,8 @@ std::vector<CirclePoint> find_vanishing_points_by_circles(std::span<const ImageL
     Eigen::Vector2d barycentre = Eigen::Vector2d::Zero();
     for (const FoundCircle& circle : circles)
       barycentre += (origin + 0.5 * circle.point) / static_cast<double>(circles.size());
-    // One circle of a far vanishing point would take the origin away with it, and all feet to one place.
+    // A single circle of a distant vanishing point would move the origin far away, where all feet nearly coincide. So
+    // the origin stays within two diagonals of the middle of the image.
     const Eigen::Vector2d middle(0.5 * width, 0.5 * height), away = barycentre - middle;
     origin = middle + away * std::min(1.0, 2 * diagonal / std::max(away.norm(), 1e-9));
   }

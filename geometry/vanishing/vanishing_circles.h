@@ -1,23 +1,26 @@
-// Vanishing points by circles in the image (Kalantari 2009, M24 to M30, M35): for comparison with vanishing_points.h,
-// which has the same statistics and needs no origin. A point comes as a pixel, so that one at infinity itself is none.
+// Vanishing points by circles in the image (Kalantari 2009, chapter 5). They exist for comparison with
+// vanishing_points.h, which uses the same statistics and needs no origin. Points are pixels, so one exactly at infinity
+// cannot be represented.
 //
-// The feet H of the perpendiculars from an origin O to lines that meet in P lie on the circle of diameter OP: its
-// centre is K = P / 2, its radius |K|, and |K - H| - |K| = 0. By |H|^2 = P'H two feet give a circle through O. With rho
-// the line's distance from O and n its normal the residual is
+// Lines that meet in P have the feet H of their perpendiculars from an origin O on the circle of diameter OP (Thales).
+// Its centre is K = P / 2, its radius |K|, hence |K - H| - |K| = 0. Two feet determine a circle through O, by
+// |H|^2 = P'H. With the distance rho of a line from O and its normal n the residual is
 //
 //     |K - H| - |K| = (|H|^2 - 2 K'H) / (|K - H| + |K|) = rho (rho - n'P) / (|K - H| + |K|),
 //
-// computed by the second form, as |K| may be far larger than |H|. Lines near O fit every circle: those with |rho|
-// below 3 sigma or 2 % of the diagonal are left out (M35).
+// The second form is computed, because |K| may be far larger than |H|. Lines near O fit every circle. Lines with |rho|
+// below 3 sigma or below 2 % of the image diagonal are therefore left out.
 //
-//   band     median of the larger half axes of the feet's error ellipses (M28).
-//   search   as in vanishing_points.h, by pairs of feet. A line without reason has theta and rho anywhere in the
-//            image; the probability p of the stop is the share of (theta, rho) in the band of the circle at hand.
-//   fit      w |H|^2 = (w P)'H as a null vector in units of the feet's distances, which P at infinity does not disturb
-//            (M26), then Gauss-Helmert with the covariances of the lines in the direction of P and the inverse of its
-//            distance (M27, M30), which are normally distributed where P, close to infinity, is not.
-//   origin   the upper left corner, then the barycentre of the centres of the circles so found, from where they cross
-//            at large angles (M29).
+// The steps are:
+//
+// * band: the median of the larger half axes of the error ellipses of the feet.
+// * search: as in vanishing_points.h, with pairs of feet. An arbitrary line has any theta and rho in the image; so the
+//   probability p of the stopping rule is the share of (theta, rho) inside the band of the circle.
+// * fit: w |H|^2 = (w P)'H as a null vector, in units of the mean |H|; a P at infinity does not disturb it. Then a
+//   Gauss-Helmert adjustment with the covariances of the lines. Its unknowns are the direction of P and the inverse of
+//   its distance: they are normally distributed also where P is close to infinity.
+// * origin: first the upper left corner, then the centroid of the circle centres found from there, from which the
+//   circles cross at large angles.
 #pragma once
 
 #include <cstdint>
@@ -31,24 +34,27 @@
 namespace megablock {
 
 struct CircleOptions {
-  double max_log10_nfa = -4;
+  double max_log10_nfa = -4;  // largest log10 of the number of false alarms, as in vanishing_points.h
   int min_draws = 1000;
-  double max_theta_sigma = 0.5 * kDegree;  // radians
-  std::uint64_t seed = 1;                  // of the image
+  double max_theta_sigma = 0.5 * kDegree;  // lines of a less certain direction are left out; radians
+  std::uint64_t seed = 1;                  // seed of the draws, one per image
 };
 
+// A vanishing point with the lines on its circle.
 struct CirclePoint {
   ImagePoint point;
   double log10_nfa = 0;
   std::vector<int> lines;
 };
 
-// Vanishing points of an image of this size, px. Those whose fit does not end are left out.
+// Returns the vanishing points of an image of this size (pixels). Points whose adjustment does not converge are left
+// out.
 std::vector<CirclePoint> find_vanishing_points_by_circles(std::span<const ImageLine> lines, int width, int height,
                                                           const CircleOptions& options = {});
 
-// The point in which lines meet, and by the algebraic fit alone. Origin: that of the lines; those within three sigmas
-// of it are left out.
+// The point in which the lines meet, by the adjustment and by the algebraic fit alone, in the coordinates of the lines.
+// Lines within three standard deviations of the origin are left out. Empty where the lines do not determine a finite
+// point.
 std::optional<ImagePoint> fit_vanishing_circle(std::span<const ImageLine> lines);
 std::optional<Eigen::Vector2d> fit_vanishing_circle_algebraic(std::span<const ImageLine> lines);
 

@@ -15,12 +15,13 @@ namespace megablock {
 
 namespace {
 
-// V with a basis of its tangent plane that turns with it.
+// The direction V and a basis of its tangent plane that moves with it.
 struct AxisState {
   Eigen::Vector3d axis;
   Eigen::Matrix<double, 3, 2> tangent;
 };
 
+// The Gauss-Helmert equation V'N = 0, one for each normal.
 struct AxisEquation {
   static constexpr int kUnknowns = 2, kEquations = 1, kMeasurements = 3, kConstraints = 0;
   using State = AxisState;
@@ -41,7 +42,7 @@ double largest_sigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, symmetric_eigen3(covariance).values(2)));
 }
 
-// Sum of N N' / (V' S V) over planes that are added; its null vector is the next V.
+// Sum of N N' / (V' S V) over the planes added, S the covariance of N. Its null vector is the next V.
 struct WeightedNormals {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   int count = 0;
@@ -52,6 +53,7 @@ struct WeightedNormals {
   Eigen::Vector3d null_vector() const { return symmetric_eigen3(sum).vectors.col(0); }
 };
 
+// Whether a plane is a unit normal with a covariance, and certain enough.
 bool is_usable(const InterpretationPlane& plane, double max_sigma) {
   if (!plane.normal.allFinite() || !plane.covariance.allFinite() || std::abs(plane.normal.norm() - 1) > 1e-6)
     return false;
@@ -59,7 +61,7 @@ bool is_usable(const InterpretationPlane& plane, double max_sigma) {
   return sigma > 0 && sigma <= max_sigma;
 }
 
-// The search among the planes at hand.
+// One search for all vanishing points of an image; the head of vanishing_points.h lists its steps.
 class AxisSearch {
  public:
   AxisSearch(std::span<const InterpretationPlane> planes, const VanishingOptions& options)
@@ -101,14 +103,15 @@ class AxisSearch {
 
  private:
   static constexpr std::size_t kFewestLines = 4;
-  static constexpr double kSameSigmas = 4;      // within which two lines may be one
-  static constexpr double kOwnSigmas = 5;       // within which a line may belong to an axis
-  static constexpr double kTailLog10 = -2;      // of the probability with which strays look like an axis
-  static constexpr double kNear = 5 * kDegree;  // within which an axis may be made of another one's strays
+  static constexpr double kSameSigmas = 4;      // within these, two lines may be one
+  static constexpr double kOwnSigmas = 5;       // within these, a line may belong to a vanishing point
+  static constexpr double kTailLog10 = -2;      // log10 of the probability that leftovers look like a vanishing point
+  static constexpr double kNear = 5 * kDegree;  // a vanishing point this close to another may consist of its leftovers
 
   const InterpretationPlane& plane(int i) const { return planes_[static_cast<std::size_t>(i)]; }
 
-  // Leaves the line with the smallest sigma of each set of lines that may be one and the same.
+  // Of each set of lines that may be one and the same, only the line with the smallest sigma represents the set. Lines
+  // are sorted by |z| of their normals, which limits the comparisons to neighbours.
   void find_representatives(const std::vector<double>& sigmas) {
     represents_.assign(planes_.size(), true);
     const auto height = [&](std::size_t k) { return std::abs(plane(usable_[k]).normal.z()); };
@@ -123,7 +126,7 @@ class AxisSearch {
       const int line = usable_[best];
       if (!represents_[static_cast<std::size_t>(line)]) continue;
       const Eigen::Matrix<double, 3, 2> across = tangent_plane(plane(line).normal);
-      const auto look = [&](std::size_t k) {  // false: beyond reach, as |z| changes no faster than the normal turns
+      const auto look = [&](std::size_t k) {  // false: too far, as |z| changes no faster than the normal turns
         const std::size_t other = by_height[k];
         if (std::abs(height(other) - height(best)) > kSameSigmas * (sigmas[best] + largest)) return false;
         if (other != best && is_same_line(line, usable_[other], across))
@@ -137,6 +140,7 @@ class AxisSearch {
     }
   }
 
+  // Whether two normals are equal within their covariances. b may have the opposite sign.
   bool is_same_line(int a, int b, const Eigen::Matrix<double, 3, 2>& across) const {
     const Eigen::Vector2d off = across.transpose() * plane(b).normal;  // up to its sign
     if (off.squaredNorm() > 0.25) return false;
@@ -144,6 +148,7 @@ class AxisSearch {
     return off.dot(covariance.inverse() * off) < kSameSigmas * kSameSigmas;
   }
 
+  // Copies the normals that count into three arrays, which makes counting fast.
   void gather_lines() {
     x_.clear();
     y_.clear();
@@ -163,6 +168,7 @@ class AxisSearch {
     return count;
   }
 
+  // The pole of the great circle with most normals, among the pairs drawn.
   Eigen::Vector3d best_pair(std::int64_t& captured) {
     const std::size_t n = x_.size(), pairs = n * (n - 1) / 2;
     const std::size_t draws = std::max(n / 2, static_cast<std::size_t>(std::max(0, options_.min_draws)));
@@ -199,7 +205,7 @@ class AxisSearch {
            log10_nfa(lines, captured, p) < options_.max_log10_nfa;
   }
 
-  // Against the mirror image of the axis in each one nearby.
+  // Compares the lines near the axis with those near its mirror image in each neighbouring axis found before.
   bool is_no_tail(const Eigen::Vector3d& axis) const {
     for (const Eigen::Vector3d& other : axes_) {
       if (axis.cross(other).norm() > std::sin(kNear)) continue;
@@ -217,6 +223,7 @@ class AxisSearch {
     return true;
   }
 
+  // Moves the axis to the weighted null vector of the normals within 2 t, three times.
   void refine(Eigen::Vector3d& axis) const {
     const double sine = std::sin(2 * result_.tolerance);
     for (int round = 0; round < 3; ++round) {
@@ -228,6 +235,7 @@ class AxisSearch {
     }
   }
 
+  // Sine of the distance from the circle within which lines are removed.
   double reach(const Eigen::Vector3d& axis, int i) const {
     return std::max(std::sin(2 * result_.tolerance), 3 * std::sqrt(axis.dot(plane(i).covariance * axis)));
   }
@@ -238,7 +246,7 @@ class AxisSearch {
     return left_.size() < before;
   }
 
-  // Every line to its axis, and the axes from their lines.
+  // Assigns every line to one axis, estimates the axes from their lines, and drops those that no longer pass the test.
   void deal_out() {
     std::vector<std::vector<int>> lines(axes_.size());
     for (int round = 0; round < 3; ++round) {
@@ -289,9 +297,9 @@ class AxisSearch {
   VanishingPoints result_;
   std::vector<int> usable_, left_;
   std::vector<bool> represents_;
-  std::vector<double> x_, y_, z_;  // normals of the lines left that count
+  std::vector<double> x_, y_, z_;  // of the lines that are left and count
   std::vector<Eigen::Vector3d> axes_;
-  std::vector<std::int64_t> lines_then_;  // that were left when an axis was found
+  std::vector<std::int64_t> lines_then_;  // number of lines that were left when an axis was found
 };
 
 }  // namespace
@@ -302,7 +310,7 @@ VanishingPoints find_vanishing_points(std::span<const InterpretationPlane> plane
 
 std::optional<FittedAxis> fit_axis(std::span<const InterpretationPlane> planes) {
   if (planes.size() < 2) return std::nullopt;
-  // Equal weights first: the axis that the weights depend on is not known yet.
+  // Equal weights give the start, because the right weights depend on the axis.
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const InterpretationPlane& plane : planes) sum += plane.normal * plane.normal.transpose();
   if (!sum.allFinite()) return std::nullopt;

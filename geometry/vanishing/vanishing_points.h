@@ -1,34 +1,34 @@
-// Vanishing points of the lines of one image, by planes on the unit sphere (Kalantari 2009, M33, M34).
+// Vanishing points of the lines of one image, by interpretation planes on the unit sphere (Kalantari 2009, chapter 6).
 //
-// The normals N of the interpretation planes of parallel lines lie on the great circle whose pole is their vanishing
-// point V (interpretation_plane.h). Great circles are taken away one by one, the fullest first:
+// The interpretation planes of parallel lines have normals N on a great circle, whose pole is the vanishing point V
+// (interpretation_plane.h). The fullest great circle is found and its lines are removed, then the next, and so on.
 //
-//   tolerance   t, the median over the lines of their normal's largest sigma: a property of the image, no setting.
-//   draws       V = N1 x N2 of half as many random pairs as there are lines, or `min_draws` where that is more, or all
-//               pairs where these are fewer; the V with most normals within t of its circle.
-//   stop        a normal without reason is within t of a given circle with probability p = sin(t). Of n lines k on the
-//               circle of the best of n (n - 1) / 2 pairs are expected so often without reason
+// * tolerance: t is the median over the lines of the largest sigma of their normals. It follows from the image, not
+//   from a setting.
+// * draws: V = N1 x N2 of random pairs, half as many as there are lines but at least `min_draws`; all pairs if these
+//   are fewer. The V with most normals within t of its circle is kept.
+// * stop: the normal of an arbitrary line is within t of a given circle with probability p = sin(t). Among n such
+//   lines, the best of n (n - 1) / 2 circles has k lines by accident with the expected number of times (false alarms)
 //
-//                   NFA = n (n - 1) / 2 * P(Binomial(n - 2, p) >= k - 2).
+//       NFA = n (n - 1) / 2 * P(Binomial(n - 2, p) >= k - 2).
 //
-//               The first circle for which log10 NFA is above `max_log10_nfa` ends the search.
-//   refinement  the V that makes sum (V'N)^2 / (V' S_N V) least over normals within 2 t, three times.
-//   removal     of all normals within max(2 t, 3 sigma) of the circle.
+//   The first circle with log10 NFA above `max_log10_nfa` ends the search.
+// * refinement: V minimises sum (V'N)^2 / (V' S_N V) over the normals within 2 t, three times.
+// * removal: all normals within max(2 t, 3 sigma) of the circle are removed.
+// * leftovers: lines with larger errors than stated, above all lines bent by distortion, survive the removal. They lie
+//   on both sides of the circle alike: a circle nearby has as many of them as its mirror image. So a circle within 5
+//   degrees of an earlier one is rejected unless it has more lines than its mirror image, at a level of 1 %.
 //
-//   strays      lines of a family whose errors are larger than stated, bent by the lens above all, are left by the
-//   removal.
-//               They lie on either side of its circle alike: as many on a circle nearby as on its mirror image. An
-//               axis within 5 degrees of one before is none if its lines are not more than those of its mirror image,
-//               at a level of 1 %.
+// If two families are nearly parallel, the first takes lines of the second. All lines are therefore assigned again at
+// the end, each to the nearest axis in standard deviations, if within five. Axes left with too few lines for their NFA
+// are dropped.
 //
-// Where two families are nearly parallel, the first takes lines of the second. So all lines are dealt out again at the
-// end, each to the axis that it is nearest to in sigmas, if within five; what then has too few for its NFA is dropped.
-// What the pieces of one broken edge have in common is no evidence for a vanishing point: lines that may be one and the
-// same, by their covariances, count once in search and stop, all in the fit.
+// The pieces of one broken edge are no evidence for a vanishing point. Lines that may be one and the same, by their
+// covariances, count once in the search and in the stopping rule; all of them enter the fit.
 //
-// The direction and its covariance are those of the Gauss-Helmert fit (gauss_helmert.h) with the equation V'N = 0, V
-// moving in its tangent plane: unit length is kept instead of being bordered, and normals bring their covariances of
-// rank two as they are.
+// The direction and its covariance come from a Gauss-Helmert fit (gauss_helmert.h) with the equation V'N = 0. V moves
+// in its tangent plane, which keeps its unit length without a constraint, and the covariances of the normals enter with
+// their rank of two.
 #pragma once
 
 #include <cstdint>
@@ -42,28 +42,29 @@
 namespace megablock {
 
 struct VanishingOptions {
-  double max_log10_nfa = -4;
-  int min_draws = 1000;
-  double max_normal_sigma = 0.5 * kDegree;  // radians; shorter lines would only raise t
-  double max_axis_sigma = 2 * kDegree;      // radians; one narrow bundle of lines has no vanishing point
-  std::uint64_t seed = 1;                   // of the image
+  double max_log10_nfa = -4;                // a vanishing point by accident is expected in one image of 10^4
+  int min_draws = 1000;                     // number of pairs drawn at least
+  double max_normal_sigma = 0.5 * kDegree;  // radians; less certain lines are left out, as they would only raise t
+  double max_axis_sigma = 2 * kDegree;      // radians; a narrow bundle of lines does not determine a vanishing point
+  std::uint64_t seed = 1;                   // of the draws, one per image
 };
 
 struct VanishingPoint {
   AxisDirection axis;
   double log10_nfa = 0;
-  double weighted_squares = 0;  // over redundancy: the variance factor of the lines' covariances
+  double weighted_squares = 0;  // over redundancy: the variance factor of the covariances of the lines
   std::int64_t redundancy = 0;
-  std::vector<int> lines;  // those that it was estimated from
+  std::vector<int> lines;  // indices of the lines that it was estimated from
 };
 
 struct VanishingPoints {
-  std::vector<VanishingPoint> points;  // as they were found
-  std::vector<int> point_of;           // of every line; -1: none
+  std::vector<VanishingPoint> points;  // in the order in which they were found
+  std::vector<int> point_of;           // for every line, index of its vanishing point; -1: none
   double tolerance = 0;                // t, radians
 };
 
-// Planes with numbers that are not finite or without error are left out. The same result for the same planes and seed.
+// Returns the vanishing points of the planes of one image. Planes that are not finite or have no error are left out.
+// The result depends only on the planes and the options.
 VanishingPoints find_vanishing_points(std::span<const InterpretationPlane> planes,
                                       const VanishingOptions& options = {});
 
@@ -72,7 +73,7 @@ struct FittedAxis {
   double weighted_squares = 0;
   std::int64_t redundancy = 0;
 };
-// The axis that planes have in common (M34). Empty for fewer than two, and planes that are all one.
+// The common direction of planes. Empty for fewer than two planes, and where all planes are the same.
 std::optional<FittedAxis> fit_axis(std::span<const InterpretationPlane> planes);
 
 }  // namespace megablock

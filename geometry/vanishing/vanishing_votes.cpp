@@ -7,7 +7,7 @@
 namespace megablock {
 
 std::optional<Eigen::Vector3d> vanishing_point_by_votes(std::span<const InterpretationPlane> planes, double tolerance) {
-  constexpr double kSamePlane = 1e-6;  // rad
+  constexpr double kSamePlane = 1e-6;  // radians
   const double scale = 1 / std::sin(tolerance);
   std::optional<Eigen::Vector3d> best;
   double most = 0;

@@ -1,12 +1,12 @@
-// The vanishing point with most votes among the intersections of any two lines: for comparison with vanishing_points.h
-// (Kalantari 2009, M36; C. Rother, "A new approach to vanishing point detection in architectural environments", Image
-// and Vision Computing 20(9-10), 2002).
+// The vanishing point with most votes among the intersections of all pairs of lines (C. Rother, "A new approach to
+// vanishing point detection in architectural environments", Image and Vision Computing 20(9-10), 2002; Kalantari 2009,
+// chapter 6). It exists for comparison with vanishing_points.h.
 //
-// Any two planes propose the direction N1 x N2 (interpretation_plane.h), and every line votes for the directions close
-// to its plane, by 1 - angle / tolerance. No adjustment follows, and two lines that meet far away hardly tell where.
-// The time grows with the third power of the number of lines.
+// Each pair of planes proposes the direction N1 x N2 (interpretation_plane.h). Every line votes for the directions
+// close to its plane, with 1 - angle / tolerance. There is no adjustment, and two lines that meet far away hardly
+// determine where. The time grows with the third power of the number of lines.
 //
-// Solutions: one. Degenerate: lines whose planes are all the same.
+// There is one solution. Degenerate case: all planes are the same.
 #pragma once
 
 #include <optional>
@@ -17,8 +17,8 @@
 
 namespace megablock {
 
-// A unit vector, or its negative. Empty for fewer than two lines and degenerate ones; planes that are not numbers are
-// passed over.
+// Returns a unit vector of undefined sign. `tolerance` is in radians. Empty for fewer than two lines and for equal
+// planes; planes that are not finite are ignored.
 std::optional<Eigen::Vector3d> vanishing_point_by_votes(std::span<const InterpretationPlane> planes,
                                                         double tolerance = 5 * kDegree);
 

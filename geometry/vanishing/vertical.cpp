@@ -14,31 +14,35 @@ namespace megablock {
 
 namespace {
 
+// Vanishing points closer to the candidate than this do not count against it.
 constexpr double kNearlyParallel = 10 * kDegree;
+// Largest cost of a candidate.
 constexpr double kMostCost = 16;
 
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
+// Whether two axes are perpendicular within the given angle or three standard deviations.
 bool are_orthogonal(const AxisDirection& a, const AxisDirection& b, double within) {
   const double cosine = a.direction.dot(b.direction);
   const double variance = a.direction.dot(b.covariance * a.direction) + b.direction.dot(a.covariance * b.direction);
   return std::abs(std::asin(std::clamp(cosine, -1.0, 1.0))) < std::max(within, 3 * std::sqrt(std::max(0.0, variance)));
 }
 
-// Roll and pitch from `down` to the axis.
+// Rotation from `down` to the axis, split into roll and pitch (radians).
 Eigen::Vector2d roll_and_pitch(const Eigen::Vector3d& down, const Eigen::Vector3d& axis) {
   const Eigen::Vector3d cross = down.cross(axis);
   const double size = cross.norm();
   if (size == 0) return Eigen::Vector2d::Zero();
   Eigen::Vector3d roll_axis = Eigen::Vector3d::UnitZ() - down.z() * down;
-  // A camera that looks straight down has no roll: any axis does, pitch is the lesser demand.
+  // For a camera that looks straight down, roll is undefined. Any axis will do, as pitch is the weaker condition.
   roll_axis = roll_axis.norm() > 1e-9 ? roll_axis.normalized() : Eigen::Vector3d(tangent_plane(down).col(0));
   const Eigen::Vector3d turn = angle_between(down, axis) / size * cross;
   return {turn.dot(roll_axis), turn.dot(roll_axis.cross(down))};
 }
 
+// Gauss-Helmert equations of an attitude: the seen direction has no component perpendicular to R times the ground axis.
 struct AttitudeEquations {
   static constexpr int kUnknowns = 3, kEquations = 2, kMeasurements = 3, kConstraints = 0;
   using State = Eigen::Quaterniond;
@@ -75,6 +79,7 @@ Eigen::Vector3d down_of_exif_orientation(int code) {
 std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, const VerticalPrior& prior) {
   double most = 0;
   for (const VanishingPoint& p : points) most = std::max(most, static_cast<double>(p.lines.size()));
+  // 2 ln((1 - q) / q) with q = 0.05, see the head of vertical.h.
   const double not_orthogonal = 2 * std::log(0.95 / 0.05);
   std::optional<Vertical> best;
   std::vector<Vertical> candidates;
@@ -101,6 +106,7 @@ std::optional<Vertical> find_vertical(std::span<const VanishingPoint> points, co
     best = candidates.back();
   }
   if (!best) return best;
+  // Of nearly parallel candidates the one with most lines is taken: a leaning wall must not replace the vertical.
   const AxisDirection upright = best->down;
   for (const Vertical& other : candidates)
     if (points[static_cast<std::size_t>(other.point)].lines.size() >
@@ -121,6 +127,7 @@ RollPitch roll_pitch_of(const AxisDirection& down) {
 
 Eigen::Matrix3d levelling_rotation(const Eigen::Vector3d& down) {
   const double sine = std::hypot(down.x(), down.z()), cosine = down.y();
+  // Rodrigues' formula with cos(angle) = down.y, about the horizontal axis perpendicular to `down`.
   if (sine == 0)
     return cosine > 0 ? Eigen::Matrix3d::Identity() : Eigen::Vector3d(1, -1, -1).asDiagonal().toDenseMatrix();
   const Eigen::Vector3d axis(-down.z() / sine, 0, down.x() / sine);
