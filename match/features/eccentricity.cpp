@@ -1,20 +1,22 @@
-// Let u be coordinates in the tangent plane of the unit sphere at the keypoint's ray and y = A u + 1/2 B(u, u) those of
-// its image. A neighbourhood that would look I0(y) under y = A u looks
+// The derivation of the correction. Let u be coordinates in the tangent plane of the unit sphere at the ray of the
+// keypoint, and y = A u + 1/2 B(u, u) the image coordinates of u, to second order. A neighbourhood that would give the
+// image I0(y) under y = A u alone gives
 //
 //     I(y) = I0(y - Q(y)),   Q_i(y) = y' S_i y,   S_i = 1/2 A^-T B_i A^-1.
 //
-// The detector takes the extremum of L * I, L = Laplacian of a Gaussian of variance t, instead of that of L * I0 at 0.
-// To first order it moves by d with
+// The detector takes the extremum of L * I, where L is the Laplacian of a Gaussian of variance t, instead of the
+// extremum of L * I0, which lies at 0. To first order the extremum moves by d with
 //
 //     d_j = int (Q . grad I0) d_j L / int d_j I0 d_j L.
 //
-// Of I0 nothing is known but that L responds to it most at 0; the mean over white textures under this condition is
-// proportional to L itself (for a texture with a power of 1/frequency^2 it is a Gaussian and the result 3/4 of this
-// one, for a disc of the scale 3/2). With I0 = L the integrals give
+// About I0 only one thing is known: it gives the extremal response of L at 0. The mean over white textures under this
+// condition is proportional to L itself. (For textures with the power 1/frequency^2 it is a Gaussian, and the result
+// 3/4 of the following one; for a disc of the scale it is 3/2.) With I0 = L the integrals give
 //
 //     d_i = t/3 (sum_k (S_i)_kk + 2 sum_k (S_k)_ki),
 //
-// which is 4/3 t sin(a) cos(a) / f away from the axis for a ray at the angle a in a perspective image.
+// In a perspective image with the principal distance f, for a ray at the angle a from the axis, this is 4/3 t sin(a)
+// cos(a) / f, outwards.
 #include "match/features/eccentricity.h"
 
 #include <array>
@@ -26,8 +28,8 @@ namespace megablock {
 
 namespace {
 
-// Variance of the Laplacian nearest to OpenCV's difference of Gaussians, by the keypoint's diameter d: the narrower one
-// has sigma = d / 2, the wider one 2^(1/3) times that.
+// Variance of the Laplacian that is closest to OpenCV's difference of Gaussians, from the keypoint's diameter d. The
+// narrow Gaussian has sigma = d / 2, the wide one 2^(1/3) times that.
 double kernel_variance(double diameter_px) {
   constexpr double kRatioSquared = 1.5874010519681994;  // 2^(2/3)
   return diameter_px * diameter_px / 4 * (1 + kRatioSquared) / 2;
@@ -43,8 +45,9 @@ Eigen::Vector2d eccentricity_px(const Intrinsics& intrinsics, const Eigen::Vecto
   const Eigen::Matrix2d to_plane = (centre.by_point * tangent).inverse();  // A^-1
   if (!centre.valid || !to_plane.allFinite()) return Eigen::Vector2d::Zero();
 
-  constexpr double kStep = 1e-4;                // rad
+  constexpr double kStep = 1e-4;                // radians
   std::array<Eigen::Matrix2d, 2> by_direction;  // [k](i, j) = (B_i)_jk
+  // Second derivatives B by central differences of the projection's Jacobian.
   for (int k = 0; k < 2; ++k) {
     const ProjectionJacobian after = project_with_jacobian(intrinsics, *ray + kStep * tangent.col(k)),
                              before = project_with_jacobian(intrinsics, *ray - kStep * tangent.col(k));

@@ -25,13 +25,14 @@ void FeatureOptions::check() const {
 
 namespace {
 
-// OpenCV's own threads would make the result of a unit depend on the machine; the caller runs units in parallel.
+// OpenCV's own threads would make the results of a unit of work depend on the machine. The caller runs units in
+// parallel.
 void use_one_opencv_thread() { [[maybe_unused]] static const bool done = (cv::setNumThreads(1), true); }
 
-// The image SIFT sees: reduced when it is larger than asked for.
+// The image that SIFT works on: reduced when it has more pixels than allowed.
 struct ReducedImage {
   cv::Mat pixels;
-  double scale_x = 1, scale_y = 1;  // full-image pixels per reduced pixel
+  double scale_x = 1, scale_y = 1;  // pixels of the full image per reduced pixel
 };
 
 ReducedImage reduce(const cv::Mat& full, double max_megapixels) {
@@ -47,8 +48,8 @@ ReducedImage reduce(const cv::Mat& full, double max_megapixels) {
   return reduced;
 }
 
-// Position with pixel centres at +0.5: OpenCV's integer positions are pixel centres and its SIFT reports them 0.25 px
-// too high, so 0.5 - 0.25 remains.
+// Offset from OpenCV's positions to positions with pixel centres at +0.5. In OpenCV integer positions are pixel
+// centres, which asks for 0.5; its SIFT reports positions 0.25 px too high, so 0.25 remains.
 constexpr double kSiftOffset = 0.25;
 
 struct Detection {
@@ -56,7 +57,7 @@ struct Detection {
   int row;  // in the order of detection
 };
 
-// Index of the grid cell of a detection in a grid of roughly square cells.
+// A grid of roughly square cells over the image; cell() returns the index of the cell of a keypoint.
 struct Grid {
   Grid(int width, int height, int cells) {
     const double side = std::sqrt(static_cast<double>(width) * height / cells);
@@ -75,13 +76,14 @@ struct Grid {
   double scale_x = 1, scale_y = 1;
 };
 
+// Largest first; the other elements make the order unique.
 auto position_key(const Detection& d) {
   return std::tuple(-d.keypoint.scale_px, d.keypoint.x, d.keypoint.y, d.keypoint.angle_deg, d.row);
 }
 
-// Keeps `limit` detections: every grid cell gives its largest in turn (first all the largest, then all the second
-// largest ...) until the limit is reached. Large regions are found again from another place far more often than
-// strong small ones (foliage: half as many matches again).
+// Keeps `limit` detections, evenly distributed. Every grid cell gives its largest detection, then every cell its second
+// largest, and so on until the limit is reached. Large features are found again in other images far more often than
+// small ones of high contrast (in foliage this gives half as many matches again).
 void keep_evenly(std::vector<Detection>& detections, int limit, int width, int height) {
   if (limit == 0 || detections.size() <= static_cast<std::size_t>(limit)) return;
   constexpr int kFeaturesPerCell = 40;
@@ -89,7 +91,7 @@ void keep_evenly(std::vector<Detection>& detections, int limit, int width, int h
   std::sort(detections.begin(), detections.end(),
             [](const Detection& a, const Detection& b) { return position_key(a) < position_key(b); });
   std::vector<int> count(grid.size(), 0);
-  std::vector<std::pair<int, std::size_t>> order(detections.size());  // (round in its cell, rank by size)
+  std::vector<std::pair<int, std::size_t>> order(detections.size());  // (rank in its cell, rank by size)
   for (std::size_t i = 0; i < detections.size(); ++i) order[i] = {count[grid.cell(detections[i].keypoint)]++, i};
   std::sort(order.begin(), order.end());
   std::vector<Detection> kept(static_cast<std::size_t>(limit));
@@ -97,6 +99,7 @@ void keep_evenly(std::vector<Detection>& detections, int limit, int width, int h
   detections = std::move(kept);
 }
 
+// Turns the 128 floating-point numbers of OpenCV's SIFT into bytes.
 SiftDescriptor quantise(const float* sift, bool root) {
   SiftDescriptor bytes;
   if (!root) {
@@ -105,7 +108,8 @@ SiftDescriptor quantise(const float* sift, bool root) {
     }
     return bytes;
   }
-  // RootSIFT (Arandjelovic and Zisserman, 2012): Euclidean distance of the roots = Hellinger distance.
+  // RootSIFT: the Euclidean distance of the square roots is the Hellinger distance of the histograms (R. Arandjelovic
+  // and A. Zisserman, "Three things everyone should know to improve object retrieval", CVPR 2012).
   constexpr double kScale = 176;  // the fast kernel needs norms up to 181 (nearest_kernel.h); 512 finds no more matches
   double sum = 0;
   for (std::size_t i = 0; i < bytes.size(); ++i) sum += sift[i];
@@ -117,6 +121,7 @@ SiftDescriptor quantise(const float* sift, bool root) {
   return bytes;
 }
 
+// Whether the keypoint's pixel is 0 in the mask. Positions are in units of 2^-10 px.
 bool is_masked(const cv::Mat& mask, const Keypoint& k) {
   if (mask.empty()) return false;
   const int column = std::clamp(k.x >> 10, 0, mask.cols - 1), row = std::clamp(k.y >> 10, 0, mask.rows - 1);
@@ -129,7 +134,7 @@ cv::Ptr<cv::SIFT> make_sift(const FeatureOptions& options) {
   return cv::SIFT::create(0, kLayers, options.contrast_threshold, kEdgeThreshold, kSigma);
 }
 
-// Where OpenCV's keypoints lie in the full image; those under the mask are left out.
+// Converts OpenCV's keypoints to the full image and leaves out those under the mask.
 std::vector<Detection> place(const std::vector<cv::KeyPoint>& found, const ReducedImage& image, const cv::Mat& mask) {
   std::vector<Detection> detections;
   detections.reserve(found.size());
@@ -146,8 +151,8 @@ std::vector<Detection> place(const std::vector<cv::KeyPoint>& found, const Reduc
   return detections;
 }
 
-// Keypoints and descriptors of the features kept. Building the image pyramid a second time for the descriptors costs
-// less than describing the two thirds that are not kept.
+// Detects features, selects them and describes the selected ones. SIFT builds its image pyramid twice in this way,
+// which costs less than to describe the two thirds that are not selected.
 void detect_and_describe(const cv::Mat& pixels, const cv::Mat& mask, const FeatureOptions& options,
                          ImageFeatures& features) {
   const ReducedImage image = reduce(pixels, options.max_megapixels);
@@ -171,6 +176,7 @@ void detect_and_describe(const cv::Mat& pixels, const cv::Mat& mask, const Featu
   }
 }
 
+// Reads an image and its mask. Returns the reason of a failure, or an empty string.
 std::string load(const std::string& path, const std::string& mask_path, cv::Mat& pixels, cv::Mat& mask) {
   GreyImage image = read_grey_image(path);
   if (!image.failure.empty()) return image.failure;

@@ -1,4 +1,5 @@
-// SIFT features of one image.
+// Detection of the SIFT features of one image (D. Lowe, "Distinctive image features from scale-invariant keypoints",
+// IJCV 60(2), 2004), evenly distributed and with bytes for descriptors.
 #pragma once
 
 #include <string>
@@ -9,14 +10,16 @@
 namespace megablock {
 
 struct FeatureOptions {
-  int max_features = 14000;           // per image, largest kept evenly over the image; 0 = all
+  int max_features = 14000;           // per image, the largest, evenly distributed; 0 = all
   double max_megapixels = 25;         // larger images are reduced before detection (positions refer to the full image)
-  double contrast_threshold = 0.007;  // of OpenCV's SIFT; lower = more features on weak texture
-  bool root_sift = true;              // L1-normalise and square-root before quantising to bytes
+  double contrast_threshold = 0.007;  // of OpenCV's SIFT; a lower one finds more features on weak texture
+  bool root_sift = true;              // L1-normalise and take square roots before quantising to bytes
   void check() const;                 // throws InputError
 };
 
-// Never throws for a bad file: `failure` says why there are no features (missing, empty, not an image, truncated).
+// Returns the features of an image file, with positions in the full image (units of 2^-10 px, pixel centres at +0.5).
+// `mask_path` may be empty. Does not throw for a bad file: `failure` then says why there are no features (missing,
+// empty, not an image, truncated). Throws InputError for impossible options.
 ImageFeatures detect_features(const std::string& path, const std::string& mask_path, ImageIndex image,
                               const FeatureOptions& options);
 

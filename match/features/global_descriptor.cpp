@@ -1,7 +1,8 @@
-// A bag of words whose vocabulary needs no training: seven fixed hyperplanes through the descriptor space cut it into
-// 128 cells (random hyperplane hashing, Charikar 2002); the counts of the cells, square-rooted and normalised, are the
-// image's vector. A hyperplane's normal has entries +1 and -1, as many of each, so that typical descriptors (all of
-// the same norm, none negative) fall on both sides of it.
+// A bag of words whose vocabulary needs no training. Seven fixed hyperplanes cut the space of descriptors into 128
+// cells (M. Charikar, "Similarity estimation techniques from rounding algorithms", STOC 2002: random hyperplane
+// hashing). The numbers of descriptors in the cells, square-rooted and normalised, are the vector of the image. The
+// normal of a hyperplane has as many elements +1 as -1; typical descriptors, which all have the same norm and no
+// negative element, then fall on both sides of it.
 #include "match/features/global_descriptor.h"
 
 #include <cmath>
@@ -16,6 +17,8 @@ namespace {
 constexpr std::size_t kPlanes = 7, kDimension = 128;
 using Planes = std::array<std::array<int, kDimension>, kPlanes>;
 
+// The hyperplanes are the same in every run and on every machine: the generator is specified by the standard, the
+// shuffle is written out.
 Planes make_planes() {
   Planes planes;
   std::mt19937 generator(7);

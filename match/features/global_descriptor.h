@@ -1,4 +1,5 @@
-// One vector per image from its SIFT descriptors, to find images of the same place without positions.
+// One vector for each image, computed from its SIFT descriptors. It serves to find images of the same place without
+// positions.
 #pragma once
 
 #include <array>
@@ -8,8 +9,9 @@
 
 namespace megablock {
 
-// Unit norm (zero for an image without features). Independent of the order of the descriptors, of image rotation and
-// scale. The dot product of two images' vectors grows with their likeness.
+// Returns a vector of unit norm (zero for an image without features). It does not depend on the order of the
+// descriptors, nor on the rotation and scale of the image. The scalar product of two vectors grows with the similarity
+// of the images.
 std::array<float, 128> global_descriptor(const std::vector<SiftDescriptor>& descriptors);
 
 }  // namespace megablock

@@ -13,10 +13,12 @@ namespace megablock {
 
 namespace {
 
+// Grid of the cross-validation: penalties C and widths gamma of the radial basis functions.
 constexpr double kPenalties[] = {1, 10, 100}, kWidths[] = {0.1, 0.4, 1.6, 6.4};
 constexpr int kFolds = 5;
 
-// Right, wrong or neither (two sights of one moving thing at one moment, of one place of a repeated facade).
+// The label of a match of two observations: true (right), false (wrong), or none. It is undefined for two observations
+// of one moving object at one moment and for two of one place of a repeated facade.
 std::optional<bool> label_of(std::uint8_t a, std::uint8_t b, bool same_frame) {
   constexpr auto kRight = static_cast<std::uint8_t>(Verdict::kRight),
                  kVehicle = static_cast<std::uint8_t>(Verdict::kVehicle);
@@ -26,7 +28,7 @@ std::optional<bool> label_of(std::uint8_t a, std::uint8_t b, bool same_frame) {
   return std::nullopt;
 }
 
-// std::shuffle is the library's own; this one is the same everywhere.
+// std::shuffle depends on the standard library; this one gives the same order everywhere.
 template <typename Value>
 void shuffle(std::vector<Value>& values, std::mt19937_64& generator) {
   for (std::size_t i = values.size(); i > 1; --i) std::swap(values[i - 1], values[generator() % i]);
@@ -36,6 +38,7 @@ struct Matrix {
   cv::Mat values, labels;  // CV_32F [samples, features], CV_32S [samples, 1]
 };
 
+// Mean and standard deviation of each feature over the training samples.
 struct Scaling {
   std::vector<double> mean, deviation;
 };
@@ -80,7 +83,7 @@ cv::Ptr<cv::ml::SVM> trained(const Matrix& matrix, double penalty, double width)
   return machine;
 }
 
-// Number of samples classified rightly.
+// Number of samples that the machine classifies correctly.
 int count_right(const cv::ml::SVM& machine, const Matrix& matrix) {
   cv::Mat answers;
   machine.predict(matrix.values, answers);
@@ -90,7 +93,7 @@ int count_right(const cv::ml::SVM& machine, const Matrix& matrix) {
   return right;
 }
 
-// Rows of one fold, or all others.
+// The samples of one fold, or all others.
 Matrix part_of(const Matrix& all, int fold, bool inside) {
   Matrix part{cv::Mat(0, all.values.cols, CV_32F), cv::Mat(0, 1, CV_32S)};
   for (int r = 0; r < all.values.rows; ++r) {
@@ -101,6 +104,7 @@ Matrix part_of(const Matrix& all, int fold, bool inside) {
   return part;
 }
 
+// Chooses penalty and width by cross-validation and trains on all samples.
 cv::Ptr<cv::ml::SVM> best_machine(const Matrix& matrix) {
   int most = -1;
   double penalty = 0, width = 0;
@@ -109,7 +113,7 @@ cv::Ptr<cv::ml::SVM> best_machine(const Matrix& matrix) {
       int right = 0;
       for (int fold = 0; fold < kFolds; ++fold)
         right += count_right(*trained(part_of(matrix, fold, false), c, g), part_of(matrix, fold, true));
-      if (right <= most) continue;  // of equals the smoother one, which comes first
+      if (right <= most) continue;  // of equal ones the first, which is the smoothest
       most = right;
       penalty = c, width = g;
     }
@@ -143,7 +147,7 @@ std::vector<LabelledMatch> labelled_matches(const Block& block, const TrackSet& 
     for (std::int64_t i = tracks.begin[t]; i < tracks.begin[t + 1]; ++i)
       for (std::int64_t j = i + 1; j < tracks.begin[t + 1]; ++j) pairs.emplace_back(i, j);
     shuffle(pairs, generator);
-    // A track with a mistake gives a wrong match where it can: they are few.
+    // Wrong matches are rare, so a track with a wrong observation contributes a wrong match if it can.
     std::optional<LabelledMatch> chosen;
     for (const auto& [i, j] : pairs) {
       const ImageIndex a = tracks.image[static_cast<std::size_t>(i)], b = tracks.image[static_cast<std::size_t>(j)];

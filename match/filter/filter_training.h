@@ -1,4 +1,5 @@
-// Training of the match filter (match_filter.h) from tracks whose wrong observations are known.
+// Trains the match filter (match_filter.h) on tracks whose wrong observations are known, from simulated blocks for
+// example.
 #pragma once
 
 #include <array>
@@ -10,32 +11,36 @@
 
 namespace megablock {
 
+// A match with its label.
 struct LabelledMatch {
   MatchSample sample;
   bool right = true;
 };
 
-// Matches of the tracks of images that the trajectory relates: one of each track at most, pairs of different frames, as
-// matching would find them. wrong [observations]: 0 right, else the number of a mistake (simulate.h, Verdict); a match
-// is wrong when one of the two is, or when both show a thing that moved between the frames.
+// Returns at most one match from each track: a pair of observations of different frames, as matching would find it,
+// whose images the trajectory relates. `wrong` has one element per observation: 0 for a right one, otherwise the kind
+// of the mistake (Verdict in simulate.h). A match is wrong when one of its observations is, or when both show an object
+// that moved between the frames. Throws InputError where `wrong` has the wrong length.
 std::vector<LabelledMatch> labelled_matches(const Block& block, const TrackSet& tracks,
                                             const std::vector<std::uint8_t>& wrong, const TrustOptions& trust,
                                             std::uint64_t seed);
 
 struct TrainingOptions {
   std::vector<MatchFeature> features = {MatchFeature::kReprojection, MatchFeature::kDistance, MatchFeature::kAngle};
-  int samples = 466;  // half of them right; InputError when there are not as many
+  int samples = 466;  // number of training samples, half of them right
   std::uint64_t seed = 1;
 };
 
 struct TrainedFilter {
-  std::string yaml;    // what MatchFilter reads
-  double correct = 0;  // share of the samples that were not trained on, as many right as wrong ones
+  std::string yaml;  // the model, as MatchFilter reads it
+  // Share of correct answers on other samples than the training ones, right and wrong in equal number.
+  double correct = 0;
   std::int64_t tested = 0;
-  std::array<double, 2> correct_of{};  // of the wrong, of the right ones
+  std::array<double, 2> correct_of{};  // of the wrong matches, of the right ones
 };
 
-// Penalty and width are chosen by five-fold cross-validation. Deterministic by the seed.
+// Trains the filter; five-fold cross-validation chooses penalty and width. The result depends only on the input and the
+// seed. Throws InputError where there are too few matches of a kind.
 TrainedFilter train_filter(const std::vector<LabelledMatch>& matches, const TrainingOptions& options);
 
 }  // namespace megablock

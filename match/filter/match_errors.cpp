@@ -7,13 +7,13 @@
 namespace megablock {
 
 MatchErrors match_errors(const Ray& a, const Ray& b, double focal_a_px, double focal_b_px) {
-  constexpr double kFar = 1e4;  // metres
+  constexpr double kFar = 1e4;  // metres; limit of the distances along nearly parallel rays
   const Eigen::Vector3d baseline = b.origin - a.origin, normal = a.direction.cross(b.direction);
   const double cosine = a.direction.dot(b.direction), sine = normal.norm();
   MatchErrors errors;
   errors.angle_rad = std::atan2(sine, cosine);
   const double along_a = baseline.dot(a.direction), along_b = baseline.dot(b.direction);
-  if (sine < 1e-9) {  // parallel: far away on both rays
+  if (sine < 1e-9) {  // parallel: the point is far away on both rays
     errors.distance_a_m = errors.distance_b_m = kFar;
     errors.ray_distance_m = baseline.cross(a.direction).norm();
   } else {
@@ -21,6 +21,7 @@ MatchErrors match_errors(const Ray& a, const Ray& b, double focal_a_px, double f
     errors.distance_b_m = std::clamp((cosine * along_a - along_b) / (sine * sine), -kFar, kFar);
     errors.ray_distance_m = std::abs(baseline.dot(normal)) / sine;
   }
+  // Squared length of the part of v perpendicular to a direction.
   const auto across = [](const Eigen::Vector3d& v, const Eigen::Vector3d& direction) {
     return (v - direction * direction.dot(v)).squaredNorm();
   };

@@ -30,6 +30,7 @@ std::optional<MatchSample> match_sample(const TrustedPair& pair, const Camera& c
   return sample;
 }
 
+// The logarithms and asinh compress the long tails of the errors.
 double value_of(MatchFeature feature, const MatchSample& sample) {
   const MatchErrors& e = sample.errors;
   switch (feature) {

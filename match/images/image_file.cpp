@@ -19,10 +19,11 @@ bool is_jpeg(std::span<const unsigned char> file) {
   return file.size() >= 3 && file[0] == 0xFF && file[1] == kStartOfImage && file[2] == 0xFF;
 }
 
-// Markers without a length: TEM, RST0-7, SOI.
+// Whether a marker has no length field: TEM, RST0 to RST7, SOI.
 bool stands_alone(unsigned char marker) { return marker == 0x01 || (marker >= 0xD0 && marker <= kStartOfImage); }
 
-// Position of the next marker's 0xFF in entropy-coded data (stuffed zeros and restart markers belong to the data).
+// Position of the 0xFF of the next marker after entropy-coded data. Stuffed zeros and restart markers belong to the
+// data.
 std::size_t end_of_scan(std::span<const unsigned char> file, std::size_t at) {
   while (at < file.size()) {
     const void* found = std::memchr(file.data() + at, 0xFF, file.size() - at);
@@ -53,6 +54,7 @@ bool read_bytes(const std::string& path, std::vector<unsigned char>& bytes) {
   return static_cast<bool>(stream);
 }
 
+// Stretches the range of grey values to 8 bits.
 cv::Mat to_eight_bits(const cv::Mat& pixels) {
   if (pixels.depth() == CV_8U) return pixels;
   double darkest = 0, brightest = 0;
@@ -68,7 +70,7 @@ cv::Mat to_eight_bits(const cv::Mat& pixels) {
 bool is_complete_jpeg(std::span<const unsigned char> file) {
   std::size_t at = 2;
   while (at + 1 < file.size()) {
-    if (file[at] != 0xFF) return false;  // no marker where one must stand
+    if (file[at] != 0xFF) return false;  // no marker where there must be one
     const unsigned char marker = file[at + 1];
     if (marker == kEndOfImage) return true;
     if (marker == 0xFF) {

@@ -22,7 +22,8 @@ std::vector<InterpretationPlane> planes_of(const std::vector<ImageLine>& lines, 
   return planes;
 }
 
-// Of the axis of these lines by each parameter of the camera: by a hundredth of what it may be wrong by.
+// Derivatives of the axis of these lines by the parameters of the camera: central differences with a hundredth of the
+// plausible error of each parameter.
 Eigen::Matrix3Xd derivatives_by_camera(const std::vector<ImageLine>& lines, const Camera& camera,
                                        const Eigen::Vector3d& down) {
   const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width);
@@ -44,13 +45,14 @@ Eigen::Matrix3Xd derivatives_by_camera(const std::vector<ImageLine>& lines, cons
   return result;
 }
 
+// Settings of one search.
 struct Look {
   SegmentOptions segments;
   VanishingOptions search;
 };
 
-// Of a large picture two: the first one reduced, for shorter edges, and with every vanishing point that accident lets
-// expect once in a picture.
+// The searches to make. For a large image there are two. The first is in the reduced image, with shorter edges, and
+// accepts every vanishing point that is expected by accident at most once per image.
 std::vector<Look> looks_at(const cv::Mat& picture, const SegmentOptions& options, std::uint64_t seed) {
   constexpr double kReducedMegapixels = 0.5, kShortestPx = 20, kTimesLarger = 4;
   Look whole{options, {}};
@@ -66,7 +68,7 @@ std::vector<Look> looks_at(const cv::Mat& picture, const SegmentOptions& options
 
 struct EdgesSeen {
   int segments = 0;
-  std::vector<ImageLine> lines;  // of those that have a plane
+  std::vector<ImageLine> lines;  // lines of the segments that have a plane
   VanishingPoints found;         // of these lines
   std::optional<Vertical> vertical;
 };
@@ -115,7 +117,8 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
   try {
     for (const Look& look : looks_at(image.pixels, options, seed)) {
       seen = edges_seen(image.pixels, mask.pixels, camera, prior, look);
-      if (!seen.vertical && seen.segments > 0) break;  // without any, edges may be too short for the reduced picture
+      // Without any segment, the edges may be too short for the reduced image.
+      if (!seen.vertical && seen.segments > 0) break;
     }
   } catch (const cv::Exception& e) {
     result.failure = "no segments: " + e.err;

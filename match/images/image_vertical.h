@@ -1,9 +1,9 @@
-// The vertical in one picture, from its straight edges (M45): segments, vanishing points, the one of the vertical.
-// Nothing of any other picture is needed.
+// Finds the vertical in one image from its straight edges (Kalantari 2009, chapter 8): line segments, their vanishing
+// points, and the vanishing point of the vertical. No other image is needed.
 //
-// A large picture is looked at reduced first, which takes a sixth of the time: what shows a vertical shows it there
-// too, by fewer and longer edges (so did all of 79 pictures). Where not even an accident looks like one, no more is
-// looked for.
+// A large image is searched in reduced form first, which takes a sixth of the time. An image that shows a vertical
+// shows it there too, with fewer and longer edges (this held for all of 79 images). If the reduced image has no
+// candidate at all, the full image is not searched.
 #pragma once
 
 #include <cstdint>
@@ -15,23 +15,26 @@
 
 namespace megablock {
 
+// The result for one image.
 struct ImageVertical {
-  std::string failure;                     // of reading the picture; one line
-  int segments = 0, vanishing_points = 0;  // of the last look
-  // Below, where there is a vertical.
+  std::string failure;                     // why the image could not be read; one line, empty on success
+  int segments = 0, vanishing_points = 0;  // of the last search
+  // The following is valid if `found`.
   bool found = false;
-  // Camera axes, pointing down. Its covariance is that of the lines times their variance factor, where that is above
-  // one.
+  // The vertical in camera axes, pointing down. Its covariance is that of the lines, multiplied by their variance
+  // factor if that exceeds one.
   AxisDirection down;
-  double roll = 0;  // from where it was expected, in sigmas of the prior
-  // Of `down` by each parameter of the camera: these turn and bend the lines of all its images together.
+  double roll = 0;  // deviation from the expected roll, in sigmas of the prior
+  // Derivative of `down` by each parameter of the camera. An error of the camera moves the lines of all its images in
+  // the same way, so the errors of their verticals are correlated.
   Eigen::Matrix3Xd by_camera;
-  int lines = 0;  // that show it
+  int lines = 0;  // number of lines through the vanishing point
   double variance_factor = 0;
   double log10_nfa = 0;
 };
 
-// Never throws for a bad file. `camera`: of the picture, whose size it must have; its mask is honoured.
+// `camera` is the camera of the image, which must have its size; its mask is applied. The result depends on the image,
+// the camera, the options and the seed. Does not throw for a bad file; throws InputError for impossible options.
 ImageVertical find_image_vertical(const std::string& path, const Camera& camera, const VerticalPrior& prior,
                                   std::uint64_t seed, const SegmentOptions& options = {});
 

@@ -10,11 +10,11 @@ namespace megablock {
 
 namespace {
 
-constexpr int kReach = 3;           // px to either side of the detected edge
+constexpr int kReach = 3;           // pixels to either side of the detected edge
 constexpr double kBlurSigma = 1.0;  // px
-constexpr int kLags = 12;           // px over which the scatter of places may be correlated
+constexpr int kLags = 12;           // pixels over which the scatter of the edge points may be correlated
 
-// Grey value between pixels, (x, y) = (0, 0) the middle of the first.
+// Bilinear interpolation of the grey value; (0, 0) is the centre of the first pixel.
 double grey_at(const cv::Mat& smooth, double x, double y) {
   const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
   const double u = x - column, v = y - row;
@@ -23,17 +23,18 @@ double grey_at(const cv::Mat& smooth, double x, double y) {
   return (1 - v) * ((1 - u) * upper[0] + u * upper[1]) + v * ((1 - u) * lower[0] + u * lower[1]);
 }
 
-// The edge as measured: places along and across the detected segment, one per pixel of its length.
+// The measured edge points: positions along and across the detected segment, one per pixel of its length.
 struct EdgePlaces {
   std::vector<double> along, across;
 };
 
+// A segment as detected: start point and unit directions in the reduced image.
 struct DetectedEdge {
   Eigen::Vector2d start, along, across;
   double length = 0;
 };
 
-// Gradients across the edge at whole pixels from -kReach to kReach, at a place along it.
+// Differences of grey values across the edge at a place along it, at whole pixels from -kReach to kReach.
 void gradients_across(const cv::Mat& smooth, const Eigen::Vector2d& place, const Eigen::Vector2d& across,
                       double (&gradient)[2 * kReach + 1]) {
   double before = 0;
@@ -45,6 +46,8 @@ void gradients_across(const cv::Mat& smooth, const Eigen::Vector2d& place, const
   }
 }
 
+// Measures the edge at every pixel of its length. Points without a clear gradient maximum are left out. Empty for an
+// edge closer to the border than the search reaches.
 EdgePlaces places_of(const cv::Mat& smooth, const DetectedEdge& edge) {
   EdgePlaces places;
   const int count = static_cast<int>(edge.length) + 1;
@@ -54,7 +57,7 @@ EdgePlaces places_of(const cv::Mat& smooth, const DetectedEdge& edge) {
   };
   if (!inside(edge.start) || !inside(edge.start + edge.length * edge.along)) return places;
   double gradient[2 * kReach + 1], rise = 0;
-  for (int i = 0; i < count; ++i) {  // from dark to bright, or the other way
+  for (int i = 0; i < count; ++i) {  // the edge is dark to bright or bright to dark; its sum tells
     gradients_across(smooth, edge.start + i * edge.along, edge.across, gradient);
     rise += gradient[kReach - 1] + gradient[kReach] + gradient[kReach + 1];
   }
@@ -66,6 +69,7 @@ EdgePlaces places_of(const cv::Mat& smooth, const DetectedEdge& edge) {
       if (sign * gradient[k] > sign * gradient[best]) best = k;
     const double left = sign * gradient[best - 1], peak = sign * gradient[best], right = sign * gradient[best + 1];
     if (!(peak > least) || !(left > 0) || !(right > 0) || !(peak > left && peak >= right)) continue;
+    // Vertex of the parabola through the logarithms of three gradients.
     const double a = std::log(left), b = std::log(peak), c = std::log(right);
     places.along.push_back(i);
     places.across.push_back(best - kReach + 0.5 * (a - c) / (a - 2 * b + c));
@@ -73,12 +77,14 @@ EdgePlaces places_of(const cv::Mat& smooth, const DetectedEdge& edge) {
   return places;
 }
 
+// A straight line across = offset + slope * along, with its standard deviation and the points it was fitted to.
 struct StraightFit {
   double offset = 0, slope = 0, sigma = 0;
   EdgePlaces kept;
 };
 
-// Places without strays: three rounds, within three sigmas, and never farther than the detector's own half width.
+// Fits a line and rejects outliers, three times: beyond three sigmas, and never farther than the detector's own half
+// width.
 StraightFit fit_places(const EdgePlaces& places) {
   StraightFit fit;
   fit.kept = places;
@@ -112,7 +118,8 @@ StraightFit fit_places(const EdgePlaces& places) {
   return fit;
 }
 
-// How many neighbouring places stand for one: 1 + 2 sum of the correlations of the scatter, over all edges.
+// How many neighbouring points are worth one independent point: 1 + 2 times the sum of the correlations of the scatter,
+// pooled over all edges.
 class Correlation {
  public:
   void add(const StraightFit& fit) {
@@ -154,9 +161,9 @@ bool is_masked(const cv::Mat& mask, const Eigen::Vector2d& p) {
 }  // namespace
 
 void SegmentOptions::check() const {
-  if (!(min_length_px >= 10)) throw InputError("the shortest segment must have 10 px at least");
+  if (!(min_length_px >= 10)) throw InputError("min_length_px must be at least 10");
   if (!(max_megapixels > 0)) throw InputError("max_megapixels must be greater than 0");
-  if (!(straightness_px >= 0)) throw InputError("the straightness must not be negative");
+  if (!(straightness_px >= 0)) throw InputError("straightness_px must not be negative");
 }
 
 std::vector<LineSegment> find_line_segments(const cv::Mat& grey, const cv::Mat& mask, const SegmentOptions& options) {
@@ -186,7 +193,7 @@ std::vector<LineSegment> find_line_segments(const cv::Mat& grey, const cv::Mat& 
     edge.across = {-edge.along.y(), edge.along.x()};
     const EdgePlaces places = places_of(smooth, edge);
     StraightFit fit = fit_places(places);
-    // An edge of which half shows no gradient is two, or texture.
+    // If half of the edge shows no gradient, it is two edges, or texture.
     if (fit.kept.along.size() < 5 || static_cast<double>(fit.kept.along.size()) < 0.5 * edge.length) continue;
     if (fit.kept.along.back() - fit.kept.along.front() < options.min_length_px) continue;
     correlation.add(fit);
@@ -212,7 +219,7 @@ std::vector<LineSegment> find_line_segments(const cv::Mat& grey, const cv::Mat& 
     for (const double along : fit.kept.along) points.push_back(to_full(along));
     const double size = std::sqrt(scale.prod());
     segment.sigma_px = fit.sigma * size;
-    // Edges of a few places may lie straight by accident.
+    // A few points may lie straight by accident.
     const double sigma = std::max(fit.sigma, 0.02) * size;
     const auto line = fit_image_line(points, sigma * std::sqrt(per_place));
     if (!line) continue;

@@ -1,13 +1,15 @@
-// Straight edges of a picture, with the covariance of their lines (M13, M14).
+// Straight edges in an image, with the covariance of their lines (Kalantari 2009, chapter 2).
 //
-// Where edges are is told by OpenCV's line segment detector (von Gioi, Jakubowicz, Morel and Randall, "LSD: a fast line
-// segment detector with a false detection control", PAMI 32(4), 2010), whose ends say little of how good they are. So
-// every edge is measured again: at each pixel along it, the place across it where the grey values of the smoothed
-// picture change most, between pixels by a parabola through the logarithms of three gradients (a blurred step has a
-// Gaussian gradient, of which the logarithm is a parabola). The line through these places, without strays, has their
-// scatter for its sigma. Neighbouring places share pixels: their scatter's correlation from place to place, pooled over
-// the picture, tells how many of them stand for one. Edges of buildings are not straight to hundredths of a pixel, and
-// lenses bend them; `straightness_px` in each end is added to what the scatter lets expect.
+// OpenCV's line segment detector finds the edges (R. Grompone von Gioi, J. Jakubowicz, J.-M. Morel and G. Randall,
+// "LSD: a fast line segment detector with a false detection control", IEEE PAMI 32(4), 2010). It does not say how
+// accurate its end points are, so every edge is measured again. At each pixel along the edge, the position across it is
+// that of the steepest change of the smoothed grey values, interpolated by a parabola through the logarithms of three
+// gradients (the gradient of a blurred step is a Gaussian, and its logarithm a parabola). The line is fitted to these
+// points without outliers; their scatter gives its standard deviation.
+//
+// Neighbouring points share pixels. The correlation of their scatter, pooled over the image, tells how many of them are
+// worth one independent point. Edges of buildings are not straight to hundredths of a pixel, and lenses bend them, so
+// `straightness_px` at each end is added to the covariance.
 #pragma once
 
 #include <string>
@@ -22,19 +24,20 @@ class Mat;
 namespace megablock {
 
 struct SegmentOptions {
-  double min_length_px = 30;      // at the resolution looked at; shorter ones say nothing of a direction
-  double max_megapixels = 4;      // larger pictures are reduced (lines refer to the full image)
-  double straightness_px = 0.15;  // at the resolution looked at
+  double min_length_px = 30;      // in the reduced image; shorter segments do not determine a direction
+  double max_megapixels = 4;      // larger images are reduced (lines refer to the full image)
+  double straightness_px = 0.15;  // in the reduced image
   void check() const;             // throws InputError
 };
 
 struct LineSegment {
-  Eigen::Vector2d first, second;  // px, pixel centres at +0.5
-  ImageLine line;                 // origin: the upper left corner of the image
-  double sigma_px = 0;            // scatter of the edge's places across it
+  Eigen::Vector2d first, second;  // end points, pixels, pixel centres at +0.5
+  ImageLine line;                 // origin: upper left corner of the image
+  double sigma_px = 0;            // scatter of the edge points across the line, pixels of the full image
 };
 
-// Of an 8-bit grey picture; mask as in projects (0 = ignore), empty: none. In the order of the detector.
+// Returns the segments of an 8-bit grey image in the order of the detector. In the mask 0 means ignore, as in projects;
+// an empty mask masks nothing.
 std::vector<LineSegment> find_line_segments(const cv::Mat& grey, const cv::Mat& mask,
                                             const SegmentOptions& options = {});
 

@@ -11,11 +11,11 @@ namespace megablock {
 
 namespace {
 
-constexpr double kUnit = 1.0 / 8192;  // of the gradients as kept
-constexpr double kDark = 16;          // c: below it the noise of the sensor would count as change
-constexpr double kLeastVariation = 0.012, kMostVariation = 0.05;  // bounds of t; noise of a camera is about 0.008
+constexpr double kUnit = 1.0 / 8192;  // unit in which gradients are stored
+constexpr double kDark = 16;          // c; below this grey value, sensor noise would count as change
+constexpr double kLeastVariation = 0.012, kMostVariation = 0.05;  // limits of t; sensor noise is about 0.008
 
-// Of n values the one that a share of them does not exceed.
+// The value that a share of the values does not exceed. Reorders the values.
 template <typename Value>
 Value quantile(std::vector<Value>& values, double share) {
   const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
@@ -28,6 +28,7 @@ struct Variation {
   cv::Mat structure;    // |m|, CV_32F
 };
 
+// m, v_0.5 and v_0.8 at every pixel.
 Variation variation_of(const std::vector<cv::Mat>& gradients) {
   const cv::Size size = gradients.front().size();
   Variation v{cv::Mat(size, CV_32F), cv::Mat(size, CV_32F), cv::Mat(size, CV_32F)};
@@ -54,7 +55,7 @@ Variation variation_of(const std::vector<cv::Mat>& gradients) {
 
 cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
 
-// Pieces of `candidates` of whose rim, one to three pixels outside, at least a share is firm.
+// The connected pieces of `candidates` that have at least a share of their rim, one to three pixels outside, in `firm`.
 cv::Mat pieces_with_firm_rim(const cv::Mat& candidates, const cv::Mat& firm, double share) {
   cv::Mat labels, boxes, centres, kept = cv::Mat::zeros(candidates.size(), CV_8U);
   const int count = cv::connectedComponentsWithStats(candidates, labels, boxes, centres, 4);
@@ -77,7 +78,7 @@ cv::Mat pieces_with_firm_rim(const cv::Mat& candidates, const cv::Mat& firm, dou
   return kept;
 }
 
-// Without regions smaller than `area` pixels.
+// The regions without those smaller than `area` pixels.
 cv::Mat without_specks(const cv::Mat& regions, double area) {
   cv::Mat labels, boxes, centres, kept = cv::Mat::zeros(regions.size(), CV_8U);
   const int count = cv::connectedComponentsWithStats(regions, labels, boxes, centres, 8);
@@ -128,8 +129,8 @@ void StaticRegionFinder::add(cv::Mat gradients, const cv::Size& image_size) {
 
 cv::Mat StaticRegionFinder::mask() const {
   if (images() < options_.min_images)
-    throw InputError("static regions: " + std::to_string(images()) + " images tell nothing; " +
-                     std::to_string(options_.min_images) + " are needed");
+    throw InputError("static regions: " + std::to_string(images()) + " images are too few; at least " +
+                     std::to_string(options_.min_images) + " are needed to tell the vehicle from the scene");
   const Variation v = variation_of(gradients_);
   std::vector<float> typical(v.usual.begin<float>(), v.usual.end<float>());
   const double t = std::clamp(options_.variation_share * quantile(typical, 0.75), kLeastVariation, kMostVariation);
@@ -144,7 +145,8 @@ cv::Mat StaticRegionFinder::mask() const {
   cv::morphologyEx(regions, regions, cv::MORPH_OPEN, disc(1));
   regions = without_specks(regions, area);
   regions = ~without_specks(~regions, area);  // holes
-  // The pixels on the silhouette change with the scene beside them.
+  // The pixels on the vehicle's silhouette change with the scene beside them, so the regions grow by one pixel and the
+  // margin.
   cv::dilate(regions, regions, disc(1 + options_.margin_px));
   if (cv::countNonZero(regions) == 0) return cv::Mat(image_size_, CV_8U, cv::Scalar(255));
   cv::Mat full;

@@ -47,7 +47,7 @@ std::vector<std::int32_t> squared_norms(const std::vector<SiftDescriptor>& descr
   return norms;
 }
 
-// Components less `shift`, modulo 256 where the values are bytes.
+// Rows of elements less `shift`, modulo 256 for bytes, padded with descriptors of zeros (less `shift`).
 template <typename Value>
 std::vector<Value> pack_rows(const std::vector<SiftDescriptor>& descriptors, std::size_t padded, int shift = 0) {
   std::vector<Value> packed(padded * kDimension, static_cast<Value>(-shift));
@@ -59,7 +59,8 @@ std::vector<Value> pack_rows(const std::vector<SiftDescriptor>& descriptors, std
   return packed;
 }
 
-// Panels of kColumnTile descriptors; in a panel, four bytes' worth of components of each descriptor in turn.
+// Panels of kColumnTile descriptors. Within a panel, four bytes of elements of each descriptor follow one another,
+// which is what the kernels multiply at a time.
 template <typename Value>
 std::vector<Value> pack_panels(const std::vector<SiftDescriptor>& descriptors, std::size_t padded) {
   constexpr std::size_t kTogether = 4 / sizeof(Value);
@@ -73,7 +74,7 @@ std::vector<Value> pack_panels(const std::vector<SiftDescriptor>& descriptors, s
   return packed;
 }
 
-// What the kernel for short descriptors asks of both sets together.
+// Largest values of a set, which decide whether the kernel for short descriptors may be used.
 struct Size {
   std::int64_t largest_norm = 0;  // squared
   int largest_byte = 0;
@@ -94,7 +95,7 @@ bool are_short(const Size& a, const Size& b) {
   return a.largest_byte <= 127 && b.largest_byte <= 127 && a.largest_norm * b.largest_norm <= kLargestSum * kLargestSum;
 }
 
-// norms - 256 sum(b): what run_avx512 takes.
+// Squared norms less 256 sum(b), for run_avx512: see nearest_kernel.h.
 std::vector<std::int32_t> shifted_norms(const std::vector<SiftDescriptor>& descriptors,
                                         std::vector<std::int32_t> norms) {
   for (std::size_t i = 0; i < descriptors.size(); ++i)
@@ -102,7 +103,7 @@ std::vector<std::int32_t> shifted_norms(const std::vector<SiftDescriptor>& descr
   return norms;
 }
 
-// [k][padded] to [count][k].
+// Reorders [k][padded] to [count][k].
 std::vector<std::int32_t> transpose(const std::vector<std::int32_t>& lists, std::size_t k, std::size_t padded,
                                     std::size_t count) {
   std::vector<std::int32_t> result(count * k);

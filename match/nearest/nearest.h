@@ -1,4 +1,4 @@
-// Exact nearest neighbours between the descriptors of two images, both ways in one pass.
+// Exact nearest neighbours between the SIFT descriptors of two images, from a to b and from b to a in one pass.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,11 @@
 
 namespace megablock {
 
-// The k nearest rows of the other set for every row, nearest first; ties: lower row first.
+// For every row of one set its k nearest rows of the other set, nearest first. Of equal distances the lower row is
+// first.
 struct Neighbours {
-  static constexpr std::int32_t kFar = 1 << 29;  // above every distance; with row -1: fewer than k neighbours exist
+  // Above every distance; with row -1 it means that there are fewer than k neighbours.
+  static constexpr std::int32_t kFar = 1 << 29;
   std::size_t k = 0;
   std::vector<std::int32_t> distance;  // [rows * k], squared Euclidean
   std::vector<std::int32_t> row;       // [rows * k]
@@ -20,12 +22,13 @@ struct MutualNeighbours {
   Neighbours of_a, of_b;
 };
 
-// For which processors; the result is the same, to the bit.
+// The instruction sets for which there is a kernel. All give the same result, to the bit.
 enum class NearestKernel : std::uint8_t { kPortable, kAvx2, kAvx512 };
-// The fastest that this processor runs.
+// The fastest kernel that this processor can run.
 NearestKernel fastest_nearest_kernel();
 
-// k is 1 to 8. Of a kernel that the processor does not run, the fastest that it does.
+// Returns the k nearest neighbours both ways, 1 <= k <= 8; throws InputError for another k. A kernel that the processor
+// cannot run is replaced by the fastest that it can.
 MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
                                     std::size_t k, NearestKernel kernel = fastest_nearest_kernel());
 

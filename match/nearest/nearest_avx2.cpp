@@ -12,7 +12,7 @@ constexpr std::size_t kRowTile = 4;  // rows of a tile in registers
 
 __m256i load(const void* p) { return _mm256_loadu_si256(static_cast<const __m256i*>(p)); }
 
-// Four bytes of a row (two or four of its components), in every lane.
+// Loads four bytes of a row (two or four of its elements) into every lane.
 __m256i broadcast_four_bytes(const void* p) {
   std::int32_t bytes;
   __builtin_memcpy(&bytes, p, sizeof bytes);
@@ -21,6 +21,7 @@ __m256i broadcast_four_bytes(const void* p) {
 
 using Sums = __m256i[kRowTile][2];  // 32-bit dot products of 4 rows with 16 columns
 
+// Dot products of a tile, from 16-bit elements.
 void multiply(const Problem& p, std::size_t row, std::size_t column, Sums& sum) {
   for (auto& s : sum) s[0] = s[1] = _mm256_setzero_si256();
   const std::int16_t* a = p.a16 + row * kDimension;
@@ -36,6 +37,7 @@ void multiply(const Problem& p, std::size_t row, std::size_t column, Sums& sum) 
   }
 }
 
+// Dot products of a tile of short descriptors, from 8-bit elements.
 void multiply_short(const Problem& p, std::size_t row, std::size_t column, Sums& sum) {
   for (auto& s : sum) s[0] = s[1] = _mm256_setzero_si256();
   const std::uint8_t* a = p.a8 + row * kDimension;
@@ -56,7 +58,8 @@ void multiply_short(const Problem& p, std::size_t row, std::size_t column, Sums&
   }
 }
 
-// Distances of a tile, and those that could enter a list into the lists.
+// Computes the distances of a tile, and inserts those that are nearer than the last entry of a list of a row or a
+// column.
 void keep_nearest(const Problem& p, std::size_t row, std::size_t column, const Sums& sum) {
   alignas(32) std::int32_t distance[kRowTile][kColumnTile];
   const std::int32_t* worst_column = p.column_distance + (p.k - 1) * p.columns + column;
@@ -86,6 +89,7 @@ void keep_nearest(const Problem& p, std::size_t row, std::size_t column, const S
   }
 }
 
+// Visits the tiles so that a block of rows stays in the cache while all columns pass.
 template <typename Multiply>
 void run(const Problem& p, Multiply multiply_tile) {
   Sums sum;

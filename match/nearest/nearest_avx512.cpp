@@ -1,4 +1,4 @@
-// Before the intrinsics: they are declared for what is named here.
+// This must come before the intrinsics, which are declared for the instruction sets named here.
 #pragma GCC target("avx512bw,avx512vnni")
 
 #include <immintrin.h>
@@ -11,23 +11,24 @@ namespace megablock::nearest_kernel {
 
 namespace {
 
-constexpr std::size_t kRows = 8, kPanels = 2;  // of a tile in registers
+constexpr std::size_t kRows = 8, kPanels = 2;  // rows and panels of columns of a tile in registers
 
 __m512i load(const void* p) { return _mm512_loadu_si512(p); }
 
-// Four bytes of a row, in every lane.
+// Loads four bytes of a row into every lane.
 __m512i broadcast_four_bytes(const void* p) {
   std::int32_t bytes;
   __builtin_memcpy(&bytes, p, sizeof bytes);
   return _mm512_set1_epi32(bytes);
 }
 
-// sum += four products each of unsigned bytes of b and signed ones of a. GCC 12 copies every sum twice around the
-// intrinsic, which costs half of the speed.
+// sum += four products each of unsigned bytes of b and signed bytes of a. Written as assembly, because GCC 12 copies
+// every sum twice around the intrinsic, which costs half of the speed.
 void add_products(__m512i& sum, __m512i of_b, __m512i of_a) {
   asm("vpdpbusd %2, %1, %0" : "+v"(sum) : "v"(of_b), "v"(of_a));
 }
 
+// Dot products of a tile.
 template <std::size_t panels>
 [[gnu::always_inline]] inline void multiply(const Problem& p, std::size_t row, std::size_t column,
                                             __m512i (&sum)[kRows][panels]) {
@@ -50,7 +51,8 @@ template <std::size_t panels>
   }
 }
 
-// Distances of a tile, and those that could enter a list into the lists.
+// Computes the distances of a tile, and inserts those that are nearer than the last entry of a list of a row or a
+// column.
 template <std::size_t panels>
 [[gnu::always_inline]] inline void keep_nearest(const Problem& p, std::size_t row, std::size_t column,
                                                 const __m512i (&sum)[kRows][panels]) {

@@ -13,15 +13,16 @@ namespace megablock {
 
 namespace {
 
-constexpr double kCell = 16;           // px, of the grid of keypoints
-constexpr double kStep = 12;           // px along the epipolar line
-constexpr int kDepths = 16;            // pieces of the line, of equal difference in inverse distance
-constexpr double kBandSigmas = 3;      // half of the band's width
-constexpr double kRivalCosine = 0.75;  // of a descriptor that nothing nearer rivals
+constexpr double kCell = 16;       // pixels, side of the cells of the keypoint grid
+constexpr double kStep = 12;       // pixels, step along the epipolar line
+constexpr int kDepths = 16;        // pieces of the line, at equal differences of inverse distance
+constexpr double kBandSigmas = 3;  // half of the width of the band
+// Cosine between a descriptor and the assumed next one, where geometry leaves none.
+constexpr double kRivalCosine = 0.75;
 
 Eigen::Vector2d position(const Keypoint& k) { return {from_fixed_pixel(k.x), from_fixed_pixel(k.y)}; }
 
-// Keypoints by square cells.
+// The keypoints of an image, sorted into square cells.
 class KeypointGrid {
  public:
   KeypointGrid(const std::vector<Keypoint>& keypoints, const Camera& camera)
@@ -41,7 +42,8 @@ class KeypointGrid {
       members_[static_cast<std::size_t>(next[cell[i]]++)] = static_cast<std::int32_t>(i);
   }
 
-  // Calls visitor(keypoint) for those of the cells around a place that this visit has not been to yet.
+  // Calls visitor(keypoint) for the keypoints in the cells around a place. A cell is visited once for each value of
+  // `visit`.
   template <typename Visitor>
   void around(const Eigen::Vector2d& place, double reach, std::int32_t visit, const Visitor& visitor) {
     for (std::int64_t r = row(place.y() - reach); r <= row(place.y() + reach); ++r)
@@ -63,7 +65,7 @@ class KeypointGrid {
 
   std::int64_t columns_, rows_;
   std::vector<std::int32_t> begin_, members_;
-  std::vector<std::int32_t> visit_;  // [cells] last visit
+  std::vector<std::int32_t> visit_;  // [cells] the last visit
 };
 
 std::int32_t squared_distance(const SiftDescriptor& a, const SiftDescriptor& b) {
@@ -81,6 +83,7 @@ double norm(const SiftDescriptor& d) {
   return std::sqrt(static_cast<double>(sum));
 }
 
+// Matches the features of a with those of b along their epipolar lines.
 class GuidedMatcher {
  public:
   GuidedMatcher(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
@@ -122,11 +125,12 @@ class GuidedMatcher {
     return {k() + 1, std::vector<std::int32_t>(size, Neighbours::kFar), std::vector<std::int32_t>(size, -1)};
   }
 
-  // Compares a feature with all along its epipolar line; returns the half width of the band in its middle.
+  // Compares a feature with all features near its epipolar line. Returns the half width of the band at the middle of
+  // the line. The line is computed as a polygon, because distortion bends it.
   double compare_along(const Ray& ray, std::int32_t row) {
     const double nearest = 1 / options_.min_distance_m, farthest = 1 / options_.max_distance_m;
     Eigen::Vector2d before = Eigen::Vector2d::Zero();
-    bool begun = false;  // `before` is a place
+    bool begun = false;  // `before` is a point in or near the image
     double middle = 0;
     for (int d = 0; d <= kDepths; ++d) {
       const double inverse = nearest + (farthest - nearest) * d / kDepths;
@@ -143,7 +147,7 @@ class GuidedMatcher {
     return middle;
   }
 
-  // Pieces beyond a quarter of the image outside of it are left out: distortion may fold there.
+  // Points farther outside than a quarter of the image are left out, because the distortion may fold back there.
   bool near_image(const Eigen::Vector2d& p, double width) const {
     const double x = width + 0.25 * camera_b_.width, y = width + 0.25 * camera_b_.height;
     return p.allFinite() && p.x() > -x && p.x() < camera_b_.width + x && p.y() > -y && p.y() < camera_b_.height + y;
@@ -166,6 +170,7 @@ class GuidedMatcher {
     }
   }
 
+  // Updates the lists of nearest neighbours of both features.
   void compare(std::int32_t row, std::int32_t other) {
     const auto i = static_cast<std::size_t>(row), j = static_cast<std::size_t>(other);
     const std::int32_t distance = squared_distance(a_.descriptors[i], b_.descriptors[j]);
@@ -174,6 +179,7 @@ class GuidedMatcher {
     nearest_kernel::insert(&of_b_.distance[j * of_b_.k], &of_b_.row[j * of_b_.k], 1, of_b_.k, distance, row);
   }
 
+  // The ratio test: the distance to `other` against that of neighbour k + 1, or of the assumed one if that is nearer.
   bool accepts(const Neighbours& lists, std::size_t row, std::int32_t other, const SiftDescriptor& descriptor) const {
     const std::int32_t* distance = &lists.distance[row * lists.k];
     const std::int32_t* rows = &lists.row[row * lists.k];

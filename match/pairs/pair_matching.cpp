@@ -36,7 +36,7 @@ void MatchOptions::check() const {
 
 namespace {
 
-// Neighbours 1..k of a row that are nearer than ratio x neighbour k + 1.
+// Number of the first k neighbours of a row that pass the ratio test against neighbour k + 1.
 std::size_t accepted(const Neighbours& neighbours, std::size_t row, double ratio) {
   const std::size_t k = neighbours.k - 1;
   const std::int32_t* distance = neighbours.distance.data() + row * neighbours.k;
@@ -46,6 +46,7 @@ std::size_t accepted(const Neighbours& neighbours, std::size_t row, double ratio
   return count;
 }
 
+// Whether `other` is among the accepted neighbours of a row.
 bool accepts(const Neighbours& neighbours, std::size_t row, std::int32_t other, double ratio) {
   const auto first = neighbours.row.begin() + static_cast<std::ptrdiff_t>(row * neighbours.k);
   const auto last = first + static_cast<std::ptrdiff_t>(accepted(neighbours, row, ratio));
@@ -63,7 +64,8 @@ std::optional<Eigen::Vector2d> normalised_point(const Camera& camera, const Keyp
   return unproject(camera.intrinsics, {from_fixed_pixel(k.x), from_fixed_pixel(k.y)});
 }
 
-// Matches with their normalised points. The same pair of positions counts once, however many orientations SIFT gave it.
+// Matches with their normalised image points. SIFT may give one position several orientations; the same pair of
+// positions counts once.
 PositionedMatches position(const Matches& matches, const ImageFeatures& a, const ImageFeatures& b,
                            const Camera& camera_a, const Camera& camera_b) {
   std::vector<std::tuple<std::int32_t, std::int32_t, std::int32_t, std::int32_t, std::size_t>> places;
@@ -86,7 +88,7 @@ PositionedMatches position(const Matches& matches, const ImageFeatures& a, const
   for (const std::size_t i : rows) {
     const auto pa = normalised_point(camera_a, a.keypoints[static_cast<std::size_t>(matches[i].first)]);
     const auto pb = normalised_point(camera_b, b.keypoints[static_cast<std::size_t>(matches[i].second)]);
-    if (!pa || !pb) continue;  // beyond the radius the distortion can be inverted at
+    if (!pa || !pb) continue;  // beyond the radius where the distortion can be inverted
     result.matches.push_back(matches[i]);
     result.points.a.push_back(*pa);
     result.points.b.push_back(*pb);
@@ -94,14 +96,15 @@ PositionedMatches position(const Matches& matches, const ImageFeatures& a, const
   return result;
 }
 
-// The first of the rows that SIFT gives one keypoint, one for each of its orientations; they follow one another. What
-// is at one place is one point, so only the first is named in matches.
+// SIFT gives a keypoint with several orientations one row for each, one after the other. Matches name only the first of
+// these rows, because all belong to one point.
 std::int32_t first_at_place(const std::vector<Keypoint>& keypoints, std::int32_t row) {
   const auto at = [&](std::int32_t r) { return keypoints[static_cast<std::size_t>(r)]; };
   while (row > 0 && at(row - 1).x == at(row).x && at(row - 1).y == at(row).y) --row;
   return row;
 }
 
+// Matches that pass the ratio test in both directions.
 Matches mutual_matches(const MutualNeighbours& nearest, double ratio) {
   Matches matches;
   for (std::size_t row = 0; row < nearest.of_a.row.size() / nearest.of_a.k; ++row) {
@@ -117,6 +120,7 @@ Matches mutual_matches(const MutualNeighbours& nearest, double ratio) {
   return matches;
 }
 
+// A seed that depends only on the pair, so that its result does not depend on the order of work.
 std::uint64_t pair_seed(ImageIndex a, ImageIndex b) { return Hasher().add(a.value).add(b.value).value(); }
 
 }  // namespace
@@ -129,7 +133,7 @@ Matches match_descriptors(const std::vector<SiftDescriptor>& a, const std::vecto
 
 namespace {
 
-// Of the coarsest features, which come first.
+// Matches of the coarsest features, which come first in the list.
 Matches match_coarsest(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options) {
   static constexpr std::size_t kCoarsest = 1000;
   const auto coarsest = [](const ImageFeatures& image) {
@@ -149,12 +153,15 @@ Standing standing_of_coarsest(const ImageFeatures& a, const ImageFeatures& b, co
 
 namespace {
 
+// Matches of features in equal or adjacent sectors (upright_matching.h).
 Matches match_alike(const ImageFeatures& a, const ImageFeatures& b, const std::vector<std::int8_t>& sectors_a,
                     const std::vector<std::int8_t>& sectors_b, const MatchOptions& options) {
   const auto k = static_cast<std::size_t>(options.k_best) + 1;
   return mutual_matches(nearest_alike(a.descriptors, b.descriptors, sectors_a, sectors_b, k), options.ratio);
 }
 
+// Matches of descriptors in the fastest way that is safe: by known verticals, by the turn of a pair of vertical images,
+// or all with all.
 Matches match_features(const ImageFeatures& a, const ImageFeatures& b, const MatchOptions& options,
                        const PairKnowledge& known) {
   if (known.upright_a && known.upright_b) return match_alike(a, b, *known.upright_a, *known.upright_b, options);
@@ -164,7 +171,7 @@ Matches match_features(const ImageFeatures& a, const ImageFeatures& b, const Mat
   return match_descriptors(a.descriptors, b.descriptors, options);
 }
 
-// Verification of matches by two-view geometry; `by_chance`: see TwoViewOptions.
+// Verifies matches by two-view geometry and stores the inliers. `by_chance`: see TwoViewOptions.
 VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
                     const MatchOptions& options, const Matches& matches, const PairKnowledge& known, double by_chance) {
   VerifiedPair pair;
@@ -194,8 +201,8 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
   return pair;
 }
 
-// Whether the rotation takes one vertical past the other by so much that matches may have been missed for it: of
-// features compared in sectors of 30 degrees, half a sector.
+// Whether the rotation of the pair turns one vertical away from the other by more than half a sector of 30 degrees.
+// Matches may then have been missed, because features were compared by sectors.
 bool contradicts_verticals(const VerifiedPair& pair, const PairKnowledge& known) {
   constexpr double kFarthest = 15 * kDegree;
   if (pair.model == PairModel::kNone || !known.vertical_a || !known.vertical_b) return false;
@@ -209,7 +216,7 @@ Eigen::Vector2d pixel(const ImageFeatures& image, std::int32_t row) {
   return {from_fixed_pixel(k.x), from_fixed_pixel(k.y)};
 }
 
-// Drops what the filter takes for wrong; a pair that keeps too little is not verified.
+// Removes the matches that the filter considers wrong. A pair that keeps too few is not verified any more.
 void drop_wrong(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
                 const MatchOptions& options, const TrustedPair& orientation, const MatchFilter& filter,
                 VerifiedPair& pair) {
@@ -217,7 +224,7 @@ void drop_wrong(const ImageFeatures& a, const ImageFeatures& b, const Camera& ca
   for (std::size_t i = 0; i < pair.feature_a.size(); ++i) {
     const auto sample =
         match_sample(orientation, camera_a, pixel(a, pair.feature_a[i]), camera_b, pixel(b, pair.feature_b[i]));
-    samples.push_back(sample.value_or(MatchSample{}));  // verified, so it has rays
+    samples.push_back(sample.value_or(MatchSample{}));  // verified matches have rays
   }
   const std::vector<std::uint8_t> right = filter.right(samples);
   std::size_t kept = 0;
@@ -238,11 +245,11 @@ void drop_wrong(const ImageFeatures& a, const ImageFeatures& b, const Camera& ca
 
 VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Camera& camera_a, const Camera& camera_b,
                         const MatchOptions& options, const PairKnowledge& known) {
-  if (!(a.image < b.image)) throw InputError("match_pair: the first image must have the lower index");
+  if (!(a.image < b.image)) throw InputError("match_pair: the first image must have the lower index of the two");
   VerifiedPair pair;
   if (known.orientation && options.guided) {
     const GuidedMatches guided = match_along_epipolar(a, b, camera_a, camera_b, *known.orientation, options);
-    // Wrong matches lie anywhere in the band.
+    // Wrong matches lie anywhere in the band, so this share of them fits by chance.
     const double by_chance = std::min(1.0, options.max_residual_px / std::max(1.0, guided.half_width_px));
     pair = verify(a, b, camera_a, camera_b, options, guided.matches, known, by_chance);
   }

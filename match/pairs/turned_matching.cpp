@@ -12,14 +12,15 @@ namespace megablock {
 
 namespace {
 
-// From a feature of a to the one of b that it matches.
+// Change of orientation and size from a feature of a to its match in b.
 struct Change {
   double turn_rad;
-  double octaves;  // log2 of the sizes
+  double octaves;  // log2 of the ratio of sizes
 };
 
 using ChangesBySector = std::array<std::vector<Change>, kUprightSectors>;
 
+// The changes of all matches, sorted by the sector of their turn.
 ChangesBySector changes_of(const ImageFeatures& a, const ImageFeatures& b,
                            std::span<const std::pair<std::int32_t, std::int32_t>> matches) {
   ChangesBySector changes;
@@ -34,9 +35,10 @@ ChangesBySector changes_of(const ImageFeatures& a, const ImageFeatures& b,
   return changes;
 }
 
-// Of lund's pairs, along a street, none has so many so near, of nadir pairs four of five have.
+// Whether most changes of size are equal. In the street block "lund" no pair has so many so near; of pairs of vertical
+// images four of five have.
 bool are_of_one_size(std::vector<Change> changes) {
-  constexpr double kNear = 0.2, kShare = 0.7;  // octaves: 15 %
+  constexpr double kNear = 0.2, kShare = 0.7;  // in octaves; 0.2 is 15 %
   const auto middle = changes.begin() + std::ssize(changes) / 2;
   std::nth_element(changes.begin(), middle, changes.end(),
                    [](const Change& p, const Change& q) { return p.octaves < q.octaves; });
@@ -46,6 +48,7 @@ bool are_of_one_size(std::vector<Change> changes) {
   return static_cast<double>(near) >= kShare * static_cast<double>(changes.size());
 }
 
+// The mean direction of the turns.
 double mean_turn(const std::vector<Change>& changes) {
   double cosines = 0, sines = 0;
   for (const Change& change : changes) {
@@ -63,6 +66,7 @@ std::optional<double> turn_from_above(const ImageFeatures& a, const ImageFeature
   constexpr std::size_t kTogether = 3;
   const ChangesBySector changes = changes_of(a, b, matches);
   std::size_t count = 0;
+  // The largest number of changes within three adjacent sectors.
   std::vector<Change> most;
   for (std::size_t sector = 0; sector < kUprightSectors; ++sector) {
     count += changes[sector].size();

@@ -1,7 +1,9 @@
-// Matching of two images that look down: what lies on the ground is turned by the same angle wherever it is seen.
+// Faster matching of two vertical images: everything on the ground is turned by the same angle from one image to the
+// other.
 //
-// From above no vertical is seen (upright_matching.h). But the coarsest features of both images, matched first, tell
-// the turn of the pair, and directions counted from it are compared in the same sectors: a quarter of all comparisons.
+// Vertical images do not show the vertical (upright_matching.h). But the coarsest features, matched first, tell the
+// turn of the pair. Directions of keypoints counted from it are then compared in sectors, which leaves a quarter of the
+// comparisons.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +16,14 @@
 
 namespace megablock {
 
-// From directions of keypoints in a to those in b, radians, as most matches have it within three sectors. None where
-// they might agree by accident (of pairs without any right match no more than one in a thousand has a turn), and where
-// they do not agree in size: from above flat ground is as large in one place as in another, along streets it is not.
+// Returns the turn (radians) from directions of keypoints in a to those in b, on which most matches agree to within
+// three sectors. Empty where this agreement may be an accident (among pairs without any right match at most one in a
+// thousand passes), and where the matches do not agree in size: seen from above, flat ground has the same scale
+// everywhere, along streets it has not.
 std::optional<double> turn_from_above(const ImageFeatures& a, const ImageFeatures& b,
                                       std::span<const std::pair<std::int32_t, std::int32_t>> matches);
 
-// [features]: sectors (upright_matching.h) of their directions, counted from this one.
+// For each feature the sector of its direction (upright_matching.h), counted from `direction_rad`.
 std::vector<std::int8_t> sectors_from(const ImageFeatures& image, double direction_rad);
 
 }  // namespace megablock

@@ -14,15 +14,17 @@ namespace megablock {
 
 namespace {
 
-// Sectors from a to b, 0 to kUprightSectors - 1.
+// The turn from sector a to sector b, 0 to kUprightSectors - 1.
 int turn_between(std::int8_t a, std::int8_t b) { return (b - a + kUprightSectors) % kUprightSectors; }
 
+// Whether features in these sectors are compared: equal or adjacent sectors, or one without a sector.
 bool stand_alike(std::int8_t a, std::int8_t b) {
   if (a == kAnySector || b == kAnySector) return true;
   const int turn = turn_between(a, b);
   return turn <= 1 || turn == kUprightSectors - 1;
 }
 
+// The descriptors of the given rows.
 std::vector<SiftDescriptor> picked(const std::vector<SiftDescriptor>& descriptors,
                                    const std::vector<std::int32_t>& rows) {
   std::vector<SiftDescriptor> result;
@@ -35,7 +37,7 @@ Neighbours no_neighbours(std::size_t rows, std::size_t k) {
   return {k, std::vector<std::int32_t>(rows * k, Neighbours::kFar), std::vector<std::int32_t>(rows * k, -1)};
 }
 
-// Puts a neighbour into the list of a row, in order of distance, then of rows.
+// Inserts a neighbour into the list of a row, in order of distance, then of row.
 void insert_neighbour(Neighbours& all, std::size_t of, std::int32_t distance, std::int32_t row) {
   const std::size_t first = of * all.k;
   std::size_t place = all.k;
@@ -63,7 +65,7 @@ std::int8_t sector_of(double angle_rad) {
 
 std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camera& camera,
                                          const Eigen::Vector3d& down) {
-  constexpr double kLowest = 0.5, kHighest = -0.866;  // sines of 30 degrees below the horizon and 60 above
+  constexpr double kLowest = 0.5, kHighest = -0.866;  // sines of 30 degrees below the horizon and of 60 degrees above
   constexpr double kStep = 1e-3;
   std::vector<std::int8_t> sectors(image.keypoints.size(), kAnySector);
   for (std::size_t i = 0; i < sectors.size(); ++i) {
@@ -74,6 +76,7 @@ std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camer
     const Eigen::Vector3d ray = point->homogeneous().normalized();
     const double below = ray.dot(down);
     if (!(below < kLowest && below > kHighest)) continue;
+    // Direction in the image in which the vertical runs at this place.
     const Eigen::Vector2d vertical = project(camera.intrinsics, ray + kStep * down) - pixel;
     sectors[i] = sector_of(keypoint.angle_deg * kDegree - std::atan2(vertical.y(), vertical.x()));
   }
@@ -85,7 +88,7 @@ MutualNeighbours nearest_alike(const std::vector<SiftDescriptor>& a, const std::
                                std::size_t k) {
   MutualNeighbours all{no_neighbours(a.size(), k), no_neighbours(b.size(), k)};
   for (std::int8_t sector = kAnySector; sector < kUprightSectors; ++sector) {
-    std::vector<std::int32_t> rows_a, rows_b;  // ascending, as ties are decided by rows
+    std::vector<std::int32_t> rows_a, rows_b;  // ascending, because rows decide between equal distances
     for (std::size_t i = 0; i < a.size(); ++i)
       if (sectors_a[i] == sector) rows_a.push_back(static_cast<std::int32_t>(i));
     for (std::size_t j = 0; j < b.size(); ++j)
@@ -116,7 +119,8 @@ Standing compare_standing(std::span<const std::pair<std::int32_t, std::int32_t>>
     ++turned[static_cast<std::size_t>(turn_between(of_a, of_b))];
     ++count;
   }
-  // What each of two turns explains, within a sector, and the other does not is as likely for either by chance.
+  // Of two turns, each explains the matches within one sector of it. Matches that only one of them explains fall to
+  // either with equal probability by chance.
   const auto near = [](int turn, int other) {
     const int apart = turn_between(static_cast<std::int8_t>(turn), static_cast<std::int8_t>(other));
     return apart <= 1 || apart == kUprightSectors - 1;
@@ -136,7 +140,7 @@ Standing compare_standing(std::span<const std::pair<std::int32_t, std::int32_t>>
 }
 
 std::vector<std::uint8_t> upright_pairs(std::span<const StandingPair> pairs) {
-  std::map<ImageIndex, int> belief;  // others alike, less others turned
+  std::map<ImageIndex, int> belief;  // number of other images it agrees with, less those it is turned against
   for (const StandingPair& pair : pairs) {
     const int said = pair.standing == Standing::kAlike ? 1 : pair.standing == Standing::kTurned ? -1 : 0;
     belief[pair.a] += said;

@@ -1,11 +1,12 @@
-// Matching of two images that know where down is: what stands upright in one does so in the other.
+// Faster matching of two images with known vertical: an object that is upright in one image is upright in the other.
 //
-// A feature's direction is counted from that of the vertical at its place, in sectors of 30 degrees, and features are
-// compared with those of the same sector and the two beside it: a quarter of all comparisons (gravity-aligned features:
-// D. Kurz and S. Benhimane, "Inertial sensor-aligned visual feature descriptors", CVPR 2011). Of verified matches in
-// streets 99 % differ by less than 20 degrees. The direction says nothing where one looks down on the ground, which
-// turns with the heading, nor next to the zenith: features seen more than 30 degrees below the horizon or 60 above it
-// are compared with all.
+// The direction of a feature is counted from the vertical at its place in the image, in sectors of 30 degrees. Features
+// are compared only with those in the same and in the two adjacent sectors, which is a quarter of all comparisons
+// (gravity-aligned features: D. Kurz and S. Benhimane, "Inertial sensor-aligned visual feature descriptors", CVPR
+// 2011). Of verified matches in streets, 99 % differ by less than 20 degrees.
+//
+// The direction means nothing on the ground seen from above, which turns with the heading, nor near the zenith.
+// Features seen more than 30 degrees below the horizon or 60 degrees above are therefore compared with all.
 #pragma once
 
 #include <array>
@@ -20,28 +21,29 @@
 
 namespace megablock {
 
+// Number of sectors, and the value for a feature without one.
 inline constexpr int kUprightSectors = 12;
 inline constexpr std::int8_t kAnySector = -1;
 
-// The sector of a direction, in radians, any number of turns.
+// The sector of a direction in radians, of any size. kAnySector for NaN.
 std::int8_t sector_of(double angle_rad);
 
-// [features]: 0 to kUprightSectors - 1, or kAnySector. `down`: unit, camera axes.
+// For each feature its sector, 0 to kUprightSectors - 1, or kAnySector. `down` is a unit vector in camera axes.
 std::vector<std::int8_t> upright_sectors(const ImageFeatures& image, const Camera& camera, const Eigen::Vector3d& down);
 
-// As nearest_neighbours of all, those left out that differ by more than one sector.
+// As nearest_neighbours, but without the pairs that differ by more than one sector.
 MutualNeighbours nearest_alike(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b,
                                std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b,
                                std::size_t k);
 
-// How features that match, found regardless of sectors, stand in two images.
+// How the sectors of two images agree, according to matches found regardless of sectors.
 enum class Standing : std::int8_t {
-  kUnknown,  // too few to tell
+  kUnknown,  // too few matches to tell
   kAlike,
-  kTurned,  // most of them by another turn than none: a vertical is wrong
+  kTurned,  // most matches agree on a turn other than zero: one of the verticals is wrong
 };
-// Of pairs without any right match, whose turns are evenly spread, no more than one in a thousand is taken for alike,
-// and one for turned.
+// Among pairs without any right match, whose turns are evenly distributed, at most one in a thousand is considered
+// alike, and at most one in a thousand turned.
 Standing compare_standing(std::span<const std::pair<std::int32_t, std::int32_t>> matches,
                           std::span<const std::int8_t> sectors_a, std::span<const std::int8_t> sectors_b);
 
@@ -49,9 +51,9 @@ struct StandingPair {
   ImageIndex a, b;
   Standing standing = Standing::kUnknown;
 };
-// 1 for the pairs in which only features that stand alike need to be compared: where they are seen to stand so, and,
-// where nothing is seen, of images that stand alike with more others than they are turned against. A wrong vertical
-// costs a pair its matches, so that it takes evidence to believe one.
+// Decides in which pairs only features in like sectors are compared; 1 for these. It does so where the pair itself was
+// seen to be alike. Where nothing was seen, both images must agree with more others than they are turned against: a
+// wrong vertical costs a pair its matches, so it must be supported by evidence.
 std::vector<std::uint8_t> upright_pairs(std::span<const StandingPair> pairs);
 
 }  // namespace megablock

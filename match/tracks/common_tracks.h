@@ -1,5 +1,6 @@
-// How many tracks all images of a subset have in common (KP-12). Matches of pairs do not tell: of subsets with like
-// numbers for every pair, one may share a tenth of the tracks of another.
+// Counts the tracks that all images of a subset have in common (A. Barrier and S. Martin, "Bundle adjustment with known
+// positions", report, ENS Paris-Saclay). The numbers of matches of pairs do not tell this: of subsets with like numbers
+// for every pair, one may have a tenth of the common tracks of another.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +12,11 @@ namespace megablock {
 
 struct ImageSubset {
   std::vector<ImageIndex> images;  // ascending
-  std::int64_t common_tracks = 0;  // seen in every one of them
+  std::int64_t common_tracks = 0;  // number of tracks with observations in all of these images
 };
 
-// The subsets (images in any order, repeated ones count once) by falling number of common tracks; equal ones as given.
-// InputError for a subset without images.
+// Returns the subsets by falling number of common tracks; equal ones keep their order. Images may be in any order, and
+// repeated ones count once. Throws InputError for an empty subset.
 std::vector<ImageSubset> rank_by_common_tracks(const TrackSet& tracks,
                                                const std::vector<std::vector<ImageIndex>>& subsets);
 

@@ -32,7 +32,7 @@ void MatchOrder::fail(const char* what) const {
 void MatchOrder::add(const VerifiedPair& pair, std::int32_t generation) {
   if (pair.a.value < 0 || pair.b <= pair.a || pair.feature_a.size() != pair.feature_b.size())
     throw InputError("matches of images " + std::to_string(pair.a.value) + " and " + std::to_string(pair.b.value) +
-                     ": no such image pair, or columns of different length");
+                     ": the images must be two, the lower index first, with a feature of each for every match");
   headers_.push_back({generation, static_cast<std::int32_t>(pair.feature_a.size()), pair.a.value, pair.b.value,
                       static_cast<std::int64_t>(rows_.size())});
   rows_.insert(rows_.end(), pair.feature_a.begin(), pair.feature_a.end());
@@ -43,7 +43,7 @@ void MatchOrder::add(const VerifiedPair& pair, std::int32_t generation) {
 
 void MatchOrder::write_run() {
   if (!file_) {
-    std::error_code ignored;  // what matters is whether the file can be made
+    std::error_code ignored;  // only the result counts: whether the file can be made
     std::filesystem::create_directories(std::filesystem::path(memory_.scratch_file).parent_path(), ignored);
     file_.reset(std::fopen(memory_.scratch_file.c_str(), "w+b"));
     if (!file_) fail("sorted");
@@ -76,7 +76,7 @@ void take_rows(const void* rows, std::int32_t count, PairMatches& pair) {
 
 }  // namespace
 
-// A sorted run in the file, read through a buffer of its own.
+// A sorted run in the file, read through its own buffer.
 class MatchOrder::Run {
  public:
   Run(const MatchOrder& order, std::int64_t begin, std::int64_t end) : order_(&order), next_(begin), end_(end) {
@@ -84,7 +84,7 @@ class MatchOrder::Run {
   }
   const Header& header() const { return header_; }
   bool ended() const { return ended_; }
-  // The matches of header(); then header() is the next pair's.
+  // Copies the matches of header() into `pair` and moves on to the next pair.
   void take(PairMatches& pair) {
     pair.generation = header_.generation;
     pair.a = ImageIndex(header_.a);
@@ -120,7 +120,7 @@ class MatchOrder::Run {
   }
 
   const MatchOrder* order_;
-  std::int64_t next_, end_;  // in the file, behind the buffer
+  std::int64_t next_, end_;  // position in the file behind the buffer, and end of the run
   std::vector<char> buffer_;
   std::size_t position_ = 0;
   Header header_{};
@@ -148,6 +148,7 @@ void MatchOrder::visit_memory(const std::function<void(const PairMatches&)>& vis
   }
 }
 
+// Merges the runs: the queue holds the runs by their next pair.
 void MatchOrder::visit_runs(const std::function<void(const PairMatches&)>& visit) {
   std::vector<Run> runs;
   for (std::size_t r = 0; r + 1 < run_begin_.size(); ++r) runs.emplace_back(*this, run_begin_[r], run_begin_[r + 1]);

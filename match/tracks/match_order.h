@@ -1,8 +1,9 @@
-// The matches of a block in the order in which tracks are made of them, which does not depend on the cells they came
-// from: by generation; then pairs with many matches first, as their links are the surest; then by image.
+// Sorts the matches of a block into the order in which tracks are built: by generation, then pairs with many matches
+// first, because their links are the most reliable, then by image. This order does not depend on the cells in which
+// pairs were matched.
 //
-// More than memory holds are sorted in runs of MatchMemory::bytes that wait in a scratch file and are merged while
-// read.
+// Matches that exceed MatchMemory::bytes are sorted in runs, which wait in a scratch file and are merged while they are
+// read (external merge sort).
 #pragma once
 
 #include <cstdint>
@@ -17,11 +18,11 @@
 namespace megablock {
 
 struct MatchMemory {
-  std::int64_t bytes = std::int64_t{128} << 20;  // of matches held at a time
-  std::string scratch_file;                      // made where they exceed it, and removed; empty: all stay in memory
+  std::int64_t bytes = std::int64_t{128} << 20;  // largest size of matches in memory
+  std::string scratch_file;  // written where they exceed it, and removed later; empty: all stay in memory
 };
 
-// Matches of one pair of images.
+// The matches of one pair of images: feature_a[i] matches feature_b[i].
 struct PairMatches {
   std::int32_t generation = 0;
   ImageIndex a, b;
@@ -35,16 +36,18 @@ class MatchOrder {
   MatchOrder(const MatchOrder&) = delete;
   MatchOrder& operator=(const MatchOrder&) = delete;
 
-  // InputError where the pair is none. StoreError where the scratch file cannot be written.
+  // Adds the matches of a pair. Throws InputError for an invalid pair, and StoreError where the scratch file cannot be
+  // written.
   void add(const VerifiedPair& pair, std::int32_t generation);
-  // Once, after all pairs. The argument of `visit` holds until it returns.
+  // Calls `visit` for all pairs in order. Call it once, after all pairs were added. The argument is valid during the
+  // call only.
   void visit(const std::function<void(const PairMatches&)>& visit);
 
  private:
   struct Header {
     std::int32_t generation, count;
     std::int64_t a, b;
-    std::int64_t offset;  // in rows_: of a's rows, then b's
+    std::int64_t offset;  // in rows_: first the rows of a, then those of b
     bool operator<(const Header& other) const;
   };
   class Run;
@@ -57,7 +60,7 @@ class MatchOrder {
   std::vector<Header> headers_;
   std::vector<std::int32_t> rows_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  std::vector<std::int64_t> run_begin_;  // bytes of each run in the file, and the end
+  std::vector<std::int64_t> run_begin_;  // first byte of each run in the file, and the end
 };
 
 }  // namespace megablock

@@ -19,7 +19,7 @@ void MatchedFeatures::mark(ImageIndex image, const std::vector<std::int32_t>& ro
   if (rows.empty()) return;
   const auto [lowest, highest] = std::minmax_element(rows.begin(), rows.end());
   if (!images_.contains(image) || *lowest < 0)
-    throw InputError("matches of image " + std::to_string(image.value) + ": no such image or feature");
+    throw InputError("matches of image " + std::to_string(image.value) + ": the image or the feature does not exist");
   std::vector<std::uint64_t>& words = images_[image].words;
   const std::size_t needed = static_cast<std::size_t>(*highest) / kWordBits + 1;
   if (words.size() < needed) words.resize(needed);
@@ -39,7 +39,7 @@ void MatchedFeatures::number() {
   }
   if (count() > std::numeric_limits<FeatureNumber>::max())
     throw InputError("the block has " + std::to_string(count()) +
-                     " matched features, more than 2^32: cut it into blocks that overlap");
+                     " matched features, more than 2^32; divide it into blocks that overlap");
   std::size_t image = 0;
   for (std::int64_t number = 0; number < count(); number += kHintStep) {
     while (begin_[image + 1] <= number) ++image;
@@ -74,7 +74,7 @@ std::int32_t MatchedFeatures::row_of(FeatureNumber number) const {
   for (std::uint32_t in_word; rank >= (in_word = static_cast<std::uint32_t>(std::popcount(own.words[word]))); ++word)
     rank -= in_word;
   std::uint64_t bits = own.words[word];
-  for (; rank > 0; --rank) bits &= bits - 1;  // clears the lowest
+  for (; rank > 0; --rank) bits &= bits - 1;  // clears the lowest bit
   return static_cast<std::int32_t>(word * kWordBits) + std::countr_zero(bits);
 }
 

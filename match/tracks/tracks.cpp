@@ -13,8 +13,8 @@ void TrackOptions::check() const {
   if (min_length < 2) throw InputError("min_track_length must be at least 2, not " + std::to_string(min_length));
 }
 
-// Sets of matched features as linked lists in ascending order, which is ascending order of images; the root of a set is
-// its first feature.
+// Sets of matched features (union-find). Each set is also a linked list in ascending order of features, which is
+// ascending order of images. The root of a set is its first feature.
 class TrackBuilder::FeatureSets {
  public:
   static constexpr FeatureNumber kNone = std::numeric_limits<FeatureNumber>::max();
@@ -34,7 +34,7 @@ class TrackBuilder::FeatureSets {
     return length == 0;
   }
 
-  // Unites two sets unless the union would see an image twice.
+  // Unites two sets, unless the union would contain an image twice.
   void unite(FeatureNumber one, FeatureNumber other) {
     const FeatureNumber a = root(one), b = root(other);
     if (a == b || share_image(a, b)) return;
@@ -51,6 +51,7 @@ class TrackBuilder::FeatureSets {
     return n;
   }
 
+  // Walks both lists in parallel, as in a merge.
   bool share_image(FeatureNumber i, FeatureNumber j) const {
     ImageIndex image_i = features_.image_of(i), image_j = features_.image_of(j);
     while (image_i != image_j) {

@@ -1,9 +1,11 @@
-// Tracks = connected components of the matches; a component that sees an image twice is split into consistent parts.
+// Builds tracks: the connected components of the matches. A component that would contain an image twice is split into
+// consistent parts.
 //
-// Matches are taken in the order of match_order.h, and each unites the tracks of its two features unless the union
-// would see an image twice. So tracks do not depend on the cells in which pairs were matched.
+// Matches are taken in the order of match_order.h. Each unites the tracks of its two features, unless the union would
+// contain an image twice. As that order does not depend on the cells in which pairs were matched, neither do the
+// tracks.
 //
-// Memory: 8 bytes per matched feature, besides matched_features.h and match_order.h; nothing per match.
+// Memory: 8 bytes per matched feature, besides that of matched_features.h and match_order.h; nothing per match.
 #pragma once
 
 #include <functional>
@@ -18,34 +20,34 @@
 namespace megablock {
 
 struct TrackOptions {
-  int min_length = 2;               // images
-  bool remove_eccentricity = true;  // of keypoints (eccentricity.h); whoever measures the tracks does it
+  int min_length = 2;               // smallest number of images of a track
+  bool remove_eccentricity = true;  // of keypoints (eccentricity.h); done where the tracks are written
   void check() const;               // throws InputError
 };
 
-// One track: ascending images, and the row of each in its features.
+// One track: its images, ascending, and for each the row of its feature.
 struct Track {
-  FeatureNumber first;  // number of its first feature, by which TrackBuilder finds it again
+  FeatureNumber first;  // number of its first feature, which identifies the track
   std::vector<ImageIndex> images;
   std::vector<std::int32_t> features;
 };
 
-// Builds tracks from pairs in batches ("generations"), as a block that grows brings them: what earlier generations
-// united stays united, so that a later one changes no tracks but those its own matches touch.
+// Builds tracks from pairs that come in batches ("generations"), as in a block that grows. Features that an earlier
+// generation united stay united; a later one changes only the tracks that its own matches touch.
 class TrackBuilder {
  public:
   explicit TrackBuilder(std::size_t images, MatchMemory memory = {});
   ~TrackBuilder();
-  // In any order. InputError for pairs that name images or features that cannot be.
+  // Adds the matches of a pair, in any order. Throws InputError for images or features that cannot exist.
   void add(const VerifiedPair& pair, std::int32_t generation = 0);
-  // Once, after all pairs.
+  // Builds the tracks. Call once, after all pairs.
   void build();
 
-  // Tracks of at least `min_length` images, by first image, then first feature.
+  // Calls `visit` for the tracks of at least `min_length` images, ordered by first image, then first feature.
   void visit(int min_length, const std::function<void(const Track&)>& visit) const;
   Track track(FeatureNumber first) const;
-  // How many tracks of three and more images each image had when the generation, or the last one before it that
-  // brought pairs, had been added.
+  // For each image the number of tracks of three and more images after this generation (or the last one before it that
+  // brought pairs).
   const IndexedVector<ImageIndex, std::int64_t>& long_tracks(std::int32_t generation) const;
 
  private:
@@ -59,8 +61,8 @@ class TrackBuilder {
   std::vector<IndexedVector<ImageIndex, std::int64_t>> long_tracks_;  // by generation
 };
 
-// All pairs in one batch, with the positions of the keypoints. Ids are 0..n-1, ordered by first image, then first
-// feature. InputError also for features that do not exist.
+// Builds tracks from all pairs in one batch, with the positions of the keypoints. Ids are 0 to n - 1, ordered by first
+// image, then first feature. Throws InputError also for features that do not exist.
 TrackSet build_tracks(const IndexedVector<ImageIndex, std::vector<Keypoint>>& keypoints,
                       const std::vector<VerifiedPair>& pairs, const TrackOptions& options);
 

@@ -9,16 +9,16 @@ namespace megablock {
 
 namespace {
 
-constexpr int kLongestChain = 12;  // relative poses put together
+constexpr int kLongestChain = 12;  // number of relative poses that are concatenated at most
 
 double squared(double x) { return x * x; }
 
-// Pose of `to` in `from`'s axes, both poses given in one frame of reference.
+// Pose of `to` in the axes of `from`; both are given in the same frame.
 Pose relative(const Pose& from, const Pose& to) {
   return {(to.rotation * from.rotation.conjugate()).normalized(), from.rotation * (to.centre - from.centre)};
 }
 
-// `inner` is given in the axes of `outer`.
+// The pose `inner`, given in the axes of `outer`, in the frame that `outer` is given in.
 Pose composed(const Pose& outer, const Pose& inner) {
   return {(inner.rotation * outer.rotation).normalized(), outer.centre + outer.rotation.conjugate() * inner.centre};
 }
@@ -34,6 +34,8 @@ void TrustOptions::check() const {
 double TrustedPair::epipolar_sigma_px(double focal_px, double distance_m, double pixel_sigma) const {
   return std::sqrt(squared(pixel_sigma) + squared(focal_px * rotation_sigma_rad) +
                    squared(focal_px * position_sigma_m / std::max(1.0, std::abs(distance_m))));
+  // The variance of the epipolar line: that of the observation, of the rotation, and of the base seen from the
+  // distance.
 }
 
 TrustedPairs::TrustedPairs(const Block& block, const TrustOptions& options) : block_(block), options_(options) {
@@ -64,7 +66,7 @@ std::optional<TrustedPairs::Relative> TrustedPairs::along_chain(FrameIndex from,
 std::optional<TrustedPairs::Relative> TrustedPairs::between(FrameIndex from, FrameIndex to) const {
   const Frame &a = block_.frames[from], &b = block_.frames[to];
   if (a.rig != b.rig || a.pass != b.pass) return std::nullopt;
-  if (!(std::abs(a.time_s - b.time_s) <= options_.max_seconds)) return std::nullopt;  // unknown times: not trusted
+  if (!(std::abs(a.time_s - b.time_s) <= options_.max_seconds)) return std::nullopt;  // unknown times are not trusted
   if (const auto chain = along_chain(from, to)) return chain;
   if (!a.given_pose || !b.given_pose) return std::nullopt;
   return Relative{relative(*a.given_pose, *b.given_pose), options_.rotation_sigma_deg * std::numbers::pi / 180,
@@ -85,7 +87,7 @@ std::optional<TrustedPair> TrustedPairs::relate(ImageIndex a, ImageIndex b) cons
   if (!frames) return std::nullopt;
   const Mount &mount_a = block_.mount_of(a), &mount_b = block_.mount_of(b);
   double rotation = squared(frames->rotation_sigma_rad), position = squared(frames->position_sigma_m);
-  if (image_a.mount != image_b.mount)  // of one and the same mount what is wrong is wrong in both
+  if (image_a.mount != image_b.mount)  // errors of one and the same mount are in both images alike
     for (const Mount* mount : {&mount_a, &mount_b}) {
       rotation += squared(mount->rotation_sigma_rad);
       position += squared(mount->position_sigma_m);

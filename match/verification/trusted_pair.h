@@ -1,6 +1,6 @@
-// Relative orientation of two images that is known before they are matched: by the rig's mounts within a frame, by the
-// trajectory between frames that follow one another on one drive. Metres off in the ground frame, a trajectory is good
-// to centimetres from second to second.
+// The relative orientation of two images that is known before they are matched: within a frame from the mounts of the
+// rig, between nearby frames of one drive from the trajectory. A trajectory may be off by metres in the ground frame,
+// but it is accurate to centimetres from second to second.
 #pragma once
 
 #include <optional>
@@ -11,36 +11,40 @@
 namespace megablock {
 
 struct TrustOptions {
-  bool use_trajectory = true;        // of rigs of several cameras with given poses
-  double max_seconds = 20;           // between two frames whose relative pose is trusted
-  double position_sigma_m = 0.05;    // of it, where no relative pose states one
-  double rotation_sigma_deg = 0.05;  // the same
+  bool use_trajectory = true;        // for rigs of several cameras with given poses
+  double max_seconds = 20;           // largest time between two frames whose relative pose is trusted, seconds
+  double position_sigma_m = 0.05;    // of that relative pose, where the block states none; metres
+  double rotation_sigma_deg = 0.05;  // the same, degrees
   void check() const;                // throws InputError
 };
 
+// A trusted relative orientation.
 struct TrustedPair {
-  Pose a, b;                      // cameras, right with respect to one another
-  double rotation_sigma_rad = 0;  // of b's rays with respect to a's
-  double position_sigma_m = 0;    // of b's centre with respect to a's
-  // Sigma across the epipolar line of a match at some distance, px; `pixel_sigma` is that of the images alone.
+  Pose a, b;                      // poses of the two cameras in a common frame
+  double rotation_sigma_rad = 0;  // of the rays of b relative to those of a
+  double position_sigma_m = 0;    // of the centre of b relative to that of a
+  // Standard deviation across the epipolar line of a match at this object distance (metres), in pixels. `pixel_sigma`
+  // is the part of the observations alone.
   double epipolar_sigma_px(double focal_px, double distance_m, double pixel_sigma = 1) const;
 };
 
+// Finds trusted relative orientations in a block.
 class TrustedPairs {
  public:
-  // The block must outlive it.
+  // `block` must outlive the object. Throws InputError for impossible options.
   TrustedPairs(const Block& block, const TrustOptions& options);
-  // Empty when nothing trusted relates the two images.
+  // Returns the relative orientation of two images; empty if neither mounts nor trajectory give one. Images of rigs
+  // with a single camera have none.
   std::optional<TrustedPair> relate(ImageIndex a, ImageIndex b) const;
 
  private:
   struct Step {
-    Pose pose;  // of the next frame in this one
+    Pose pose;  // pose of the next frame in the axes of this one
     FrameIndex next;
     double rotation_sigma_rad = 0, position_sigma_m = 0;
   };
   struct Relative {
-    Pose pose;  // from -> to, centre of `to` in `from`
+    Pose pose;  // from -> to, centre of `to` in the axes of `from`
     double rotation_sigma_rad = 0, position_sigma_m = 0;
   };
   std::optional<Relative> between(FrameIndex from, FrameIndex to) const;
@@ -48,7 +52,7 @@ class TrustedPairs {
 
   const Block& block_;
   TrustOptions options_;
-  IndexedVector<FrameIndex, Step> steps_;  // next invalid: no relative pose begins at the frame
+  IndexedVector<FrameIndex, Step> steps_;  // next is invalid where no relative pose begins at the frame
 };
 
 }  // namespace megablock

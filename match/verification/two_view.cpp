@@ -19,23 +19,24 @@ namespace megablock {
 
 namespace {
 
-// A simpler model is chosen when it explains this share of the matches of the richer one.
+// A simpler model is chosen if it explains this share of the matches of the general one.
 constexpr double kRotationShare = 0.9, kPlaneShare = 0.8;
-// The fundamental matrix is tried below the first share of all matches and chosen by the second factor of gain.
+// The fundamental matrix is tried if the inliers are below the first share of all matches. It is chosen if it has more
+// inliers by the second factor.
 constexpr double kDoubtfulShare = 0.4, kFocalGain = 1.3;
-// Below this share of all matches what verticals give is checked by five points.
+// If fewer matches than this share support the orientation from known verticals, five points check it.
 constexpr double kDoubtfulVertical = 0.25;
-// Steps of an adjustment below it change nothing that matters: radians, of orientations good to some 1e-4. Those that
-// only tell candidates apart, and are adjusted once more, need less.
+// Steps of an adjustment below kSettled (radians) change nothing that matters, as orientations are accurate to about
+// 1e-4. Adjustments that only tell candidates apart, and are repeated later, need only kNear.
 constexpr double kSettled = 1e-7, kNear = 1e-5;
-// Of the right matches, within the limit of transfer residuals that follows from the matches' sigma.
+// Share of right matches within the limit of transfer residuals that follows from the sigma of the matches.
 constexpr double kRightShare = 0.999;
-// Of the best orientation's support, for a plane's other one to be its twin.
+// Share of the best orientation's support that the other orientation of a plane needs to be its twin.
 constexpr double kTwinShare = 0.95;
 
-// Of the draws of five points that look for more than what verticals gave.
+// Confidence of the RANSAC with five points that looks for more support than verticals gave.
 constexpr double kSecondLook = 0.9;
-// Support of what they find, over that of what verticals gave, that leaves it the same.
+// If it finds less than this factor more support, the orientation from verticals stands.
 constexpr double kSameSupport = 1.05;
 
 RelativeAdjustment adjustment(double scale, double tolerance = kSettled) {
@@ -52,6 +53,7 @@ std::vector<std::size_t> rows_of(const std::vector<std::uint8_t>& inlier) {
   return rows;
 }
 
+// The pairs that are inliers.
 PointPairs selected_pairs(const PointPairs& points, const std::vector<std::uint8_t>& inlier) {
   PointPairs pairs;
   for (const std::size_t i : rows_of(inlier)) {
@@ -77,9 +79,10 @@ struct Hypothesis {
   RelativeOrientation orientation;
   Consensus support;
   double scale = 0;               // of the weights of its adjustment
-  std::vector<double> weights{};  // further ones; empty: all one
+  std::vector<double> weights{};  // further weights; empty: equal
 };
 
+// The estimation of one pair: samples, comparison of models, refinement, and selection of the inliers.
 class PairEstimation {
  public:
   PairEstimation(const PointPairs& points, const TwoViewOptions& options)
@@ -92,7 +95,7 @@ class PairEstimation {
   TwoView estimate() {
     TwoView none;
     none.inlier.assign(points_.size(), 0);
-    // The general model first: what it explains tells how many draws a simpler one that is to be chosen needs.
+    // The general model comes first. Its inliers tell how many draws the simpler models need in order to replace it.
     if (const auto general = orientation()) refine_all(std::array{*general});
     transfer_limit_ = transfer_limit();
     const auto rotation = simpler<RotationPairEstimator>(300, kRotationShare);
@@ -103,7 +106,7 @@ class PairEstimation {
     const int best_count = this->best_count();
 
     if (rotation_count >= needed_ && rotation_count >= kRotationShare * best_count) return turned(*rotation);
-    // A plane leaves the fundamental matrix undetermined.
+    // A plane leaves the fundamental matrix undetermined, so it is not tried then.
     const bool planar = plane_count >= kPlaneShare * best_count;
     if (best_count < needed_ || (!planar && best_count < kDoubtfulShare * static_cast<double>(points_.size()))) {
       auto found = uncalibrated();
@@ -124,8 +127,8 @@ class PairEstimation {
     return sampling;
   }
 
-  // Inliers that chance would give: random matches fall into the residual's band along the epipolar line with the share
-  // of the image that the band covers, and the unknowns of the model adapt to them.
+  // Number of inliers that a model needs beyond chance. A random match falls into the band along its epipolar line with
+  // probability (area of the band) / (area of the image), and the unknowns of the model adapt to some more of them.
   int inliers_needed() const {
     constexpr double kAdaptation = 4;
     Eigen::AlignedBox2d box;
@@ -134,11 +137,11 @@ class PairEstimation {
     const double share = std::min(1.0, 2 * options_.max_residual * size.norm() / size.prod());
     const auto count = static_cast<double>(points_.size());
     const double by_chance = std::max(options_.by_chance, kAdaptation * share) * count;
-    // Matches crowded into a corner all lie in the band: never ask for more than a half.
+    // Matches that crowd into a corner all lie in the band; at most half of the matches are taken as accidental.
     return options_.min_inliers + static_cast<int>(std::min(by_chance, 0.5 * count));
   }
 
-  // The orientations that explain a plane.
+  // The two orientations that explain a plane, from its homography.
   std::vector<RelativeOrientation> twins(const std::vector<std::uint8_t>& inlier) const {
     const InlierRays rays = rays_of(points_, inlier);
     std::vector<RelativeOrientation> found;
@@ -148,9 +151,9 @@ class PairEstimation {
     return found;
   }
 
-  // By five points. Where the verticals are known and agree with what three points give, these begin, and a few draws
-  // of five see whether there is more: errors of verticals lead into side minima, above all with cameras that are not
-  // calibrated.
+  // The orientation from samples of five points. If the verticals are known, samples of three points come first. If
+  // their result agrees with the verticals, a few draws of five points only check whether there is more support: errors
+  // of the verticals lead into side minima, above all with uncalibrated cameras.
   std::optional<RelativeOrientation> orientation() {
     std::vector<RelativeOrientation> starts;
     if (options_.vertical_a && options_.vertical_b) {
@@ -174,8 +177,8 @@ class PairEstimation {
     return found->model;
   }
 
-  // Whether the rotation takes one vertical to the other, within four sigmas of both and of the rotation, and a tenth
-  // of a degree for what sigmas do not tell.
+  // Whether the rotation turns one vertical into the other, within four sigmas of both verticals and of the rotation,
+  // plus a tenth of a degree for errors that the sigmas do not cover.
   bool agrees_with_verticals(const RelativeOrientation& found, const Consensus& support) const {
     constexpr double kSigmas = 4, kMore = 0.1 * kDegree;
     const Eigen::Matrix3d rotation = found.rotation.toRotationMatrix();
@@ -187,22 +190,24 @@ class PairEstimation {
     Eigen::Matrix3d covariance = rotation * a.covariance * rotation.transpose() + b.covariance +
                                  by_rotation * precision.covariance.topLeftCorner<3, 3>() * by_rotation.transpose();
     covariance += kMore * kMore / (kSigmas * kSigmas) * Eigen::Matrix3d::Identity();
-    covariance += b.direction * b.direction.transpose();  // along it nothing differs
+    // Makes the matrix regular; along the vertical there is no difference.
+    covariance += b.direction * b.direction.transpose();
     const Eigen::Vector3d difference = turned - b.direction;
     return turned.dot(b.direction) > 0 && difference.dot(covariance.inverse() * difference) < kSigmas * kSigmas;
   }
 
   int best_count() const { return hypotheses_.empty() ? 0 : hypotheses_.front().support.count; }
 
-  // A rotation, or a plane. What it explains the general model explains too, so that samples come from what agrees with
-  // that one: there, most matches must agree for the simpler one to be chosen. Of all matches where there is none.
+  // A rotation, or a plane. The general model explains its matches too. Samples are therefore drawn from the inliers of
+  // the general model, of which most must agree for the simpler model to be chosen. Without a general model they come
+  // from all matches.
   template <typename Estimator>
   std::optional<RansacResult<typename Estimator::Model>> simpler(int max_draws, double share) {
     if (best_count() < needed_) return counted(ransac(Estimator(points_), sampling(transfer_limit_, max_draws)));
     return sampled_from<Estimator>(hypotheses_.front().support, sampling(transfer_limit_, max_draws, share));
   }
 
-  // Of samples of the consensus alone, refined over all matches and held against them.
+  // Draws samples from the consensus alone; refines and scores the model with all matches.
   template <typename Estimator>
   std::optional<RansacResult<typename Estimator::Model>> sampled_from(const Consensus& consensus,
                                                                       const RansacOptions& options) {
@@ -218,7 +223,7 @@ class PairEstimation {
     return found;
   }
 
-  // Refines candidates over all points; the best by score comes first, one of each.
+  // Refines candidates with all matches and sorts them by score. Keeps either the refined or the original orientation.
   void refine_all(std::span<const RelativeOrientation> candidates) {
     for (const RelativeOrientation& start : candidates) {
       const RelativeOrientation refined =
@@ -232,8 +237,8 @@ class PairEstimation {
                      [](const Hypothesis& p, const Hypothesis& q) { return p.support.score > q.support.score; });
   }
 
-  // Last refinement over the inliers, with the weights' reach taken from their own scatter, and what single ones decide
-  // bounded.
+  // The final adjustment over the inliers. Their scatter determines the reach of the robust weights, and leverage
+  // weights bound the influence of single matches.
   Hypothesis polished(const Hypothesis& start) const {
     const Eigen::Matrix3d essential = essential_from(start.orientation);
     std::vector<double> residuals;
@@ -248,8 +253,8 @@ class PairEstimation {
     return result.support.score > 0.98 * start.support.score ? result : start;
   }
 
-  // Of a component of the residuals, from their median and the redundancy of a model with that many unknowns; as wide
-  // as it can be where they are too few.
+  // Standard deviation of a residual component, from the median of the squared residuals and the redundancy of a model
+  // with this number of unknowns. With too few matches it is the largest allowed residual.
   template <typename Estimator>
   double sigma_of(const Estimator& estimator, const typename Estimator::Model& model, const Consensus& within,
                   int components, int unknowns) const {
@@ -263,8 +268,8 @@ class PairEstimation {
     return std::max(sigma, 1e-3 * options_.max_residual);  // matches are never exact
   }
 
-  // A transfer residual has the errors of both points in two components: with the limit of Sampson residuals, planes
-  // and rotations of less exact matches would not be seen as such.
+  // The limit of transfer residuals. They contain the errors of both points in two components. With the limit of
+  // Sampson residuals, planes and rotations of inaccurate matches would not be recognised.
   double transfer_limit() const {
     const double limit = options_.max_residual;
     if (hypotheses_.empty() || std::isinf(options_.max_sigmas)) return limit;
@@ -274,7 +279,7 @@ class PairEstimation {
     return std::max(limit, threshold_of_sigma(std::numbers::sqrt2 * std::min(sigma, largest), 2, kRightShare));
   }
 
-  // Those of the consensus within `limit` that their sigma allows.
+  // Restricts a consensus within `limit` to the matches that its standard deviation allows.
   template <typename Estimator>
   Consensus selected(const Estimator& estimator, const typename Estimator::Model& model, const Consensus& within,
                      double limit, int components, int unknowns) const {
@@ -284,7 +289,7 @@ class PairEstimation {
     return result.count < options_.min_inliers ? within : result;
   }
 
-  // The last selection, and a refinement over it. The support of `wide` is what max_residual lets in.
+  // The final selection of inliers and a last adjustment over them. `wide` has the inliers within max_residual.
   Hypothesis selected(const Hypothesis& wide) const {
     Hypothesis last = wide;
     const auto select = [&](const Consensus& within) {
@@ -344,7 +349,7 @@ class PairEstimation {
   TwoView turned(const RansacResult<Eigen::Quaterniond>& found) const {
     const RotationPairEstimator estimator(points_);
     RansacResult<Eigen::Quaterniond> best = found;
-    // Least squares over all inliers until their number stops growing.
+    // Least squares over all inliers, repeated while the score grows.
     for (int round = 0; round < 10; ++round) {
       const InlierRays rays = rays_of(points_, best.consensus.inlier);
       const Eigen::Quaterniond rotation = fit_rotation(rays.a, rays.b);
@@ -357,12 +362,13 @@ class PairEstimation {
     TwoView result = finish(PairModel::kRotationOnly, best.model, best.consensus);
     const InlierRays rays = rays_of(points_, result.inlier);
     result.precision = precision_of_rotation(best.model, rays.a, rays.b, 1e-3 * options_.max_residual);
-    result.ill_conditioned = true;  // nothing is known of the base
+    result.ill_conditioned = true;  // the base is unknown
     return result;
   }
 
-  // Focal lengths far off: the fundamental matrix holds where no essential does. Its orientation is approximate. What
-  // is right lies near the best essential one's epipolar lines even so, and most of the rest does not.
+  // The case of wrong focal lengths: a fundamental matrix fits where no essential matrix does. Its orientation is
+  // approximate. Right matches still lie near the epipolar lines of the best essential matrix, and most wrong ones do
+  // not, so samples come from matches near them.
   std::optional<TwoView> uncalibrated() {
     const double limit = 4 * options_.max_residual;
     const FivePointEstimator estimator(points_, limit);
@@ -389,7 +395,7 @@ class PairEstimation {
   const PointPairs& points_;
   const TwoViewOptions& options_;
   FivePointEstimator five_points_;
-  double transfer_limit_;  // of residuals of rotations and planes
+  double transfer_limit_;  // limit of the residuals of rotations and planes
   int needed_;
   int draws_ = 0;
   bool by_vertical_ = false;
