@@ -1,7 +1,7 @@
-// The only file that includes CGAL: it takes long to compile.
+// The graph of panoramas by CGAL's alpha shape. This is the only file that includes CGAL, which takes long to compile.
 //
-// The alpha value of CGAL is the squared radius. Heights get a thousandth of a metre that depends on the row, before
-// they are stretched: positions in one plane have no tetrahedra.
+// CGAL's alpha value is the squared radius. Positions in one plane have no tetrahedra; so each height gets up to a
+// millimetre more, depending on the row, before heights are stretched.
 #include <CGAL/Alpha_shape_3.h>
 #include <CGAL/Alpha_shape_cell_base_3.h>
 #include <CGAL/Alpha_shape_vertex_base_3.h>

@@ -20,15 +20,18 @@ namespace megablock {
 namespace {
 
 constexpr int kSectors = 8;
-constexpr std::size_t kSearchFactor = 4;  // candidates looked at per neighbour wanted
-constexpr double kSectorDistance = 3;     // times the distance of the farthest nearest neighbour
-constexpr double kRigDistance = 30;       // metres, between images of rigs (CN-11)
-constexpr double kConeRange = 30;         // metres: how far such images see things in common, when there is no limit
-constexpr double kLeastOverlap = 0.03;    // of the cones
+constexpr std::size_t kSearchFactor = 4;  // candidates that are examined for each neighbour wanted
+// Limit of a sector's nearest, as a multiple of the distance of the farthest wanted neighbour.
+constexpr double kSectorDistance = 3;
+constexpr double kRigDistance = 30;     // metres, default of max_pair_distance_m for rigs with poses
+constexpr double kConeRange = 30;       // metres: how far cameras of rigs see, if there is no limit
+constexpr double kLeastOverlap = 0.03;  // of two cones that makes a pair
+// Frames of one pass belong to one visit of a place if they are at most this many frames and seconds apart.
 constexpr std::int64_t kVisitFrames = 25;
 constexpr double kVisitSeconds = 60;
-constexpr double kConeMargin = 5 * std::numbers::pi / 180;  // of overlap two images of a frame need
+constexpr double kConeMargin = 5 * std::numbers::pi / 180;  // overlap that two images of a frame need, radians
 
+// One search for the candidate pairs of a block. run() collects pairs by each rule and removes duplicates.
 class PairFinder {
  public:
   PairFinder(const Block& block, const GlobalDescriptors& descriptors, const CandidateOptions& options)
@@ -73,10 +76,10 @@ class PairFinder {
         if (!same_frame(a, b)) add(a, b);
   }
 
-  // Its cone is known, and its place not doubtful.
+  // Whether the viewing cone of the image is known and its position is not doubtful.
   bool coned(ImageIndex image) const { return cones_.has(image) && !view(image).doubtful; }
 
-  // A visit: frames of one pass that follow one another.
+  // Whether two images belong to one visit: frames of one pass that follow one another.
   bool same_visit(ImageIndex a, ImageIndex b) const {
     const FrameIndex fa = block_.images[a].frame, fb = block_.images[b].frame;
     const Frame &x = block_.frames[fa], &y = block_.frames[fb];
@@ -84,6 +87,7 @@ class PairFinder {
            !(std::abs(x.time_s - y.time_s) > kVisitSeconds);
   }
 
+  // Pairs of images of rigs whose viewing cones intersect.
   void add_intersecting() {
     std::vector<ImageIndex> coned_images;
     std::vector<Eigen::Vector2d> centres;
@@ -119,7 +123,8 @@ class PairFinder {
     ImageIndex image;
     bool operator<(const Overlap& o) const { return share != o.share ? share > o.share : rank < o.rank; }
   };
-  // As many as `neighbours`, the best of the visits in turn; the visit with the best one begins.
+  // At most `neighbours` images: the best of each visit, then the second best of each, and so on. The visit with the
+  // largest overlap begins.
   std::vector<ImageIndex> best_of_each(std::vector<std::vector<Overlap>> visits) const {
     for (auto& visit : visits) std::sort(visit.begin(), visit.end());
     std::sort(visits.begin(), visits.end(), [](const auto& a, const auto& b) { return a.front() < b.front(); });
@@ -132,7 +137,7 @@ class PairFinder {
     return best;
   }
 
-  // Both look about the same way, as far as known.
+  // Whether both images look in about the same direction, as far as it is known.
   bool views_agree(ImageIndex a, ImageIndex b) const {
     if (!view(a).directed || !view(b).directed) return true;
     return view(a).direction.dot(view(b).direction) >= std::cos(options_.max_view_angle_deg * std::numbers::pi / 180);
@@ -142,6 +147,7 @@ class PairFinder {
     return (view(a).centre - view(b).centre).norm() <= options_.max_pair_distance_m;
   }
 
+  // Pairs by distance on the ground.
   void add_nearest() {
     std::vector<ImageIndex> located;
     std::vector<Eigen::Vector2d> places;
@@ -149,7 +155,7 @@ class PairFinder {
     for (ImageIndex image : by_rank_) {
       if (!view(image).located) continue;
       located.push_back(image);
-      // A doubtful position stays where its GPS says: others may well be near it.
+      // A doubtful position is also used as it is: it may be right, and other images may be near it.
       places.push_back(view(image).doubtful ? view(image).centre : view(image).place);
       reach = std::max(reach, view(image).reach);
     }
@@ -172,8 +178,8 @@ class PairFinder {
     }
   }
 
-  // Positions in `found` of the neighbours to take: the nearest of each of eight sectors (so that a line of images
-  // close together is tied to the next line as well), then the nearest of the rest.
+  // Selects from `found` (ascending by distance): first the nearest of each of eight sectors, so that a dense flight
+  // line is also linked to the next line, then the nearest of the others.
   std::vector<std::size_t> all_round(const Eigen::Vector2d& place, const std::vector<KdTree::Neighbour>& found,
                                      const std::vector<Eigen::Vector2d>& places) const {
     const auto wanted = std::min(static_cast<std::size_t>(options_.neighbours), found.size());
@@ -197,6 +203,7 @@ class PairFinder {
     return result;
   }
 
+  // Pairs of images that follow one another in the order of acquisition.
   void add_order() {
     const auto span = static_cast<std::size_t>(options_.order_neighbours);
     for (const std::vector<ImageIndex>& pass : views_.passes)
@@ -205,14 +212,15 @@ class PairFinder {
           if (!same_frame(pass[i], pass[j]) && !(coned(pass[i]) && coned(pass[j]))) add(pass[i], pass[j]);
   }
 
-  // Images without position, or with a doubtful one, against the images that look most alike. Descriptors are compared
-  // as integers, so that the order of additions cannot decide.
+  // Pairs of each image without a position, or with a doubtful one, with the images of the most similar global
+  // descriptors. The descriptors are compared as integers, because the result must not depend on the order of
+  // additions.
   void add_similar() {
     std::vector<ImageIndex> sought;
     for (ImageIndex image : by_rank_)
       if (!view(image).located || view(image).doubtful) sought.push_back(image);
     if (sought.empty()) return;
-    constexpr float scale = 4096;  // 128 products of at most 2^24 each stay below 2^31 for unit vectors
+    constexpr float scale = 4096;  // the sum of 128 products of at most 2^24 stays below 2^31 for unit vectors
     const std::size_t count = descriptors_.size();
     std::vector<std::array<std::int16_t, 128>> codes(count);
     std::vector<std::uint8_t> described(count, 0);
@@ -252,6 +260,7 @@ class PairFinder {
       if (!same_frame(image, other)) add(image, other);
   }
 
+  // Pairs of images of one frame.
   void add_within_frames() {
     IndexedVector<FrameIndex, std::vector<ImageIndex>> of_frame(block_.frames.size());
     for (ImageIndex image : images_) of_frame[block_.images[image].frame].push_back(image);
@@ -280,7 +289,8 @@ class PairFinder {
   std::vector<ImagePair> pairs_;
 };
 
-// Cells over the ground by the pairs' midpoints; pairs without any place by the ranks of their images.
+// Groups pairs into cells by the midpoint of their places on the ground; pairs without any place by the ranks of their
+// images.
 std::vector<std::vector<std::int64_t>> cells_of_pairs(const std::vector<ImagePair>& pairs, const Views& views,
                                                       std::int64_t limit) {
   std::array<std::vector<Eigen::Vector2d>, 2> places;
@@ -345,7 +355,7 @@ CandidateGraph extend_candidates(const CandidateGraph& previous, const Block& bl
   check_descriptors(block, global_descriptors);
   for (const ImagePair& pair : previous.pairs)
     if (pair.b >= first_new_image)
-      throw InputError("candidate pairs: the former pairs name images that are not of the former block");
+      throw InputError("candidate pairs: the earlier pairs name images that the earlier block does not have");
   PairFinder finder(block, global_descriptors, options);
   std::vector<ImagePair> added = finder.run();
   std::erase_if(added, [&](const ImagePair& pair) { return pair.b < first_new_image; });

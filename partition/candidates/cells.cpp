@@ -8,8 +8,9 @@ namespace megablock {
 namespace {
 
 constexpr double kHalfExtent = 1 << 23;
-constexpr int kMaxDepth = 68;  // parts of about a millimetre; places closer together are cut by number
+constexpr int kMaxDepth = 68;  // parts of about a millimetre; places closer together are divided by number
 
+// Halves parts recursively; see cells.h.
 class CellMaker {
  public:
   CellMaker(const std::vector<Eigen::Vector2d>& places, std::size_t limit) : places_(places), limit_(limit) {}

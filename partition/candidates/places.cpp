@@ -15,7 +15,7 @@ using Rows = std::vector<std::int64_t>;
 
 std::size_t at(std::int64_t row) { return static_cast<std::size_t>(row); }
 
-// Neighbours over interior and normal edges.
+// Neighbours of each position along interior and normal edges.
 std::vector<Rows> neighbours_of(std::size_t count, const std::vector<PanoramaEdge>& edges) {
   std::vector<Rows> neighbours(count);
   for (const PanoramaEdge& edge : edges) {
@@ -26,6 +26,7 @@ std::vector<Rows> neighbours_of(std::size_t count, const std::vector<PanoramaEdg
   return neighbours;
 }
 
+// Number of the connected component of each position.
 std::vector<std::int32_t> components_of(const std::vector<Rows>& neighbours) {
   DisjointSets sets(static_cast<std::int64_t>(neighbours.size()));
   for (std::size_t row = 0; row < neighbours.size(); ++row)
@@ -40,7 +41,7 @@ std::vector<std::int32_t> components_of(const std::vector<Rows>& neighbours) {
   return component;
 }
 
-// Position of each frame in its pass.
+// Position of each frame within its pass.
 Rows order_in_pass(const std::vector<std::int64_t>& pass) {
   std::map<std::int64_t, std::int64_t> next;
   Rows order;
@@ -48,7 +49,7 @@ Rows order_in_pass(const std::vector<std::int64_t>& pass) {
   return order;
 }
 
-// Frames reached over a few edges, ascending.
+// Positions reached over at most `hops` edges, ascending.
 Rows around(std::int64_t row, int hops, const std::vector<Rows>& neighbours) {
   Rows reached{row}, front{row};
   for (int hop = 0; hop < hops; ++hop) {
@@ -84,14 +85,15 @@ std::vector<Place> choose_places(const std::vector<Eigen::Vector3d>& positions, 
   const std::vector<Rows> neighbours = neighbours_of(positions.size(), edges);
   const std::vector<std::int32_t> component = components_of(neighbours);
   const Rows order = order_in_pass(pass);
-  const auto next_to = [&](std::int64_t row) -> std::int64_t {  // successor, else predecessor, else -1
+  // Next frame of the pass, else the previous one, else -1.
+  const auto next_to = [&](std::int64_t row) -> std::int64_t {
     for (const std::int64_t other : {row + 1, row - 1})
       if (other >= 0 && other < static_cast<std::int64_t>(pass.size()) && pass[at(other)] == pass[at(row)])
         return other;
     return -1;
   };
-  // The nearest frames of each stretch of one visit with each stretch of another; a before c, so that every pair of
-  // visits counts once.
+  // The nearest frames of each stretch of one visit with each stretch of another. a comes before c, so that every pair
+  // of visits counts once.
   using Stretch = std::tuple<std::int64_t, std::int64_t, std::int64_t, std::int64_t>;
   std::map<Stretch, Meeting> meetings;
   for (std::int64_t a = 0; a < static_cast<std::int64_t>(positions.size()); ++a)

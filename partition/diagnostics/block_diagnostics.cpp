@@ -18,24 +18,26 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDown = 0.7071;             // an image looks down within 45 degrees of the nadir
-constexpr double kLeastSlope = 0.2;          // of the rays to a footprint's corners
-constexpr double kUsualOverlap = 0.75;       // taken where no ground is known
-constexpr double kStreetFactor = 2;          // vehicles stop and turn
-constexpr double kNeighbourFootprints = 4;   // how far a neighbouring line is sought, larger footprint sides
-constexpr double kParallel = 0.9;            // cosine between neighbouring lines
-constexpr double kSameLine = 0.1;            // lines so close, larger footprint sides, are one flown twice
-constexpr double kSamePlace = 0.7;           // exposures of theirs so close along them, usual steps, stand side by side
-constexpr std::size_t kAround = 64;          // exposures that are asked whether a place is inside the block
-constexpr std::int64_t kMostMissing = 1000;  // exposures, or lines, that are missing in one gap
+constexpr double kDown = 0.7071;            // cosine: an image looks down within 45 degrees of the nadir
+constexpr double kLeastSlope = 0.2;         // of the rays to the corners of a footprint
+constexpr double kUsualOverlap = 0.75;      // assumed where the height of the ground is unknown
+constexpr double kStreetFactor = 2;         // additional factor of gaps along streets, as vehicles stop and turn
+constexpr double kNeighbourFootprints = 4;  // search radius of neighbouring lines, in larger footprint sides
+constexpr double kParallel = 0.9;           // cosine of the angle between lines that count as parallel
+constexpr double kSameLine = 0.1;  // lines closer than this, in larger footprint sides, are one line flown twice
+// Exposures of such lines closer than this along the line, in usual steps, are side by side.
+constexpr double kSamePlace = 0.7;
+constexpr std::size_t kAround = 64;          // number of exposures that decide whether a place is inside the block
+constexpr std::int64_t kMostMissing = 1000;  // largest number of exposures, or lines, that one gap reports
 
 double unknown() { return BlockDiagnostics::kUnknown; }
 
-// Exposures or lines that fit into a gap of so many usual distances: one at least, kMostMissing at most.
+// Number of exposures or lines that fit into a gap of so many usual distances: from 1 to kMostMissing.
 std::int64_t missing_in(double usual_distances) {
   return std::llround(std::clamp(usual_distances - 1, 1.0, static_cast<double>(kMostMissing)));
 }
 
+// One diagnosis of a block. find() calls the steps in order; each fills in a part of the result.
 class Diagnosis {
  public:
   Diagnosis(const Block& block, const BlockState& state, const DiagnosticsOptions& options)
@@ -82,7 +84,8 @@ class Diagnosis {
   double slope_down(ImageIndex image) const {
     return -(camera_of(image).rotation.conjugate() * Eigen::Vector3d::UnitZ()).z();
   }
-  // Else the frame is one of images alone, in which "up" is a guess: across the plane of the exposures, be it a facade.
+  // Whether "up" is known. Without positions, attitudes, control points, lines or verticals the frame is that of the
+  // images alone, whose "up" is only a guess: the normal of the plane of the exposures, even for a facade.
   bool vertical_is_known() const {
     const auto tells = [](const Frame& frame) {
       return frame.position_prior || frame.attitude_prior || frame.given_pose;
@@ -91,7 +94,7 @@ class Diagnosis {
     return std::ranges::any_of(block_.control_points, holds) || !block_.lines.empty() || !block_.verticals.empty() ||
            std::ranges::any_of(block_.frames, tells);
   }
-  // Whether most oriented images do.
+  // Whether most oriented images look down.
   bool looks_down() const {
     if (!vertical_is_known()) return false;
     std::int64_t down = 0, all = 0;
@@ -103,7 +106,7 @@ class Diagnosis {
     return 2 * down > all;
   }
 
-  // Which image of a frame looks down most steeply.
+  // For each frame the image that looks down most steeply.
   void find_down_images() {
     down_image_.assign(block_.frames.size(), ImageIndex());
     IndexedVector<FrameIndex, double> steepest(block_.frames.size(), kDown);
@@ -115,7 +118,8 @@ class Diagnosis {
     }
   }
 
-  // Heights above ground of the frames that look down.
+  // Heights above ground of the frames that look down. Ground heights come from tie points, else from control points;
+  // without either, the height follows from the spacing of the exposures and the usual overlap.
   void find_heights() {
     std::vector<double> known;
     for (const double height : ties_.ground_height)
@@ -143,6 +147,7 @@ class Diagnosis {
            std::min(camera.width, camera.height);
   }
 
+  // Corners of an image's footprint on horizontal ground. Empty where a corner's ray is too flat.
   std::optional<std::array<Eigen::Vector2d, 4>> footprint_of(const Camera& camera, const Pose& pose,
                                                              double height) const {
     std::array<Eigen::Vector2d, 4> corners;
@@ -185,12 +190,12 @@ class Diagnosis {
     std::vector<double> steps;
     for (const FlightLine& line : lines_)
       for (std::size_t i = 0; i + 1 < line.size(); ++i) steps.push_back(distance(line[i], line[i + 1]));
-    std::erase(steps, 0.0);  // cameras at one place that are frames of their own
+    std::erase(steps, 0.0);  // cameras at one place that are separate frames
     if (steps.empty()) return;
     found_.usual_step_m = median(std::move(steps));
     const double factor = found_.requested.gap_factor * (found_.aerial ? 1 : kStreetFactor);
     for (const FlightLine& line : lines_) {
-      // Without passes the order of frames along streets says nothing.
+      // Without known passes, the order of frames along streets means nothing.
       if (!found_.aerial && block_.frames[line.front()].pass < 0) continue;
       for (std::size_t i = 0; i + 1 < line.size(); ++i) {
         const std::int64_t missing = missing_between(line[i], line[i + 1], factor);
@@ -201,7 +206,7 @@ class Diagnosis {
     }
   }
 
-  // Of an exposure: the direction of its line, turned so that parallel lines have one, whichever way they were flown.
+  // An exposure on a flight line. `along` is the direction of the line, with a sign that is common to parallel lines.
   struct OnLine {
     FrameIndex frame;
     std::int64_t line;
@@ -209,9 +214,10 @@ class Diagnosis {
     double to_left = unknown();  // distance to the next line
   };
 
-  // Whether (1) or not (-1) each line was flown the way that stands for the lines parallel to it. The first way is
-  // east; a line that is parallel to none so far adds its own, turned to the one most like it. The sign is taken once
-  // for a line, never for an exposure: across the first way it is that of noise.
+  // For each line 1 or -1: whether it was flown in the direction that stands for all parallel lines. The first such
+  // direction is east. A line that is not parallel to any direction so far adds its own, with the sign of the most
+  // similar one. The sign is decided once per line: for single exposures of a line across the first direction, noise
+  // would decide it.
   std::vector<double> signs_of_lines() const {
     std::vector<double> signs;
     std::vector<Eigen::Vector2d> ways = {Eigen::Vector2d::UnitX()};
@@ -242,7 +248,7 @@ class Diagnosis {
     return on;
   }
 
-  // Distances to the next line on the left. Of a line flown twice the one listed first looks for both.
+  // Distances to the next line on the left. If a line was flown twice, the one listed first represents both.
   void look_left(std::vector<OnLine>& on) const {
     std::vector<Eigen::Vector2d> places;
     for (const OnLine& o : on) places.push_back(place(o.frame));
@@ -289,6 +295,7 @@ class Diagnosis {
     }
   }
 
+  // Adds a gap beside these exposures of one line, and proposes the exposures of the missing lines.
   void add_missing_line(const std::vector<OnLine>& beside, double usual) {
     if (beside.size() < 2) return;
     std::vector<double> widths;
@@ -310,19 +317,21 @@ class Diagnosis {
         };
         add({state_.frames[o.frame].centre, state_.frames[o.frame].rotation});
         if (i + 1 == beside.size()) continue;
-        // Where the line beside has a gap itself, the missing one needs no gap.
+        // Where the line beside has a gap itself, the missing line is proposed without one.
         const std::int64_t between_them = missing_between(o.frame, beside[i + 1].frame, found_.requested.gap_factor);
         for (const auto& exposure : between(o.frame, beside[i + 1].frame, between_them)) add(exposure);
       }
     line_proposals_.push_back(std::move(exposures));
   }
 
-  // Exposures that the usual distance would have put between two; 0 where they are not far apart.
+  // Number of exposures that the usual distance would put between two; 0 where the two are not far apart.
   std::int64_t missing_between(FrameIndex a, FrameIndex b, double factor) const {
     const double steps = distance(a, b) / found_.usual_step_m;
     return steps > factor ? missing_in(steps) : 0;
   }
 
+  // Stereo pairs: successive exposures of lines. If most frames are on no line, the pairs with enough tie points
+  // instead.
   void find_pairs() {
     std::size_t on_lines = 0, all = 0;
     for (const FlightLine& line : lines_) on_lines += line.size();
@@ -349,7 +358,7 @@ class Diagnosis {
     found_.pairs.push_back(pair);
   }
 
-  // Exposures at even distances between two.
+  // Exposures at equal distances between two.
   std::vector<BlockDiagnostics::Proposal> between(FrameIndex before, FrameIndex after, std::int64_t missing) const {
     const Pose &a = state_.frames[before], &b = state_.frames[after];
     std::vector<BlockDiagnostics::Proposal> exposures;
@@ -360,7 +369,7 @@ class Diagnosis {
     return exposures;
   }
 
-  // Exposures with a height, for searches by place.
+  // Prepares the search for exposures by place; only those with a known height count.
   void place_exposures() {
     std::vector<Eigen::Vector2d> places;
     for (FrameIndex f(0); block_.frames.contains(f); ++f.value)
@@ -374,7 +383,7 @@ class Diagnosis {
     return found;
   }
 
-  // Whether the exposures around lie on all sides: no half plane is without one.
+  // Whether exposures lie on all sides of a place: no half plane is without one.
   bool is_inside(const Eigen::Vector2d& where) const {
     std::vector<double> directions;
     for (const FrameIndex f : exposures_about(where, kAround, kNeighbourFootprints * largest_side_)) {
@@ -389,6 +398,7 @@ class Diagnosis {
     return widest < std::numbers::pi;
   }
 
+  // Proposes exposures for gaps, then for thin ground that these do not cover.
   void propose(GroundCover& cover) {
     std::size_t line = 0;
     for (const BlockDiagnostics::Gap& gap : found_.gaps)
@@ -398,7 +408,7 @@ class Diagnosis {
       if (cover.mostly_enough(ground.cells)) continue;
       for (const FrameIndex nearest : exposures_about(ground.centre, 1, std::numeric_limits<double>::infinity())) {
         Pose pose = state_.frames[nearest];
-        // The middle of its footprint comes to the middle of the gap.
+        // Shifts the nearest exposure so that the centre of its footprint comes to the centre of the gap.
         pose.centre.head<2>() += ground.centre - middle_of(nearest);
         add_proposal({pose.centre, pose.rotation}, nearest, cover);
       }
@@ -412,7 +422,7 @@ class Diagnosis {
     return (c[0] + c[1] + c[2] + c[3]) / 4;
   }
 
-  // As far above ground as the exposure `like`.
+  // Adds a proposal with the height above ground of the exposure `like`.
   void add_proposal(const BlockDiagnostics::Proposal& exposure, FrameIndex like, GroundCover& cover) {
     found_.proposals.push_back(exposure);
     const ImageIndex image = down_image_[like];
@@ -428,13 +438,13 @@ class Diagnosis {
   TieEvidence ties_;
   BlockDiagnostics found_;
   std::vector<FlightLine> lines_;
-  IndexedVector<FrameIndex, ImageIndex> down_image_;       // invalid: none looks down
-  IndexedVector<FrameIndex, double> height_;               // above ground
-  IndexedVector<FrameIndex, std::int64_t> footprint_row_;  // of its down image; -1: none
-  double largest_side_ = 0;                                // of the footprints, median
+  IndexedVector<FrameIndex, ImageIndex> down_image_;       // invalid: no image looks down
+  IndexedVector<FrameIndex, double> height_;               // above ground, metres
+  IndexedVector<FrameIndex, std::int64_t> footprint_row_;  // of the frame's down image; -1: none
+  double largest_side_ = 0;                                // median over the footprints of their larger side
   std::vector<FrameIndex> exposures_;
   std::optional<KdTree> tree_;                                           // of the exposures
-  std::vector<std::vector<BlockDiagnostics::Proposal>> line_proposals_;  // by gap that is a line
+  std::vector<std::vector<BlockDiagnostics::Proposal>> line_proposals_;  // for each gap that is a missing line
 };
 
 }  // namespace

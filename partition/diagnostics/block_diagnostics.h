@@ -1,22 +1,21 @@
-// Finds what a block lacks (io/block/block_diagnostics.h) from what is known of it, before its adjustment or after it.
+// Finds weaknesses of a block (io/block/block_diagnostics.h), before or after its adjustment:
 //
-//   steps     A pass (aerial: a flight line) is interrupted where the distance between successive exposures is more
-//   than
-//             gap_factor times the usual one (twice as much along streets, where vehicles stop and turn).
-//   lines     From each exposure of a line the nearest one of another, parallel line is sought to its left within 45
-//             degrees. Distances across the lines of more than gap_factor times the usual one are gaps; neighbouring
-//             exposures of a line that see the same gap form one. Lines closer than a tenth of a footprint are one.
-//   ground    Footprints are counted in a grid of an eighth of their side. Ground that fewer than min_images see is a
-//             gap if it lies in a row or column of the grid between ground that enough images see, at most three
-//             footprints apart, and the exposures around it lie on all sides of it: the rim of the block is none.
-//             Pieces narrower than two cells are left out.
-//   links     Parts hang together by links of min_link_points tie points and more; single links are the bridges of this
-//             graph (Tarjan 1974).
-//   proposals Exposures at even distances in gaps, with the attitudes of their neighbours; in the middle of thin ground
-//             that these do not see.
+// * Steps: a pass (in aerial blocks a flight line) is interrupted where the distance between successive exposures
+//   exceeds gap_factor times the usual one; along streets twice that, because vehicles stop and turn.
+// * Lines: for each exposure of a line, the nearest exposure of another, parallel line is sought to its left, within 45
+//   degrees. Distances across the lines of more than gap_factor times the usual one are gaps; neighbouring exposures of
+//   a line with the same gap form one. Lines closer than a tenth of a footprint count as one.
+// * Ground: footprints are counted in a grid whose cells have an eighth of their side. Ground seen by fewer than
+//   min_images images is a gap if, in its row or column of the grid, it lies between ground that enough images see, at
+//   most three footprints apart, and if exposures lie on all sides of it. The rim of the block is therefore no gap.
+//   Pieces narrower than two cells are left out.
+// * Links: frames belong to one part if links of min_link_points or more tie points join them. Single links are the
+//   bridges of this graph (R. E. Tarjan, Information Processing Letters 2(6), 1974).
+// * Proposals: exposures at equal distances in the gaps, with the attitudes of their neighbours, and in the middle of
+//   thin ground that these do not cover.
 //
-// Sorting and searches by k-d tree over the frames, a grid of at most 16 cells an image: O(n log n), in the order of
-// the frames.
+// The time is O(n log n): sorting, searches by k-d tree over the frames, and a grid of at most 16 cells per image. The
+// results are in the order of the frames.
 #pragma once
 
 #include <functional>
@@ -26,19 +25,22 @@
 
 namespace megablock {
 
-// What tie points say of a block.
+// The knowledge about a block that tie points give.
 struct TieEvidence {
-  LinkWeights links;                                // common tie points of frames; empty: not known
-  IndexedVector<ImageIndex, double> ground_height;  // of what each image sees, z in the block's frame; NaN: not known
+  LinkWeights links;  // numbers of common tie points of frames; empty: unknown
+  // Height of the ground that each image sees, z in the block's frame; NaN: unknown.
+  IndexedVector<ImageIndex, double> ground_height;
 };
 
-// Frames with a pose are looked at: those of `state` that are oriented. `gather(with_heights)` is called once: of a
-// block that looks down at the beginning, of others, whose heights do not matter, when frames have been looked at.
+// Diagnoses the frames of `state` that are oriented. `gather(with_heights)` is called once to collect the evidence of
+// tie points: in blocks that look down at the beginning; in others, whose ground heights do not matter, after the
+// frames were examined. Throws InputError for impossible options.
 BlockDiagnostics diagnose(const Block& block, const BlockState& state,
                           const std::function<TieEvidence(bool with_heights)>& gather,
                           const DiagnosticsOptions& options);
 
-// Before anything is oriented: frames with a given pose, or position and attitude prior.
+// The state before anything is oriented: frames with a given pose, or with position and attitude prior, count as
+// oriented.
 BlockState state_of_priors(const Block& block);
 
 }  // namespace megablock

@@ -10,9 +10,9 @@ namespace megablock {
 namespace {
 
 constexpr double kCellsPerSide = 8;   // of a footprint's smaller side
-constexpr double kMostCells = 16;     // per image
-constexpr double kFewestCells = 1e6;  // that are always allowed
-constexpr double kMostDistance = 3;   // between covered ground, larger footprint sides
+constexpr double kMostCells = 16;     // grid cells per image
+constexpr double kFewestCells = 1e6;  // number of grid cells that is always allowed
+constexpr double kMostDistance = 3;   // between covered ground, in larger footprint sides
 constexpr double kMostlyEnough = 0.9;
 
 using Polygon = std::vector<Eigen::Vector2d>;
@@ -25,14 +25,15 @@ double signed_area(const Polygon& p) {
   return twice / 2;
 }
 
-// Counter-clockwise.
+// The corners in counter-clockwise order.
 Polygon polygon_of(const Quadrilateral& q) {
   Polygon p(q.begin(), q.end());
   if (signed_area(p) < 0) std::reverse(p.begin(), p.end());
   return p;
 }
 
-// What is left of the line from a to b (Sutherland, Hodgman 1974).
+// The part of a polygon to the left of the line from a to b (I. Sutherland and G. Hodgman, Communications of the ACM
+// 17(1), 1974).
 Polygon clipped(const Polygon& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const auto side = [&](const Eigen::Vector2d& point) { return cross(b - a, point - a); };
   Polygon kept;
@@ -100,7 +101,7 @@ void GroundCover::add(const Quadrilateral& footprint) {
     }
 }
 
-// Marks the cells without enough of one row or column that lie between cells that have it.
+// Marks the insufficiently covered cells of one row or column that lie between sufficiently covered ones.
 void GroundCover::mark_between(std::int64_t first, std::int64_t step, std::int64_t length,
                                std::vector<std::uint8_t>& thin) const {
   const auto farthest = static_cast<std::int64_t>(kMostDistance * footprint_side_ / side_);
@@ -125,7 +126,7 @@ void GroundCover::find_thin(const std::function<bool(const Eigen::Vector2d&)>& i
       std::uint8_t& cell = thin[static_cast<std::size_t>(row * columns_ + column)];
       cell = cell && inside(centre(column, row));
     }
-  // Only what is two cells wide both ways stays: others are jags of footprints.
+  // Only areas two cells wide in both directions remain; narrower ones come from the jagged edges of footprints.
   const auto at = [&](std::int64_t column, std::int64_t row) {
     return thin[static_cast<std::size_t>(row * columns_ + column)];
   };
@@ -136,6 +137,7 @@ void GroundCover::find_thin(const std::function<bool(const Eigen::Vector2d&)>& i
         for (const std::int64_t cell : {row * columns_ + column, row * columns_ + column + 1,
                                         (row + 1) * columns_ + column, (row + 1) * columns_ + column + 1})
           wide[static_cast<std::size_t>(cell)] = 1;
+  // Collects connected cells into areas.
   std::vector<std::int64_t> open;
   for (std::int64_t start = 0; start < static_cast<std::int64_t>(wide.size()); ++start) {
     if (!wide[static_cast<std::size_t>(start)]) continue;

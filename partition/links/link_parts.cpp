@@ -14,7 +14,8 @@ struct GoodLink {
   std::int64_t points;
 };
 
-// Calls visit(a, b, points) for every link of enough points and then every relative pose, of frames with a pose.
+// Calls visit(a, b, points) for every link of enough points, then for every relative pose (points = 0), between frames
+// with a pose.
 template <typename Visit>
 void visit_good_links(const Block& block, const BlockState& state, const LinkWeights& links, std::int64_t enough,
                       Visit&& visit) {
@@ -26,10 +27,10 @@ void visit_good_links(const Block& block, const BlockState& state, const LinkWei
     if (oriented(pose.from, pose.to)) visit(std::min(pose.from, pose.to), std::max(pose.from, pose.to), 0);
 }
 
-// Enough of the good links to tell which of them are bridges, fewer than two per frame: a spanning forest and one of
-// what is left (H. Nagamochi, T. Ibaraki, Algorithmica 7, 1992). Whatever divides the frames in two parts, the first
-// forest has one of the links between them, and the second another one if there is any. `sets` become the parts.
-// A relative pose between frames that a link joins already is no second link.
+// Returns enough of the good links to tell which of them are bridges, fewer than two per frame: a spanning forest, and
+// a spanning forest of the remaining links (H. Nagamochi and T. Ibaraki, Algorithmica 7, 1992). However the frames are
+// divided into two parts, the first forest contains a link between them, and the second another one if there is one.
+// `sets` becomes the connected parts. A relative pose between frames that a link joins already is no second link.
 std::vector<GoodLink> two_forests(const Block& block, const BlockState& state, const LinkWeights& links,
                                   std::int64_t enough, DisjointSets& sets) {
   std::vector<GoodLink> forests;
@@ -44,7 +45,8 @@ std::vector<GoodLink> two_forests(const Block& block, const BlockState& state, c
   return forests;
 }
 
-// Bridges by depth-first search without recursion; how many frames lie below each.
+// Finds bridges by depth-first search, without recursion, and counts the frames beyond each (R. E. Tarjan, 1974). A
+// link of the search tree is a bridge if no link from below leads to the frame above it or higher.
 class Bridges {
  public:
   Bridges(std::int64_t frames, const std::vector<GoodLink>& links) : links_(links) {
@@ -66,11 +68,11 @@ class Bridges {
     below_.assign(n, 1);
   }
 
-  // Calls found(link, frames on the far side of it) for each bridge.
+  // Calls found(link, number of frames beyond it) for each bridge.
   template <typename Found>
   void find(Found&& found) {
     struct Step {
-      std::size_t frame, by, next;  // by: the link it was reached on
+      std::size_t frame, by, next;  // by: the link on which the frame was reached
     };
     std::vector<Step> path;
     std::int64_t numbers = 0;
@@ -112,6 +114,7 @@ class Bridges {
   std::vector<std::int64_t> number_, lowest_, below_;
 };
 
+// Numbers the parts by falling number of frames.
 void number_parts(const BlockState& state, DisjointSets& sets, BlockDiagnostics& d) {
   const std::size_t n = state.oriented.size();
   std::vector<std::int64_t> size(n, 0);

@@ -1,4 +1,4 @@
-// Parts of a block that hang together by good links, and the links that alone hold two parts together.
+// Finds the parts of a block that good links join, and the single links on which the connection of two parts depends.
 #pragma once
 
 #include "io/block/block_diagnostics.h"
@@ -6,7 +6,8 @@
 
 namespace megablock {
 
-// Fills in part_of_frame, part_frames, weak_links and single_links, of frames with a pose. Linear in the links.
+// Fills in part_of_frame, part_frames, weak_links and single_links of the diagnostics, for frames with a pose. The time
+// is linear in the number of links.
 void find_link_parts(const Block& block, const BlockState& state, const LinkWeights& links,
                      BlockDiagnostics& diagnostics);
 

@@ -11,7 +11,7 @@ namespace megablock {
 namespace {
 
 constexpr std::int64_t kLargest = std::numeric_limits<std::uint32_t>::max();
-constexpr std::size_t kMore = 4;  // links that a frame gets room for: there are many frames, and few links of each
+constexpr std::size_t kMore = 4;  // links that a frame's list grows by: there are many frames, each with few links
 
 }  // namespace
 
@@ -21,7 +21,7 @@ void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
   const std::int64_t apart = std::max(a, b).value - std::min(a, b).value;
   if (apart > kLargest)
     throw ComputeError("frames " + std::to_string(a.value) + " and " + std::to_string(b.value) +
-                       " are linked: a block holds at most 2^32 frames; split it");
+                       " are linked, but a block holds at most 2^32 frames; divide it into several blocks");
   const auto further = static_cast<std::uint32_t>(apart);
   if (first >= links_.size()) links_.resize(first + 1);
   std::vector<Link>& links = links_[first];

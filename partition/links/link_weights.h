@@ -1,5 +1,5 @@
-// Adds up the links between frames of a block into its graph: of every frame a list of its links to later ones, of 8
-// bytes each and what a list that grows has in reserve.
+// Adds up the links between frames (numbers of common tracks) into the graph of the block. Each frame has a list of its
+// links to later frames, with 8 bytes per link plus the reserve of a growing list.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@ namespace megablock {
 
 class LinkWeights {
  public:
-  // `tracks` more between two frames, 2^32 - 1 in all at most; nothing when they are the same. Throws ComputeError for
-  // frames that are 2^32 apart.
+  // Adds `tracks` to the link of two frames, up to 2^32 - 1 in all. Ignores a link of a frame with itself. Throws
+  // ComputeError for frames that are 2^32 or more apart.
   void add(FrameIndex a, FrameIndex b, std::int64_t tracks);
-  // The links among the first `frames` frames. Does not depend on the order of add().
+  // The links among the first `frames` frames. The result does not depend on the order of the calls of add().
   FrameGraph graph(std::int64_t frames) const;
   bool empty() const { return links_.empty(); }
-  // Calls visit(FrameEdge) for every link, ascending.
+  // Calls visit_edge(FrameEdge) for every link, ascending.
   template <typename Visit>
   void visit(Visit&& visit_edge) const {
     for (std::size_t first = 0; first < links_.size(); ++first)
@@ -29,10 +29,10 @@ class LinkWeights {
 
  private:
   struct Link {
-    std::uint32_t further;  // the later frame is so many frames on
+    std::uint32_t further;  // distance of the later frame from the earlier one
     std::uint32_t tracks;
   };
-  std::vector<std::vector<Link>> links_;  // [earlier frame], ascending
+  std::vector<std::vector<Link>> links_;  // [earlier frame] ascending
 };
 
 }  // namespace megablock

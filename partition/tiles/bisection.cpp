@@ -1,11 +1,11 @@
-// Recursive bisection with METIS (Karypis and Kumar 1998, multilevel recursive bisection): every level splits a node
-// set in two with METIS_PartGraphRecursive, one fixed seed, so that the tree of splits is the elimination tree of
-// merge/.
+// Recursive bisection with METIS (G. Karypis and V. Kumar, "A fast and high quality multilevel scheme for partitioning
+// irregular graphs", SIAM J. Sci. Comput. 20(1), 1998). Every level divides a set of nodes in two with
+// METIS_PartGraphRecursive and a fixed seed. The tree of these divisions is the elimination tree of merge/.
 //
-// A half may come out in several fragments (a tile in one piece can be adjusted on its own). Then METIS_PartGraphKway
-// is asked, which can leave both halves in one piece, but not always of the sizes that are wanted. Where it does not do
-// both, a fragment is moved to the other half where that cuts fewer links, as long as each keeps a quarter of the
-// nodes.
+// A half may consist of several fragments, whereas a tile should be in one piece, so that it can be adjusted on its
+// own. Then METIS_PartGraphKway is tried, which can keep both halves in one piece, but not always with the wanted
+// sizes. Where it fails, a fragment is moved to the other half if that cuts fewer links, as long as each half keeps a
+// quarter of the nodes.
 #include <metis.h>
 
 #include <algorithm>
@@ -23,14 +23,14 @@ namespace megablock {
 namespace {
 
 constexpr idx_t kSeed = 20260;
-constexpr idx_t kImbalance = 20;          // per mille above the ideal half, per level
-constexpr double kWorstImbalance = 0.05;  // of all nodes, for halves in one piece
-// Leaves are planned 5 % below the limit, and later splits get one more where they came out so large that METIS's
-// imbalance would take a leaf above it.
+constexpr idx_t kImbalance = 20;          // per mille above the ideal half, at each level
+constexpr double kWorstImbalance = 0.05;  // share of all nodes, for halves in one piece
+// Leaves are planned 5 % below the limit. A later division gets one leaf more if its set came out so large that the
+// imbalance of METIS could take a leaf above the limit.
 constexpr double kPlanMargin = 1.05, kSplitMargin = 1.02;
 constexpr std::int64_t kWeightLimit = 1 << 30;  // METIS adds edge weights in 32 bits
 
-// Compressed rows of an undirected graph; node_weight 1 for all.
+// An undirected graph in compressed rows; all nodes have the weight 1.
 struct Adjacency {
   std::vector<idx_t> begin, neighbour, weight;
   idx_t size() const { return static_cast<idx_t>(begin.size()) - 1; }
@@ -72,7 +72,7 @@ Adjacency adjacency(const FrameGraph& graph) {
   return result;
 }
 
-// The part of `graph` whose nodes are on `side`; `position` maps its nodes to their new numbers.
+// The subgraph of the nodes with side[v] == which, renumbered in their order.
 Adjacency subgraph(const Adjacency& graph, const std::vector<idx_t>& side, idx_t which) {
   std::vector<idx_t> position(side.size(), -1);
   idx_t count = 0;
@@ -81,7 +81,7 @@ Adjacency subgraph(const Adjacency& graph, const std::vector<idx_t>& side, idx_t
   Adjacency part;
   part.begin.reserve(static_cast<std::size_t>(count) + 1);
   part.begin.push_back(0);
-  idx_t links = 0;  // those to the other half included
+  idx_t links = 0;  // including those to the other half
   for (std::size_t v = 0; v < side.size(); ++v)
     if (side[v] == which) links += graph.begin[v + 1] - graph.begin[v];
   part.neighbour.reserve(static_cast<std::size_t>(links));
@@ -99,7 +99,7 @@ Adjacency subgraph(const Adjacency& graph, const std::vector<idx_t>& side, idx_t
   return part;
 }
 
-// Connected pieces of the nodes of equal side.
+// Connected pieces of the nodes of each side.
 struct Fragments {
   std::vector<idx_t> of_node, size, side;
   std::vector<std::int64_t> outward;  // weight of the links to the other side
@@ -135,6 +135,7 @@ Fragments fragments_of(const Adjacency& graph, const std::vector<idx_t>& side) {
   return result;
 }
 
+// Moves fragments other than the largest of each side to the other side, where the sizes allow it.
 void join_fragments(const Adjacency& graph, std::vector<idx_t>& side) {
   const Fragments fragments = fragments_of(graph, side);
   if (fragments.size.size() <= 2) return;
@@ -158,7 +159,7 @@ void join_fragments(const Adjacency& graph, std::vector<idx_t>& side) {
     if (move[static_cast<std::size_t>(fragments.of_node[v])]) side[v] = 1 - side[v];
 }
 
-// Side (0 or 1) of every node; `partition`: METIS_PartGraphRecursive or METIS_PartGraphKway.
+// Side (0 or 1) of every node. `partition` is METIS_PartGraphRecursive or METIS_PartGraphKway.
 template <typename Partition>
 std::vector<idx_t> metis_split(Adjacency& graph, double left_share, const Partition& partition, idx_t contiguous) {
   idx_t nodes = graph.size(), constraints = 1, parts = 2, cut = 0;
@@ -177,13 +178,13 @@ std::vector<idx_t> metis_split(Adjacency& graph, double left_share, const Partit
   return side;
 }
 
-// The first half gets `left_share` of the nodes.
+// Divides a graph so that side 0 gets about `left_share` of the nodes.
 std::vector<idx_t> split(Adjacency& graph, double left_share) {
   const idx_t nodes = graph.size();
   std::vector<idx_t> side(static_cast<std::size_t>(nodes), 0);
   if (!graph.neighbour.empty() && nodes > 2) {
     side = metis_split(graph, left_share, METIS_PartGraphRecursive, 0);
-    // METIS asks for a graph in one piece where it is to leave the halves in one piece.
+    // METIS keeps the halves in one piece only if the graph itself is in one piece.
     const auto pieces = [&](const std::vector<idx_t>& of) { return fragments_of(graph, of).size.size(); };
     if (pieces(side) > 2 && pieces(std::vector<idx_t>(side.size(), 0)) == 1) {
       std::vector<idx_t> whole = metis_split(graph, left_share, METIS_PartGraphKway, 1);
@@ -194,11 +195,11 @@ std::vector<idx_t> split(Adjacency& graph, double left_share) {
     join_fragments(graph, side);
   }
   const auto left = std::count(side.begin(), side.end(), 0);
-  if (left == 0 || left == nodes) {  // no links, or too few nodes: by number
+  if (left == 0 || left == nodes) {  // no links, or too few nodes: divide by number
     const auto wanted = std::clamp<std::int64_t>(std::llround(left_share * nodes), 1, nodes - 1);
     for (std::size_t v = 0; v < side.size(); ++v) side[v] = static_cast<std::int64_t>(v) < wanted ? 0 : 1;
   }
-  // The half with the lowest node comes first, whatever METIS called it.
+  // The half with the lowest node comes first, so that METIS's naming of the halves does not matter.
   if (side.front() != 0)
     for (idx_t& s : side) s = 1 - s;
   return side;
@@ -209,7 +210,8 @@ class Bisector {
   Bisector(std::int64_t node_count, std::int64_t max_leaf) : max_leaf_(max_leaf) {
     result_.leaf_of_node.assign(static_cast<std::size_t>(node_count), -1);
   }
-  // Appends the tree over `nodes` in postorder; returns the number of its root.
+  // Appends the tree over `nodes` in postorder and returns the number of its root. `leaves` is the number of leaves
+  // planned.
   std::int64_t run(Adjacency graph, const std::vector<std::int32_t>& nodes, std::int64_t leaves) {
     const auto count = static_cast<std::int64_t>(nodes.size());
     if (count > max_leaf_) {
@@ -226,7 +228,7 @@ class Bisector {
     std::array<std::vector<std::int32_t>, 2> members;
     for (std::size_t v = 0; v < side.size(); ++v) members[static_cast<std::size_t>(side[v])].push_back(nodes[v]);
     graph = Adjacency();
-    // Leaves by the sizes that came out, so that deviations of one level do not add to those of the next.
+    // The leaves are shared out by the actual sizes, so that deviations of one level do not add to those of the next.
     const double shared =
         static_cast<double>(leaves * static_cast<std::int64_t>(members[0].size())) / static_cast<double>(count);
     const std::int64_t first = std::clamp<std::int64_t>(std::llround(shared), 1, leaves - 1);
@@ -265,7 +267,7 @@ std::int64_t join(MergeTree& tree, std::int64_t left, std::int64_t right) {
 }
 
 BisectionTree bisect(const FrameGraph& graph, std::int64_t max_leaf, std::int64_t min_leaves) {
-  if (max_leaf < 1) throw InputError("bisection: a leaf must hold at least one frame");
+  if (max_leaf < 1) throw InputError("bisection: max_leaf must be at least 1 frame");
   check_size(graph);
   Bisector bisector(graph.frame_count, max_leaf);
   if (graph.frame_count > 0) {

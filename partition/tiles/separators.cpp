@@ -12,12 +12,14 @@ struct Link {
   std::int32_t left, right;  // frames in the left and the right half
 };
 
-// Links by the node at which their ends part: those of node n are links[begin[n] ...).
+// The links sorted by the tree node at which their two frames part: those of node n are links[begin[n]] to
+// links[begin[n + 1] - 1].
 struct LinksOfNodes {
   std::vector<std::size_t> begin;
   std::vector<Link> links;
 };
 
+// Sorts links by the node at which their ends part, the lowest common ancestor of their leaves.
 class Parting {
  public:
   Parting(const std::vector<std::int32_t>& leaf_of_frame, const MergeTree& tree)
@@ -65,7 +67,7 @@ class Parting {
     while (deep(y) > deep(x)) y = parent(y);
     while (parent(x) != parent(y)) x = parent(x), y = parent(y);
     const std::int64_t node = parent(x);
-    if (node < 0) return;  // trees of their own
+    if (node < 0) return;  // in separate trees
     if (tree_.nodes[static_cast<std::size_t>(node)].left == x)
       take(node, Link{a, b});
     else
@@ -78,10 +80,10 @@ class Parting {
   std::vector<std::int64_t> node_of_leaf_;
 };
 
-// Largest matching and least cover of one node's links.
+// The largest matching and the smallest vertex cover of the links of one node.
 class VertexCover {
  public:
-  // `number`: scratch, -1 for every frame between calls.
+  // `number` is scratch space with -1 for every frame before and after the call.
   VertexCover(const std::vector<Link>& links, std::vector<std::int32_t>& number) {
     const auto list = [&](std::int32_t Link::*end, std::vector<std::int32_t>& frames) {
       for (const Link& link : links) frames.push_back(link.*end);
@@ -111,8 +113,8 @@ class VertexCover {
       for (std::size_t i = 0; i < left_.size(); ++i)
         if (partner_of_left_[i] < 0) augment(static_cast<std::int32_t>(i));
     }
-    // After the last layering: what alternating paths reach from unmatched frames on the left. Of the left the cover
-    // has what they do not reach, of the right what they do.
+    // After the last layering, layer_ tells which frames on the left alternating paths reach from unmatched frames. By
+    // the theorem of Koenig the cover consists of the left frames that are not reached and the right frames that are.
     std::vector<std::int32_t> cover;
     std::vector<std::uint8_t> reached(right_.size(), 0);
     for (std::size_t i = 0; i < left_.size(); ++i) {
@@ -133,7 +135,8 @@ class VertexCover {
     return static_cast<std::size_t>(number[static_cast<std::size_t>(frame)]);
   }
 
-  // Layers of the left by the length of alternating paths; true when one ends at an unmatched frame on the right.
+  // Breadth-first search: layers of the left frames by the length of alternating paths. Returns true when a path ends
+  // at an unmatched frame on the right.
   bool layer() {
     layer_.assign(left_.size(), kUnreached);
     std::vector<std::int32_t> queue;
@@ -158,7 +161,8 @@ class VertexCover {
     return found;
   }
 
-  // Depth first along the layers, with a stack of its own: paths grow with the graph.
+  // Depth-first search along the layers for an augmenting path. It has its own stack, because paths grow with the
+  // graph.
   void augment(std::int32_t start) {
     std::vector<std::int32_t> path = {start};
     while (!path.empty()) {

@@ -1,9 +1,10 @@
-// Separators of a bisection: at every node of the tree, frames without which its two halves have no links.
+// Separators of a bisection: for every node of the tree, a set of frames without which its two halves have no links.
 //
-// The points of a node's halves can be shared out so that no other frames than these are in points of both
-// (adjust/problem/owner.h); they are what the elimination passes up to the node. The fewest frames that cover all links
-// between the halves are a least vertex cover of a bipartite graph, as many as its largest matching has links (König
-// 1931); matchings by Hopcroft and Karp (1973). Links of frames that separate a node further up are cut already.
+// The tie points of the two halves can be distributed so that only these frames occur in points of both halves
+// (adjust/problem/owner.h); they are what the elimination passes up to the node. The smallest such set is a smallest
+// vertex cover of the bipartite graph of links between the halves. It has as many frames as a largest matching has
+// links (D. Koenig, 1931), and follows from one (J. Hopcroft and R. Karp, SIAM J. Comput. 2(4), 1973). Links of frames
+// that already separate a node higher up are left out.
 #pragma once
 
 #include <vector>
@@ -12,9 +13,10 @@
 
 namespace megablock {
 
-// Depth (root 0) of the node whose halves a frame separates; -1: none. leaf_of_frame: TileIndex of the tree's leaf, -1:
-// none. Links of any weight count: where a link was dropped as weak, tracks may still hold both frames, by way of
-// others. `apart` (not 0): frames that are cut off from the outset; they get -1. Empty: none.
+// For each frame the depth (root: 0) of the node whose halves it separates; -1: none. `leaf_of_frame` is the TileIndex
+// of the frame's leaf; -1: none. Links of every weight count, because tracks may hold two frames together by way of
+// others even where the link was dropped as weak. Frames with a nonzero `apart` are taken as removed beforehand and get
+// -1; an empty list removes none.
 std::vector<std::int32_t> separator_depths(const FrameGraph& graph, const std::vector<std::int32_t>& leaf_of_frame,
                                            const MergeTree& tree, const std::vector<std::uint8_t>& apart = {});
 

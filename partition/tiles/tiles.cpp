@@ -15,12 +15,13 @@ namespace {
 
 using Frames = std::vector<FrameIndex>;  // ascending
 
-// A connected set of frames with its bisection tree (leaf_of_node by position in `frames`).
+// A connected set of frames with its bisection tree; leaf_of_node is by position in `frames`.
 struct Component {
   Frames frames;
   BisectionTree cut;
 };
 
+// The links among `frames`, renumbered by position. `position` is scratch space, -1 before and after the call.
 FrameGraph graph_of(const FrameGraph& graph, const Frames& frames, std::vector<std::int64_t>& position) {
   for (std::size_t i = 0; i < frames.size(); ++i)
     position[static_cast<std::size_t>(frames[i].value)] = static_cast<std::int64_t>(i);
@@ -35,7 +36,7 @@ FrameGraph graph_of(const FrameGraph& graph, const Frames& frames, std::vector<s
   return part;
 }
 
-// Sets of frames by representative, the largest first (ties: lowest frame); sets of one frame are left out.
+// The sets with more than one frame, the largest first; of equal size the one with the lowest frame.
 std::vector<Frames> sets_of(DisjointSets& sets, std::int64_t count) {
   std::map<std::int64_t, Frames> by_representative;
   for (std::int64_t f = 0; f < count; ++f) by_representative[sets.find(f)].push_back(FrameIndex(f));
@@ -46,8 +47,8 @@ std::vector<Frames> sets_of(DisjointSets& sets, std::int64_t count) {
   return result;
 }
 
-// Sets that hang together by at least `tracks` tracks: links are added up between the sets found so far until no two
-// sets share enough.
+// The sets of frames that at least `tracks` tracks hold together. Links between sets found so far are added up, until
+// no two sets share enough tracks.
 std::vector<Frames> linked_sets(const FrameGraph& graph, std::int64_t tracks) {
   DisjointSets sets(graph.frame_count);
   for (bool changed = true; changed;) {
@@ -70,6 +71,7 @@ std::vector<Frames> linked_sets(const FrameGraph& graph, std::int64_t tracks) {
   return sets_of(sets, graph.frame_count);
 }
 
+// Cuts the frames of a graph into components and these into tiles.
 class TileMaker {
  public:
   TileMaker(const FrameGraph& graph, const TileOptions& options)
@@ -80,7 +82,7 @@ class TileMaker {
     std::int64_t linked = 0;
     for (const Frames& frames : work) linked += static_cast<std::int64_t>(frames.size());
     std::vector<Component> result;
-    for (std::size_t i = 0; i < work.size(); ++i) {  // work grows while components fall apart
+    for (std::size_t i = 0; i < work.size(); ++i) {  // `work` grows while components fall apart
       Frames frames = std::move(work[i]);
       const bool whole = static_cast<std::int64_t>(frames.size()) == graph_.frame_count;
       const FrameGraph links = whole ? FrameGraph() : part_of(frames);
@@ -100,6 +102,7 @@ class TileMaker {
   }
 
  private:
+  // The part of min_tiles that falls to a component of this size.
   std::int64_t least_tiles(std::size_t frames, std::int64_t linked) const {
     if (linked < options_.min_tiles_from) return 1;
     const auto count = static_cast<std::int64_t>(frames);
@@ -110,7 +113,7 @@ class TileMaker {
     if (static_cast<std::int64_t>(frames.size()) > kScanLimit) return graph_of(graph_, frames, position_);
     return small_part_of(frames);
   }
-  // Few frames of a large graph: their links by binary search instead of a scan.
+  // For a few frames of a large graph: their links by binary search instead of a scan of all links.
   FrameGraph small_part_of(const Frames& frames) {
     for (std::size_t i = 0; i < frames.size(); ++i)
       position_[static_cast<std::size_t>(frames[i].value)] = static_cast<std::int64_t>(i);
@@ -126,6 +129,7 @@ class TileMaker {
     for (FrameIndex frame : frames) position_[static_cast<std::size_t>(frame.value)] = -1;
     return part;
   }
+  // The connected sets that remain when weak links between leaves are dropped.
   std::vector<Frames> pieces_without_weak_links(const FrameGraph& part, const BisectionTree& cut,
                                                 const Frames& frames) const {
     const auto leaf = [&](FrameIndex f) { return cut.leaf_of_node[static_cast<std::size_t>(f.value)]; };
@@ -145,7 +149,7 @@ class TileMaker {
   std::vector<std::int64_t> position_;  // -1 outside a call
 };
 
-// Appends `tree` with its node and tile numbers replaced; returns its root's new number.
+// Appends `tree` with new node numbers and the given tile numbers. Returns the number of its root.
 std::int64_t append(MergeTree& to, const MergeTree& tree, const std::vector<TileIndex>& tile_of_leaf) {
   const auto shift = static_cast<std::int64_t>(to.nodes.size());
   for (MergeTree::Node node : tree.nodes) {
@@ -158,7 +162,7 @@ std::int64_t append(MergeTree& to, const MergeTree& tree, const std::vector<Tile
   return static_cast<std::int64_t>(to.nodes.size()) - 1;
 }
 
-// Joins roots pairwise, neighbours first, until one is left.
+// Joins roots in pairs, neighbours first, until one root is left.
 std::int64_t join_all(MergeTree& tree, std::vector<std::int64_t> roots) {
   while (roots.size() > 1) {
     std::vector<std::int64_t> next;
@@ -178,7 +182,7 @@ void list_dropped(Tiles& tiles, const FrameGraph& graph, const TileOptions& opti
     if (weak_between_tiles(tiles, edge, options)) tiles.dropped_links.push_back(edge);
 }
 
-// Assignment, tree and components when frames are added to a block that has tiles.
+// Extends assignment, tree and components when frames are added to a block that has tiles.
 class TileExtender {
  public:
   TileExtender(const FrameGraph& graph, const Tiles& previous, const TileOptions& options)
@@ -206,7 +210,8 @@ class TileExtender {
  private:
   TileIndex& tile_of(std::int64_t frame) { return result_.tile_of_frame[FrameIndex(frame)]; }
 
-  // New frames join a tile one after the other, the best linked first, so that chains of new frames follow.
+  // New frames join a tile one after the other, the one with most tracks to a tile first. A chain of new frames thus
+  // follows its first frame.
   void join_strongest() {
     std::map<std::int64_t, std::vector<std::pair<std::int64_t, std::int64_t>>> links;  // new frame: (frame, weight)
     for (const FrameEdge& edge : graph_.edges) {
@@ -235,7 +240,7 @@ class TileExtender {
     }
   }
 
-  // What is linked only among itself.
+  // New frames without links to any tile become components and tiles of their own.
   void add_new_sets() {
     Frames rest;
     for (std::int64_t f = 0; f < graph_.frame_count; ++f)
@@ -256,6 +261,7 @@ class TileExtender {
     }
   }
 
+  // Bisects the tiles that have become too large.
   void split_large_tiles() {
     std::vector<Frames> members(static_cast<std::size_t>(previous_.tile_count));
     for (std::int64_t f = 0; f < graph_.frame_count; ++f)
@@ -275,7 +281,8 @@ class TileExtender {
     }
   }
 
-  // New frames in tiles that stay whole separate the most, so that points which they see, too, stay where they are.
+  // In tiles that stay whole, new frames count as the strongest separators, so that points which they see as well stay
+  // where they are.
   void leave_points_to_former_frames() {
     for (auto f = static_cast<std::int64_t>(previous_.tile_of_frame.size()); f < graph_.frame_count; ++f) {
       const TileIndex tile = tile_of(f);
@@ -285,7 +292,7 @@ class TileExtender {
     }
   }
 
-  // Of frames cut anew, below everything that separates former frames; marks of former ones stay.
+  // Separators of frames that are cut anew. They lie deeper than all separators of earlier frames, whose depths stay.
   void separate_parts(const FrameGraph& part, const BisectionTree& cut, const Frames& frames) {
     std::vector<std::uint8_t> apart;
     for (const FrameIndex frame : frames) apart.push_back(result_.separator_depth[frame] >= 0);
@@ -294,6 +301,7 @@ class TileExtender {
       if (depth[i] >= 0) result_.separator_depth[frames[i]] = below_ + depth[i];
   }
 
+  // Tile numbers of the parts of a bisected tile: the part with most of its earlier frames keeps the number.
   std::vector<TileIndex> numbers_of_parts(const BisectionTree& cut, const Frames& frames, TileIndex tile) {
     const std::size_t parts =
         1 + static_cast<std::size_t>(*std::max_element(cut.leaf_of_node.begin(), cut.leaf_of_node.end()));
@@ -307,8 +315,8 @@ class TileExtender {
     return numbers;
   }
 
-  // Components of the kept links (a tile counts as connected), then the former tree's subtrees within a component, the
-  // trees of new sets beside them, and the common root.
+  // Finds the components of the remaining links (a tile counts as connected). The new tree has, for each component, the
+  // subtrees of the former tree and the trees of new sets, and a common root.
   void assemble() {
     DisjointSets sets(graph_.frame_count);
     std::vector<std::int64_t> first(static_cast<std::size_t>(result_.tile_count), -1);
@@ -324,7 +332,7 @@ class TileExtender {
           !weak_between_tiles(result_, edge, options_))
         sets.unite(edge.a.value, edge.b.value);
 
-    // sets_of leaves out single frames; a tile of one frame that lost its links remains a component.
+    // sets_of leaves out single frames, but a tile of one frame that has lost its links remains a component.
     std::map<std::int64_t, std::int64_t> size;
     for (std::int64_t f = 0; f < graph_.frame_count; ++f)
       if (tile_of(f).valid()) ++size[sets.find(f)];
@@ -355,7 +363,7 @@ class TileExtender {
 
   void build_tree(std::size_t components) {
     const std::vector<MergeTree::Node>& old = previous_.tree.nodes;
-    std::vector<std::int32_t> label(old.size(), -1);  // the one component below a former node; -1: several
+    std::vector<std::int32_t> label(old.size(), -1);  // the component below a former node; -1: several
     for (std::size_t n = 0; n < old.size(); ++n) {
       const auto at = [&](std::int64_t i) { return label[static_cast<std::size_t>(i)]; };
       if (old[n].left < 0)
@@ -385,7 +393,7 @@ class TileExtender {
     join_all(result_.tree, std::move(roots));
   }
 
-  // Copies a former subtree, bisected tiles replaced by theirs.
+  // Copies a subtree of the former tree; a bisected tile is replaced by its own tree.
   std::int64_t copy(std::int64_t former) {
     const MergeTree::Node& node = previous_.tree.nodes[static_cast<std::size_t>(former)];
     if (node.left >= 0) {
@@ -409,8 +417,8 @@ class TileExtender {
   const TileOptions& options_;
   Tiles result_;
   std::int32_t below_ = 0;                                     // deeper than all separators of `previous`
-  std::vector<MergeTree> subtree_of_tile_;                     // of bisected former tiles, final tile numbers
-  std::vector<std::pair<MergeTree, std::int64_t>> new_trees_;  // of new sets; number of their first tile
+  std::vector<MergeTree> subtree_of_tile_;                     // of bisected former tiles, with final tile numbers
+  std::vector<std::pair<MergeTree, std::int64_t>> new_trees_;  // trees of new sets, with the number of their first tile
   std::vector<std::int32_t> component_of_tile_;
 };
 
@@ -455,7 +463,8 @@ Tiles extend_tiles(const FrameGraph& graph, const Tiles& previous, const TileOpt
   options.check();
   if (previous.tile_count == 0) return make_tiles(graph, options);
   if (static_cast<std::int64_t>(previous.tile_of_frame.size()) > graph.frame_count)
-    throw InputError("tiles: the block has fewer frames than when its tiles were cut; start a new job");
+    throw InputError(
+        "tiles: the block has fewer frames than when its tiles were cut; start a new job in another folder");
   return TileExtender(graph, previous, options).run();
 }
 

@@ -10,9 +10,10 @@ namespace megablock {
 
 namespace {
 
-constexpr int kColumns = 5, kRows = 3;                        // of sample directions
-constexpr double kDistances[] = {0.13, 0.25, 0.5, 1};         // of the range
-constexpr double kWidestAngle = 60 * std::numbers::pi / 180;  // at which a point looks the same from two sides
+constexpr int kColumns = 5, kRows = 3;                 // grid of sample directions
+constexpr double kDistances[] = {0.13, 0.25, 0.5, 1};  // distances of sample points, as shares of the range
+// Radians; from two directions farther apart, a point looks too different to be matched.
+constexpr double kWidestAngle = 60 * std::numbers::pi / 180;
 
 std::optional<Pose> known_pose(const Frame& frame) {
   if (frame.given_pose) return frame.given_pose;

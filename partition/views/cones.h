@@ -1,4 +1,5 @@
-// Viewing cones of images whose place and attitude are known: whether two of them can see the same things (CN-11).
+// Viewing cones of images with known position and attitude. They tell whether two images can see the same objects
+// (Cannelle 2013).
 #pragma once
 
 #include <vector>
@@ -9,14 +10,16 @@ namespace megablock {
 
 class ViewingCones {
  public:
-  // Of images of rigs of several cameras with given pose, or position and attitude prior. `range_m`: how far they see.
+  // Makes the cones of images of rigs with several cameras whose frames have a given pose, or a position and an
+  // attitude prior. `range_m` is how far the cameras see.
   ViewingCones(const Block& block, double range_m);
 
   bool has(ImageIndex image) const { return cones_[image].known; }
   const Eigen::Vector3d& centre(ImageIndex image) const { return cones_[image].camera.centre; }
 
-  // 0 to 1; 0: the cones do not intersect. Of sample points of either cone, near ones and far ones alike, those that
-  // the other image sees count the more the less the two directions differ; from 60 degrees on they do not count.
+  // The overlap of two cones, 0 to 1; 0 where they do not intersect or one is unknown. Sample points of each cone, near
+  // and far, are projected into the other image. A point that it sees counts 1 - (angle between the two
+  // directions) / 60 degrees, at least 0.
   double overlap(ImageIndex a, ImageIndex b) const;
 
  private:
@@ -25,11 +28,12 @@ class ViewingCones {
     Pose camera;  // ground -> camera
     CameraIndex of;
   };
+  // The shape of the cone of a camera.
   struct Shape {
-    std::vector<Eigen::Vector3d> samples;  // camera axes, metres
-    bool wide = false;                     // fisheye, panorama: limited by its angle, else by the image's sides
-    double cosine = 0;                     // of half the opening angle
-    Eigen::Vector2d low, high;             // of X/Z, Y/Z
+    std::vector<Eigen::Vector3d> samples;  // sample points, camera axes, metres
+    bool wide = false;          // fisheye, panorama: limited by the opening angle, others by the sides of the image
+    double cosine = 0;          // of half the opening angle
+    Eigen::Vector2d low, high;  // limits of X/Z and Y/Z
   };
   bool sees(const Cone& cone, const Eigen::Vector3d& point) const;
   double seen_share(const Cone& from, const Cone& by) const;

@@ -10,9 +10,10 @@ namespace megablock {
 namespace {
 
 constexpr double kStraight = 0.766;  // cosine of 40 degrees
-constexpr double kTinyStep = 0.2;    // of the usual one: two exposures of one place have no direction
+constexpr double kTinyStep = 0.2;    // of the usual step: shorter steps have no direction
 constexpr std::size_t kLeastLine = 3;
 
+// Finds the lines of one pass.
 class LineFinder {
  public:
   LineFinder(const std::vector<FrameIndex>& order, const BlockState& state, double usual) : order_(order) {
@@ -24,14 +25,14 @@ class LineFinder {
 
   void find(std::vector<FlightLine>& lines) const {
     for (std::size_t first = 0, last; first < order_.size(); first = last) {
-      // Frames [first, last) are a line as long as each step goes the way of the line's last one that had a direction.
+      // Frames [first, last) are a line while each step has about the direction of the line's last step that had one.
       Eigen::Vector2d way = Eigen::Vector2d::Zero();
       for (last = first + 1; last < order_.size() && agree(way, steps_[last - 1]); ++last)
         if (!steps_[last - 1].isZero()) way = steps_[last - 1];
       if (last - first >= kLeastLine)
         lines.emplace_back(order_.begin() + static_cast<std::ptrdiff_t>(first),
                            order_.begin() + static_cast<std::ptrdiff_t>(last));
-      // Two frames are a turn: the second one begins the next line.
+      // Two frames only make a turn; the second one begins the next line.
       if (last - first == 2 && last < order_.size()) --last;
     }
   }

@@ -1,4 +1,5 @@
-// Nearest neighbours among points of the ground plane (k-d tree, Bentley 1975).
+// Nearest neighbours among points of the ground plane by a k-d tree (J. L. Bentley, Communications of the ACM 18(9),
+// 1975).
 #pragma once
 
 #include <Eigen/Core>
@@ -10,6 +11,8 @@
 
 namespace megablock {
 
+// The tree is stored without pointers: the middle element of each range of order_ splits the range, across x and y in
+// turn.
 class KdTree {
  public:
   struct Neighbour {
@@ -18,17 +21,17 @@ class KdTree {
     friend auto operator<=>(const Neighbour&, const Neighbour&) = default;
   };
 
-  // Ties in distance go to the point listed first. Coordinates must be finite.
+  // Of points at equal distances the one listed first is nearer. Coordinates must be finite.
   explicit KdTree(std::vector<Eigen::Vector2d> points) : points_(std::move(points)), order_(points_.size()) {
     std::iota(order_.begin(), order_.end(), std::int64_t{0});
     build(0, order_.size(), 0);
   }
 
-  // The `count` nearest points within `radius` that `admits` accepts, nearest first.
+  // Returns the `count` nearest points within `radius` that `admits(point)` accepts, nearest first.
   template <typename Admits>
   std::vector<Neighbour> nearest(const Eigen::Vector2d& place, std::size_t count, double radius,
                                  const Admits& admits) const {
-    std::vector<Neighbour> heap;  // largest on top
+    std::vector<Neighbour> heap;  // the farthest is on top
     if (count > 0) search(place, count, radius * radius, admits, 0, order_.size(), 0, heap);
     std::sort_heap(heap.begin(), heap.end());
     return heap;
@@ -37,7 +40,7 @@ class KdTree {
  private:
   const Eigen::Vector2d& at(std::size_t i) const { return points_[static_cast<std::size_t>(order_[i])]; }
 
-  // The median of [begin, end) by the axis of this depth splits the rest.
+  // The median of [begin, end) along this axis splits the range.
   void build(std::size_t begin, std::size_t end, int axis) {
     if (end - begin < 2) return;
     const std::size_t middle = begin + (end - begin) / 2;
@@ -64,6 +67,8 @@ class KdTree {
       heap.push_back(here);
       std::push_heap(heap.begin(), heap.end());
     }
+    // Searches the side of the place first. The other side can be skipped if the dividing line is farther than the
+    // worst neighbour.
     const double offset = place[axis] - at(middle)[axis];
     const auto left = [&] { search(place, count, limit, admits, begin, middle, 1 - axis, heap); };
     const auto right = [&] { search(place, count, limit, admits, middle + 1, end, 1 - axis, heap); };

@@ -17,18 +17,19 @@ namespace megablock {
 
 namespace {
 
-constexpr double kDownward = 0.35;        // -z of a direction at least 20 degrees below the horizon
-constexpr double kMostSlant = 4;          // a footprint is sought no farther than 4 heights away
-constexpr double kHorizontalDepth = 3;    // spacings
-constexpr double kSpacingPerSide = 0.25;  // of a footprint's side: 75 % overlap
-constexpr double kDoubtfulSteps = 10;     // usual steps
+constexpr double kDownward = 0.35;        // sine: a direction at least 20 degrees below the horizon
+constexpr double kMostSlant = 4;          // a footprint is at most this many heights away
+constexpr double kHorizontalDepth = 3;    // assumed depth of horizontal views, in spacings of frames
+constexpr double kSpacingPerSide = 0.25;  // assumed spacing over the footprint's side: 75 % overlap
+constexpr double kDoubtfulSteps = 10;     // in usual steps
 constexpr double kDoubtfulSigmas = 6;
-constexpr std::ptrdiff_t kOrderWindow = 2;   // acquisition neighbours a position is compared with
-constexpr std::ptrdiff_t kPlaceWindow = 10;  // ... and sought between
+constexpr std::ptrdiff_t kOrderWindow = 2;   // neighbours in the order of acquisition that a position is compared with
+constexpr std::ptrdiff_t kPlaceWindow = 10;  // neighbours between which a missing position is assumed
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// Numbers in names compare by value; equal so far: plain comparison.
+// Compares names so that numbers in them count by value: img_9 before img_10. Names equal in this sense are compared
+// plainly.
 bool natural_less(std::string_view a, std::string_view b) {
   std::size_t i = 0, j = 0;
   while (i < a.size() && j < b.size()) {
@@ -56,7 +57,7 @@ bool name_before(const Block& block, ImageIndex a, ImageIndex b) {
   return natural_less(block.image_names[a], block.image_names[b]);
 }
 
-// Place of every image in the natural order of names.
+// Rank of every image in this order of names.
 IndexedVector<ImageIndex, std::int64_t> name_ranks(const Block& block) {
   std::vector<ImageIndex> order;
   order.reserve(block.images.size());
@@ -67,7 +68,7 @@ IndexedVector<ImageIndex, std::int64_t> name_ranks(const Block& block) {
   return ranks;
 }
 
-// Median distance to the nearest other frame.
+// Median distance of a frame to the nearest other frame, metres.
 double frame_spacing(const Block& block) {
   std::vector<Eigen::Vector2d> centres;
   for (const Frame& frame : block.frames) {
@@ -93,7 +94,7 @@ double ground_height(const Block& block) {
   return heights.empty() ? std::numeric_limits<double>::quiet_NaN() : median(std::move(heights));
 }
 
-// Slant distance from the projection centre to the scene.
+// Distance from the projection centre to the scene along the viewing direction.
 double depth_of(const View& view, double height, double spacing) {
   const double down = -view.direction.z();
   if (down < kDownward) return kHorizontalDepth * spacing;
@@ -129,7 +130,7 @@ View view_of(const Block& block, ImageIndex image, double spacing, double ground
   return view;
 }
 
-// `before(a, b)`: by name.
+// `before(a, b)` compares images by name.
 template <typename Before>
 std::vector<std::vector<ImageIndex>> passes_of(const Block& block, const Before& before) {
   std::map<std::tuple<std::int64_t, std::int64_t, int>, std::vector<ImageIndex>> groups;
@@ -140,7 +141,8 @@ std::vector<std::vector<ImageIndex>> passes_of(const Block& block, const Before&
   }
   std::vector<std::vector<ImageIndex>> passes;
   for (auto& [key, images] : groups) {
-    // Times beside the images: the block's tables may be read from a file, whose pages leave memory meanwhile.
+    // Times are copied beside the images, because the tables of the block may be mapped from a file, whose pages may
+    // leave memory meanwhile.
     std::vector<std::pair<double, ImageIndex>> order;
     order.reserve(images.size());
     for (const ImageIndex image : images) order.emplace_back(block.frames[block.images[image].frame].time_s, image);
@@ -154,7 +156,8 @@ std::vector<std::vector<ImageIndex>> passes_of(const Block& block, const Before&
   return passes;
 }
 
-// A position is doubtful when none of its located acquisition neighbours is within ten usual steps.
+// Marks positions as doubtful if no located neighbour in the order of acquisition is within ten usual steps or six
+// standard deviations, whichever is more.
 void find_doubtful(const std::vector<ImageIndex>& pass, Views& views) {
   std::vector<ImageIndex> located;
   for (ImageIndex image : pass)
@@ -173,7 +176,8 @@ void find_doubtful(const std::vector<ImageIndex>& pass, Views& views) {
   }
 }
 
-// Places for images that are not located or doubtful, between the nearest good ones of their pass.
+// Assumes a place for images without a position, or with a doubtful one: the middle between the nearest good ones of
+// their pass.
 void place_between(const std::vector<ImageIndex>& pass, Views& views) {
   const auto count = static_cast<std::ptrdiff_t>(pass.size());
   const auto at = [&](std::ptrdiff_t i) -> View& { return views.of_image[pass[static_cast<std::size_t>(i)]]; };
@@ -208,7 +212,7 @@ double half_opening(const Camera& camera) {
   return std::atan(0.5 * std::max(camera.width, camera.height) / camera.intrinsics[kFocal]);
 }
 
-// Without ranks: where frames have times no name is looked at.
+// This version needs no ranks of names: where all frames have times, no name is compared.
 std::vector<std::vector<ImageIndex>> passes_of(const Block& block) {
   return passes_of(block, [&](ImageIndex a, ImageIndex b) { return name_before(block, a, b); });
 }

@@ -1,4 +1,5 @@
-// What is known of where each image stands and looks before anything is oriented, and its order of acquisition.
+// Collects the knowledge about each image before anything is oriented: where it is, in which direction it looks, and
+// its place in the order of acquisition. Candidates are chosen by it.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,18 +10,19 @@
 namespace megablock {
 
 struct View {
-  bool located = false;                                  // the frame has a position prior or a given pose
-  bool doubtful = false;                                 // position far off its acquisition neighbours
-  bool directed = false;                                 // viewing direction known
-  bool placed = false;                                   // `place` is set
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();      // projection centre in the ground plane, metres (located)
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit, ground frame (directed)
-  // What neighbours are sought by: the footprint's centre (directed) or the projection centre; for images that are not
-  // located or doubtful, midway between those of the nearest acquisition neighbours.
+  bool located = false;   // the frame has a position prior or a given pose
+  bool doubtful = false;  // the position is far off its neighbours in the order of acquisition
+  bool directed = false;  // the viewing direction is known
+  bool placed = false;    // `place` is set
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();      // projection centre in the ground plane, metres (if located)
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit vector, ground frame (if directed)
+  // The place by which neighbours are sought: the centre of the footprint (if directed), or the projection centre. For
+  // images that are not located or doubtful, the middle between the places of their nearest neighbours in the order of
+  // acquisition.
   Eigen::Vector2d place = Eigen::Vector2d::Zero();
   double reach = 0;       // horizontal distance from centre to footprint centre, metres
-  double sigma = 0;       // of the position, horizontal, metres
-  std::int64_t rank = 0;  // by name: img_9 before img_10
+  double sigma = 0;       // standard deviation of the horizontal position, metres
+  std::int64_t rank = 0;  // in the order of names: img_9 before img_10
 };
 
 struct Views {
@@ -28,11 +30,11 @@ struct Views {
   std::vector<std::vector<ImageIndex>> passes;  // passes_of()
 };
 
-// Images of one pass, rig and mount, in order of acquisition: by time where all have one, else by name.
+// The images of each pass, rig and mount in the order of acquisition: by time if all have one, else by name.
 std::vector<std::vector<ImageIndex>> passes_of(const Block& block);
 
-// Height above ground: from control points where there are some, else from the spacing of the frames, taking three
-// quarters of overlap. Views near the horizontal are given a depth of three spacings.
+// Height above ground follows from control points if there are any, else from the spacing of the frames and an assumed
+// overlap of three quarters. Views near the horizontal get a depth of three spacings.
 Views views_of(const Block& block);
 
 // Half of the larger opening angle of an image, radians.
