@@ -1,4 +1,4 @@
-// A camera of every model with strong distortion, 1920 x 1080, for tests.
+// One camera of every model, with strong distortion and 1920 x 1080 pixels.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@ namespace megablock {
 
 inline constexpr int kSampleWidth = 1920, kSampleHeight = 1080;
 
-// Every kind in every order.
+// Every kind of model in every order.
 inline std::vector<CameraModel> every_model() {
   std::vector<CameraModel> models;
   for (const CameraModelForm& form : camera_model_forms())
@@ -20,7 +20,7 @@ inline std::vector<CameraModel> every_model() {
   return models;
 }
 
-// Corrections of tens of pixels in the corners.
+// A camera whose corrections reach tens of pixels in the corners.
 inline Intrinsics sample_camera(const CameraModel& model, double focal, int width, int height) {
   Intrinsics k = start_intrinsics(model, focal, width, height);
   std::mt19937_64 random(static_cast<std::uint64_t>(100 * static_cast<int>(model.kind) + model.order));

@@ -1,4 +1,5 @@
-// The plainest estimator of ransac.h: N unknowns of y = c.x from N observations, for tests of the engine itself.
+// The simplest estimator for ransac.h: N unknowns c of y = c.x, from samples of N observations. It tests the engine
+// alone.
 #pragma once
 
 #include <Eigen/Dense>
@@ -11,7 +12,7 @@
 
 namespace megablock {
 
-// x in [-1, 1]^N; wrong observations have y anywhere in [-3, 3].
+// Observations with x in [-1, 1]^N. The y of an outlier lies anywhere in [-3, 3].
 template <int N>
 struct LinearModelScene {
   using Vector = Eigen::Matrix<double, N, 1>;
@@ -19,7 +20,7 @@ struct LinearModelScene {
   std::vector<Vector> x;
   std::vector<double> y;
 
-  // Exactly the share `outliers` of the observations is wrong.
+  // Exactly the share `outliers` of the observations are outliers.
   LinearModelScene(std::size_t count, double outliers, double noise, std::uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(-1, 1);
@@ -38,7 +39,7 @@ template <int N>
 class LinearModelEstimator {
  public:
   using Model = Eigen::Matrix<double, N, 1>;
-  // Of any size up to eight: Eigen's decompositions are compiled once and not for every N.
+  // The size is dynamic, up to eight, so that Eigen's decompositions are compiled once and not for every N.
   using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 8, 8>;
   static constexpr std::size_t kSampleSize = N;
   explicit LinearModelEstimator(const LinearModelScene<N>& scene) : scene_(&scene) {}

@@ -1,6 +1,6 @@
-// Two images of a scene for the solvers of relative orientation: the camera of the simulations of Nister (2004) and
-// Kalantari (2009), 352 x 288 pixels and 45 degrees wide, points at depths of 1 to 3 or in the plane of depth 2; or
-// that of a photogrammetric flight.
+// Two images of a simulated scene for the solvers of relative orientation. The camera is that of the simulations of
+// Nister (2004) and Kalantari (2009), with 352 x 288 pixels and 45 degrees, with points at depths of 1 to 3 or in the
+// plane of depth 2; or that of an aerial block.
 #pragma once
 
 #include <algorithm>
@@ -19,16 +19,16 @@ inline constexpr double kSceneFocalPx = 424.9;
 
 struct PairSceneOptions {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d base{0.3, 0, 0};  // X_b = R X_a + base; zero: one centre
+  Eigen::Vector3d base{0.3, 0, 0};  // X_b = R X_a + base; zero: a common centre
   bool plane = false;
   double noise_px = 0;  // per coordinate, both images
-  double outliers = 0;  // share of pairs whose place in b has nothing to do with a
+  double outliers = 0;  // share of pairs whose point in b is unrelated to that in a
   double focal_px = kSceneFocalPx, half_width_px = 176, half_height_px = 144;
-  double depth = 2, depth_spread = 1;  // the latter either way
-  bool in_both = false;                // all points lie in the frame of b too
+  double depth = 2, depth_spread = 1;  // mean depth, and its largest deviation to either side
+  bool in_both = false;                // all points are also within the image b
 
-  // Two nadir images of 3 000 x 2 000 pixels from one line of flight, almost a plane: points at depths of 1 +- 0.025,
-  // so that the length of the base is its ratio to the height.
+  // Two nadir images with 3000 x 2000 pixels from one flight line, of an almost plane scene: points at depths of
+  // 1 +- 0.025. The length of the base is thus the base-to-height ratio.
   static PairSceneOptions aerial(const Eigen::Vector3d& base, double noise_px) {
     PairSceneOptions o;
     o.base = base;
@@ -93,7 +93,7 @@ inline double base_error_deg(const RelativeOrientation& o, const RelativeOrienta
   return degrees(angle_between(o.base, truth.base));
 }
 
-// Smallest sum of both errors.
+// The smallest sum of both errors.
 template <typename List>
 double nearest_error_deg(const List& found, const RelativeOrientation& truth) {
   double nearest = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// The rays of a simulated pair (pair_scene.h) as normalised image points.
+// Turns the rays of a simulated pair (pair_scene.h) into normalised image points.
 #pragma once
 
 #include "geometry/two_view/point_pairs.h"

@@ -1,4 +1,5 @@
-// Segments of parallel edges and of clutter in a simulated photograph, 3008 x 2000 pixels with a focal length of 3000.
+// Segments of parallel edges, and clutter, in a simulated image with 3008 x 2000 pixels and a focal length of 3000
+// pixels.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -17,7 +18,7 @@ struct SegmentScene {
   PerspectiveCentre camera{{1504, 1000}, 3000};
   double sigma_px = 0.3;
   std::vector<std::array<Eigen::Vector2d, 2>> segments;
-  std::vector<int> family;            // of every segment; -1: clutter
+  std::vector<int> family;            // of each segment; -1: clutter
   std::vector<Eigen::Vector3d> axes;  // of the families, in camera axes
   std::mt19937_64 random;
 
@@ -73,8 +74,8 @@ inline double axis_error_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b)
   return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * kDegreesPerRadian;
 }
 
-// How a camera was held: columns are its x, y and z axes in a ground frame with z down, so that the transpose sees the
-// vertical of the ground in camera axes.
+// The attitude in which a camera is held. The columns of the matrix are its x, y and z axes in a ground frame with z
+// down, so the transpose turns the vertical of the ground into camera axes.
 struct Held {
   double roll = 0, pitch = 0;                                  // radians
   int quarter_turns = 0;                                       // of the camera about its view, clockwise
@@ -87,7 +88,7 @@ struct Held {
   Eigen::Vector3d horizontal(double azimuth) const { return seen({std::sin(azimuth), 0, std::cos(azimuth)}); }
 };
 
-// A street: the vertical, `horizontals` families at least 15 degrees of azimuth apart, 10 to 50 % of clutter.
+// A street: the vertical, `horizontals` families of lines at least 15 degrees of azimuth apart, and 10 to 50 % clutter.
 inline SegmentScene urban_scene(std::uint64_t seed, const Held& held, int horizontals, double sigma_px = 0.3) {
   SegmentScene scene(seed, sigma_px);
   scene.add_family(held.vertical(), static_cast<int>(scene.uniform(40, 120)));

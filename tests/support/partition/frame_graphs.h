@@ -1,4 +1,4 @@
-// Made-up frame graphs, and what every tree over them must be.
+// Artificial frame graphs, and the properties that every tree over them must have.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ inline void add(std::vector<FrameEdge>& edges, std::int64_t a, std::int64_t b, s
   edges.push_back({FrameIndex(std::min(a, b)), FrameIndex(std::max(a, b)), weight});
 }
 
-// rows x columns frames from number `start`, linked to their neighbours (diagonals weaker).
+// rows x columns frames, numbered from `start`, each linked to its neighbours (more weakly along diagonals).
 inline std::vector<FrameEdge> grid(int rows, int columns, std::int64_t start = 0, std::int64_t weight = 100) {
   std::vector<FrameEdge> edges;
   const auto at = [&](int r, int c) { return start + std::int64_t{r} * columns + c; };

@@ -1,3 +1,4 @@
+// Camera matrices: the parts of a known camera come back, whatever the scale and sign of its matrix.
 #include "geometry/camera/camera_matrix.h"
 
 #include <gtest/gtest.h>

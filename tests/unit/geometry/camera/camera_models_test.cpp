@@ -1,4 +1,5 @@
-// Every camera model: round trips over the whole sensor, derivatives against central differences, published figures.
+// Tests of every camera model: round trips over the whole sensor, derivatives against central differences, and
+// published figures.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -14,7 +15,7 @@ namespace {
 
 class EveryModel : public testing::TestWithParam<CameraModel> {
  protected:
-  // The sensor with its borders, in steps of about 60 px.
+  // Visits the sensor with its borders, in steps of about 60 pixels.
   template <typename Visit>
   void visit_sensor(Visit&& visit, int across = 32, int down = 18) const {
     for (int i = 0; i <= across; ++i)
@@ -44,7 +45,7 @@ TEST_P(EveryModel, RaysOfPixelsProjectOntoThem) {
   int seen = 0;
   visit_sensor([&](const Eigen::Vector2d& pixel) {
     const auto ray = viewing_ray(k_, pixel);
-    if (panorama && !ray) return;  // this panorama's image goes beyond the poles
+    if (panorama && !ray) return;  // this panorama extends beyond the poles
     ASSERT_TRUE(ray) << pixel.transpose();
     ++seen;
     EXPECT_NEAR(ray->norm(), 1, 1e-14);
@@ -60,7 +61,7 @@ TEST_P(EveryModel, RaysOfPixelsProjectOntoThem) {
 }
 
 TEST_P(EveryModel, JacobiansAreCentralDifferences) {
-  // Against Richardson's extrapolation of central differences, in pixels per camera coordinate at unit distance.
+  // Compared with Richardson's extrapolation of central differences, in pixels per camera coordinate at unit distance.
   visit_sensor(
       [&](const Eigen::Vector2d& pixel) {
         if (!Eigen::AlignedBox2d(Eigen::Vector2d(10, 10), Eigen::Vector2d(1910, 1070)).contains(pixel)) return;
@@ -109,7 +110,7 @@ TEST_P(EveryCorrection, LeadsToThePinholePixel) {
     EXPECT_LT((pixel + value - straight).norm(), 1e-9);
     largest = std::max(largest, value.norm());
   });
-  EXPECT_GT(largest, 5);  // or all of this means little
+  EXPECT_GT(largest, 5);  // otherwise the comparison would mean little
 }
 
 TEST_P(EveryModel, StartsWithoutDistortion) {
@@ -121,7 +122,7 @@ TEST_P(EveryModel, StartsWithoutDistortion) {
     const bool panorama_turn = GetParam().kind == CameraModelKind::kEquirectangular && p == kPrincipalX;
     EXPECT_EQ(sigma[static_cast<std::size_t>(p)] > 0, p < start.size() && !is_fixed(GetParam(), p) && !panorama_turn);
   }
-  // One sigma of a term moves a pixel a focal length from the centre by less than half a focal length.
+  // One sigma of a term moves a pixel at one focal length from the centre by less than half a focal length.
   for (int p = 0; p < start.size(); ++p) {
     Intrinsics moved = start;
     moved[p] += sigma[static_cast<std::size_t>(p)];
@@ -144,9 +145,9 @@ std::vector<CameraModel> every_correction() {
 INSTANTIATE_TEST_SUITE_P(All, EveryModel, testing::ValuesIn(every_model()), test_name);
 INSTANTIATE_TEST_SUITE_P(All, EveryCorrection, testing::ValuesIn(every_correction()), test_name);
 
-// The cameras of Cannelle (2013), table of the simulations: its edge corrections belong to the corner farthest from the
-// centre of symmetry. b of the third camera is printed with a minus and the row of the fourth's centre as 3709; with
-// these the corrections would be 115 and 4.6 px.
+// The cameras in Cannelle's table of simulations (2013): the edge corrections belong to the corner farthest from the
+// centre of symmetry. The table prints b of the third camera with a minus, and the row of the fourth camera's centre as
+// 3709; with these the corrections would be 115 and 4.6 pixels.
 TEST(IgnRadial, HasThePublishedEdgeCorrections) {
   struct Published {
     double width, height;
@@ -195,7 +196,7 @@ TEST(Fisheye, IsEquidistantBeyondNinetyDegrees) {
 }
 
 TEST(Fisheye, EndsWhereItsPolynomialTurnsBack) {
-  // t (1 - t^2 / 3) turns back at t = 1.
+  // The radius t (1 - t^2 / 3) has its maximum at t = 1.
   const Intrinsics k(*find_model("opencv-fisheye"), {300, 0, 0, -1.0 / 3, 0, 0, 0});
   const auto at = [](double angle) { return Eigen::Vector3d(std::sin(angle), 0, std::cos(angle)); };
   EXPECT_TRUE(project(k, at(0.99)).allFinite());
@@ -217,14 +218,14 @@ TEST(Equirectangular, SeesTheWholeSphere) {
   expect_pixel({1e-13, 0, -1}, 3600, 900);
   EXPECT_FALSE(project(k, {0, 1, 0}).allFinite());
   EXPECT_FALSE(project_with_jacobian(k, {0, -1, 0}).valid);
-  // Both edges are the same place.
+  // Both edges of a panorama are the same place.
   EXPECT_LT(reprojection(k, {0.01, 0, -1}, {1, 900}).norm(), 7);
   EXPECT_LT(reprojection(k, {-0.01, 0, -1}, {3599, 900}).norm(), 7);
   EXPECT_GT(viewing_ray(k, {10, 900})->dot(*viewing_ray(k, {3590, 900})), 0.999);
 }
 
 TEST(Corrections, EndWhereTheyFold) {
-  // r (1 - r^2 / 3) in focal lengths turns back at one focal length.
+  // The radius r (1 - r^2 / 3), in focal lengths, has its maximum at one focal length.
   Intrinsics k = start_intrinsics(*find_model("odd-radial-1"), 600, kSampleWidth, kSampleHeight);
   k[kRadialTerms] = -1.0 / 3;
   EXPECT_TRUE(viewing_ray(k, {960 + 590, 540}));
@@ -235,7 +236,7 @@ TEST(Corrections, EndWhereTheyFold) {
 }
 
 TEST(Corrections, LegendreAndPolynomialSpanTheSame) {
-  // x^2 = (2 P_2 + 1) / 3: the constant is the principal point's.
+  // x^2 = (2 P_2 + 1) / 3; the principal point takes the constant.
   Intrinsics polynomial = start_intrinsics(*find_model("polynomial-2"), 1400, kSampleWidth, kSampleHeight);
   Intrinsics legendre = start_intrinsics(*find_model("legendre-2"), 1400, kSampleWidth, kSampleHeight);
   polynomial[*find_parameter(polynomial.model(), "x20")] = 6;

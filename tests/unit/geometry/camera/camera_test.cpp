@@ -1,3 +1,4 @@
+// Projection and its inverse for the Brown model, against formulas written out, round trips and finite differences.
 #include "geometry/camera/camera.h"
 
 #include <gtest/gtest.h>
@@ -66,7 +67,7 @@ TEST(Camera, UnprojectInvertsProject) {
 }
 
 TEST(Camera, UnprojectRefusesBeyondTheTurningPoint) {
-  // x (1 - x^2 / 3) grows up to x = 1, where it reaches 2/3; no point has a larger distorted radius.
+  // x (1 - x^2 / 3) grows up to x = 1, where it reaches 2/3. No point has a larger distorted radius.
   const Intrinsics barrel = {1000, 0, 0, -1.0 / 3, 0, 0, 0, 0};
   EXPECT_TRUE(unproject(barrel, {600, 0}));
   EXPECT_FALSE(unproject(barrel, {700, 0}));

@@ -1,3 +1,5 @@
+// The image formula in nine and in eleven parameters: conversions against each other, fits against simulated truth, and
+// refusal of degenerate control.
 #include "geometry/camera/collinearity.h"
 
 #include <gtest/gtest.h>
@@ -117,7 +119,7 @@ TEST(Collinearity, APointMeasuredTwiceCountsOnce) {
   const NineParameters camera = tilted_image();
   std::mt19937_64 random(64);
   for (const double noise : {0.0, 0.5})
-    for (const double apart : {0.0, 1e-4}) {  // m, of 300 m
+    for (const double apart : {0.0, 1e-4}) {  // metres, of 300 m
       ControlScene twice(camera, 6, 40, random, noise);
       ASSERT_TRUE(fit_eleven(twice.ground, twice.image));
       ASSERT_TRUE(fit_nine(camera, twice.ground, twice.image));
@@ -163,7 +165,7 @@ TEST(Collinearity, RestitutionOfBadInput) {
   EXPECT_FALSE(restitute(same, std::vector<Eigen::Vector2d>{{1, 2}, {std::nan(""), 2}}));
 }
 
-// Whatever the side of the image that the origin lies on.
+// Points behind the image are refused, whichever side of the image the origin lies on.
 TEST(Collinearity, RestitutionRefusesPointsBehindTheImages) {
   const NineParameters first = tilted_image();
   NineParameters second = first;

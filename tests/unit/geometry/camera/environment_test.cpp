@@ -1,3 +1,5 @@
+// Refraction and earth curvature: against the formulas of the textbooks for vertical images, against an integral
+// through the standard atmosphere, and against a point on a sphere.
 #include "geometry/camera/environment.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +20,7 @@ Intrinsics pinhole() {
   return camera;
 }
 
-// Outward shift of a pixel at distance r from the centre of a vertical photograph.
+// Outward shift of a pixel at the distance r from the centre of a vertical image.
 double shift(const EnvironmentEffect& effect, double r) {
   const Eigen::Vector2d pixel(0.6 * r, -0.8 * r);
   const Eigen::Vector2d seen = seen_pixel(effect, pinhole(), pixel, Eigen::Vector3d::UnitZ());
@@ -37,7 +39,8 @@ TEST(Environment, VerticalPhotographHasTheCorrectionsOfTheTextbooks) {
 }
 
 TEST(Environment, RefractionIsThatOfTheStandardAtmosphere) {
-  // A bend at the height z turns the tangent at the camera against the chord by the share (z - h) / (H - h) of itself.
+  // Refraction at the height z turns the tangent at the camera, against the chord, by the share (z - h) / (H - h) of
+  // its own angle.
   const auto integrated = [](double camera, double ground) {
     double sum = 0;
     constexpr int kSteps = 10000;
@@ -76,7 +79,7 @@ TEST(Environment, RayToAPointOnTheCurvedEarth) {
 }
 
 TEST(Environment, InverseUndoesTheEffectAtEveryAngle) {
-  for (const double scale : {0., 1., 3.}) {  // of what 9 km do
+  for (const double scale : {0., 1., 3.}) {  // multiples of the effect of 9 km
     const EnvironmentEffect effect{scale * refraction_constant(9000, 0), scale * curvature_constant(9000)};
     for (double angle = 0; angle <= std::numbers::pi; angle += 0.01)
       EXPECT_NEAR(geometric_angle(effect, seen_angle(effect, angle)), angle, 1e-14) << angle;

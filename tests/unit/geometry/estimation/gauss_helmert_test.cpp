@@ -1,3 +1,5 @@
+// The Gauss-Helmert adjustment against independent solutions of the same problems: explicit least squares, total least
+// squares, and the scatter of many trials.
 #include "geometry/estimation/gauss_helmert.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +17,7 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 using Covariances = std::vector<Eigen::Matrix2d>;
 
-// y = slope x + height, both coordinates with errors.
+// y = slope x + height, with errors in both coordinates.
 struct LineBySlope {
   static constexpr int kUnknowns = 2, kEquations = 1, kMeasurements = 2, kConstraints = 0;
   using State = Eigen::Vector2d;
@@ -27,7 +29,7 @@ struct LineBySlope {
   void move(State& s, const Eigen::Vector2d& step) const { s += step; }
 };
 
-// n'p = d with |n| = 1.
+// n'p = d with the constraint |n| = 1.
 struct LineByNormal {
   static constexpr int kUnknowns = 3, kEquations = 1, kMeasurements = 2, kConstraints = 1;
   using State = Eigen::Vector3d;
@@ -69,7 +71,7 @@ SlopedLine sloped_line(std::uint64_t seed, int count = 25) {
   return line;
 }
 
-// The same minimum and covariance without conditions: true abscissae as unknowns, which leaves ordinary least squares.
+// The same problem without conditions: with the true abscissae as further unknowns it is ordinary least squares.
 struct Explicit {
   Eigen::Vector2d state;
   Eigen::Matrix2d covariance;
@@ -168,7 +170,8 @@ TEST(GaussHelmert, CovarianceIsThatOfManyTrials) {
   }
   RecordProperty("normalised", std::to_string(normalised));
   RecordProperty("factor", std::to_string(factor));
-  // Variances of 4000 trials scatter by 2.2 %, the mean of a chi-square of two degrees over two by 1.6 %.
+  // The variances of 4000 trials scatter by 2.2 %, the mean of a chi-square of two degrees of freedom over two by 1.6
+  // %.
   EXPECT_NEAR(scatter(0, 0) / predicted(0, 0), 1, 0.08);
   EXPECT_NEAR(scatter(1, 1) / predicted(1, 1), 1, 0.08);
   EXPECT_NEAR(scatter(0, 1) / predicted(0, 1), 1, 0.10);
@@ -256,7 +259,7 @@ TEST(SimilarityAdjustment, FarFromTheOriginIsTheSame) {
   EXPECT_NEAR(a->similarity.scale, b->similarity.scale, 1e-9);
   const Eigen::Matrix4d of_a = a->covariance.topLeftCorner<4, 4>(), of_b = b->covariance.topLeftCorner<4, 4>();
   EXPECT_LT((of_a - of_b).norm(), 1e-5 * of_a.norm());
-  // The covariance of a transformed point near the set, not of the far origin's, is what can be compared.
+  // The covariance of a transformed point near the set can be compared; that of the distant origin cannot.
   const auto at = [](const AdjustedSimilarity& fit, const Eigen::Vector3d& x) {
     Eigen::Matrix<double, 3, 7> j;
     const Eigen::Matrix3d turn = fit.similarity.scale * fit.similarity.rotation.toRotationMatrix();

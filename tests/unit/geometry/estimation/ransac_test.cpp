@@ -1,3 +1,5 @@
+// The RANSAC engine with an estimator of a linear model: numbers of draws, thresholds and false alarms against closed
+// formulas, and models among outliers.
 #include "geometry/estimation/ransac.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +16,7 @@ TEST(Ransac, DrawsNeeded) {
   EXPECT_EQ(draws_needed(5, 0.5, 0.99), 146);
   EXPECT_EQ(draws_needed(2, 1, 0.99), 1);
   EXPECT_TRUE(std::isinf(draws_needed(2, 0, 0.99)));
-  // Shares whose power is below the smallest number do not divide by zero.
+  // A power of the share below the smallest double must not lead to a division by zero.
   EXPECT_GT(draws_needed(8, 1e-3, 0.99), 1e23);
 }
 
@@ -25,7 +27,7 @@ TEST(Ransac, ThresholdHoldsTheShareOfRightResiduals) {
 
 TEST(Ransac, FalseAlarmsAreThoseOfTheLargestBinomialTerm) {
   const FalseAlarms alarms(100, 3);
-  // C(100, 40) C(40, 3) 97 p^37, by its logarithms.
+  // C(100, 40) C(40, 3) 97 p^37, by logarithms.
   const double expected = std::log10(1.3746234146e28) + std::log10(9880.0) + std::log10(97.0) + 37 * std::log10(0.05);
   EXPECT_NEAR(alarms.log10_nfa(40, 0.05), expected, 1e-6);
   EXPECT_GT(alarms.log10_nfa(40, 0.05), log10_binomial_tail(97, 37, 0.05)) << "many models are tried";
@@ -66,7 +68,7 @@ TEST(Ransac, ThresholdIsChosenAContrario) {
     EXPECT_LT(found->threshold, 5 * noise);
     EXPECT_LT((found->model - scene.truth).norm(), noise);
   }
-  // Noise alone: at most one in a thousand is taken for a model, as 10^log10_nfa says.
+  // From noise alone at most one in a thousand is accepted as a model, as 10^log10_nfa says.
   int accepted = 0;
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     const LinearModelScene<3> wrong(60, 1, 0.01, seed);
@@ -86,7 +88,7 @@ TEST(Ransac, StartsAreBetterThanNothing) {
   EXPECT_GE(found->consensus.score, consensus_of(estimator, scene.truth, 0.03).score);
 }
 
-// Ten observations: 120 samples of three.
+// Ten observations have 120 samples of three.
 TEST(Ransac, FewSamplesAreAllTaken) {
   EXPECT_EQ(number_of_samples(10, 3), 120);
   EXPECT_EQ(number_of_samples(3, 3), 1);

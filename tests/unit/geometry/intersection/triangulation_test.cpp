@@ -1,3 +1,5 @@
+// Intersection of rays: exact rays give the point, the linear solution and the refinement are minima of their costs,
+// and degenerate rays are refused.
 #include "geometry/intersection/triangulation.h"
 
 #include <gmock/gmock.h>
@@ -13,10 +15,10 @@ namespace megablock {
 namespace {
 
 constexpr Intrinsics kCamera = {1200, 960, 640, -0.1, 0.02, 0, 1e-3, -5e-4};
-// Ground coordinates are large: a block of 100 km with millimetres wanted.
+// Ground coordinates are large: millimetres are wanted in a block of 100 km.
 const Eigen::Vector3d kFar(52000, -31000, 200);
 
-// A ring of cameras around `target`, each looking at it.
+// A ring of cameras around `target`, all looking at it.
 std::vector<Pose> ring(const Eigen::Vector3d& target, int count, double radius) {
   std::vector<Pose> poses;
   for (int i = 0; i < count; ++i) {
@@ -111,7 +113,8 @@ TEST(Triangulation, RefusesWhatHasNoIntersection) {
   EXPECT_FALSE(refine_point(poses[0].centre - 5 * (kFar - poses[0].centre), views)) << "start behind a camera";
 }
 
-// In grid coordinates the mean of three equal centres is not always that centre, and the rays seem to meet before it.
+// In grid coordinates the mean of three equal centres is not always that centre, and the rays seem to meet in front of
+// it.
 TEST(Triangulation, RefusesRaysOfOneCentre) {
   std::mt19937_64 random(8);
   std::normal_distribution<double> normal(0, 1);
@@ -119,7 +122,7 @@ TEST(Triangulation, RefusesRaysOfOneCentre) {
     const double x = normal(random), y = normal(random), z = normal(random);
     return Eigen::Vector3d(x, y, z);
   };
-  for (const double rounding : {0.0, std::numeric_limits<double>::epsilon()})  // centres that are computed, too
+  for (const double rounding : {0.0, std::numeric_limits<double>::epsilon()})  // computed centres, too
     for (int trial = 0; trial < 200; ++trial) {
       const Eigen::Vector3d centre = Eigen::Vector3d(652123.4, 6862345.6, 321.7) + vector();
       std::vector<Ray> rays;

@@ -1,3 +1,4 @@
+// The chi-square distribution against tables and against closed forms.
 #include "geometry/numbers/chi_square.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@ TEST(ChiSquare, ProbabilitiesOfTables) {
   EXPECT_DOUBLE_EQ(chi_square_exceeds(0, 5), 1);
 }
 
-// Of an even number of degrees it is a sum of Poisson probabilities.
+// For an even number of degrees of freedom the tail is a sum of Poisson probabilities.
 TEST(ChiSquare, ProbabilitiesOfEvenDegrees) {
   for (const int half : {2, 20, 500}) {
     const double x = 1.05 * half;  // half of the statistic

@@ -1,3 +1,4 @@
+// Roots of polynomials that are multiplied from known factors: several, double, very large, infinite and at zero.
 #include "geometry/numbers/polynomial.h"
 
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// Normal and Student distribution against tables and closed forms.
 #include "geometry/numbers/student.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ TEST(StudentDistribution, QuantilesOfTables) {
   EXPECT_NEAR(student_quantile(0.05, 120), 1.658, 5e-4);
 }
 
-// One and two degrees of freedom have distributions in closed form.
+// The distributions with one and with two degrees of freedom have closed forms.
 TEST(StudentDistribution, ClosedForms) {
   for (const double p : {0.4, 0.1, 1e-3, 1e-6}) {
     EXPECT_NEAR(student_quantile(p, 1) * std::tan(std::numbers::pi * p), 1, 1e-9) << p;

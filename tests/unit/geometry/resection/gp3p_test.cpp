@@ -1,3 +1,5 @@
+// The generalised three-point problem: the true pose of simulated rigs is among the solutions, and every solution meets
+// the points.
 #include "geometry/resection/gp3p.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +43,7 @@ double distance_to_truth(const Case& c, const Solutions<Pose, 8>& poses) {
 
 TEST(Gp3p, FindsTheTruthAmongSolutionsThatMeetTheRays) {
   std::mt19937_64 random(5);
-  for (const double baseline : {0.01, 0.3, 4.0}) {  // a compact head, a vehicle, two places of a vehicle
+  for (const double baseline : {0.01, 0.3, 4.0}) {  // a compact camera head, a vehicle, two positions of a vehicle
     int missed = 0;
     constexpr int kTrials = 1000;
     for (int trial = 0; trial < kTrials; ++trial) {
@@ -85,7 +87,7 @@ TEST(Gp3p, NothingForBadPoints) {
   EXPECT_TRUE(solve_gp3p(bad.origins, bad.directions, bad.points).empty());
 }
 
-// Turned about, a ray may meet its point in another pose, but not in the true one.
+// A ray turned around may meet its point in another pose, but not in the true one.
 TEST(Gp3p, PointsBehindAreNotMet) {
   std::mt19937_64 random(9);
   std::size_t found = 0;
@@ -102,7 +104,7 @@ TEST(Gp3p, PointsBehindAreNotMet) {
   EXPECT_GT(found, 0u);
 }
 
-// The rig slides along them: any distance solves the equations.
+// The rig can slide along parallel rays: every distance solves the equations.
 TEST(Gp3p, RefusesParallelRays) {
   std::mt19937_64 random(8);
   for (int trial = 0; trial < 200; ++trial) {
@@ -115,7 +117,7 @@ TEST(Gp3p, RefusesParallelRays) {
       c.points[k] = c.truth.centre + c.truth.rotation.conjugate() * inside;
     }
     EXPECT_TRUE(solve_gp3p(c.origins, c.directions, c.points).empty()) << trial;
-    // Two of them leave the third to say where.
+    // If only two are parallel, the third determines the position.
     c.directions[2] = (c.directions[2] + Eigen::Vector3d(0.1, -0.2, 0.15)).normalized();
     c.points[2] = c.truth.centre + c.truth.rotation.conjugate() * (c.origins[2] + 7 * c.directions[2]);
     EXPECT_LT(distance_to_truth(c, solve_gp3p(c.origins, c.directions, c.points)), 1e-4) << trial;

@@ -1,3 +1,5 @@
+// The three-point problem: the true pose of simulated cameras is among the solutions, also in special positions, and
+// every solution meets the points.
 #include "geometry/resection/p3p.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +40,7 @@ TEST(P3p, FindsTheTruthAmongConsistentSolutions) {
   EXPECT_LE(missed, kTrials / 200) << "near-degenerate triangles only";
 }
 
-// From the axis of an equilateral triangle two of the conics fall apart by themselves.
+// For a camera on the axis of an equilateral triangle, two of the conics are pairs of lines themselves.
 TEST(P3p, FromTheAxisOfAnEquilateralTriangle) {
   for (const double height : {0.5, 2.0, 30.0, 1000.0}) {
     std::array<Eigen::Vector3d, 3> rays, points;
@@ -67,14 +69,14 @@ TEST(P3p, NothingForBadPoints) {
   EXPECT_TRUE(solve_p3p(rays, bad).empty());
   auto bad_rays = rays;
   bad_rays[1] = bad_rays[0];
-  for (const Pose& pose : solve_p3p(bad_rays, points))  // one behind the other
+  for (const Pose& pose : solve_p3p(bad_rays, points))  // one ray against another
     for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(to_inside(pose, points[k]).normalized().dot(bad_rays[k]), 1 - 1e-9);
   bad_rays = rays;
   bad_rays[1].z() = std::nan("");
   EXPECT_TRUE(solve_p3p(bad_rays, points).empty());
 }
 
-// Turned about, a ray may meet its point in another pose, but not in the true one.
+// A ray turned around may meet its point in another pose, but not in the true one.
 TEST(P3p, PointsBehindAreNotMet) {
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -106,9 +108,9 @@ TEST(P3p, PointsBehindAreNotMet) {
   EXPECT_GT(found_turned, 0);
 }
 
-// Centres on the circular cylinder over the circle through the points: two solutions coincide there. Errors grow as the
-// root of those of the rays, from rounding (1e-16) to 1e-7, and the truth is found all the same; elsewhere in
-// proportion.
+// Centres on the circular cylinder over the circle through the points. Two solutions coincide there, and errors grow as
+// the square root of the errors of the rays, from rounding (1e-16) to 1e-7; the truth is found all the same. Elsewhere
+// errors grow in proportion.
 TEST(P3p, OnTheDangerCylinder) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> uniform(-1, 1);

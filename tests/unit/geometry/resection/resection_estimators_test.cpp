@@ -1,3 +1,5 @@
+// Resection by RANSAC for single cameras and rigs: the true pose among wrong observations, and a minimum after the
+// adjustment.
 #include "geometry/resection/resection_estimators.h"
 
 #include <gtest/gtest.h>
@@ -9,12 +11,13 @@
 namespace megablock {
 namespace {
 
-constexpr double kSightLimit = 4e-3;  // rad, noise 1e-3
+constexpr double kSightLimit = 4e-3;  // radians; the noise is 1e-3
 
 struct SightScene {
   Pose truth;
   std::vector<RaySight> sights;
-  // Cameras half a metre around the rig's origin, points 5 to 30 m away, in front of the first camera or all around.
+  // The cameras are within half a metre of the rig's origin, the points 5 to 30 m away, in front of the first camera or
+  // all around.
   SightScene(int cameras, int count, double wrong, std::uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(-1, 1);
@@ -85,7 +88,7 @@ TEST(ResectionEstimator, BadInput) {
   for (std::size_t i = 0; i < line.size(); ++i) line[i].point = {1.0 * static_cast<double>(i), 2, 3};
   EXPECT_EQ(count(line), 0) << "points on one line";
 
-  // What is not a number, and what lies behind, is no inlier and does no harm.
+  // Observations that are not finite, or behind the camera, are never inliers and do no harm.
   SightScene scene(1, 200, 0, 2);
   for (std::size_t i = 0; i < 40; ++i) {
     scene.sights[5 * i].point.x() = std::numeric_limits<double>::quiet_NaN();

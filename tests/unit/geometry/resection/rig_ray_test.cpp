@@ -1,3 +1,4 @@
+// Residuals of rays against reprojection errors, and their derivatives against differences.
 #include "geometry/resection/rig_ray.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ TEST(RigRay, ResidualIsTheReprojectionErrorInPixels) {
     ASSERT_TRUE(ray);
     const auto residual = ray_residual(*ray, in_rig);
     ASSERT_TRUE(residual);
-    // Axes across the ray may be turned against the image's: lengths agree.
+    // The axes perpendicular to the ray may be rotated relative to the image, so only lengths are compared.
     EXPECT_NEAR(residual->pixels.norm(), shift.norm(), 0.005);
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3d step = 1e-5 * Eigen::Vector3d::Unit(axis);

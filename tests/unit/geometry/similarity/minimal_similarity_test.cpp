@@ -1,3 +1,4 @@
+// Minimal solutions of a similarity, from three points and from mixed control, against the simulated truth.
 #include "geometry/similarity/minimal_similarity.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +36,7 @@ TEST(MinimalSimilarity, IsExactForAnyRotation) {
     const auto found = solve_similarity(from, to);
     ASSERT_TRUE(found);
     EXPECT_LT(largest_difference(*found, truth), 1e-8);
-    // The order of the points does not matter.
+    // The order of the points must not matter.
     const auto turned = solve_similarity({from[1], from[2], from[0]}, {to[1], to[2], to[0]});
     EXPECT_LT(largest_difference(*found, *turned), 1e-8);
   }
@@ -53,7 +54,7 @@ TEST(MinimalSimilarity, NothingForBadPoints) {
   }
 }
 
-// The smallest difference of a solution from the truth; each must meet the control.
+// The smallest difference of a solution from the truth. Every solution must meet the control.
 template <std::size_t Places, typename Heights>
 double nearest_of(const Solutions<Similarity, 2>& found, const Similarity& truth,
                   const std::array<PlaceControl, Places>& places, const Heights& heights) {
@@ -72,7 +73,7 @@ TEST(MinimalControl, TwoPlacesAndThreeHeights) {
     const Similarity truth = random_similarity(random);
     std::array<Eigen::Vector3d, 5> x;
     for (Eigen::Vector3d& point : x) point = 50 * random_direction(random);
-    const bool full = trial % 2;  // the heights of the two places and one more
+    const bool full = trial % 2;  // the heights of the two planimetric points and of one more point
     std::array<PlaceControl, 2> places;
     for (std::size_t i = 0; i < 2; ++i) places[i] = {x[i], truth(x[i]).head<2>()};
     std::array<HeightControl, 3> heights;
@@ -135,7 +136,7 @@ TEST(MinimalControl, NothingForControlThatIsNoNumberOrThereTwice) {
   for (std::size_t i = 0; i < 3; ++i) {
     Places bad = places;
     bad[i].model.z() = nan;
-    EXPECT_EQ(by_heights(bad, heights).empty(), i < 2) << i;  // the third takes no part
+    EXPECT_EQ(by_heights(bad, heights).empty(), i < 2) << i;  // the third does not enter
     EXPECT_TRUE(solve_minimal_control(bad, one).empty()) << i;
     bad = places;
     bad[i].ground.y() = nan;

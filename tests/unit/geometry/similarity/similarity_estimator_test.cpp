@@ -1,3 +1,4 @@
+// Similarities by RANSAC: the truth among many wrong pairs.
 #include "geometry/similarity/similarity_estimator.h"
 
 #include <gtest/gtest.h>
@@ -38,14 +39,14 @@ TEST(SimilarityEstimator, FindsTheTruthAmongWrongPairs) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const SharedPlaces shared(300, 0.6, seed);
     const SimilarityEstimator estimator(shared.pairs);
-    // Thresholds given, and chosen a contrario.
+    // Both with a given threshold and with one chosen a contrario.
     for (const RansacOptions& options : {RansacOptions{.threshold = 5, .seed = seed},
                                          RansacOptions{.max_threshold = 0.1 * estimator.extent(), .seed = seed}}) {
       const auto found = ransac(estimator, options);
       ASSERT_TRUE(found);
       EXPECT_NEAR(found->consensus.count, 120, 30);
       EXPECT_LT(found->threshold, 15);
-      // Sigma 0.05 of all that are right; those within a threshold that is chosen may be fewer.
+      // All right pairs would give a sigma of 0.05; a chosen threshold may admit fewer of them.
       EXPECT_LT(error_at_origin(found->model, shared.truth), options.threshold > 0 ? 0.15 : 0.3);
       EXPECT_NEAR(found->model.scale / shared.truth.scale, 1, 3e-4);
     }

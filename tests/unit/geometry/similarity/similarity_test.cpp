@@ -1,3 +1,5 @@
+// Similarity: least squares against the truth and against neighbouring solutions, robust fits with gross errors, and
+// covariances against the scatter of repeated fits.
 #include "geometry/similarity/similarity.h"
 
 #include <gtest/gtest.h>
@@ -99,7 +101,7 @@ TEST(Similarity, RobustFitIgnoresGrossErrors) {
   expect_same(*found, clouds.truth, 0.01, 0.5);
 }
 
-// Frames of a street: the rotation about it stays open, the places do not.
+// Frames along a street: the rotation about it is undetermined, the positions are not.
 TEST(Similarity, RobustFitOfPlacesOnALineIgnoresGrossErrors) {
   const Similarity truth{1.5, rotation_exp<double>({0.3, -1, 2}), {100, -50, 20}};
   std::vector<Eigen::Vector3d> from, to;
@@ -118,7 +120,7 @@ TEST(Similarity, RobustFitOfPlacesOnALineIgnoresGrossErrors) {
   EXPECT_NEAR(found->scale, truth.scale, 1e-3);
 }
 
-// Sigmas a hundred times too small must not leave three points in the lead.
+// With sigmas that are a hundred times too small, a solution through three points only must not win.
 TEST(Similarity, RobustFitStandsSigmasThatAreTooSmall) {
   Clouds clouds(60, 0.5);
   for (std::size_t i = 0; i < 60; i += 3) clouds.to[i] += Eigen::Vector3d(1e4, 2e3 * static_cast<double>(i % 7), -500);
@@ -127,7 +129,7 @@ TEST(Similarity, RobustFitStandsSigmasThatAreTooSmall) {
   expect_same(*found, clouds.truth, 0.02, 1);
 }
 
-// Errors of many fits in the metric of the covariance: 7 on the average, and chi-square distributed where each is.
+// The squared errors of many fits in the metric of the covariance: 7 on average, and chi-square distributed.
 TEST(Similarity, CovarianceIsThatOfRepeatedFits) {
   const Clouds clouds(15, 0, {100, 60, 5});
   std::mt19937_64 random(12);
@@ -161,7 +163,7 @@ TEST(Similarity, CovarianceIsThatOfRepeatedFits) {
   for (int k = 0; k < 7; ++k) EXPECT_NEAR(scatter(k, k) / predicted(k, k), 1, 0.1) << k;
 }
 
-// The inverse of the normal equations at the origin, made without the centroids.
+// The inverse of the normal equations at the origin, computed without centroids.
 TEST(Similarity, CovarianceIsTheInverseOfTheNormalEquations) {
   const Clouds clouds(6);
   const std::vector<double> weights = {1, 2, 3, 4, 0.5, 0.25};

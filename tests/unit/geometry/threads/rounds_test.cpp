@@ -1,4 +1,5 @@
-// Rounds of parts: all parts once, rounds finished in order, never more than one ahead, errors of the first round.
+// Rounds of parts: every part runs once, rounds finish in order and are never more than one ahead, and errors are those
+// of the first round that fails.
 #include "geometry/threads/rounds.h"
 
 #include <gtest/gtest.h>
@@ -22,11 +23,11 @@ class RoundsOnThreads : public testing::TestWithParam<int> {
 
 TEST_P(RoundsOnThreads, EveryPartOnceAndRoundsFinishedInOrder) {
   constexpr std::int64_t kRounds = 50;
-  const auto parts = [](std::int64_t round) { return round % 7; };  // some have none
+  const auto parts = [](std::int64_t round) { return round % 7; };  // some rounds have no parts
   std::vector<std::vector<std::atomic<int>>> visits;
   for (std::int64_t r = 0; r < kRounds; ++r) visits.emplace_back(static_cast<std::size_t>(parts(r)));
   std::vector<std::int64_t> finished;
-  std::atomic<std::int64_t> done = 0;  // rounds that are finished
+  std::atomic<std::int64_t> done = 0;  // number of finished rounds
   std::atomic<int> wrong = 0;
   const auto ahead = [&](std::int64_t round) { return round % 5 != 0; };
   const auto may_be_open = [&](std::int64_t round) { return round == done || (round == done + 1 && ahead(round)); };

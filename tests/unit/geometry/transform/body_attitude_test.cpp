@@ -1,3 +1,4 @@
+// Yaw, pitch and roll of the aircraft: known attitudes, signs of the angles, and round trips.
 #include "geometry/transform/body_attitude.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +13,7 @@ namespace {
 
 const Eigen::Vector3d kEastward(1, 0, 0), kNorthward(0, 1, 0), kUpward(0, 0, 1);
 
-// World -> camera with these camera axes.
+// World -> camera, from the camera axes in the world.
 Eigen::Quaterniond rotation_of(const Eigen::Vector3d& right, const Eigen::Vector3d& down, const Eigen::Vector3d& view) {
   Eigen::Matrix3d r;
   r << right.transpose(), down.transpose(), view.transpose();
@@ -37,7 +38,7 @@ TEST(BodyAttitude, SignsOfTheAngles) {
   // Flying north: nose up looks ahead, the right wing down looks to the left.
   EXPECT_NEAR(view({0, 0.2, 0}).dot(kNorthward), std::sin(0.2), 1e-15);
   EXPECT_NEAR(view({0, 0, 0.2}).dot(kEastward), -std::sin(0.2), 1e-15);
-  // An oblique photo 30 degrees off nadir to the east, the image's top ahead: pitch 30, yaw 90.
+  // An oblique image 30 degrees off nadir to the east, the image's top ahead: pitch 30, yaw 90.
   const BodyAttitude oblique = body_attitude(
       rotation_of(-kNorthward, -(kEastward * std::cos(std::numbers::pi / 6) + kUpward * std::sin(std::numbers::pi / 6)),
                   kEastward * std::sin(std::numbers::pi / 6) - kUpward * std::cos(std::numbers::pi / 6)));

@@ -1,3 +1,4 @@
+// Rotations between directions: exact, weighted and with outliers.
 #include "geometry/transform/rotation_fit.h"
 
 #include <gtest/gtest.h>

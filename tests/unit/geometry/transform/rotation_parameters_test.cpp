@@ -1,3 +1,4 @@
+// Cayley's and Thompson's parameters and the stereographic base, against their defining formulas.
 #include "geometry/transform/rotation_parameters.h"
 
 #include <gtest/gtest.h>

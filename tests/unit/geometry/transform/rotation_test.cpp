@@ -1,3 +1,5 @@
+// Rotations: exponential and logarithm against Rodrigues' formula, derivatives against differences, and photogrammetric
+// angles against known attitudes.
 #include "geometry/transform/rotation.h"
 
 #include <gtest/gtest.h>
@@ -106,9 +108,9 @@ TEST(Attitude, SignsOfTheAngles) {
   // Pitch up: the viewing direction rises. Roll right wing down: the image's right side points down.
   EXPECT_GT((rotation_from(YawPitchRoll{0.3, 0.2, 0}).conjugate() * Eigen::Vector3d::UnitZ()).z(), 0.1);
   EXPECT_LT((rotation_from(YawPitchRoll{0.3, 0, 0.2}).conjugate() * Eigen::Vector3d::UnitX()).z(), -0.1);
-  // Kappa turns the photo counter-clockwise seen from above: its x axis from east towards north.
+  // Kappa turns the image counter-clockwise as seen from above: its x axis turns from east towards north.
   EXPECT_GT((rotation_from(OmegaPhiKappa{0, 0, 0.2}).conjugate() * Eigen::Vector3d::UnitX()).dot(kNorth), 0.1);
-  // Omega tilts the view towards the north, phi towards the west (looking along the photo's -z).
+  // Omega tilts the view towards the north, phi towards the west (the view is along the photo's -z).
   EXPECT_GT((rotation_from(OmegaPhiKappa{0.2, 0, 0}).conjugate() * Eigen::Vector3d::UnitZ()).dot(kNorth), 0.1);
   EXPECT_LT((rotation_from(OmegaPhiKappa{0, 0.2, 0}).conjugate() * Eigen::Vector3d::UnitZ()).dot(kEast), -0.1);
 }

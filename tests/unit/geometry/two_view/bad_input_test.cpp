@@ -1,5 +1,6 @@
-// What every solver must bear: a number that is none in any place of its input, a correspondence that is there twice,
-// fewer of them than it needs. What only some can meet (lines, planes, no base, points behind) is tested beside each.
+// Bad input that every solver of relative orientation must survive: a value that is not finite, in any place; a
+// correspondence given twice; fewer correspondences than needed. Cases that concern only some solvers (lines, planes,
+// no base, points behind) are tested with those.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -23,20 +24,20 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-// Input as a list: one correspondence after another, each of `width` numbers, and what is not one of them.
+// The input as a list of correspondences with `width` numbers each, followed by numbers that belong to none.
 struct SolverCase {
   const char* name;
   std::size_t correspondences, width;
   Numbers input;
-  std::function<std::size_t(const Numbers&)> solve;  // number of solutions
-  bool any_number = false;                           // takes more correspondences, too
+  std::function<std::size_t(const Numbers&)> solve;  // returns the number of solutions
+  bool any_number = false;                           // the solver also takes more correspondences
 };
 
 template <int N>
 Eigen::Matrix<double, N, 1> part(const Numbers& input, std::size_t at) {
   return Eigen::Map<const Eigen::Matrix<double, N, 1>>(input.data() + at);
 }
-// The vectors that begin at `first` of every correspondence of so many numbers.
+// The vectors that begin at `first` in every correspondence of so many numbers.
 template <int N, std::size_t Count>
 std::array<Eigen::Matrix<double, N, 1>, Count> parts(const Numbers& input, std::size_t width, std::size_t first) {
   std::array<Eigen::Matrix<double, N, 1>, Count> result;

@@ -1,3 +1,4 @@
+// The coplanarity determinant and the intersection of two rays, against their geometric meaning.
 #include "geometry/two_view/coplanarity.h"
 
 #include <gtest/gtest.h>

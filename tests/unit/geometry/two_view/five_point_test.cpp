@@ -1,3 +1,5 @@
+// The five-point solver: the truth is among the solutions, every solution fulfils the equations, and structured scenes
+// and double roots are found as well.
 #include "geometry/two_view/five_point.h"
 
 #include <gtest/gtest.h>
@@ -42,7 +44,8 @@ TEST(FivePoint, StructuredScenesAreNoSpecialCase) {
         options.rotation = rotation_exp<double>({0, 0, half_turn});
         options.base = base;
         options.plane = plane;
-        // A base along the plane's normal is a double root: half of the digits, and a few samples without.
+        // A base along the plane's normal is a double root: half of the digits are lost, and a few samples have no
+        // solution.
         const bool double_root = plane && base.z() > 0;
         int missed = 0;
         for (int trial = 0; trial < 100; ++trial) {
@@ -56,7 +59,7 @@ TEST(FivePoint, StructuredScenesAreNoSpecialCase) {
   }
 }
 
-// Newton steps as long as those for simple roots end at some 1e-5 degrees.
+// With Newton steps of the usual length, the iterations would end at about 1e-5 degrees.
 TEST(FivePoint, DoubleRootsAreReached) {
   std::mt19937_64 random(14);
   PairSceneOptions options;
@@ -91,7 +94,7 @@ TEST(FivePoint, NothingForBadPoints) {
   bad_b = b;
   bad_b[2] = -bad_b[2];
   EXPECT_GT(nearest_error_deg(solve_five_point_in_front(a, bad_b), scene.truth), 1e-3) << "a point behind";
-  // No base: any solution has the equations fulfilled, and nothing more can be said.
+  // Without a base every solution fulfils the equations; nothing more can be tested.
   for (const RelativeOrientation& o : solve_five_point(a, a))
     for (std::size_t i = 0; i < 5; ++i) EXPECT_LT(std::abs(a[i].dot(essential_from(o) * a[i])), 1e-12);
 }

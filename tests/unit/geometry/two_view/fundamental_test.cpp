@@ -1,3 +1,4 @@
+// Fundamental and essential matrices from seven and more points, against the simulated truth.
 #include "geometry/two_view/fundamental.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +16,7 @@ Eigen::Matrix3d scene_camera() {
 
 struct PixelScene {
   std::vector<Eigen::Vector2d> a, b;
-  Eigen::Matrix3d truth;  // of Frobenius norm one
+  Eigen::Matrix3d truth;  // Frobenius norm one
 
   explicit PixelScene(const PairScene& scene) {
     const Eigen::Matrix3d k = scene_camera(), back = k.inverse();

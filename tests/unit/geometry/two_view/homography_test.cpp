@@ -1,3 +1,5 @@
+// Homographies and their orientations: the truth is among them, all explain the points, and rotations and bases along
+// the normal are recognised.
 #include "geometry/two_view/homography.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +13,7 @@
 namespace megablock {
 namespace {
 
-// A plane n.X = 1 seen from both images at random.
+// A plane n.X = 1 that is seen from both images, at random.
 struct PlaneScene {
   std::vector<Eigen::Vector3d> a, b;
   RelativeOrientation truth;
@@ -150,7 +152,7 @@ TEST(RotationPair, TwoRaysGiveTheRotationOfOneCentre) {
     ASSERT_TRUE(found);
     EXPECT_LT(rotation_angle(*found, truth), 1e-10);
   }
-  // A misfit of the angle between the rays is shared.
+  // A misfit of the angle between the rays is shared equally.
   const auto shared =
       solve_rotation_pair({0, 0, 1}, {std::sin(0.3), 0, std::cos(0.3)}, {0, 0, 1}, {std::sin(0.32), 0, std::cos(0.32)});
   ASSERT_TRUE(shared);

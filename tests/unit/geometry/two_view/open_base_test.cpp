@@ -1,3 +1,4 @@
+// Covariance of an undetermined base, against the errors of many simulated pairs.
 #include "geometry/two_view/open_base.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +28,7 @@ struct Adjusted {
   double over() const { return base_error_deg(found, truth) / degrees(precision.base_sigma()); }
 };
 
-// From the truth: which of a plane's orientations is right is not asked here.
+// Starts from the truth, because the choice between the two orientations of a plane is not tested here.
 Adjusted adjusted(const PairSceneOptions& options, std::size_t matches, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const PairScene scene(options, matches, random);
@@ -38,7 +39,7 @@ Adjusted adjusted(const PairSceneOptions& options, std::size_t matches, std::uin
   return pair;
 }
 
-// Errors go by the square root of the noise along the normal, and as least squares say well off it.
+// Along the normal the errors grow as the square root of the noise; far off the normal they are those of least squares.
 TEST(OpenBase, SigmasAreThoseOfErrors) {
   for (const double noise_px : {0.1, 0.5})
     for (const double off_normal_deg : {0.0, 5.0, 10.0, 90.0}) {
@@ -58,7 +59,7 @@ TEST(OpenBase, SigmasAreThoseOfErrors) {
     }
 }
 
-// What least squares say of a pair of general points, well determined.
+// For a well-determined pair of general points the covariance is that of least squares.
 TEST(OpenBase, IsLeastSquaresWhereThoseAreLinear) {
   PairSceneOptions options;
   options.rotation = rotation_exp<double>({0.05, -0.08, 0.3});
@@ -94,7 +95,7 @@ TEST(OpenBase, WithoutABaseItStaysOpen) {
   }
 }
 
-// A plane's other orientation is exactly as good; only what lies between the two belongs to one of them.
+// The other orientation of a plane is exactly as good; its surroundings must not enter the covariance of this one.
 TEST(OpenBase, TwinsBehindABarrierDoNotCount) {
   const Adjusted pair = adjusted(over_a_plane(45, 0.1), 300, 3);
   EXPECT_LT(degrees(pair.precision.base_sigma()), 3);

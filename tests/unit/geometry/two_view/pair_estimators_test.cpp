@@ -1,3 +1,4 @@
+// RANSAC for pairs of images: the truth among half wrong matches, for every estimator.
 #include "geometry/two_view/pair_estimators.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ PairScene half_wrong_scene(const Eigen::Vector3d& base, bool plane, std::uint64_
   return PairScene(options, 500, random);
 }
 
-// The model of half of the matches.
+// The model of the right half of the matches.
 template <typename Estimator>
 RansacResult<typename Estimator::Model> found_half(const Estimator& estimator, const RansacOptions& options) {
   const auto found = ransac(estimator, options);
@@ -36,7 +37,7 @@ RansacResult<typename Estimator::Model> found_half(const Estimator& estimator, c
 
 TEST(PairEstimators, FindTheTruthAmongHalfWrongMatches) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    // Thresholds given, and chosen a contrario.
+    // Both with a given threshold and with one chosen a contrario.
     for (const RansacOptions& options : {RansacOptions{.threshold = kLimit, .seed = seed},
                                          RansacOptions{.max_threshold = 30 * kLimit, .seed = seed}}) {
       const PairScene scene = half_wrong_scene({0.3, 0, 0.05}, false, seed);
@@ -133,7 +134,7 @@ TEST(PairEstimators, PointsBehindAreNoInliers) {
   EXPECT_EQ(consensus_of(HomographyEstimator(points), -Eigen::Matrix3d::Identity(), 1e3).count, 0);
 }
 
-// How close to one another, in the image a, points of the samples that are drawn lie at least.
+// The smallest distance, in the image a, between points of the drawn samples.
 double closest_of_samples(const PointPairs& points, double spacing) {
   struct Watched : FivePointEstimator {
     Watched(const PointPairs& p, double s) : FivePointEstimator(p, kLimit, s), points(p) {}
@@ -158,7 +159,7 @@ TEST(PairEstimators, PointsOfSamplesAreSpreadOut) {
   EXPECT_LT(closest_of_samples(points, 1e3), 1e3) << "no points are so far apart: any sample must do";
 }
 
-// Nothing is found, or what is called an inlier is one.
+// Either nothing is found, or the inliers are inliers.
 template <typename Estimator>
 void expect_harmless(const Estimator& estimator, bool may_find) {
   for (const RansacOptions& options :
@@ -202,7 +203,7 @@ TEST(PairEstimators, BadInput) {
     line.b.emplace_back(0.01 * i + 0.1, 0.02 * i);
   }
   expect_all_harmless(line);
-  // Some that are not numbers do no harm to the others, and are no inliers.
+  // Points that are not finite do no harm to the others and are never inliers.
   const PairScene scene = half_wrong_scene({0.3, 0, 0.05}, false, 9);
   PointPairs points = normalised_points(scene);
   for (std::size_t i = 0; i < 100; ++i) points.b[5 * i].x() = kNan;

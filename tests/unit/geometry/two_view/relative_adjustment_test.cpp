@@ -1,3 +1,5 @@
+// The adjustment of a relative orientation: derivatives against differences, minima of the cost, and covariances
+// against the errors of many simulated pairs.
 #include "geometry/two_view/relative_adjustment.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +20,7 @@ PairSceneOptions turned_scene(double noise_px, double outliers = 0) {
   return options;
 }
 
-// Each of them by differences, off the truth, so that the part that vanishes with the residual counts.
+// Each derivative by differences, away from the truth, so that the part that vanishes with the residual is tested too.
 TEST(RelativeAdjustment, DerivativesAreThoseOfTheResidual) {
   std::mt19937_64 random(4);
   const PairScene scene(turned_scene(2), 50, random);
@@ -101,7 +103,7 @@ TEST(RelativeAdjustment, CovarianceIsThatOfTheErrors) {
       const auto e = error_of(found, scene.truth);
       sum += e.dot(precision.covariance.inverse() * e);
     }
-    // A sum of chi-square variables with five degrees of freedom, within 99.9 %.
+    // A sum of chi-square variables with five degrees of freedom each, within 99.9 %.
     EXPECT_GT(chi_square_exceeds(sum, 5 * kTrials), 5e-4) << sum / (5 * kTrials);
     EXPECT_LT(chi_square_exceeds(sum, 5 * kTrials), 1 - 5e-4) << sum / (5 * kTrials);
   }

@@ -1,3 +1,4 @@
+// The three-point solver with known verticals: the truth of simulated pairs, tilted images, and degenerate cases.
 #include "geometry/two_view/vertical_pair.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@ TEST(VerticalPair, FindsAnyOrientationOfTiltedImages) {
     options.rotation = rotation_exp<double>(3.1 * uniform(random) * random_direction(random));
     options.base = 0.3 * random_direction(random);
     const PairScene scene(options, 3, random);
-    const Eigen::Vector3d vertical = random_direction(random);  // as good as any
+    const Eigen::Vector3d vertical = random_direction(random);  // any direction will do
     const auto found =
         solve_vertical_pair(scene.first<3>(scene.a), scene.first<3>(scene.b), vertical, options.rotation * vertical);
     EXPECT_LT(nearest_error_deg(found, scene.truth), 1e-5);
@@ -55,8 +56,8 @@ TEST(VerticalPair, PlaneSeenAlongItsNormalIsADoubleRoot) {
   }
 }
 
-// Any base in the plane fits there: nothing can be said but that what is found is an orientation that fulfils the
-// equations. A hundredth off the plane the truth is found.
+// Any base in the plane fits, so only this can be tested: every result is an orientation that fulfils the equations.
+// With points off the plane by a hundredth, the truth is found.
 TEST(VerticalPair, PointsAndBaseInOnePlane) {
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -105,7 +106,7 @@ TEST(VerticalPair, NothingForBadPoints) {
   EXPECT_TRUE(solve_vertical_pair(a, a, kDown, kDown).empty()) << "no base";
 }
 
-// A ray turned about keeps all equations; what is left are orientations that do see its point on it.
+// A ray turned around fulfils all equations, too. Only orientations that see its point in front remain.
 TEST(VerticalPair, PointsBehindAreNotMet) {
   std::mt19937_64 random(5);
   std::size_t found = 0;

@@ -1,3 +1,4 @@
+// Lines, their feet and interpretation planes: exact cases, and covariances against differences.
 #include "geometry/vanishing/interpretation_plane.h"
 
 #include <gtest/gtest.h>
@@ -25,8 +26,8 @@ TEST(ImageLine, IsExactOnExactPoints) {
     ASSERT_TRUE(line);
     EXPECT_NEAR(std::abs(line->along().dot(along)), 1, 1e-12);
     EXPECT_LT((line->rho * line->across() - 123.4 * across).norm(), 1e-9);
-    // A segment of length L with ends good to s: sigma of the direction s sqrt(2) / L, of the place in the middle s /
-    // sqrt(2).
+    // For a segment of length L with end points of accuracy s, the direction has the sigma s sqrt(2) / L, and the
+    // position in the middle the sigma s / sqrt(2).
     EXPECT_NEAR(std::sqrt(line->covariance(0, 0)), 0.3 * std::sqrt(2.0) / 200, 1e-9);
     const ImageLine middle = line_about(*line, 123.4 * across + 110 * along);
     EXPECT_NEAR(middle.rho, 0, 1e-9);

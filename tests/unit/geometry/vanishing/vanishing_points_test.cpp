@@ -1,3 +1,5 @@
+// Vanishing points of simulated images: families of lines and their members, bad input, and the binomial tail they are
+// tested with.
 #include "geometry/vanishing/vanishing_points.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +60,7 @@ TEST(VanishingPoints, FindsFamiliesAndTheirLines) {
   }
 }
 
-// Unknown cameras and pictures with lines of which half are too short.
+// Unknown cameras, and images in which half of the lines are too short.
 TEST(VanishingPoints, WithoutCalibrationAndWithShortLines) {
   SegmentScene scene = urban_scene(4, Held{-0.03, 0.1}, 2);
   scene.add_clutter(400, 5, 30);
@@ -90,7 +92,7 @@ TEST(VanishingPoints, AllSegmentsOnOneLine) {
   EXPECT_TRUE(find_vanishing_points(scene.planes()).points.empty());
   scene.add_clutter(100);
   EXPECT_TRUE(find_vanishing_points(scene.planes()).points.empty()) << "any axis in its plane would hold them";
-  // And it hides no true ones.
+  // It must not hide true vanishing points either.
   scene.add_family(Held{0.1, 0.2}.vertical(), 40);
   const VanishingPoints found = find_vanishing_points(scene.planes());
   ASSERT_EQ(found.points.size(), 1u);
@@ -130,7 +132,7 @@ TEST(VanishingPoints, LinesThatAreNoNumbers) {
   EXPECT_TRUE(find_vanishing_points(planes).points.empty());
 }
 
-// What it takes for one narrow bundle to be told from a family.
+// A narrow bundle of lines must be told from a family.
 TEST(VanishingPoints, ANarrowBundleHasNone) {
   SegmentScene scene;
   for (int i = 0; i < 12; ++i) scene.add({1500.0 + 6 * i, 1000}, {0, 1}, 200, -1);

@@ -1,3 +1,4 @@
+// The vanishing point by votes.
 #include "geometry/vanishing/vanishing_votes.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,5 @@
+// The vertical among vanishing points, levelling, roll and pitch, and the attitude from axes, with covariances against
+// many trials.
 #include "geometry/vanishing/vertical.h"
 
 #include <gtest/gtest.h>
@@ -37,7 +39,7 @@ TEST(Vertical, IsSignedDownAndTheOneThatAllAreOrthogonalTo) {
 }
 
 TEST(Vertical, AStreetStraightAheadIsNone) {
-  // Three axes at right angles: only how the camera was held tells them apart.
+  // Of three perpendicular axes, only the way the camera was held tells which is vertical.
   for (const double pitch : {-0.5, 0.0, 0.6})
     for (const double roll : {-0.2, 0.05}) {
       const Held held{roll, pitch};
@@ -67,14 +69,14 @@ TEST(Vertical, NoneWithoutCandidates) {
   EXPECT_TRUE(find_vertical(std::vector{point_at(held.vertical())}));
   EXPECT_FALSE(
       find_vertical(std::vector{point_at(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()))}));
-  // Stairs: near enough to upright, but across most of the others.
+  // Stairs: near enough to the expected vertical, but oblique to most of the others.
   const Eigen::Vector3d oblique = Held{0.5, 0}.vertical();
   EXPECT_FALSE(find_vertical(
       std::vector{point_at(oblique), point_at(held.horizontal(0.5 * EIGEN_PI)), point_at(held.horizontal(0.7))}));
 }
 
 TEST(Vertical, PriorOfASensor) {
-  // Straight down, where no picture is upright.
+  // A camera that looks straight down has no upright image.
   VerticalPrior prior;
   prior.down = Eigen::Vector3d(0.02, -0.03, 1).normalized();
   prior.roll_sigma = prior.pitch_sigma = 2 * kDegree;
@@ -88,7 +90,8 @@ TEST(Vertical, PriorOfASensor) {
 }
 
 TEST(Vertical, ExifCodes) {
-  // Row 0 of the stored pixels is shown at: 1 top, 3 bottom, 6 right, 8 left; 2, 4, 5, 7 are their mirror images.
+  // Row 0 of the stored pixels is displayed: 1 at the top, 3 at the bottom, 6 on the right, 8 on the left; 2, 4, 5, 7
+  // are mirror images.
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY();
   const Eigen::Vector3d down[9] = {y, y, y, -y, -y, x, x, -x, -x};
   for (int code = 0; code < 9; ++code) EXPECT_EQ(down_of_exif_orientation(code), down[code]) << code;
@@ -101,7 +104,7 @@ TEST(Vertical, RollAndPitch) {
       const auto down = [](double r, double p) {
         return Eigen::Vector3d(std::sin(r) * std::cos(p), std::cos(r) * std::cos(p), -std::sin(p));
       };
-      Eigen::Matrix<double, 3, 2> root;  // of the covariance that roll and pitch with these sigmas give
+      Eigen::Matrix<double, 3, 2> root;  // square root of the covariance that roll and pitch with these sigmas give
       const double h = 1e-6, sigma_roll = 0.01, sigma_pitch = 0.02;
       root.col(0) = (down(roll + h, pitch) - down(roll - h, pitch)) / (2 * h) * sigma_roll;
       root.col(1) = (down(roll, pitch + h) - down(roll, pitch - h)) / (2 * h) * sigma_pitch;
@@ -128,7 +131,7 @@ TEST(Vertical, LevelledImageHasUprightVerticals) {
 
 struct Town {
   Eigen::Quaterniond truth = Eigen::Quaterniond(0.6, 0.5, -0.4, 0.3).normalized();
-  // Two axes, or three, seen with different errors.
+  // Two or three axes, seen with different errors.
   std::vector<SeenAxis> seen(int count, std::mt19937_64& random) const {
     std::normal_distribution<double> normal(0, 1);
     const Eigen::Vector3d ground[3] = {-Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()};

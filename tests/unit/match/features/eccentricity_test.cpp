@@ -1,3 +1,5 @@
+// The eccentricity of keypoints, against a closed form and against the extremum of the detector's response to a
+// rendered patch.
 #include "match/features/eccentricity.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +13,7 @@
 namespace megablock {
 namespace {
 
-// Wide-angle cameras of 600 x 400 px.
+// Wide-angle cameras with 600 x 400 pixels.
 const Intrinsics kPerspective{250, 300, 200, 0, 0, 0, 0, 0};
 const Intrinsics kDistorted{250, 310, 190, -0.1, 0.02, 0, 1e-3, -2e-3};
 const Intrinsics kPanorama(CameraModel{CameraModelKind::kEquirectangular, 0}, {600 / (2 * std::numbers::pi), 300, 200});
@@ -45,8 +47,8 @@ double laplacian(const Eigen::Vector2d& y, double t) {
   return -t * (2 - s) * std::exp(-s / 2);
 }
 
-// Where the response to a patch that would look like the Laplacian itself, if the camera mapped directions linearly,
-// has its extremum: gradient and second derivatives of the response, summed over the pixels of the warped patch.
+// The extremum of the response to a patch that would look like the Laplacian itself if the camera mapped directions
+// linearly. Gradient and second derivatives of the response are summed over the pixels of the distorted patch.
 Eigen::Vector2d extremum(const Intrinsics& camera, const Eigen::Vector2d& pixel, double t) {
   const Eigen::Vector3d ray = *viewing_ray(camera, pixel);
   const Eigen::Matrix<double, 3, 2> tangent = tangent_plane(ray);

@@ -1,3 +1,4 @@
+// Feature detection on rendered blobs and textures: positions, selection, masks, order, and bad files.
 #include "match/features/features.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Blob {
-  double x, y, sigma, height;  // px, pixel centres at +0.5
+  double x, y, sigma, height;  // pixels, pixel centres at +0.5
 };
 
 // Bright and dark Gaussian blobs, sampled at the pixel centres.
@@ -75,7 +76,7 @@ class Features : public testing::Test {
     write_picture(path(name), pixels);
     return path(name);
   }
-  // Copies the first bytes of a file.
+  // Copies the first part of a file.
   std::string truncate(const std::string& from, const std::string& name, double share) const {
     std::ifstream in(from, std::ios::binary);
     std::vector<char> bytes(std::istreambuf_iterator<char>(in), {});
@@ -92,7 +93,7 @@ class Features : public testing::Test {
   ScratchDirectory scratch_;
 };
 
-// Mean and number of differences found - true over blobs that have a feature within reach.
+// Mean and number of the differences found - true, over the blobs that have a feature within reach.
 std::tuple<double, double, int> mean_offset(const ImageFeatures& features, const std::vector<Blob>& blobs,
                                             double reach) {
   double dx = 0, dy = 0;
@@ -128,7 +129,7 @@ TEST_F(Features, PositionsHavePixelCentresAtOneHalf) {
 
 TEST_F(Features, PositionsInReducedImagesReferToTheFullImage) {
   FeatureOptions options;
-  for (const double megapixels : {0.75, 1.3}) {  // factor 2 exactly, and an odd one
+  for (const double megapixels : {0.75, 1.3}) {  // a factor of exactly 2, and an odd one
     options.max_megapixels = megapixels;
     const auto blobs = blob_grid(2000, 1500, 90, 8, 2);
     const ImageFeatures features = detect(write("large.png", render(2000, 1500, blobs)), options);
@@ -164,7 +165,7 @@ TEST_F(Features, RootSiftHasTheNormOfItsScale) {
   for (const SiftDescriptor& d : features.descriptors) {
     double square = 0;
     for (const double v : d) square += v * v;
-    EXPECT_NEAR(std::sqrt(square), 176, 5);  // at most 181: matching depends on it for speed
+    EXPECT_NEAR(std::sqrt(square), 176, 5);  // at most 181, which fast matching needs
   }
 }
 

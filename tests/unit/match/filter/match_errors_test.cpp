@@ -1,3 +1,4 @@
+// Errors of matches and trusted relative orientations, against independent formulas and known trajectories.
 #include "match/filter/match_errors.h"
 
 #include <gtest/gtest.h>
@@ -11,14 +12,14 @@ namespace {
 
 const Intrinsics kCamera = {1000, 960, 540, 0, 0, 0, 0, 0};
 
-// Two cameras in different attitudes, b ahead and to the right of a.
+// Two cameras with different attitudes; b is ahead and to the right of a.
 struct TwoCameras {
   Pose a{rotation_exp<double>(Eigen::Vector3d(0.1, -0.2, 0.05)), {10, -4, 2}};
   Pose b{rotation_exp<double>(Eigen::Vector3d(0.05, 0.1, -0.1)), {11.5, -4.2, 2.8}};
   MatchErrors of(const Eigen::Vector2d& in_a, const Eigen::Vector2d& in_b) const {
     return match_errors(*ground_ray(a, kCamera, in_a), *ground_ray(b, kCamera, in_b), 1000, 1000);
   }
-  // Seen from a, straight on and d away.
+  // A point at the distance d, nearly straight ahead of a.
   Eigen::Vector3d ahead(double d) const { return a.centre + a.rotation.conjugate() * Eigen::Vector3d(0.1 * d, 0, d); }
   Eigen::Vector2d in_a(const Eigen::Vector3d& p) const { return project(kCamera, to_inside(a, p)); }
   Eigen::Vector2d in_b(const Eigen::Vector3d& p) const { return project(kCamera, to_inside(b, p)); }
@@ -36,7 +37,7 @@ TEST(MatchErrors, OfARightMatchTellWhereThePointIs) {
   EXPECT_NEAR(e.angle_rad, std::acos(to_a.dot(to_b)), 1e-9);
 }
 
-// The residual of an independent formula, for pinhole cameras; to first order, so for a small error.
+// The residual by an independent formula for pinhole cameras. It is exact to first order, so the error is small.
 TEST(MatchErrors, ReprojectionIsSampsonsResidual) {
   const TwoCameras two;
   const Eigen::Vector3d point = two.ahead(9);
@@ -48,14 +49,14 @@ TEST(MatchErrors, ReprojectionIsSampsonsResidual) {
       1000 * std::abs(sampson_residual(essential_from(pose), *unproject(kCamera, a), *unproject(kCamera, b)));
   const MatchErrors e = two.of(a, b);
   EXPECT_GT(sampson, 0.5);
-  // Pixels grow towards the border of a plane image, which angles do not: within a few per cent here.
+  // Pixels of a plane image grow towards the border, angles do not; the difference is a few per cent here.
   EXPECT_NEAR(e.reprojection_px, sampson, 0.1 * sampson);
   EXPECT_GT(e.ray_distance_m, 1e-3);
 }
 
 TEST(MatchErrors, BehindTheCamerasIsNegative) {
   const TwoCameras two;
-  // Rays that meet behind: the point seen by turning both directions round.
+  // Rays that meet behind the cameras: both directions are turned around.
   const Eigen::Vector3d point = two.ahead(8);
   const Ray a{two.a.centre, (two.a.centre - point).normalized()}, b{two.b.centre, (two.b.centre - point).normalized()};
   const MatchErrors e = match_errors(a, b, 1000, 1000);
@@ -68,7 +69,7 @@ TEST(MatchErrors, BehindTheCamerasIsNegative) {
   EXPECT_TRUE(std::isfinite(parallel.reprojection_px));
 }
 
-// Frames 4 m apart, half a second each, with two cameras; the trajectory is off by metres as a whole.
+// Frames with two cameras, 4 m and half a second apart. The trajectory as a whole is off by metres.
 Block drive(std::int64_t frames) {
   Block block;
   Camera camera;
@@ -101,7 +102,7 @@ TEST(TrustedPairs, RelatesImagesOfOneDrive) {
   ASSERT_TRUE(pair);
   EXPECT_GT(pair->rotation_sigma_rad, 0.01);
   EXPECT_GT(pair->position_sigma_m, 0.05);
-  // A ground point has the same coordinates in the second camera whichever way it is taken there.
+  // A ground point has the same coordinates in the second camera, whichever chain of poses leads there.
   const Eigen::Vector3d point(14, 5, 20);
   const Pose a = camera_pose(*block.frames[FrameIndex(1)].given_pose, block.rigs.front().mounts[0].pose);
   const Pose b = camera_pose(*block.frames[FrameIndex(3)].given_pose, block.rigs.front().mounts[1].pose);
@@ -110,7 +111,7 @@ TEST(TrustedPairs, RelatesImagesOfOneDrive) {
   const auto turned = trajectory.relate(ImageIndex(7), ImageIndex(2));
   ASSERT_TRUE(turned);
   EXPECT_EQ(turned->a.centre, pair->b.centre);
-  // One mount: its sigma is no part of the pair's.
+  // Within one mount, its sigma does not enter that of the pair.
   EXPECT_NEAR(trajectory.relate(ImageIndex(3), ImageIndex(7))->position_sigma_m, 0.05, 1e-12);
   EXPECT_TRUE(trajectory.relate(ImageIndex(4), ImageIndex(5)));  // of one frame
 }

@@ -1,3 +1,4 @@
+// The match filter: its share of correct answers on simulated streets, against that published by Cannelle (2013).
 #include "match/filter/match_filter.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +12,7 @@
 namespace megablock {
 namespace {
 
-// `calibrated`: cameras and mounts are known, as where the published figures come from; else they are nominal.
+// `calibrated`: cameras and mounts are known, as for the published figures; otherwise they are nominal.
 std::vector<LabelledMatch> street(std::uint64_t seed, bool calibrated) {
   SimulationOptions options = SimulationOptions::of(SimulationOptions::Scene::kStereopolis);
   options.frames = 120;
@@ -30,7 +31,8 @@ TrainedFilter train(const std::vector<LabelledMatch>& matches, const std::vector
   return train_filter(matches, options);
 }
 
-// CN-15: the residual alone leaves what slides along the epipolar line; the distance finds a part of it.
+// The residual alone accepts wrong matches along the epipolar line. The distance rejects a part of them, the angle more
+// (Cannelle 2013).
 TEST(MatchFilter, DistanceAndAngleTellWhatTheResidualDoesNot) {
   using enum MatchFeature;
   const std::vector<LabelledMatch> matches = street(3, true);

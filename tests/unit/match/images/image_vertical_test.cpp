@@ -1,3 +1,4 @@
+// The vertical of rendered images of a street corner, against the attitude they were rendered with.
 #include "match/images/image_vertical.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Windows on the two walls of a corner, seen by a camera that is held askew.
+// Windows on the two walls of a corner, seen by a tilted camera.
 class ImageVerticalTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -28,7 +29,7 @@ class ImageVerticalTest : public ::testing::Test {
     camera_.intrinsics = Intrinsics{800, 450, 300};
   }
 
-  // Camera axes of a ground with y down, z ahead.
+  // Camera axes in a ground frame with y down and z ahead.
   Eigen::Matrix3d attitude() const {
     return (Eigen::AngleAxisd(0.06, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-0.15, Eigen::Vector3d::UnitX()) *
             Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()))
@@ -39,7 +40,7 @@ class ImageVerticalTest : public ::testing::Test {
     std::mt19937_64 random(4);
     const auto pixel = [&](const Eigen::Vector3d& ground) {
       const Eigen::Vector3d p = attitude() * ground;
-      // Drawn with 4 fractional bits; OpenCV's (0, 0) is the middle of the first pixel.
+      // Drawn with 4 fractional bits; OpenCV's (0, 0) is the centre of the first pixel.
       return cv::Point(static_cast<int>(std::lround(16 * (800 * p.x() / p.z() + 449.5))),
                        static_cast<int>(std::lround(16 * (800 * p.y() / p.z() + 299.5))));
     };
@@ -47,7 +48,7 @@ class ImageVerticalTest : public ::testing::Test {
       for (int wall = 0; wall < 2; ++wall)
         for (int column = 0; column < 7; ++column)
           for (int row = -4; row < 4; ++row) {
-            // Walls run off to either side of a corner 12 m ahead.
+            // The walls recede to both sides of a corner 12 m ahead.
             const double jitter = 0.3 * std::uniform_real_distribution<double>(0, 1)(random);
             const auto at = [&](double along, double height) {
               const Eigen::Vector3d way = wall == 0 ? Eigen::Vector3d(-0.8, 0, -0.2) : Eigen::Vector3d(0.9, 0, 0.6);
@@ -81,7 +82,7 @@ TEST_F(ImageVerticalTest, IsFoundInAPicture) {
   EXPECT_LT(sigma, 0.2);
   EXPECT_GT(v.lines, 20);
 
-  // The same again, and what the camera's errors do to it.
+  // The result is repeatable, and the derivatives show the effect of the camera's errors.
   EXPECT_EQ(find_image_vertical(draw(true), camera_, {}, 1).down.direction, v.down.direction);
   for (const IntrinsicParameter p : {kFocal, kPrincipalX, kPrincipalY, kRadial1}) {
     Camera changed = camera_;
@@ -93,8 +94,8 @@ TEST_F(ImageVerticalTest, IsFoundInAPicture) {
   }
 }
 
-// Two and a half times as large: looked at reduced, where windows are too small for most edges, and then as a whole,
-// for what is found.
+// Two and a half times as large: the image is searched in reduced form, in which most windows are too small, and then
+// in full for what is found.
 TEST_F(ImageVerticalTest, IsFoundInALargePictureByAllItsEdges) {
   const std::string file = scratch_.path("large.png");
   cv::Mat picture = read_picture(draw(true), cv::IMREAD_GRAYSCALE);
@@ -110,7 +111,7 @@ TEST_F(ImageVerticalTest, IsFoundInALargePictureByAllItsEdges) {
   EXPECT_LT(std::acos(v.down.direction.dot(truth)) * kDegreesPerRadian, 0.1);
 }
 
-// Edges that are too short for the reduced picture are edges all the same.
+// Edges too short for the reduced image still count.
 TEST_F(ImageVerticalTest, ALargePictureOfShortEdgesHasEdges) {
   camera_.width = 2250;
   camera_.height = 1500;
@@ -128,7 +129,7 @@ TEST_F(ImageVerticalTest, ALargePictureOfShortEdgesHasEdges) {
   EXPECT_EQ(find_image_vertical(file, camera_, {}, 1).segments, std::ssize(find_line_segments(picture, {})));
 }
 
-// Of a large picture whose edges lie anywhere no more than the reduced one is looked at.
+// If the edges of a large image have random directions, only the reduced image is searched.
 TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
   camera_.width = 2250;
   camera_.height = 1500;
@@ -139,7 +140,7 @@ TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
     std::uniform_real_distribution<double> uniform(0, 1);
     for (int bar = 0; bar < 200; ++bar) {
       const double x = 2250 * uniform(random), y = 1500 * uniform(random), angle = EIGEN_PI * uniform(random);
-      const double length = bar % 4 == 0 ? 120 : 40;  // most too short for the reduced picture
+      const double length = bar % 4 == 0 ? 120 : 40;  // most are too short for the reduced image
       const cv::Point2d along(length * std::cos(angle), length * std::sin(angle));
       cv::line(picture, cv::Point2d(x, y), cv::Point2d(x, y) + along, cv::Scalar(60), 7, cv::LINE_AA);
     }

@@ -1,3 +1,4 @@
+// Line segments of rendered edges: positions and covariances against the truth, for many noise levels.
 #include "match/images/line_segments.h"
 
 #include <gtest/gtest.h>
@@ -10,8 +11,8 @@
 namespace megablock {
 namespace {
 
-// Bright bars on dark ground, their edges through known points: grey values are the share of the pixel that is covered,
-// by 8 x 8 samples.
+// Bright bars on dark ground, with edges through known points. The grey value of a pixel is its covered share, from 8 x
+// 8 samples.
 struct Bars {
   cv::Mat picture;
   struct Edge {
@@ -31,7 +32,7 @@ struct Bars {
     };
     std::vector<Bar> bars;
     for (int k = 0; k < kCells * kCells; ++k) {
-      // A third of them nearly along the rows or columns of pixels, as edges of buildings are.
+      // A third of the edges runs nearly along rows or columns of pixels, as edges of buildings do.
       const double angle =
           k % 3 == 0 ? (k % 2) * 0.5 * EIGEN_PI + 0.03 * (uniform(random) - 0.5) : uniform(random) * EIGEN_PI;
       const double x = kCell * (k % kCells + 0.5) + uniform(random), y = kCell * (k / kCells + 0.5) + uniform(random);
@@ -75,7 +76,7 @@ EdgeErrors errors_of(double noise, double straightness) {
         if ((middle - edge.point).norm() > 40 || std::abs((middle - edge.point).dot(across)) > 2 ||
             std::abs(segment.line.along().dot(across)) > 0.1)
           continue;
-        // The line about the edge's own point: its distance and direction should be zero.
+        // The line about the edge's own point should have the distance and the direction zero.
         const ImageLine about = line_about(segment.line, edge.point);
         const double sign = about.along().dot(edge.along) < 0 ? -1 : 1;
         const Eigen::Vector2d error(
@@ -103,7 +104,7 @@ TEST(LineSegments, AreWhereTheEdgesAre) {
 
 TEST(LineSegments, HaveTheErrorsOfTheirCovariance) {
   for (const double noise : {3.0, 6.0}) {
-    const EdgeErrors e = errors_of(noise, 0.015);  // what sampling by pixels moves edges by, whatever the noise
+    const EdgeErrors e = errors_of(noise, 0.015);  // displacement of edges by the sampling into pixels, without noise
     EXPECT_GT(e.normalised, 0.7) << noise;
     EXPECT_LT(e.normalised, 1.5) << noise;
     RecordProperty("normalised" + std::to_string(static_cast<int>(noise)), std::to_string(e.normalised));
@@ -114,7 +115,7 @@ TEST(LineSegments, OfReducedPicturesReferToTheFullOne) {
   const Bars bars(7, 1);
   SegmentOptions options;
   const auto full = find_line_segments(bars.picture, {}, options);
-  options.max_megapixels = 0.25;  // 600 x 600 to 500 x 500
+  options.max_megapixels = 0.25;  // from 600 x 600 to 500 x 500
   const auto reduced = find_line_segments(bars.picture, {}, options);
   EXPECT_GT(reduced.size(), 30u);
   int near = 0;

@@ -1,3 +1,4 @@
+// The mask of the vehicle, found in simulated images of a drive and compared with the truth.
 #include "match/images/static_regions.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +11,7 @@
 namespace megablock {
 namespace {
 
-// Pictures of one camera of the Stereopolis vehicle along its drive, and where the vehicle is in them.
+// Images of one camera of the Stereopolis vehicle along a drive, and the region that shows the vehicle.
 struct Pictures {
   std::vector<cv::Mat> grey;
   cv::Mat truth;  // 0: the vehicle
@@ -56,7 +57,7 @@ double share(const cv::Mat& a, const cv::Mat& of) {
 
 class VehicleMask : public testing::TestWithParam<const char*> {};
 
-// Here a reduced pixel is one of the picture, so that a margin would be half of the mast's width.
+// Here a reduced pixel is a pixel of the image, so the margin would be half of the mast's width.
 TEST_P(VehicleMask, IsFoundAndLittleElse) {
   const Pictures pictures = drive(GetParam(), true);
   ASSERT_GT(cv::countNonZero(pictures.truth == 0), 600);
@@ -71,7 +72,7 @@ TEST_P(VehicleMask, IsFoundAndLittleElse) {
 INSTANTIATE_TEST_SUITE_P(Cameras, VehicleMask, testing::Values("c22", "c31", "c41"),
                          [](const auto& camera) { return std::string(camera.param); });
 
-// Neither the sky, which the upward camera sees in every picture, nor the road is taken for the vehicle.
+// Neither the sky, which the upward camera sees in every image, nor the road is taken for the vehicle.
 TEST(StaticRegions, WithoutAVehicleNothingIsMasked) {
   for (const char* camera : {"c34", "c22"})
     EXPECT_EQ(cv::countNonZero(mask_of(drive(camera, false)) == 0), 0) << camera;

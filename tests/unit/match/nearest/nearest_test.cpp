@@ -1,3 +1,4 @@
+// Nearest neighbours: every kernel against a brute-force search, up to the limits of their integers.
 #include "match/nearest/nearest.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +13,7 @@
 namespace megablock {
 namespace {
 
-// Those that this processor does not run give way to the fastest that it does.
+// Kernels that this processor cannot run are replaced by the fastest that it can.
 constexpr NearestKernel kAvx2 = NearestKernel::kAvx2;
 constexpr NearestKernel kKernels[] = {NearestKernel::kPortable, kAvx2, NearestKernel::kAvx512};
 
@@ -31,7 +32,7 @@ std::int32_t squared_distance(const SiftDescriptor& a, const SiftDescriptor& b) 
   return sum;
 }
 
-// All comparisons, full sort.
+// All distances, sorted.
 Neighbours brute_force(const std::vector<SiftDescriptor>& a, const std::vector<SiftDescriptor>& b, std::size_t k) {
   Neighbours result;
   result.k = k;
@@ -93,7 +94,7 @@ TEST(NearestExtremes, FullBytesAreExact) {
 }
 
 TEST(NearestExtremes, SumsAtTheLimitOfSixteenBits) {
-  // One pair of components carries nearly the whole norm: 127^2 + 127^2 = 32258 < 2^15, and the rest fills up.
+  // One pair of elements carries nearly the whole norm: 127^2 + 127^2 = 32258 < 2^15; the others fill up the rest.
   SiftDescriptor peak{};
   peak[6] = peak[7] = 127;
   for (std::size_t i = 10; i < 14; ++i) peak[i] = 11;
@@ -141,7 +142,7 @@ TEST(MatchDescriptors, EqualsTheRuleWrittenOut) {
   auto a = random_descriptors(150, 120, 3);
   auto b = random_descriptors(170, 120, 4);
   std::mt19937_64 generator(5);
-  for (std::size_t i = 0; i < 100; ++i) {  // noisy copies; every third one repeated, as on a facade
+  for (std::size_t i = 0; i < 100; ++i) {  // noisy copies; every third one is repeated, as on a facade
     b[i] = a[i];
     for (auto& v : b[i]) v = static_cast<std::uint8_t>(v + generator() % 9);
     if (i % 3 == 0) b[100 + i / 3] = b[i];

@@ -1,3 +1,5 @@
+// Matching of simulated pairs of images: orientation and inliers against the truth, with and without known verticals,
+// turns and trusted orientations.
 #include "match/pairs/pair_matching.h"
 
 #include <gtest/gtest.h>
@@ -36,8 +38,8 @@ struct TwoPictures {
   std::vector<std::pair<std::int32_t, std::int32_t>> true_matches;
 };
 
-// Row i of a is row i of b for the first kMatches; the rest are features of their own. The first hundred keypoints of
-// the matched ones are reported a second time, with another orientation.
+// Row i of a matches row i of b for the first kMatches rows; the other features have no counterpart. The first hundred
+// matched keypoints are listed twice, with another orientation.
 TwoPictures make_scene() {
   std::mt19937_64 generator(3);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -75,7 +77,7 @@ TwoPictures make_scene() {
     add(scene.a, random_pixel(), random_descriptor(generator));
     add(scene.b, random_pixel(), random_descriptor(generator));
   }
-  for (int i = 0; i < 100; ++i) {  // wrong matches: same descriptor anywhere
+  for (int i = 0; i < 100; ++i) {  // wrong matches: the same descriptor anywhere
     const SiftDescriptor d = random_descriptor(generator);
     add(scene.a, random_pixel(), d);
     add(scene.b, random_pixel(), d);
@@ -117,8 +119,8 @@ TEST(MatchPair, NamesTheFirstOfTheRowsAtOnePlace) {
   EXPECT_EQ(std::pair(pair.feature_a[1], pair.feature_b[1]), std::pair(2, 2));
 }
 
-// The two pictures with marks that turn as they should, and their verticals, the second one off by so much in its
-// picture.
+// The two images with features that are turned as they should be, and their verticals. The second vertical is off by a
+// given angle in its image.
 struct UprightPictures {
   TwoPictures scene = make_scene();
   AxisDirection down_a, down_b;
@@ -126,7 +128,7 @@ struct UprightPictures {
 
   explicit UprightPictures(double off_deg) {
     std::mt19937_64 generator(13);
-    const double turn_deg = 0.4 / kDegree;  // of the second picture
+    const double turn_deg = 0.4 / kDegree;  // of the second image
     for (std::size_t i = 0; i < scene.a.keypoints.size(); ++i) {
       scene.a.keypoints[i].angle_deg = static_cast<float>(generator() % 360);
       const bool matched = i < kMatches + 100;
@@ -159,14 +161,14 @@ TEST(MatchPair, TrueVerticalsCostNoMatches) {
   EXPECT_GE(std::ssize(pair.feature_a), kMatches);
 }
 
-// Of features in sectors that are off by less than two some are compared all the same, and the rotation tells.
+// If the sectors are off by less than two, some right features are still compared, and the rotation reveals the error.
 TEST(MatchPair, WrongVerticalsCostNoMatches) {
   const TwoPictures plain = make_scene();
   const VerifiedPair without = match_pair(plain.a, plain.b, make_camera(), make_camera(), {});
   for (const double off : {25., -40., 70., 180.}) {
     const UprightPictures upright(off);
     EXPECT_EQ(upright.standing(), std::abs(off) < 30 ? Standing::kAlike : Standing::kTurned) << off;
-    if (std::abs(off) > 45) continue;  // nothing right is compared
+    if (std::abs(off) > 45) continue;  // no right features are compared
     const VerifiedPair pair =
         match_pair(upright.scene.a, upright.scene.b, make_camera(), make_camera(), {}, upright.knowledge());
     EXPECT_EQ(pair.feature_a, without.feature_a) << off;
@@ -174,7 +176,7 @@ TEST(MatchPair, WrongVerticalsCostNoMatches) {
   }
 }
 
-// Without verticals, the turn of the pictures does: wrong matches of another turn are not compared, right ones all are.
+// Without verticals, the turn of the images is used: matches of another turn are not compared, all right ones are.
 TEST(MatchPair, TheTurnCostsNoMatches) {
   const UprightPictures turned(0);
   const auto match = [&](bool by_turn) {
@@ -220,7 +222,7 @@ TEST(MatchPair, ImagesWithoutFeaturesAreNotVerified) {
   EXPECT_EQ(match_pair(scene.a, empty, make_camera(), make_camera(), {}).model, PairModel::kNone);
 }
 
-// A facade 10 m away whose windows are all alike: every feature has a twin in each of the others, 3.4 m along and more.
+// A facade 10 m away with identical windows: every feature has a twin in each other window, at multiples of 3.4 m.
 TwoPictures make_facade(TrustedPair& pair) {
   std::mt19937_64 generator(5);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -278,7 +280,7 @@ TEST(MatchPair, TrustedOrientationTellsRepeatedWindowsApart) {
   EXPECT_LT(right(blind), right(guided) / 2);
 }
 
-// Where the trust is misplaced, the pair is matched as if there were none.
+// If the trust is misplaced, the pair is matched as if there were none.
 TEST(MatchPair, AWrongTrustIsNoHarm) {
   const TwoPictures scene = make_scene();
   TrustedPair wrong;

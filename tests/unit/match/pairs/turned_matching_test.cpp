@@ -1,3 +1,4 @@
+// The turn of two vertical images from their matches, among wrong ones.
 #include "match/pairs/turned_matching.h"
 
 #include <gtest/gtest.h>
@@ -21,11 +22,11 @@ struct MatchedPair {
 struct View {
   double turn_deg = 0;
   double turn_error_deg = 8;
-  double size = 1;            // in b, of that in a
+  double size = 1;            // in b, relative to a
   double octave_error = 0.1;  // of sizes
 };
 
-// `right` matches as the view has them; those after them have any turn and any size of an octave up and down.
+// The first `right` matches agree with the view; the others have any turn, and any size within an octave.
 MatchedPair matched_pair(const View& view, int right, int wrong, std::uint64_t seed) {
   std::mt19937_64 generator(seed);
   std::uniform_real_distribution<double> any_turn(0, 360), octave(-1, 1);
@@ -80,7 +81,7 @@ TEST(TurnedMatching, SpreadTurnsAreNoTurn) {
     EXPECT_FALSE(found_turn({.turn_error_deg = 180}, 40, 0, seed)) << seed;
 }
 
-// As where one walks along a street: what is near grows faster.
+// Images from along a street: near objects grow faster.
 TEST(TurnedMatching, AStreetIsNotSeenFromAbove) {
   int taken = 0;
   for (std::uint64_t seed = 1; seed <= 1000; ++seed)

@@ -1,3 +1,4 @@
+// Matching by sectors relative to the vertical: against all comparisons written out, and with wrong verticals.
 #include "match/pairs/upright_matching.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ bool alike(std::int8_t a, std::int8_t b) {
   return a == kAnySector || b == kAnySector || apart <= 1 || apart == kUprightSectors - 1;
 }
 
-// One after the other, all of them.
+// All descriptors, one after the other.
 void expect_nearest(const std::vector<SiftDescriptor>& of, const std::vector<SiftDescriptor>& among,
                     const std::vector<std::int8_t>& sectors_of, const std::vector<std::int8_t>& sectors_among,
                     const Neighbours& found) {
@@ -83,13 +84,13 @@ Camera bent_camera() {
   return camera;
 }
 
-// Marks on walls, seen by cameras that are turned and tilted: a mark's direction in the wall, seen from each.
+// Marks on walls, seen by rotated and tilted cameras: the direction of a mark on the wall, as seen in each image.
 TEST(UprightMatching, MarksOfWallsKeepTheirSector) {
   const Camera camera = bent_camera();
   std::mt19937_64 generator(7);
   std::uniform_real_distribution<double> unit(-1, 1);
   const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
-  // x right, y down, z ahead of a level camera that looks north, then rolled and tilted.
+  // Axes of a level camera that looks north (x right, y down, z ahead), then rolled and tilted.
   Eigen::Matrix3d level;
   level << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   const Eigen::Matrix3d a = rotation_exp<double>(Eigen::Vector3d(0.2, 0, 0.5)).toRotationMatrix() * level,
@@ -124,7 +125,7 @@ TEST(UprightMatching, LookingDownNothingStands) {
     EXPECT_EQ(sector, kAnySector);
 }
 
-// Of matches of which `right` have this turn, in degrees and good to 8, and the others any.
+// Matches of which `right` have this turn (degrees, accurate to 8), and the others any.
 Standing standing(double turn_deg, int right, int wrong, std::uint64_t seed) {
   std::mt19937_64 generator(seed);
   std::uniform_real_distribution<double> any(0, 360);
@@ -167,12 +168,12 @@ TEST(UprightMatching, ItTakesEvidenceToBelieveAVertical) {
   const auto pair = [](int a, int b, Standing standing) {
     return StandingPair{ImageIndex(a), ImageIndex(b), standing};
   };
-  // 0 to 2 stand alike, 3 is turned against them, of 4 and 5 nothing is seen.
+  // Images 0 to 2 agree, 3 is turned against them, nothing is known of 4 and 5.
   const std::vector<StandingPair> pairs{pair(0, 1, Standing::kAlike),   pair(0, 2, Standing::kUnknown),
                                         pair(1, 2, Standing::kAlike),   pair(0, 3, Standing::kTurned),
                                         pair(1, 3, Standing::kTurned),  pair(2, 3, Standing::kUnknown),
                                         pair(0, 4, Standing::kUnknown), pair(4, 5, Standing::kUnknown)};
-  // 0 and 1 are turned against 3 as often as they stand alike with others.
+  // 0 and 1 are turned against 3 as often as they agree with others.
   EXPECT_EQ(upright_pairs(pairs), (std::vector<std::uint8_t>{1, 0, 1, 0, 0, 0, 0, 0}));
   std::vector<StandingPair> more = pairs;
   for (const int image : {0, 1, 2}) more.push_back(pair(image, 6, Standing::kAlike));

@@ -1,3 +1,5 @@
+// Tracks from matches: against a brute-force construction with sets, for random matches in any order and with little
+// memory.
 #include "match/tracks/tracks.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +20,7 @@ namespace {
 
 using Keypoints = IndexedVector<ImageIndex, std::vector<Keypoint>>;
 
-// Every feature at a place of its own.
+// Every feature has its own position.
 Keypoints make_keypoints(std::size_t images, std::int32_t features) {
   Keypoints keypoints(images);
   std::int32_t place = 0;
@@ -70,7 +72,8 @@ TEST(Tracks, LaterBatchesDoNotUndoEarlierOnes) {
   TrackBuilder builder(4);
   builder.add(make_pair(0, 1, {{0, 0}}), 0);
   builder.add(make_pair(1, 2, {{0, 0}}), 0);
-  // Surer pairs that would split the first track if they came with it: image 3 sees 0 and 2 at two places.
+  // Stronger pairs, which would split the first track if they came together with it: image 3 sees 0 and 2 as two
+  // features.
   builder.add(make_pair(0, 3, {{0, 0}, {1, 1}}), 2);
   builder.add(make_pair(2, 3, {{0, 1}, {1, 0}}), 2);
   builder.build();
@@ -81,7 +84,7 @@ TEST(Tracks, LaterBatchesDoNotUndoEarlierOnes) {
   EXPECT_EQ(builder.long_tracks(9), builder.long_tracks(2)) << "the last one that brought pairs";
 }
 
-// Independent of the builder: sets as std::set, pairs sorted as the header says, no numbers.
+// Independent of the builder: sets as std::set, pairs sorted as the header says, no feature numbers.
 std::vector<Sightings> tracks_by_brute_force(std::vector<std::pair<int, VerifiedPair>> pairs) {
   std::sort(pairs.begin(), pairs.end(), [](const auto& p, const auto& q) {
     return std::tuple(p.first, q.second.feature_a.size(), p.second.a, p.second.b) <
@@ -159,7 +162,7 @@ TEST(Tracks, JoinMatchesOverImages) {
 }
 
 TEST(Tracks, SplitWhereAnImageWouldBeSeenTwice) {
-  // Images 0-1-2 agree on one point by strong pairs; the weak pair 0-2 links it to another feature of image 2.
+  // Strong pairs agree on one point in the images 0, 1, 2; the weak pair 0-2 links it to another feature of image 2.
   const Keypoints keypoints = make_keypoints(3, 5);
   const TrackSet set = build_tracks(
       keypoints,
@@ -179,7 +182,8 @@ TEST(Tracks, RandomMatchesGiveConsistentTracksInAnyOrder) {
       for (int i = 0; i < kFeatures; ++i) {
         if (generator() % 3 == 0) continue;
         matches.emplace_back(i,
-                             generator() % 10 == 0 ? static_cast<int>(generator() % kFeatures) : i);  // a tenth wrong
+                             // A tenth is wrong.
+                             generator() % 10 == 0 ? static_cast<int>(generator() % kFeatures) : i);
       }
       pairs.push_back(make_pair(a, b, matches));
     }

@@ -1,3 +1,5 @@
+// Relative orientation of simulated pairs with wrong matches: general scenes, planes, rotations, wrong focal lengths
+// and verticals; precision against the errors of many pairs.
 #include "match/verification/two_view.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +16,7 @@
 namespace megablock {
 namespace {
 
-constexpr double kFocal = 1400, kWidth = 2000, kHeight = 1500;  // px
+constexpr double kFocal = 1400, kWidth = 2000, kHeight = 1500;  // pixels
 
 enum class Relief { kGeneral, kPlane, kRotation };
 
@@ -22,9 +24,9 @@ struct Simulation {
   Relief scene = Relief::kGeneral;
   int matches = 800;
   double outlier_share = 0.5, noise_px = 0.5;
-  double baseline = 0.15;  // of the distance
+  double baseline = 0.15;  // relative to the distance
   Eigen::Vector3d rotation{0.05, -0.08, 0.3};
-  double focal_error = 0;  // relative, of the focal length the points are normalised with
+  double focal_error = 0;  // relative error of the focal length that normalises the points
   std::uint64_t seed = 1;
 };
 
@@ -34,7 +36,7 @@ struct SimulatedPair {
   RelativeOrientation truth;
 };
 
-// Camera a looks down on ground 1 away; camera b is moved sideways and turned.
+// Camera a looks down on ground at the distance 1; camera b is shifted and rotated.
 SimulatedPair simulate(const Simulation& s) {
   std::mt19937_64 generator(s.seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -80,7 +82,7 @@ double translation_error_deg(const TwoView& found, const SimulatedPair& pair) {
   return std::acos(std::clamp(found.translation.dot(pair.truth.base), -1.0, 1.0)) / kDegree;
 }
 
-// Shares of the good and of the wrong matches that are accepted.
+// Accepted shares of the right and of the wrong matches.
 std::pair<double, double> accepted_shares(const TwoView& found, const SimulatedPair& pair) {
   double good = 0, wrong = 0, good_accepted = 0, wrong_accepted = 0;
   for (std::size_t i = 0; i < pair.good.size(); ++i) {
@@ -163,7 +165,7 @@ TEST_P(TwoViews, RandomMatchesAreRefused) {
   }
 }
 
-// A vertical of each image, tilted by an error in a direction of its own.
+// A vertical for each image, tilted by an error in its own direction.
 TwoViewOptions with_verticals(const SimulatedPair& pair, double error_deg, std::uint64_t seed) {
   TwoViewOptions options = options_for(seed);
   const Eigen::Vector3d down = Eigen::Vector3d(0.1, 0.2, 1).normalized();
@@ -220,7 +222,7 @@ TEST(TwoView, IsRepeatable) {
 }
 
 TEST(TwoView, PrecisionIsThatOfTheErrors) {
-  // Half of a wrong match is accepted in the mean where half of them are wrong: it must not decide.
+  // With half of the matches wrong, half a wrong match is accepted on average. It must not decide the base.
   for (const double outliers : {0.0, 0.2, 0.5}) {
     constexpr int kTrials = 150;
     double sum = 0;
@@ -242,8 +244,8 @@ TEST(TwoView, PrecisionIsThatOfTheErrors) {
   }
 }
 
-// Matches of 0.2 px, every tenth of them moved across its epipolar line, to a residual of 2 px: a limit of 3 px lets
-// them pass, their sigma does not.
+// Matches of 0.2 pixels accuracy, every tenth moved across its epipolar line to a residual of 2 pixels. A limit of 3
+// pixels accepts them, the limit by their sigma does not.
 TEST(TwoView, WrongMatchesOfTwoPixelsAreRefusedWhereOthersAreExact) {
   for (const Relief scene : {Relief::kGeneral, Relief::kPlane, Relief::kRotation}) {
     Simulation s;
@@ -269,8 +271,8 @@ TEST(TwoView, WrongMatchesOfTwoPixelsAreRefusedWhereOthersAreExact) {
   }
 }
 
-// Less exact matches: none of the right ones that 3 px leave is lost, and planes and rotations are seen as such, which
-// the limit of 3 px for their transfer residuals does not do.
+// Less accurate matches: no right one within 3 pixels is lost, and planes and rotations are recognised, for which a
+// limit of 3 pixels on transfer residuals would be too narrow.
 TEST(TwoView, MatchesOfTwoPixelsKeepTheRightOnes) {
   int right_models = 0, by_constant = 0, pairs = 0;
   for (const Relief scene : {Relief::kGeneral, Relief::kPlane, Relief::kRotation})

@@ -1,3 +1,4 @@
+// Candidate pairs and cells: the nearest neighbours against sorting, and the rules of candidates.h one by one.
 #include "partition/candidates/candidates.h"
 
 #include <gmock/gmock.h>
@@ -26,7 +27,7 @@ Camera camera() {
   return c;
 }
 
-// A block of single photos; photos are added by position.
+// A block of single images, which are added by position.
 Block single_photo_block() {
   Block block;
   block.cameras.push_back(camera());
@@ -47,7 +48,7 @@ ImageIndex add_photo(Block& block, const std::string& name, std::optional<Eigen:
 
 std::string photo_name(int i) { return "IMG_" + std::to_string(i) + ".jpg"; }
 
-// Rows flown to and fro; slightly irregular, so that distances differ.
+// Flight lines in alternating directions, slightly irregular, so that distances differ.
 Block aerial_block(int rows, int columns, double step = 10, double row_distance = 20) {
   Block block = single_photo_block();
   std::mt19937 random(7);
@@ -150,7 +151,7 @@ TEST(Candidates, NeighboursOnAGridOfPhotos) {
   const CandidateGraph graph = candidate_pairs(block, {}, options);
   expect_sound(graph, options);
   EXPECT_EQ(connected_sets(block, graph), 1);
-  // Every image with its eight nearest, by brute force.
+  // Every image and its eight nearest, by brute force.
   for (std::int64_t i = 0; i < 200; ++i) {
     std::vector<std::pair<double, int>> others;
     for (int j = 0; j < 200; ++j)
@@ -168,7 +169,7 @@ TEST(Candidates, NeighboursOnAGridOfPhotos) {
 }
 
 TEST(Candidates, LinesWithDenseImagesAreTiedToTheNextLine) {
-  // 2 m along the line, 30 m across: the 14 nearest of an image are all in its own line.
+  // With 2 m along the line and 30 m across, the 14 nearest of an image are all in its own line.
   const Block block = aerial_block(4, 60, 2, 30);
   CandidateOptions options;
   const CandidateGraph graph = candidate_pairs(block, {}, options);
@@ -237,7 +238,7 @@ TEST(Candidates, AGpsOutlierDoesNotTearTheGraph) {
   const CandidateGraph graph = candidate_pairs(block, {}, options);
   EXPECT_EQ(connected_sets(block, graph), 1);
   for (int d : {-2, -1, 1, 2}) EXPECT_TRUE(has(graph, outlier, outlier + d));
-  // Sought between its acquisition neighbours too: images of the next line.
+  // Also sought between its neighbours in the order of acquisition: images of the next line.
   int other_lines = 0;
   for (const ImagePair& pair : graph.pairs)
     if (pair.a.value == outlier || pair.b.value == outlier)
@@ -262,7 +263,7 @@ TEST(Candidates, ImagesWithoutPositionGoByDescriptors) {
   const CandidateGraph graph = candidate_pairs(block, descriptors, options);
   for (int i : {33, 34, 35}) EXPECT_TRUE(has(graph, static_cast<int>(lost.value), i));
   expect_sound(graph, options);
-  descriptors[lost].fill(0);  // no descriptor either: order of acquisition alone
+  descriptors[lost].fill(0);  // no descriptor either: only the order of acquisition
   options.order_neighbours = 2;
   EXPECT_EQ(connected_sets(block, candidate_pairs(block, descriptors, options)), 1);
 }
@@ -277,7 +278,7 @@ TEST(Candidates, WithoutPositionsAllPairsOfASmallBlock) {
   expect_sound(graph, options);
   EXPECT_LE(graph.cell_begin.size(), 30u);
   options.exhaustive_below = 30;
-  EXPECT_EQ(candidate_pairs(block, {}, options).pairs.size(), 29u + 28);  // order of acquisition is left
+  EXPECT_EQ(candidate_pairs(block, {}, options).pairs.size(), 29u + 28);  // the order of acquisition remains
 }
 
 TEST(Candidates, OrderIsByTimeElseByNumberInTheName) {
@@ -297,8 +298,8 @@ TEST(Candidates, OrderIsByTimeElseByNumberInTheName) {
               1);
 }
 
-// Rotation ground -> camera of a camera that looks along `heading` (radians from north, clockwise), tilted by `pitch`
-// below the horizon, image upright.
+// Rotation ground -> camera of a camera that looks along `heading` (radians, clockwise from north), `pitch` below the
+// horizon, with an upright image.
 Eigen::Quaterniond looking(double heading, double pitch) {
   const Eigen::Vector3d z(std::sin(heading) * std::cos(pitch), std::cos(heading) * std::cos(pitch), -std::sin(pitch));
   const Eigen::Vector3d x(std::cos(heading), -std::sin(heading), 0);
@@ -315,7 +316,7 @@ TEST(Candidates, RigImagesByConesAndViewingDirections) {
   Rig rig{"rig", {}};
   for (int m = 0; m < 4; ++m)
     rig.mounts.push_back(Mount{CameraIndex(0), Pose{looking(90 * m * kDegree, 0) * looking(0, 0).conjugate()}, 0, 0});
-  // Mount rotations turn the rig's camera axes: a fifth camera between two others overlaps both.
+  // Mount rotations turn the rig's camera axes. A fifth camera between two others overlaps both.
   rig.mounts.push_back(Mount{CameraIndex(0), Pose{looking(45 * kDegree, 0) * looking(0, 0).conjugate()}, 0, 0});
   block.rigs.push_back(rig);
   for (int f = 0; f < 30; ++f) {
@@ -347,7 +348,7 @@ TEST(Candidates, RigImagesByConesAndViewingDirections) {
 }
 
 TEST(Candidates, FootprintsDecideForObliqueViews) {
-  // Two lines 100 m apart at 100 m height; one looks at the ground under the other, 45 degrees to the east.
+  // Two lines 100 m apart at 100 m height. One looks at the ground below the other, 45 degrees to the east.
   Block block = single_photo_block();
   for (int i = 0; i < 40; ++i) add_photo(block, "nadir" + std::to_string(i), Eigen::Vector3d(100, 5.0 * i, 100));
   for (int i = 0; i < 40; ++i) add_photo(block, "oblique" + std::to_string(i), Eigen::Vector3d(0, 5.0 * i, 100));

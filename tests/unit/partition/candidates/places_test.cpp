@@ -1,3 +1,4 @@
+// Places of registration in simulated drives: every crossing and every parallel pass, but not a bridge over a street.
 #include "partition/candidates/places.h"
 
 #include <gtest/gtest.h>
@@ -53,7 +54,7 @@ TEST(Places, EveryCrossingAndEveryParallelPass) {
   for (int s = 0; s < kStreets; ++s) drives.add(0, {-20, 100.0 * s, 30}, {420, 100.0 * s, 30});
   for (int s = 0; s < kStreets; ++s) drives.add(1, {100.0 * s, -20, 30.5}, {100.0 * s, 420, 30.5});
   for (int s = 0; s < kStreets; ++s) drives.add(2, {420, 100.0 * s + 3, 30}, {-20, 100.0 * s + 3, 30});
-  // A trajectory that drifts on every pass.
+  // A trajectory that drifts in every pass.
   for (std::size_t i = 0; i < drives.positions.size(); ++i)
     drives.positions[i] += Eigen::Vector3d(0.8, -0.7, 0.2) * static_cast<double>(drives.pass[i]);
   const std::vector<Place> places = drives.places();

@@ -1,3 +1,4 @@
+// Diagnostics of simulated blocks with known gaps, thin ground, missing lines and single links.
 #include "partition/diagnostics/block_diagnostics.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@
 namespace megablock {
 namespace {
 
-// Vertical photographs 60 m wide and 40 m long along their line, from 100 m.
+// Vertical images that cover 60 m across and 40 m along their line, from 100 m height.
 struct Survey {
   Block block;
   BlockState state;
@@ -41,7 +42,7 @@ struct Survey {
     block.rigs.push_back(rig);
   }
 
-  // Flying along `heading` (from east, counter-clockwise); looking down, or ahead.
+  // An exposure that flies along `heading` (counter-clockwise from east) and looks down, or ahead.
   FrameIndex add(double x, double y, double heading = 0, std::int64_t pass = 0, bool down = true) {
     const FrameIndex index(static_cast<std::int64_t>(block.frames.size()));
     Frame frame;
@@ -100,7 +101,7 @@ TEST(FlightLines, TwoExposuresOfOnePlaceDoNotEndALine) {
   EXPECT_EQ(flight_lines(acquisition_order(survey.block, state), state).size(), 1u);
 }
 
-// Without times by name, numbers in it by value; no table of all names' places is made for it.
+// Without times the order is by name, numbers in names by value, without a table of the ranks of all names.
 TEST(FlightLines, AreInTheOrderOfNamesOrTimes) {
   Survey survey;
   for (int i = 0; i < 12; ++i) survey.add(16 * i, 0);
@@ -121,7 +122,8 @@ TEST(GroundCover, CommonShareOfQuadrilaterals) {
   const Quadrilateral turned = {Eigen::Vector2d(0, 2), {4, 2}, {4, 0}, {0, 0}};
   EXPECT_NEAR(common_share(a, turned), 1, 1e-14);
   EXPECT_NEAR(common_share(a, {Eigen::Vector2d(3, 1), {7, 1}, {7, 3}, {3, 3}}), 1. / 8, 1e-14);
-  EXPECT_NEAR(common_share(a, {Eigen::Vector2d(1, 0.5), {2, 0.5}, {2, 1.5}, {1, 1.5}}), 1, 1e-14);  // inside
+  // One inside the other.
+  EXPECT_NEAR(common_share(a, {Eigen::Vector2d(1, 0.5), {2, 0.5}, {2, 1.5}, {1, 1.5}}), 1, 1e-14);
   EXPECT_NEAR(common_share(a, {Eigen::Vector2d(2, -1), {4, 1}, {2, 3}, {0, 1}}), 6. / 8, 1e-14);
   EXPECT_EQ(common_share(a, {Eigen::Vector2d(5, 0), {9, 0}, {9, 2}, {5, 2}}), 0);
   EXPECT_EQ(common_share(a, {Eigen::Vector2d(1, 1), {1, 1}, {1, 1}, {1, 1}}), 0);
@@ -147,10 +149,10 @@ TEST(BlockDiagnostics, BasesOverlapsAndTwoMissingExposures) {
   ASSERT_EQ(d.proposals.size(), 2u);
   EXPECT_LT((d.proposals[0].centre - Eigen::Vector3d(48, 0, 100)).norm(), 1e-9);
   EXPECT_LT((d.proposals[1].centre - Eigen::Vector3d(64, 0, 100)).norm(), 1e-9);
-  EXPECT_TRUE(d.thin_ground.empty());  // a single line has rim on both sides
+  EXPECT_TRUE(d.thin_ground.empty());  // a single line has a rim on both sides
 }
 
-// Lines flown to and fro, one of them and one exposure missing.
+// Lines flown in alternating directions; one line and one exposure are missing.
 Survey turned_survey(double turn, double noise) {
   Survey survey;
   std::mt19937 random(1);
@@ -175,7 +177,8 @@ TEST(BlockDiagnostics, RotatedBlockHasTheSameGaps) {
       EXPECT_TRUE(d.gaps[1].line);
       EXPECT_EQ(d.gaps[1].missing, 1);
       EXPECT_NEAR(d.gaps[1].distance_m, 84, 1e-9 + 3 * noise);
-      EXPECT_NEAR((d.gaps[1].to - d.gaps[1].from).norm(), 7 * 16, 1e-9 + 14 * noise);  // whole: ends turn by noise
+      // Complete; its ends turn by the noise.
+      EXPECT_NEAR((d.gaps[1].to - d.gaps[1].from).norm(), 7 * 16, 1e-9 + 14 * noise);
       if (noise == 0) {
         EXPECT_EQ(d.proposals.size(), 9u);
       }
@@ -236,7 +239,7 @@ TEST(BlockDiagnostics, StreetsHaveInterruptionsAndLinksOnly) {
   EXPECT_EQ(d.part_frames, (std::vector<std::int64_t>{7, 1}));
   ASSERT_EQ(d.weak_links.size(), 1u);
   EXPECT_EQ(d.weak_links[0].points, 3);
-  ASSERT_EQ(d.single_links.size(), 3u);  // 2-3, 3-4, 4-5: two frames and more on either side
+  ASSERT_EQ(d.single_links.size(), 3u);  // 2-3, 3-4, 4-5: at least two frames on either side
   EXPECT_EQ(d.single_links[0].a, FrameIndex(2));
   EXPECT_EQ(d.single_links[0].frames, 3);
 }
@@ -250,10 +253,10 @@ TEST(BlockDiagnostics, RelativePosesHoldPartsTogether) {
   survey.block.relative_poses.push_back({FrameIndex(2), FrameIndex(1), {}, 1e-3, 0.01});
   const BlockDiagnostics d = survey.found();
   EXPECT_EQ(d.part_frames.size(), 1u);
-  EXPECT_TRUE(d.single_links.empty());  // it is no link of tie points
+  EXPECT_TRUE(d.single_links.empty());  // a relative pose is no link of tie points
 }
 
-// Frames that hang together with the first one, without one of the links.
+// Number of frames that remain connected with the first one without one of the links.
 std::int64_t reached(std::int64_t frames, const std::vector<FrameEdge>& links, std::size_t without, FrameIndex from) {
   DisjointSets sets(frames);
   for (std::size_t l = 0; l < links.size(); ++l)
@@ -305,7 +308,7 @@ TEST(BlockDiagnostics, OfImagesAloneNobodyKnowsWhereDownIs) {
   EXPECT_FALSE(found().aerial);
   EXPECT_TRUE(found().pairs.empty() && found().footprints.empty());
   ControlPoint& point = survey.block.control_points.emplace_back();
-  point.role = PointRole::kCheck;  // takes no part
+  point.role = PointRole::kCheck;  // must not count
   EXPECT_FALSE(found().aerial);
   point.role = PointRole::kControl;
   EXPECT_TRUE(found().aerial);

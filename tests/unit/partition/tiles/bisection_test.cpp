@@ -1,3 +1,4 @@
+// Bisection of artificial graphs: size of separators, balance, limits of leaves, and extreme graphs.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -12,10 +13,10 @@
 namespace megablock {
 namespace {
 
-// Frames on the root's separator: those linked across the two halves of the whole.
+// Number of frames on the root's separator: those with links across the two halves.
 std::int64_t root_separator(const FrameGraph& graph, const BisectionTree& cut) {
   const MergeTree::Node& root = cut.tree.nodes.back();
-  std::int64_t first_right = 0;  // leaves are numbered in tree order: the left half holds the lower ones
+  std::int64_t first_right = 0;  // leaves are numbered in tree order, so the left half has the lower numbers
   for (std::int64_t n = 0; n <= root.left; ++n) first_right += cut.tree.nodes[static_cast<std::size_t>(n)].tile.valid();
   std::set<std::int64_t> left, right;
   for (const FrameEdge& edge : graph.edges) {

@@ -1,3 +1,4 @@
+// Separators of bisections: against all sets of frames of small graphs, and against the overlap of large ones.
 #include "partition/tiles/separators.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +11,7 @@
 namespace megablock {
 namespace {
 
-// Two leaves under one root.
+// A tree of two leaves under one root.
 MergeTree two_leaves() {
   MergeTree tree;
   tree.nodes.resize(2);
@@ -52,7 +53,7 @@ TEST(Separators, LeaveOutFramesThatAreApartAndFramesWithoutLeaf) {
   EXPECT_EQ(separator_depths(links, {0, -1, 1, 1}, tree)[3], -1);
 }
 
-// Against all sets of frames, on random links between two halves of seven.
+// Compared with all sets of frames, for random links between two halves of seven.
 TEST(Separators, AreTheFewestFramesThatCoverTheLinks) {
   constexpr int kHalf = 7;
   const MergeTree tree = two_leaves();
@@ -76,7 +77,7 @@ TEST(Separators, AreTheFewestFramesThatCoverTheLinks) {
   }
 }
 
-// 80 x 40 frames linked over four columns and two rows, as photographs with 80 and 60 % overlap are.
+// 80 x 40 frames linked over four columns and two rows, as in blocks with 80 and 60 % overlap.
 TEST(Separators, CutEveryNodeOfATreeByAboutWhatTheOverlapIs) {
   constexpr int kColumns = 80, kRows = 40;
   std::vector<std::pair<int, int>> links;
@@ -91,7 +92,7 @@ TEST(Separators, CutEveryNodeOfATreeByAboutWhatTheOverlapIs) {
   const std::vector<std::int32_t> depth = separator_depths(block, cut.leaf_of_node, cut.tree);
   const std::vector<std::int32_t> node_depth = depths(cut.tree);
 
-  // Whatever links two leaves is cut at the node where they part, or further up.
+  // Every link between two leaves is cut at the node where they part, or higher up.
   std::vector<std::vector<std::int64_t>> path(static_cast<std::size_t>(
       1 + *std::max_element(cut.leaf_of_node.begin(), cut.leaf_of_node.end())));  // of every leaf, from the root
   for (std::size_t n = 0; n < cut.tree.nodes.size(); ++n) {
@@ -109,7 +110,7 @@ TEST(Separators, CutEveryNodeOfATreeByAboutWhatTheOverlapIs) {
     while (x[static_cast<std::size_t>(parting) + 1] == y[static_cast<std::size_t>(parting) + 1]) ++parting;
     EXPECT_TRUE((depth[a] >= 0 && depth[a] <= parting) || (depth[b] >= 0 && depth[b] <= parting));
   }
-  // At the root two rows of 80 or four columns of 40; METIS's cut is not quite straight.
+  // At the root two rows of 80, or four columns of 40; the cut of METIS is not quite straight.
   EXPECT_LE(std::count(depth.begin(), depth.end(), 0), 1.15 * 160);
   EXPECT_GE(std::count(depth.begin(), depth.end(), 0), 160);
 }

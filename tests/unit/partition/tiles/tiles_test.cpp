@@ -1,3 +1,4 @@
+// Tiles of artificial graphs: limits, balance, components, dropped links, and blocks that grow.
 #include "partition/tiles/tiles.h"
 
 #include <gmock/gmock.h>
@@ -44,7 +45,7 @@ void expect_tiles(const FrameGraph& graph, const Tiles& tiles, const TileOptions
   EXPECT_EQ(tiles.dropped_links, dropped);
 }
 
-// Frames of a component are reached from one another without the dropped links.
+// The frames of a component must be connected without the dropped links.
 void expect_connected_components(const FrameGraph& graph, const Tiles& tiles) {
   std::vector<std::int64_t> label(static_cast<std::size_t>(graph.frame_count));
   for (std::size_t i = 0; i < label.size(); ++i) label[i] = static_cast<std::int64_t>(i);
@@ -137,7 +138,7 @@ TEST(MakeTiles, SameTilesEveryTime) {
   const FrameGraph graph = sorted(30 * 40, grid(30, 40));
   const Tiles first = make_tiles(graph, options);
   for (int i = 0; i < 3; ++i) {
-    std::srand(static_cast<unsigned>(i));  // METIS draws from the C library's generator
+    std::srand(static_cast<unsigned>(i));  // METIS draws from the generator of the C library
     EXPECT_EQ(make_tiles(graph, options).tile_of_frame, first.tile_of_frame);
   }
 }
@@ -150,7 +151,7 @@ TEST(MakeTiles, DisjointSetsAreComponentsUnderOneRoot) {
   TileOptions options;
   const Tiles tiles = make_tiles(graph, options);
   expect_tiles(graph, tiles, options);
-  EXPECT_EQ(tiles.component[FrameIndex(40)], 0);  // the largest
+  EXPECT_EQ(tiles.component[FrameIndex(40)], 0);  // the largest component
   EXPECT_EQ(tiles.component[FrameIndex(0)], 1);
   EXPECT_EQ(tiles.component[FrameIndex(160)], 2);
   EXPECT_EQ(tiles.component[FrameIndex(162)], -1);
@@ -306,7 +307,7 @@ TEST(ExtendTiles, BisectsATileOverTheLimit) {
   std::int64_t moved = 0;
   for (std::int64_t f = 0; f < 120; ++f)
     moved += tiles.tile_of_frame[FrameIndex(f)] != previous.tile_of_frame[FrameIndex(f)];
-  EXPECT_LT(moved, 60);  // tiles away from the new frames keep all of theirs
+  EXPECT_LT(moved, 60);  // tiles away from the new frames keep all their frames
 }
 
 TEST(ExtendTiles, SeparatorsOfFormerFramesStayAndBisectedTilesGetTheirs) {
@@ -319,7 +320,7 @@ TEST(ExtendTiles, SeparatorsOfFormerFramesStayAndBisectedTilesGetTheirs) {
   };
   ASSERT_GT(separating(previous), 12);
   options.tile_max_frames = 30;
-  for (const FrameEdge& edge : grid(12, 20, 240)) edges.push_back(edge);  // a set of its own
+  for (const FrameEdge& edge : grid(12, 20, 240)) edges.push_back(edge);  // a set without links to the others
   const Tiles tiles = extend_tiles(sorted(480, edges), previous, options);
   ASSERT_GT(tiles.tile_count, previous.tile_count + 8);
   for (std::int64_t f = 0; f < 240; ++f)
@@ -344,7 +345,7 @@ TEST(ExtendTiles, NewSetsAndJoinedComponents) {
   ASSERT_EQ(previous.tile_count, 2);
   add(edges, 10, 75, 30);  // joins the two sets
   add(edges, 50, 75, 20);
-  add(edges, 76, 77, 30);  // a set of its own
+  add(edges, 76, 77, 30);  // a set without links to the others
   add(edges, 5, 78, 3);    // too weak: no tile
   const FrameGraph after = sorted(79, edges);
   const Tiles tiles = extend_tiles(after, previous, options);

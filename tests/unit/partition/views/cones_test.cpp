@@ -1,3 +1,4 @@
+// Viewing cones of simulated drives with ten cameras: against dense sample points.
 #include "partition/views/cones.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,7 @@ double distance(const Block& block, ImageIndex a, ImageIndex b) {
   return (pose_of(block, a).centre - pose_of(block, b).centre).norm();
 }
 
-// By closely set points of a's cone, through the full camera model.
+// Whether two cones meet, by dense points of a's cone, projected through the full camera model.
 bool cones_meet(const Block& block, ImageIndex a, ImageIndex b, double range) {
   const Pose from = pose_of(block, a), by = pose_of(block, b);
   const Camera &ca = block.cameras[block.camera_of(a)], &cb = block.cameras[block.camera_of(b)];
@@ -64,12 +65,13 @@ TEST(ViewingCones, PairsOfARigAreNearAndSeeTheSame) {
   }
   EXPECT_GE(*std::min_element(partners.begin(), partners.end()), 6);  // at the ends of the drives cameras look away
   EXPECT_LE(checked, 14 * block.images.size());
-  // The other drive has its turn.
+  // The other drive also gets partners.
   EXPECT_GT(across, checked / 4);
   EXPECT_LT(across, checked * 3 / 4);
 }
 
-// Per camera and not per frame: of two frames side by side the cameras to the right never meet those to the left.
+// Pairs are decided per camera, not per frame: of two frames side by side, the cameras to the right never meet those to
+// the left.
 TEST(ViewingCones, CamerasThatLookApartAreNoPairs) {
   const Block block = street();
   const ViewingCones cones(block, 30);
@@ -79,7 +81,8 @@ TEST(ViewingCones, CamerasThatLookApartAreNoPairs) {
     return i;
   };
   EXPECT_EQ(cones.overlap(image(3, "c31"), image(4, "c32")), 0);
-  EXPECT_EQ(cones.overlap(image(4, "c22"), image(3, "c42")), 0);  // ahead of the one ahead, behind the one behind
+  // The one looks ahead of the front frame, the other behind the rear frame.
+  EXPECT_EQ(cones.overlap(image(4, "c22"), image(3, "c42")), 0);
   const double next = cones.overlap(image(3, "c22"), image(4, "c22"));
   EXPECT_GT(next, 0.2);
   EXPECT_GT(next, cones.overlap(image(3, "c22"), image(6, "c22")));
