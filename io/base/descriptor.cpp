@@ -46,7 +46,7 @@ void write_fully(int file, const std::string& path, const void* data, std::size_
 }
 
 void flush_to_disk(int file, const std::string& path) {
-  // Some network file systems cannot flush a directory and answer EINVAL: nothing is lost that they could keep.
+  // Some network file systems cannot flush a directory and answer EINVAL. They would not keep the directory any safer.
   if (::fsync(file) != 0 && errno != EINVAL) throw_file_error(path, "flushed to disk", errno);
 }
 

@@ -1,4 +1,5 @@
-// An open file of the operating system and whole reads and writes on it, where std::fstream tells too little of errors.
+// An open file of the operating system, with complete reads and writes on it. It is used where std::fstream says too
+// little about errors, or cannot flush to the disk.
 #pragma once
 
 #include <cstddef>
@@ -7,10 +8,10 @@
 
 namespace megablock {
 
-// Closed at the end of its scope; id() < 0 (and errno set) when the file could not be opened.
+// Closes the file at the end of its scope. id() is negative, and errno set, when the file could not be opened.
 class Descriptor {
  public:
-  Descriptor(const std::string& path, int flags);  // flags of open(2)
+  Descriptor(const std::string& path, int flags);  // `flags` as in open(2)
   ~Descriptor();
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
@@ -20,12 +21,12 @@ class Descriptor {
   int id_;
 };
 
-std::int64_t file_size(int file);  // of a regular file, bytes; -1 otherwise
+std::int64_t file_size(int file);  // size of a regular file in bytes; -1 for anything else
 
-// Reads exactly `size` bytes; false at the end of the file or on an error.
+// Reads exactly `size` bytes at `offset`. Returns false at the end of the file and on an error.
 bool read_fully(int file, void* data, std::size_t size, std::int64_t offset);
 
-// `path` is for messages; errors as throw_file_error.
+// Write all bytes, or flush the file to the disk. `path` is for messages; they throw as throw_file_error does.
 void write_fully(int file, const std::string& path, const void* data, std::size_t size);
 void flush_to_disk(int file, const std::string& path);
 

@@ -1,5 +1,5 @@
-// Union-find over dense numbers; the representative of a set is its lowest member, so results do not depend on the
-// order of the unions.
+// Union-find over the numbers 0 to count - 1. The representative of a set is its lowest member, so the result does not
+// depend on the order of the unions.
 #pragma once
 
 #include <algorithm>
@@ -15,11 +15,12 @@ class DisjointSets {
   explicit DisjointSets(std::int64_t count) : parent_(static_cast<std::size_t>(count)) {
     std::iota(parent_.begin(), parent_.end(), std::int64_t{0});
   }
+  // The representative of a member's set. Shortens the path on its way.
   std::int64_t find(std::int64_t member) {
     while (at(member) != member) member = at(member) = at(at(member));
     return member;
   }
-  // True when two sets became one.
+  // Unites two sets; returns whether they were different.
   bool unite(std::int64_t a, std::int64_t b) {
     a = find(a);
     b = find(b);

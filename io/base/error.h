@@ -1,5 +1,5 @@
-// The project's one exception family. The message is one line a user can act on: what is wrong, where, what to do.
-// cluster/ turns them into exit codes in one place.
+// The one family of exceptions of the project. A message is one line that lets the user act: what is wrong, where, and
+// what to do. cluster/ turns the exceptions into exit codes in one place.
 #pragma once
 
 #include <stdexcept>
@@ -7,31 +7,32 @@
 
 namespace megablock {
 
-// Base of everything the program reports to its user.
+// Base of all errors that the program reports to its user.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Bad usage or bad input (exit code 2).
+// Wrong usage or wrong input (exit code 2).
 class InputError : public Error {
  public:
   using Error::Error;
 };
 
-// A file of the job is missing, truncated, altered or of another version (recomputed where it is a unit).
+// A file of the job is missing, truncated, altered, or of another version. If it is the result of a unit of work, the
+// unit is computed again.
 class StoreError : public Error {
  public:
   using Error::Error;
 };
 
-// A computation that cannot be completed from these data (a failed unit): singular tile, too few points ...
+// A computation is impossible with these data: a singular tile, too few points. The unit of work has failed.
 class ComputeError : public Error {
  public:
   using Error::Error;
 };
 
-// The user or the scheduler asked to stop (exit code 75).
+// The user or the scheduler asked the program to stop (exit code 75).
 class Interrupted : public Error {
  public:
   using Error::Error;

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// What to do about an error the user can mend; null for the others.
+// Advice for errors that the user can correct; null for the others.
 const char* remedy(int error) {
   switch (error) {
     case ENOSPC:

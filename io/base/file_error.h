@@ -1,4 +1,4 @@
-// Failures of the operating system while writing or reading files, as the project's errors.
+// Turns failures of the operating system with files into the errors of the project, with advice.
 #pragma once
 
 #include <fstream>
@@ -6,18 +6,18 @@
 
 namespace megablock {
 
-// Throws for `error` (an errno value) met while `action` ("written", "created" ...) was tried on `path`. What the user
-// can mend (full disk or quota, read-only or missing permission, a file in the way) is an InputError with its remedy,
-// everything else a StoreError.
+// Throws for the errno value `error`, which occurred when `path` was to be `action` ("written", "created"). Errors that
+// the user can correct (full disk or quota, read-only file system, missing permission, a file in the way) become an
+// InputError with the remedy; all others become a StoreError.
 [[noreturn]] void throw_file_error(const std::string& path, const std::string& action, int error);
 
-// A file that the user names, to be read. Throws as above when it cannot be opened or is a folder.
+// Opens a file that the user names, for reading. Throws as above if it cannot be opened or is a folder.
 std::ifstream open_input(const std::string& path);
 
-// Makes a folder and those above it. Throws as above when that is not possible.
+// Makes a folder and its parents. Throws as above if that is impossible.
 void make_folder(const std::string& path);
 
-// InputError when the folder that is to hold the file or folder `path` is not there: it may be mistyped.
+// Throws InputError if the folder that is to contain `path` does not exist: its name may be mistyped.
 void check_parent(const std::string& path);
 
 }  // namespace megablock

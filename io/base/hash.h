@@ -1,4 +1,4 @@
-// XXH3 (64-bit) hashing: fingerprints of units, file checksums, digests.
+// 64-bit hashes by XXH3: fingerprints of units of work, checksums of files, digests of results.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace megablock {
 
-// Streaming hash. Values are hashed by their bytes; lengths of strings and vectors are hashed first, so that
-// neighbouring fields cannot run into one another.
+// Hash of a sequence of values. Values are hashed by their bytes. The length of a string or vector is hashed before its
+// contents, so that the contents of neighbouring fields cannot be confused.
 class Hasher {
  public:
   Hasher();
@@ -49,7 +49,7 @@ class Hasher {
   void* state_;
 };
 
-std::uint64_t hash_file(const std::string& path);  // throws StoreError when it cannot be read
-std::string hex(std::uint64_t value);              // 16 digits
+std::uint64_t hash_file(const std::string& path);  // throws StoreError if the file cannot be read
+std::string hex(std::uint64_t value);              // 16 hexadecimal digits
 
 }  // namespace megablock

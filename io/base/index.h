@@ -1,7 +1,7 @@
-// Distinct index types, so that the compiler refuses to mix them.
+// A separate index type for each kind of object, so that the compiler refuses to mix them up.
 //
-// GlobalIndex<Kind>: 64-bit dense index in the block. LocalIndex<Kind>: 32-bit dense index in a tile.
-// User-visible names are strings and are never used as keys inside.
+// GlobalIndex<Kind> is a dense 64-bit index in the block, LocalIndex<Kind> a dense 32-bit index in a tile. Names that
+// users see are strings; they never serve as keys inside the program.
 #pragma once
 
 #include <compare>
@@ -40,7 +40,7 @@ using CameraIndex = GlobalIndex<CameraKind>;
 using RigIndex = GlobalIndex<RigKind>;
 using FrameIndex = GlobalIndex<FrameKind>;
 using ImageIndex = GlobalIndex<ImageKind>;
-using TrackIndex = GlobalIndex<PointKind>;  // a track and its tie point share the index
+using TrackIndex = GlobalIndex<PointKind>;  // a track and its tie point share an index
 using TileIndex = GlobalIndex<TileKind>;
 
 using LocalCamera = LocalIndex<CameraKind>;
@@ -48,7 +48,7 @@ using LocalFrame = LocalIndex<FrameKind>;
 using LocalImage = LocalIndex<ImageKind>;
 using LocalPoint = LocalIndex<PointKind>;
 
-// A vector addressed by one index type only.
+// A vector that is addressed by one index type only.
 template <typename Index, typename Value>
 class IndexedVector : public std::vector<Value> {
  public:

@@ -1,5 +1,5 @@
-// The names of a table's rows, one behind the other in one text: of a million images they take a third of what as many
-// strings take, and they can be away while nobody asks for one.
+// The names of a table's rows in one text, one after the other. A million image names take a third of the memory of as
+// many strings. The table can also be unloaded while no name is needed.
 #pragma once
 
 #include <cstdint>
@@ -21,11 +21,12 @@ class NameTable {
     end_.push_back(std::ssize(text_));
   }
 
-  // Of all names, one behind the other, and where each ends in it.
+  // The text of all names, and the position in it where each name ends.
   const std::vector<char>& text() const { return text_; }
   const std::vector<std::int64_t>& ends() const { return end_; }
 
-  // Valid until the table changes. Throws std::out_of_range where there is no such row, so of a table that is away.
+  // The name of a row, valid until the table changes. Throws std::out_of_range for a row that does not exist, so also
+  // for an unloaded table.
   std::string_view operator[](Index row) const {
     const auto i = static_cast<std::size_t>(row.value);
     const auto end = static_cast<std::size_t>(end_.at(i)), begin = i == 0 ? 0 : static_cast<std::size_t>(end_[i - 1]);
@@ -33,8 +34,8 @@ class NameTable {
   }
 
  private:
-  std::vector<std::int64_t> end_;  // [rows] in text_
-  std::vector<char> text_;         // no string, which would keep its memory where an empty one is assigned
+  std::vector<std::int64_t> end_;  // [rows] end of each name in text_
+  std::vector<char> text_;         // a vector, because a string keeps its memory when an empty one is assigned
 };
 
 }  // namespace megablock

@@ -55,7 +55,7 @@ void check_image_names(const Block& block) {
   bool ascending = true;
   for (ImageIndex i(1); block.images.contains(i) && ascending; ++i.value)
     ascending = block.image_names[ImageIndex(i.value - 1)] < block.image_names[i];
-  if (ascending) return;  // as they mostly do; the list below has 16 bytes of every image
+  if (ascending) return;  // the usual case; the list below takes 16 bytes for each image
   std::vector<std::string_view> names;
   names.reserve(block.images.size());
   for (ImageIndex i(0); block.images.contains(i); ++i.value) names.push_back(block.image_names[i]);

@@ -1,7 +1,7 @@
-// The block: cameras, rigs, frames, images, priors, control. What the project file and the image headers say;
-// results (poses, points) are kept apart, in BlockState.
+// The block: cameras, rigs, frames, images, priors and control, as read from the project file and the image headers.
+// Results (poses, points) are kept separately, in BlockState.
 //
-// Frames of reference and conventions: docs/design.md, Conventions.
+// docs/design.md, "Conventions", defines the frames and the sense of rotations.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,77 +17,84 @@
 
 namespace megablock {
 
-// The local topocentric ground frame (east, north, up; metres) about the block origin.
+// The local topocentric ground frame (east, north, up; metres) about the origin of the block.
 struct GroundFrame {
-  bool georeferenced = false;  // false: arbitrary frame (free block or metric local coordinates)
-  double latitude_deg = 0;     // of the origin, WGS84
+  bool georeferenced = false;  // false: arbitrary frame (free block, or metric local coordinates)
+  double latitude_deg = 0;     // of the origin, WGS84, degrees
   double longitude_deg = 0;
-  double height_m = 0;        // ellipsoidal
-  std::string crs = "local";  // of the inputs: "EPSG:4326", "EPSG:25832", "local"
+  double height_m = 0;        // above the ellipsoid
+  std::string crs = "local";  // of the input: "EPSG:4326", "EPSG:25832", "local"
 };
 bool same_origin(const GroundFrame& a, const GroundFrame& b);
 
 struct Camera {
   std::string name;
   int width = 0, height = 0;  // pixels
-  Intrinsics intrinsics{};    // start values
-  // Prior sigma of each parameter in its own unit: 0 = held, infinity = free without prior.
+  Intrinsics intrinsics{};    // initial values
+  // Prior standard deviation of each parameter in its own unit: 0 = held fixed, infinity = free without a prior.
   IntrinsicSigmas prior_sigma{};
-  bool focal_known = false;  // from EXIF, sensor table or project file; else a guess (1.2 x larger side)
-  std::string mask_path;     // PNG, black = ignore; empty = none
+  // From EXIF, the sensor table or the project file; false: a guess (1.2 times the larger side).
+  bool focal_known = false;
+  std::string mask_path;  // PNG, black = ignore; empty = no mask
 };
 
-// Pose of a camera in its rig. A single photo is a rig of one camera with the identity mount, held.
+// Pose of a camera in its rig. A single camera is a rig of one camera with the identity as its mount, held fixed.
 struct Mount {
   CameraIndex camera;
   Pose pose;  // X_cam = R_mount (X_rig - C_mount)
-  // Prior sigmas; 0 = held. A rig's first mount is its reference and always held.
+  // Prior standard deviations; 0 = held fixed. The first mount of a rig is its reference and always held.
   double rotation_sigma_rad = 0;
   double position_sigma_m = 0;
   bool held() const { return rotation_sigma_rad == 0 && position_sigma_m == 0; }
 };
 
+// Cameras that are fixed to each other.
 struct Rig {
   std::string name;
   std::vector<Mount> mounts;
 };
 
-// GNSS position of the antenna in the ground frame.
+// Position of the GNSS antenna in the ground frame.
 struct PositionPrior {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();   // metres
-  Eigen::Vector3d sigma = Eigen::Vector3d(3, 3, 6);     // metres, east north up
-  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  // antenna in the rig, metres: antenna = C + R' lever_arm
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // metres
+  Eigen::Vector3d sigma = Eigen::Vector3d(3, 3, 6);    // metres; east, north, up
+  // Position of the antenna in the rig, metres: antenna = C + R' lever_arm.
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
 };
 
-// Attitude observed in the ground frame (already turned from the frame's own vertical to the block's).
+// Attitude observed in the ground frame. Where it was observed relative to the vertical at the frame's own place, it
+// has been turned to the vertical of the block's origin.
 struct AttitudePrior {
   Eigen::Quaterniond rotation_cw = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d sigma_rad = Eigen::Vector3d::Constant(0.05);  // about the rig's x, y, z axes; see adjust/residuals.h
+  Eigen::Vector3d sigma_rad = Eigen::Vector3d::Constant(0.05);  // about the rig's x, y, z axes
 };
 
+// One exposure of a rig, with what is known of its pose.
 struct Frame {
   std::string name;
   RigIndex rig;
-  std::int64_t pass = -1;                                    // acquisition line it belongs to, -1 unknown
+  std::int64_t pass = -1;                                    // number of the acquisition line; -1: unknown
   double time_s = std::numeric_limits<double>::quiet_NaN();  // of acquisition (EXIF), seconds since 1970
   std::optional<PositionPrior> position_prior;
   std::optional<AttitudePrior> attitude_prior;
-  std::optional<Pose> given_pose;  // approximate pose from a file: initial orientation skips the frame
+  std::optional<Pose> given_pose;  // approximate pose from a file; initial orientation skips this frame
 };
 
+// One exposure of one camera.
 struct Image {
   FrameIndex frame;
-  int mount = 0;                // in the frame's rig
-  std::uint64_t file_hash = 0;  // XXH3 of the file (0: none)
+  int mount = 0;                // index in the mounts of the frame's rig
+  std::uint64_t file_hash = 0;  // XXH3 of the file; 0: none
 };
 
-// Relative pose between two frames: R = R_to R_from', T = R_from (C_to - C_from), in the from-frame's axes.
+// Observed relative pose of two frames, in the axes of `from`: R = R_to R_from', T = R_from (C_to - C_from).
 struct RelativePose {
   FrameIndex from, to;
   Pose pose;  // rotation from -> to, centre of `to` in `from`
   double rotation_sigma_rad = 0, position_sigma_m = 0;
 };
 
+// The observation of a point in an image.
 struct ImageMeasurement {
   ImageIndex image;
   Eigen::Vector2d pixel;  // pixel centres at +0.5
@@ -104,38 +111,40 @@ struct ControlPoint {
   std::vector<ImageMeasurement> measurements;
 };
 
-// A straight line of the scene with a known direction; its ends in an image are any two of its points.
+// A straight line of the scene with a known direction. Its end points in an image are any two points of it.
 struct KnownLine {
   enum class Direction : std::uint8_t { kVertical, kHorizontal };
   struct Measurement {
     ImageIndex image;
     Eigen::Vector2d first, second;  // pixel centres at +0.5
-    double sigma_px = 1;            // of each end, across the line
+    double sigma_px = 1;            // of each end point, across the line
   };
   std::string name;
   Direction direction = Direction::kVertical;
   std::vector<Measurement> measurements;
 };
 
-// Where an image sees down: by the vanishing point of vertical edges, or as an inclinometer says.
+// The vertical as an image sees it, from the vanishing point of vertical edges or from an inclinometer.
 struct SeenVertical {
   ImageIndex image;
-  Eigen::Vector3d down = Eigen::Vector3d::UnitY();           // camera axes, unit
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // of `down`, radians^2, of rank two; of measuring alone
-  // What `down` owes to the camera, the same error for all its images: the parameters that it was found with, and its
-  // derivative by each. Empty where it owes it nothing.
+  Eigen::Vector3d down = Eigen::Vector3d::UnitY();  // camera axes, unit vector
+  // Covariance of `down` from its measurement alone, rad^2, rank two.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  // The dependence of `down` on the camera, whose errors are common to all its images: the parameters used to find it,
+  // and its derivative by each of them. Empty for a vertical that does not depend on the camera.
   Eigen::VectorXd camera;
   Eigen::Matrix3Xd by_camera;
 };
 
+// All observations and priors of a block.
 struct Block {
   GroundFrame ground;
   std::string image_folder;  // absolute, ends with '/'; empty for simulated tie points
   IndexedVector<CameraIndex, Camera> cameras;
-  IndexedVector<RigIndex, Rig> rigs;
+  IndexedVector<RigIndex, Rig> rigs;  // absolute, ends with '/'; empty for simulated tie points
   IndexedVector<FrameIndex, Frame> frames;
   IndexedVector<ImageIndex, Image> images;
-  NameTable<ImageIndex> image_names;  // [images] unique; relative paths in the image folder
+  NameTable<ImageIndex> image_names;  // [images] relative paths in the image folder, all different
   std::vector<RelativePose> relative_poses;
   std::vector<ControlPoint> control_points;
   std::vector<KnownLine> lines;
@@ -146,7 +155,7 @@ struct Block {
     return rig_of(images[image].frame).mounts[static_cast<std::size_t>(images[image].mount)];
   }
   CameraIndex camera_of(ImageIndex image) const { return mount_of(image).camera; }
-  // Throw std::out_of_range where image_names is away.
+  // These two throw std::out_of_range if image_names is unloaded.
   std::string name_of(ImageIndex image) const { return std::string(image_names[image]); }
   std::string path_of(ImageIndex image) const { return image_folder.empty() ? "" : image_folder + name_of(image); }
 
@@ -157,7 +166,7 @@ struct Block {
   }
 };
 
-// Current values of everything but points. Mounts are indexed [rig][mount].
+// The current values of all unknowns except points. Mounts are indexed [rig][mount].
 struct BlockState {
   IndexedVector<FrameIndex, Pose> frames;
   IndexedVector<FrameIndex, std::uint8_t> oriented;  // 1 = the frame has a pose
@@ -165,13 +174,14 @@ struct BlockState {
   IndexedVector<RigIndex, std::vector<Pose>> mounts;
 };
 
-// State with the block's start values: cameras and mounts as given, frames with given_pose oriented.
+// The state with the initial values of the block: cameras and mounts as given; frames with a given pose are oriented.
 BlockState initial_state(const Block& block);
 
-// Any image file that is there.
+// Whether at least one image file exists.
 bool has_pictures(const Block& block);
 
-// Throws InputError when indices dangle, sigmas are negative or not finite, names repeat, quaternions are not unit.
+// Throws InputError for indices that refer to nothing, sigmas that are negative or not finite, repeated names, and
+// quaternions that are not unit quaternions.
 void check(const Block& block);
 
 }  // namespace megablock

@@ -19,7 +19,7 @@ using OrderedJson = nlohmann::ordered_json;
 
 OrderedJson finite_number(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
 
-constexpr std::size_t kMostListedFootprints = 10000;  // a million of them would be half a gigabyte of text
+constexpr std::size_t kMostListedFootprints = 10000;  // a million footprints would be half a gigabyte of text
 
 class JsonWriter {
  public:
@@ -112,7 +112,7 @@ class JsonWriter {
     for (const Eigen::Vector2d& corner : footprint.corners) corners.push_back({corner.x(), corner.y()});
     return {{"image", block_.name_of(footprint.image)}, {"corners_m", corners}};
   }
-  // The frames of all parts but the largest.
+  // The frames of all parts except the largest.
   OrderedJson smaller_parts() const {
     OrderedJson parts = OrderedJson::array();
     for (std::size_t p = 1; p < d_.part_frames.size(); ++p) parts.push_back(OrderedJson::array());

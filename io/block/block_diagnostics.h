@@ -1,6 +1,6 @@
-// What a block lacks: gaps, missing overlap, weak links, unfavourable bases, and where a view should be added (M57).
-// Found by partition/diagnostics/block_diagnostics.h from any state of a job, drawn by the report, written beside it as
-// JSON.
+// Weaknesses of a block: gaps, missing overlap, weak links, unfavourable bases, and places where exposures should be
+// added (Kalantari 2009, chapter 10, suggests this). partition/diagnostics/block_diagnostics.h finds them from any
+// state of a job; the report draws them and writes them as JSON beside it.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,60 +14,60 @@
 
 namespace megablock {
 
-// What is asked of a block.
+// The requirements that a block is compared with.
 struct DiagnosticsOptions {
   double min_base_to_height = 0.1, max_base_to_height = 1.2;  // of successive exposures of a flight line
-  double min_overlap = 0.5;                                   // of their footprints, share of the smaller one
-  int min_images = 2;                                         // that see every place on the ground
-  int min_link_points = 15;                                   // common tie points; a link with fewer is weak
-  double gap_factor = 1.5;  // larger distances than so many usual ones are gaps; along streets twice as many
-  void check() const;       // throws InputError
+  double min_overlap = 0.5;                                   // of their footprints, as a share of the smaller one
+  int min_images = 2;        // number of images that must see every place on the ground
+  int min_link_points = 15;  // common tie points; a link with fewer is weak
+  double gap_factor = 1.5;   // distances above so many usual ones are gaps; twice as many along streets
+  void check() const;        // throws InputError
 };
 
 struct BlockDiagnostics {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
   DiagnosticsOptions requested;
-  // Aerial: most images look down. Only these have footprints, bases, flight lines, ground and proposals; of others,
-  // facades along streets above all, only interruptions of passes and links say something.
+  // In an aerial block most images look down. Only such blocks have footprints, bases, flight lines, ground and
+  // proposals. In others, above all facades along streets, only interruptions of passes and links have a meaning.
   bool aerial = false;
   bool links_known = false;           // there are tie points or matches
   double usual_step_m = kUnknown;     // between successive exposures, median
   double line_distance_m = kUnknown;  // between neighbouring flight lines, median
   double height_m = kUnknown;         // above ground, median
-  std::int64_t lines = 0;             // of three exposures and more
+  std::int64_t lines = 0;             // number of flight lines of at least three exposures
 
-  // Where an image's corners look on a horizontal plane at the height of its ground; in order around it.
+  // The corners of an image on a horizontal plane at the height of the ground that it sees, in order around it.
   struct Footprint {
     ImageIndex image;
     std::array<Eigen::Vector2d, 4> corners;
   };
-  std::vector<Footprint> footprints;  // by image
+  std::vector<Footprint> footprints;  // ascending by image
 
-  // A place where exposures are missing between others: along a pass, or a flight line between its neighbours.
+  // A place where exposures are missing between others: within a pass, or a flight line between its neighbours.
   struct Gap {
     bool line = false;
-    FrameIndex before, after;  // on both sides; of a line: where it begins
-    Eigen::Vector2d from, to;  // along a pass: these two; of a line: its ends
-    std::int64_t missing = 0;  // exposures, or flight lines
-    double distance_m = 0;     // from one side to the other
+    FrameIndex before, after;  // on both sides; of a line: where the gap begins
+    Eigen::Vector2d from, to;  // within a pass: these two; of a line: its ends
+    std::int64_t missing = 0;  // number of exposures, or of flight lines
+    double distance_m = 0;     // from one side to the other, metres
   };
   std::vector<Gap> gaps;
 
-  // A connected piece of ground between well covered places that fewer than min_images see.
+  // A connected piece of ground that fewer than min_images images see, between sufficiently covered ground.
   struct ThinGround {
-    Eigen::Vector2d centre;  // of its cells
+    Eigen::Vector2d centre;  // mean of its cells
     double area_m2 = 0;
     std::vector<Eigen::Vector2d> cells;  // centres
   };
   std::vector<ThinGround> thin_ground;
-  double cell_m = 0;  // side of the cells
+  double cell_m = 0;  // side of a cell, metres
 
-  // Two exposures that follow one another on a flight line; without flight lines, any two with a good link.
+  // Two successive exposures of a flight line; without flight lines, any two with a good link.
   struct StereoPair {
     FrameIndex a, b;
     double base_m = 0, base_to_height = kUnknown;
-    double overlap = kUnknown;  // of the footprints, share of the smaller one
+    double overlap = kUnknown;  // of the footprints, as a share of the smaller one
   };
   std::vector<StereoPair> pairs;
   bool base_is_outside(const StereoPair& pair) const {
@@ -75,18 +75,18 @@ struct BlockDiagnostics {
   }
   bool overlap_is_missing(const StereoPair& pair) const { return pair.overlap < requested.min_overlap; }
 
-  // What hangs together by links of min_link_points tie points and more, and by relative poses; largest first.
-  IndexedVector<FrameIndex, std::int32_t> part_of_frame;  // -1: without pose
+  // Parts that are connected by links of at least min_link_points tie points and by relative poses, the largest first.
+  IndexedVector<FrameIndex, std::int32_t> part_of_frame;  // -1: without a pose
   std::vector<std::int64_t> part_frames;
   struct Link {
     FrameIndex a, b;
     std::int64_t points = 0;
-    std::int64_t frames = 0;  // of a single link: on its smaller side
+    std::int64_t frames = 0;  // for a single link: number of frames on its smaller side
   };
-  std::vector<Link> weak_links;    // all that there is between two parts
-  std::vector<Link> single_links;  // good ones that two frames and more hang on
+  std::vector<Link> weak_links;    // all links between two parts
+  std::vector<Link> single_links;  // good links that alone connect at least two frames with the rest
 
-  // Where a view is missing, with the attitude of its neighbours.
+  // A position where an exposure is missing, with the attitude of its neighbours.
   struct Proposal {
     Eigen::Vector3d centre;
     Eigen::Quaterniond rotation;  // ground -> rig
@@ -94,10 +94,10 @@ struct BlockDiagnostics {
   std::vector<Proposal> proposals;
 };
 
-// One JSON object; docs/job-format.md. Places in the block's frame and, when it is georeferenced, as latitude and
-// longitude too.
+// One JSON object, as described in docs/job-format.md. Positions are in the block's frame, and in georeferenced blocks
+// also as latitude and longitude.
 std::string to_json(const BlockDiagnostics& diagnostics, const Block& block);
-// A few lines, what could not be looked for at the end.
+// The same in a few lines of text. Lines at the end name what could not be examined.
 std::string to_text(const BlockDiagnostics& diagnostics, const Block& block);
 
 }  // namespace megablock

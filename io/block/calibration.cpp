@@ -19,7 +19,7 @@ double worst_axis(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, symmetric_eigen(covariance).values(2)));
 }
 
-// Per axis, of all directions.
+// The mean over all directions, per axis.
 double mean_axis(const Eigen::Matrix3d& covariance) { return std::sqrt(std::max(0.0, covariance.trace() / 3)); }
 
 std::string quoted_name(const std::string& name) { return "\"" + name + "\""; }

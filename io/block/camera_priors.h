@@ -1,12 +1,12 @@
-// Prior sigmas of cameras of which nothing but a start value is known.
+// Prior standard deviations for cameras of which only an initial value is known.
 #pragma once
 
 #include "io/block/block.h"
 
 namespace megablock {
 
-// Prior sigmas that keep self-calibration of small blocks stable (weak_sigmas); the focal length is good for 5 %, 30 %
-// when guessed.
+// Priors that keep the self-calibration of small blocks stable (weak_sigmas). The focal length is taken as accurate to
+// 5 %, or to 30 % if it is a guess.
 IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera);
 
 }  // namespace megablock

@@ -14,7 +14,7 @@ namespace megablock {
 
 namespace detail {
 
-// A PROJ transformation with the context it lives in.
+// A PROJ transformation together with its context.
 class ProjTransform {
  public:
   ProjTransform() : context_(proj_context_create()) {
@@ -31,7 +31,7 @@ class ProjTransform {
   PJ_CONTEXT* context() const { return context_; }
   void set(PJ* transform) { transform_ = transform; }
 
-  // False when PROJ cannot transform the point.
+  // Transforms a point in place. Returns false when PROJ cannot.
   bool apply(PJ_DIRECTION direction, Eigen::Vector3d& xyz) const {
     proj_errno_reset(transform_);
     const PJ_COORD result = proj_trans(transform_, direction, proj_coord(xyz.x(), xyz.y(), xyz.z(), HUGE_VAL));
@@ -56,7 +56,7 @@ using ProjObject = std::unique_ptr<PJ, ProjDeleter>;
 
 double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
 
-// Rows: east, north, up in geocentric axes.
+// Rotation from geocentric axes to east, north, up; the rows are these directions.
 Eigen::Matrix3d enu_from_geocentric(double latitude_deg, double longitude_deg) {
   const double sp = std::sin(radians(latitude_deg)), cp = std::cos(radians(latitude_deg));
   const double sl = std::sin(radians(longitude_deg)), cl = std::cos(radians(longitude_deg));
@@ -70,7 +70,7 @@ std::string upper(std::string text) {
   return text;
 }
 
-// PROJ's name for the forms of a system that control files use.
+// PROJ's name of a system, also for the other forms that control files use.
 std::string proj_name(const std::string& crs) {
   const std::string name = upper(crs);
   if (name == "WGS84" || name == "EPSG:4326") return "EPSG:4979";
@@ -83,15 +83,15 @@ std::string proj_name(const std::string& crs) {
   return crs;
 }
 
-// A code of an authority, a PROJ string or WKT. PROJ takes any other text for a part of a name and chooses among the
-// systems that hold it.
+// Whether the text is a code of an authority, a PROJ string or WKT. PROJ would take any other text as a part of a name
+// and choose among the systems that contain it.
 bool names_one_system(const std::string& proj_name) {
   const std::size_t colon = proj_name.find(':');
   const bool code = colon != std::string::npos && colon > 0 && proj_name.find_first_of(" \t") == std::string::npos;
   return code || proj_name.starts_with("+") || proj_name.find('[') != std::string::npos;
 }
 
-// Longitude, latitude in degrees.
+// Whether longitude and latitude (degrees) are plausible.
 bool in_range(const Eigen::Vector3d& p) { return std::abs(p.x()) <= 360 && std::abs(p.y()) <= 90; }
 
 }  // namespace
@@ -137,7 +137,7 @@ CrsToWgs84::CrsToWgs84(const std::string& crs) : crs_(crs), transform_(std::make
   if (!source || !proj_is_crs(source.get()))
     throw InputError("coordinate reference system '" + crs +
                      "' is not known to PROJ; write a code (EPSG:25832), WGS84, WGS84 UTM 32N, a PROJ string or WKT");
-  // A system of two dimensions gets an ellipsoidal height; one with a vertical part keeps its own.
+  // A two-dimensional system gets an ellipsoidal height. One with a vertical part keeps its own heights.
   ProjObject source_3d(proj_crs_promote_to_3D(context, nullptr, source.get()));
   ProjObject target(proj_create(context, "EPSG:4979"));
   const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};

@@ -1,8 +1,8 @@
-// Coordinate reference systems by PROJ: the block's local frame, and inputs in other systems.
+// Coordinate reference systems, by PROJ: the local frame of the block, and input in other systems.
 //
-// The local frame is topocentric (east, north, up; metres) about GroundFrame's origin, exact for any distance (it is a
-// rotation and shift of geocentric coordinates). Every object has a PROJ context of its own: use one object from one
-// thread at a time, and as many objects as threads.
+// The local frame is topocentric (east, north, up; metres) about the origin of GroundFrame. It is a rotation and a
+// shift of geocentric coordinates and therefore exact at every distance. Every object has its own PROJ context: use an
+// object in one thread at a time, and one object for each thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@
 
 namespace megablock {
 
-// WGS84; height above the ellipsoid.
+// A position in WGS84. The height is above the ellipsoid.
 struct Geodetic {
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;
 };
@@ -23,7 +23,8 @@ namespace detail {
 class ProjTransform;
 }
 
-// Between WGS84 and the local frame of a georeferenced block (InputError when it is not).
+// Transforms between WGS84 and the local frame of a georeferenced block. The constructor throws InputError for another
+// block.
 class Georeference {
  public:
   explicit Georeference(const GroundFrame& ground);
@@ -33,8 +34,8 @@ class Georeference {
 
   Eigen::Vector3d to_local(const Geodetic& position) const;
   Geodetic to_geodetic(const Eigen::Vector3d& local) const;
-  // Turns directions of the block's frame into the east-north-up frame at `position` (its own vertical): a rotation
-  // R_cw that refers to the own vertical becomes R_cw * own_from_block(position) in the block.
+  // Rotation from directions in the block's frame to the east-north-up frame at `position`, which has its own vertical.
+  // A rotation R_cw that refers to that vertical becomes R_cw * own_from_block(position) in the block.
   Eigen::Quaterniond own_from_block(const Geodetic& position) const;
 
  private:
@@ -42,11 +43,11 @@ class Georeference {
   std::unique_ptr<detail::ProjTransform> transform_;
 };
 
-// From any system PROJ knows to WGS84. `crs`: "EPSG:25832", "EPSG:25832+5773" (with a vertical system), a PROJ string,
-// WKT, "WGS84", or "WGS84 UTM 32N"; no other names, which PROJ would search for. Coordinates in the order x (easting or
-// longitude), y (northing or latitude), z. Without a vertical system z is a height above the ellipsoid. InputError when
-// PROJ does not know the system, or when a grid it needs (a geoid, say) is not installed: PROJ would otherwise hand
-// back heights unchanged, silently.
+// Transforms between WGS84 and any system that PROJ knows. `crs` may be "EPSG:25832", "EPSG:25832+5773" (with a
+// vertical system), a PROJ string, WKT, "WGS84" or "WGS84 UTM 32N"; other names are refused, because PROJ would search
+// for them. Coordinates have the order x (easting or longitude), y (northing or latitude), z. Without a vertical
+// system, z is a height above the ellipsoid. Throws InputError for an unknown system, and for one that needs a grid (a
+// geoid, for example) that is not installed: PROJ would otherwise return unchanged heights without a word.
 class CrsToWgs84 {
  public:
   explicit CrsToWgs84(const std::string& crs);
@@ -54,7 +55,7 @@ class CrsToWgs84 {
   CrsToWgs84(CrsToWgs84&&) noexcept;
   CrsToWgs84& operator=(CrsToWgs84&&) noexcept;
 
-  Geodetic to_wgs84(const Eigen::Vector3d& xyz) const;  // InputError outside the system's range
+  Geodetic to_wgs84(const Eigen::Vector3d& xyz) const;  // throws InputError outside the range of the system
   Eigen::Vector3d from_wgs84(const Geodetic& position) const;
 
  private:

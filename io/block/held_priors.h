@@ -1,7 +1,7 @@
-// Positions and attitudes that are known: held by a sigma that nothing else comes near, so that whoever weighs priors
-// holds them without knowing of it. A sigma of 0 in the project file means this.
+// Positions and attitudes that are known exactly. They get a standard deviation far below that of any other
+// observation, so the adjustment holds them without a special case. A sigma of 0 in the project file means this.
 //
-// Images tell a camera's position to micrometres at best, its attitude to nanoradians: what is held moves by a
+// Images determine a camera's position to micrometres at best and its attitude to nanoradians; a held value moves by a
 // millionth of that. Coordinates of 1000 km are rounded to a hundredth of the sigma.
 #pragma once
 
@@ -9,27 +9,27 @@
 
 namespace megablock {
 
-inline constexpr double kHeldPositionSigma = 1e-8;   // m
-inline constexpr double kHeldAttitudeSigma = 1e-11;  // rad
+inline constexpr double kHeldPositionSigma = 1e-8;   // metres
+inline constexpr double kHeldAttitudeSigma = 1e-11;  // radians
 
-// Twice: a sigma that was turned or converted is rounded.
+// The factor of two allows for sigmas that were rounded in a rotation or conversion.
 inline bool held(const PositionPrior& prior) { return prior.sigma.minCoeff() <= 2 * kHeldPositionSigma; }
 inline bool held(const AttitudePrior& prior) { return prior.sigma_rad.minCoeff() <= 2 * kHeldAttitudeSigma; }
 
-// A held prior as one that merely comes before all others: where informations are compared, that of a held one would
-// hide them all.
+// A held prior with a sigma that is merely far below all others. Where the information of observations is compared,
+// that of a held prior would hide all others.
 inline PositionPrior comparable(PositionPrior prior) {
-  constexpr double kFirm = 1e-3;  // m
+  constexpr double kFirm = 1e-3;  // metres
   if (held(prior)) prior.sigma = prior.sigma.cwiseMax(kFirm);
   return prior;
 }
 inline AttitudePrior comparable(AttitudePrior prior) {
-  constexpr double kFirm = 1e-7;  // rad
+  constexpr double kFirm = 1e-7;  // radians
   if (held(prior)) prior.sigma_rad = prior.sigma_rad.cwiseMax(kFirm);
   return prior;
 }
 
-// Puts oriented frames where they are held.
+// Sets oriented frames to their held positions and attitudes.
 inline void place_held_frames(const Block& block, BlockState& state) {
   for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
     const Frame& frame = block.frames[f];

@@ -1,10 +1,10 @@
-// What the adjustment says of its observations, by kind: are the stated sigmas true?
+// Statistics of the observations after an adjustment, for each kind: are the stated standard deviations true?
 //
-// The redundancy number of a residual v with weighted Jacobian J (divided by sigma, multiplied by the robust loss's
-// sqrt(rho')) is r = 1 - J Q J', Q the posterior covariance (Baarda 1968). Over all residuals the numbers add up to
-// the degrees of freedom; the variance component of a kind is sum v^2 / sum r (Foerstner 1979): its square root is the
-// factor between the sigma that the residuals show and the stated one. At wrong weights the components are biased
-// towards one another; estimated again with the sigmas that they give, they settle.
+// A residual v with the weighted Jacobian J (divided by sigma, multiplied by sqrt(rho') of the robust loss) has the
+// redundancy number r = 1 - J Q J', where Q is the posterior covariance (W. Baarda, 1968). The redundancy numbers of
+// all residuals add up to the degrees of freedom. The variance component of a kind of observations is sum v^2 / sum
+// r (W. Foerstner, 1979); its square root is the factor between the sigma that the residuals show and the stated one.
+// With wrong weights the components are biased towards each other; repeated with the new sigmas, they converge.
 #pragma once
 
 #include <array>
@@ -32,22 +32,22 @@ enum class ObservationKind : std::uint8_t {
 };
 inline constexpr std::size_t kObservationKinds = 14;
 
-// "image, tie points" ...: for tables.
+// A name for tables: "image, tie points".
 const char* name_of(ObservationKind kind);
-// "image_tie" ...: a word for json and HDF5.
+// A word for JSON and HDF5: "image_tie".
 const char* word_of(ObservationKind kind);
 
 struct ObservationStatistics {
-  std::int64_t count = 0;       // scalar residuals
-  double weighted_squares = 0;  // sum rho' (v / sigma)^2
+  std::int64_t count = 0;       // number of scalar residuals
+  double weighted_squares = 0;  // sum of rho' (v / sigma)^2
   double redundancy = 0;        // sum of redundancy numbers
-  double scale = 1;             // sigma of the adjustment over the stated one
+  double scale = 1;             // the sigma that the adjustment used, over the stated one
   void add(double weighted_square, double redundancy_number) {
     ++count;
     weighted_squares += weighted_square;
     redundancy += redundancy_number;
   }
-  // Sigma that the residuals show over the stated one; NaN with less than one redundant observation.
+  // The sigma that the residuals show, over the stated one. NaN with less than one redundant observation.
   double sigma_factor() const {
     return redundancy >= 1 ? scale * std::sqrt(weighted_squares / redundancy) : std::nan("");
   }
@@ -57,7 +57,7 @@ struct ObservationTable {
   std::array<ObservationStatistics, kObservationKinds> kinds{};
   ObservationStatistics& operator[](ObservationKind kind) { return kinds[static_cast<std::size_t>(kind)]; }
   const ObservationStatistics& operator[](ObservationKind kind) const { return kinds[static_cast<std::size_t>(kind)]; }
-  void add(const ObservationTable& other);  // in the order of the calls
+  void add(const ObservationTable& other);  // the result depends on the order of the calls, through rounding
 };
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// How far an adjusted pose is from what was observed of it.
+// Differences of an adjusted pose from its observed position and attitude.
 #pragma once
 
 #include "geometry/transform/rotation.h"
@@ -6,11 +6,11 @@
 
 namespace megablock {
 
-// Adjusted antenna minus observed position, m, ground frame.
+// Adjusted minus observed position of the antenna, metres, ground frame.
 inline Eigen::Vector3d difference(const Pose& pose, const PositionPrior& prior) {
   return pose.centre + pose.rotation.conjugate() * prior.lever_arm - prior.position;
 }
-// Rotation from the observed to the adjusted attitude about the rig's axes, rad.
+// Rotation from the observed to the adjusted attitude about the rig's axes, radians.
 inline Eigen::Vector3d difference(const Pose& pose, const AttitudePrior& prior) {
   return rotation_log<double>(pose.rotation * prior.rotation_cw.conjugate());
 }

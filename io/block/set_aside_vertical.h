@@ -1,4 +1,4 @@
-// Observed verticals that orientation does not believe, with the reason.
+// Observed verticals that the orientation rejects, with the reason.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,13 @@
 
 namespace megablock {
 
-// Whether a vertical is believed, and if not, why.
+// Whether a vertical is accepted, and if not, why.
 enum class VerticalVerdict : std::uint8_t {
   kBelieved,
-  kContradicted,   // most others contradict it
-  kNoConsensus,    // those it can be compared with agree on no direction
-  kAgainstGround,  // what it and others take for down is not, by the positions or attitudes
-  kAgainstPoses,   // as most others with given poses, it shows another direction than theirs of down
+  kContradicted,   // most other verticals contradict it
+  kNoConsensus,    // the verticals that it can be compared with do not agree
+  kAgainstGround,  // positions or attitudes show that the direction it and others agree on is not down
+  kAgainstPoses,   // like most other verticals of frames with given poses, it contradicts the vertical of these poses
 };
 
 struct SetAsideVertical {

@@ -1,4 +1,4 @@
-// Rows of one set of tracks added to another.
+// Appends rows of one set of tracks to another.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace megablock {
 
-// Rows [first, last) behind the others.
+// Appends the rows [first, last).
 template <typename Value>
 void append_rows(const std::vector<Value>& from, std::int64_t first, std::int64_t last, std::vector<Value>& to) {
   to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(first),
             from.begin() + static_cast<std::ptrdiff_t>(last));
 }
 
-// Tracks [first, last) with their observations behind those of `to`, which may be a set without even its first begin.
+// Appends the tracks [first, last) with their observations. `to` may be empty, even without its first `begin`.
 void append_tracks(const TrackSet& from, std::int64_t first, std::int64_t last, TrackSet& to);
 
 }  // namespace megablock

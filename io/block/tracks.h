@@ -1,6 +1,7 @@
-// Tracks (tie points) and their observations, compressed sparse rows.
+// Tracks (tie points) and their observations, as compressed sparse rows.
 //
-// Positions are integers in units of 2^-10 px (exact in double), as stored; every consumer reads these values.
+// Positions are integers in units of 2^-10 px, which a double represents exactly. Files and all calculations use the
+// same values.
 #pragma once
 
 #include <cmath>
@@ -16,13 +17,13 @@ inline constexpr double kPixelUnit = 1.0 / 1024;  // px
 inline std::int32_t to_fixed_pixel(double px) { return static_cast<std::int32_t>(std::lround(px * 1024)); }
 inline double from_fixed_pixel(std::int32_t v) { return v * kPixelUnit; }
 
-// Observations of track t are rows [begin[t], begin[t+1]); images ascending and distinct inside a track.
+// The observations of track t are the rows [begin[t], begin[t+1]). The images of a track are ascending and distinct.
 struct TrackSet {
-  std::vector<TrackIndex> id;         // [tracks], ascending global indices
+  std::vector<TrackIndex> id;         // [tracks] ascending global indices
   std::vector<std::int64_t> begin;    // [tracks + 1]
   std::vector<ImageIndex> image;      // [observations]
   std::vector<std::int32_t> x, y;     // [observations], 2^-10 px, pixel centres at +0.5
-  std::vector<std::int32_t> feature;  // [observations], row in the image's features; -1 when there is none
+  std::vector<std::int32_t> feature;  // [observations] row in the features of the image; -1: none
 
   std::int64_t track_count() const { return static_cast<std::int64_t>(id.size()); }
   std::int64_t observation_count() const { return static_cast<std::int64_t>(image.size()); }

@@ -15,7 +15,7 @@ namespace megablock {
 
 namespace {
 
-// Exiv2 and its XMP parser keep global tables: one reader at a time.
+// Exiv2 and its XMP parser have global tables, so only one thread may read at a time.
 std::mutex& exiv2_mutex() {
   static std::mutex mutex;
   return mutex;
@@ -35,7 +35,7 @@ class ExifFields {
     const auto* value = find(key);
     return value ? trimmed_exif(value->toString()) : "";
   }
-  // The n-th component; NaN when absent or with denominator zero.
+  // Component n of a field; NaN if it is absent or its denominator is zero.
   double number(const char* key, long n = 0) const {
     const auto* value = find(key);
     if (!value || n >= value->count()) return ImageHeader::kUnknown;
@@ -58,7 +58,7 @@ class ExifFields {
   const Exiv2::ExifData& data_;
 };
 
-// XMP properties by their local name, whatever prefix the writer chose.
+// Finds XMP properties by their local name, whatever prefix the writer chose.
 double xmp_number(const Exiv2::XmpData& data, const std::string& group, const std::string& name) {
   for (const auto& property : data) {
     if (property.groupName() != group || property.tagName() != name) continue;
@@ -68,7 +68,7 @@ double xmp_number(const Exiv2::XmpData& data, const std::string& group, const st
   return ImageHeader::kUnknown;
 }
 
-// Degrees of the three rationals degrees, minutes, seconds (the latter two may be absent).
+// Degrees from the three rationals degrees, minutes and seconds; the last two may be absent.
 double dms_degrees(const ExifFields& exif, const char* key) {
   const double degrees = exif.number(key, 0), minutes = exif.number(key, 1), seconds = exif.number(key, 2);
   return degrees + (std::isnan(minutes) ? 0 : minutes / 60) + (std::isnan(seconds) ? 0 : seconds / 3600);
@@ -93,8 +93,9 @@ void read_position(const ExifFields& exif, const Exiv2::XmpData& xmp, ImageHeade
   if (up > 0) header.position_sigma_vertical_m = up;
 }
 
-// The gimbal's angles are those of the camera. Flight angles are the body's and say nothing of a gimballed camera; a
-// fixed one looks down the body's z axis only by assumption, so they are not used alone.
+// The gimbal angles are those of the camera. Flight angles are those of the body and say nothing about a camera on a
+// gimbal. For a fixed camera they would need the assumption that it looks along the body's z axis, so they are not used
+// alone.
 void read_attitude(const Exiv2::XmpData& xmp, ImageHeader& header) {
   const double yaw = xmp_number(xmp, "drone-dji", "GimbalYawDegree");
   const double pitch = xmp_number(xmp, "drone-dji", "GimbalPitchDegree");
@@ -122,7 +123,7 @@ double read_time(const ExifFields& exif) {
 void read_lens(const ExifFields& exif, ImageHeader& header) {
   header.focal_mm = exif.number("Exif.Photo.FocalLength");
   header.focal_35mm = exif.number("Exif.Photo.FocalLengthIn35mmFilm");
-  // The resolution refers to the image as taken; a reduced copy keeps the original size in PixelXDimension.
+  // The resolution refers to the original image. A reduced copy keeps the original size in PixelXDimension.
   const double resolution = exif.number("Exif.Photo.FocalPlaneXResolution");  // pixels per unit
   const double unit = exif.number("Exif.Photo.FocalPlaneResolutionUnit");
   const double unit_mm = unit == 3 ? 10 : unit == 4 ? 1 : 25.4;
@@ -131,7 +132,8 @@ void read_lens(const ExifFields& exif, ImageHeader& header) {
   if (std::isnan(pixels)) pixels = std::max(header.width, header.height);
   if (other > pixels) pixels = other;
   const double sensor = pixels / resolution * unit_mm;
-  if (sensor > 3 && sensor < 70) header.sensor_width_mm = sensor;  // else a copy whose tags no longer belong together
+  // Otherwise a copy with tags that no longer fit together.
+  if (sensor > 3 && sensor < 70) header.sensor_width_mm = sensor;
 }
 
 std::string exiv2_reason(const Exiv2::AnyError& error) {

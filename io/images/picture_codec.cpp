@@ -15,7 +15,7 @@ namespace {
 constexpr const char* kLibrary = "libmegablock_pictures.so";
 
 PictureCodecs load_codecs() {
-  void* library = dlopen(kLibrary, RTLD_NOW | RTLD_LOCAL);  // stays until the end
+  void* library = dlopen(kLibrary, RTLD_NOW | RTLD_LOCAL);  // stays loaded until the process ends
   void* symbol = library == nullptr ? nullptr : dlsym(library, "megablock_picture_codecs");
   if (symbol == nullptr)
     throw InputError(std::string("pictures cannot be read or written: ") + dlerror() +

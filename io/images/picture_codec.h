@@ -1,11 +1,12 @@
-// Pictures from and to the bytes of their files (JPEG, PNG, TIFF and what else OpenCV's imgcodecs knows).
+// Decodes and encodes image files (JPEG, PNG, TIFF and the other formats of OpenCV's imgcodecs).
 //
-// imgcodecs brings GDAL and with it some eighty libraries, 30 MiB and a tenth of a second to every process that is
-// linked with it. So it is not: libmegablock_pictures.so is, which is loaded from beside the program (or, installed,
-// from ../lib/megablock) when the first picture is read or written. Ranks that only adjust never load it.
+// imgcodecs depends on GDAL and so on about eighty libraries; they cost every linked process 30 MiB and a tenth of a
+// second. The program is therefore not linked with it. libmegablock_pictures.so is, and it is loaded from beside the
+// program (or, once installed, from ../lib/megablock) when the first image is read or written. Ranks that only adjust
+// never load it.
 //
-// All throw InputError when the library is not there, and cv::Exception where OpenCV does. Before pictures are read by
-// threads, from which nothing may be thrown, load_picture_codecs() makes sure of the library.
+// All functions throw InputError if the library is missing, and cv::Exception where OpenCV does. Call
+// load_picture_codecs() before threads read images, because nothing may be thrown from a thread.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -16,21 +17,21 @@ namespace megablock {
 
 void load_picture_codecs();
 
-// As cv::imdecode, `flags` of cv::ImreadModes: empty when it is no picture that imgcodecs knows.
+// As cv::imdecode, with the `flags` of cv::ImreadModes. Empty for anything that imgcodecs cannot decode.
 cv::Mat decode_picture(const std::vector<unsigned char>& file, int flags);
 
-// As cv::imread: the same of a file, empty also when it cannot be read.
+// As cv::imread, the same for a file. Empty also if the file cannot be read.
 cv::Mat read_picture(const std::string& path, int flags);
 
-// As cv::imencode. `extension`: ".jpg", ".png"; `parameters`: pairs of cv::ImwriteFlags and values. ComputeError where
-// imgcodecs cannot.
+// As cv::imencode. `extension` is ".jpg" or ".png", for example; `parameters` are pairs of cv::ImwriteFlags and values.
+// Throws ComputeError where imgcodecs fails.
 std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
                                           const std::vector<int>& parameters = {});
 
-// The format by the extension of `path`. InputError when the file cannot be written.
+// Writes a file in the format of its extension. Throws InputError if the file cannot be written.
 void write_picture(const std::string& path, const cv::Mat& picture, const std::vector<int>& parameters = {});
 
-// What libmegablock_pictures.so offers, by its one symbol.
+// The functions of libmegablock_pictures.so, which its only symbol returns.
 struct PictureCodecs {
   cv::Mat (*decode)(const std::vector<unsigned char>& file, int flags);
   std::vector<unsigned char> (*encode)(const std::string& extension, const cv::Mat& picture,

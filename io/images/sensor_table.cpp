@@ -11,12 +11,12 @@ namespace megablock {
 namespace {
 
 struct Sensor {
-  std::string_view make;  // empty: of any make
+  std::string_view make;  // empty: any make
   double width_mm;
 };
 using SensorTable = std::multimap<std::string_view, Sensor, std::less<>>;  // by model
 
-// Letters and digits in lower case, as the table writes names.
+// Letters and digits in lower case, the form in which the table has names.
 std::string plain_name(std::string_view name) {
   std::string plain;
   for (const char c : name) {
@@ -41,7 +41,7 @@ SensorTable read_table(std::string_view text) {
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (line.empty() || line.front() == '#') continue;
     const std::string_view make = next_field(line), model = next_field(line), width = next_field(line);
-    double width_mm = 0;  // stays zero in the header line
+    double width_mm = 0;  // remains zero in the header line
     std::from_chars(width.data(), width.data() + width.size(), width_mm);
     if (width_mm > 0) table.emplace(model, Sensor{make, width_mm});
   }
@@ -61,7 +61,7 @@ std::optional<double> sensor_width_mm(const std::string& make, const std::string
   static const SensorTable table = read_table(kSensorWidths);
   const std::string name = plain_name(model), maker = plain_name(make);
   if (const auto width = find_width(table, maker, name)) return width;
-  // "NIKON CORPORATION", "NIKON D800": many makers repeat their name before the model's.
+  // Many makers repeat their name before that of the model: "NIKON CORPORATION", "NIKON D800".
   const std::string first_word = plain_name(std::string_view(make).substr(0, make.find(' ')));
   for (const std::string& prefix : {maker, first_word})
     if (!prefix.empty() && name.starts_with(prefix))

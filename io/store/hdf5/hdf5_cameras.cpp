@@ -8,7 +8,7 @@ namespace {
 
 constexpr const char* kCovariance = "cameras/covariance";
 
-// Columns of a matrix of parameters; one when there is no camera.
+// Number of columns of a matrix of parameters; one if there is no camera.
 std::size_t columns_of(const std::vector<CameraModel>& models) {
   int most = 1;
   for (const CameraModel& model : models) most = std::max(most, parameter_count(model));

@@ -1,6 +1,6 @@
-// Parameters of cameras in files, a row per camera: names of the models and their parameters, values as a matrix with
-// as many columns as the largest model has, NaN behind the last parameter (docs/job-format.md, "Cameras"). Internal to
-// io/.
+// Camera parameters in files, one row per camera: the names of models and parameters, and the values as a matrix. It
+// has as many columns as the largest model has parameters, with NaN after the last parameter of a smaller one
+// (docs/job-format.md, "Cameras"). Internal to io/.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,9 @@
 
 namespace megablock {
 
-// Datasets cameras/model and cameras/parameters.
+// Writes the datasets cameras/model and cameras/parameters.
 void put_models(Hdf5Writer& file, const std::vector<CameraModel>& models);
-// Throws StoreError when a model is not known, or there are not `rows` of them (any number when negative).
+// Reads the models. Throws StoreError for an unknown model, or if their number is not `rows` (any number if negative).
 std::vector<CameraModel> get_models(const Hdf5Reader& file, std::int64_t rows = -1);
 
 template <typename Cameras>
@@ -20,14 +20,14 @@ std::vector<CameraModel> models_of(const Cameras& cameras) {
   return column(cameras, [](const Intrinsics& k) { return k.model(); });
 }
 
-// Matrices [cameras x parameters], row c from parameters(c), the first of as many values as model c has.
+// Writes a matrix [cameras x parameters]. values[c] points to as many values as model c has parameters.
 void put_parameters(Hdf5Writer& file, const std::string& name, const std::vector<CameraModel>& models,
                     const std::vector<const double*>& values, const std::string& description);
-// Throws StoreError when the shape does not fit the models.
+// Reads such a matrix. Throws StoreError if its shape does not fit the models.
 void get_parameters(const Hdf5Reader& file, const std::string& name, const std::vector<CameraModel>& models,
                     const std::vector<double*>& values);
 
-// Intrinsics and their models.
+// Intrinsics together with their models.
 template <typename Cameras>
 void put_intrinsics(Hdf5Writer& file, const Cameras& cameras, const std::string& description) {
   put_parameters(file, "cameras/intrinsics", models_of(cameras),
@@ -35,7 +35,7 @@ void put_intrinsics(Hdf5Writer& file, const Cameras& cameras, const std::string&
 }
 std::vector<Intrinsics> get_intrinsics(const Hdf5Reader& file, std::int64_t rows = -1);
 
-// Square matrices [cameras x parameters x parameters].
+// Covariances as an array [cameras x parameters x parameters].
 void put_covariances(Hdf5Writer& file, const std::vector<Eigen::MatrixXd>& covariances);
 std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::vector<CameraModel>& models);
 

@@ -6,7 +6,8 @@
 
 namespace megablock {
 
-// Square matrices of a list, one behind the other (symmetric, so the order of rows and columns does not matter).
+// The elements of all matrices, one matrix after the other. The matrices are symmetric, so the order of rows and
+// columns does not matter.
 template <typename Scalar, typename Matrices>
 std::vector<Scalar> flattened(const Matrices& matrices) {
   std::vector<Scalar> values;
@@ -18,6 +19,7 @@ std::vector<Scalar> flattened(const Matrices& matrices) {
   return values;
 }
 
+// The inverse of flattened().
 template <typename Matrix, typename Scalar>
 std::vector<Matrix> square_matrices(const std::vector<Scalar>& values) {
   constexpr std::size_t kSize = Matrix::SizeAtCompileTime;

@@ -18,7 +18,8 @@ std::vector<hsize_t> extent_of(hid_t space) {
   return extent;
 }
 
-// Reads the ranges of an open dataset, each behind the one before; the chunks they share stay in its cache.
+// Reads the ranges of an open dataset one after the other. Chunks that several ranges share stay in the dataset's
+// cache.
 bool read_ranges(hid_t set, hid_t memory_type, const std::vector<RowRange>& ranges, char* values) {
   const Hdf5Handle space(H5Dget_space(set), &H5Sclose);
   std::vector<hsize_t> extent = extent_of(space.id()), start(extent.size(), 0);
@@ -43,7 +44,7 @@ std::int64_t count_of(const std::vector<RowRange>& ranges) {
   return count;
 }
 
-// Fixed-length texts without their padding.
+// Strings of fixed length without their padding.
 std::vector<std::string> unpadded(const std::string& padded, std::size_t length) {
   std::vector<std::string> values(padded.size() / length);
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -53,7 +54,7 @@ std::vector<std::string> unpadded(const std::string& padded, std::size_t length)
   return values;
 }
 
-// "[12, 3]", "[any, 3]"
+// A shape as text: "[12, 3]", "[any, 3]".
 std::string shape_text(const std::vector<std::int64_t>& shape) {
   std::string text = "[";
   for (std::size_t d = 0; d < shape.size(); ++d)

@@ -1,4 +1,5 @@
-// Rows of items as matrices in files and back: poses, vectors, indices. Used by the readers and writers of io/ only.
+// Turns lists of items into the matrices of files and back: poses, vectors, indices. Only the readers and writers of
+// io/ use it.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +14,7 @@ namespace megablock {
 
 inline constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
-// One value per item: column(items, [](const Item&) -> value).
+// One value for each item: column(items, [](const Item&) -> value).
 template <typename Items, typename Get>
 auto column(const Items& items, Get get) {
   using Value = std::decay_t<decltype(get(*items.begin()))>;
@@ -23,7 +24,7 @@ auto column(const Items& items, Get get) {
   return values;
 }
 
-// Three values per item, row-major.
+// Three values for each item, row-major.
 template <typename Items, typename Get>
 std::vector<double> vectors3(const Items& items, Get get) {
   std::vector<double> values;
@@ -57,7 +58,7 @@ inline Eigen::Quaterniond quaternion(const std::vector<double>& values, std::siz
 inline Eigen::Quaterniond absent_quaternion() { return {kAbsent, kAbsent, kAbsent, kAbsent}; }
 inline Eigen::Vector3d absent_vector() { return Eigen::Vector3d::Constant(kAbsent); }
 
-// Poses of a list: datasets <group>/rotation_wxyz [n,4] and <group>/centre [n,3].
+// A list of poses as the datasets <group>/rotation_wxyz [n,4] and <group>/centre [n,3].
 template <typename Poses>
 void write_poses(Hdf5Writer& file, const std::string& group, const Poses& poses, const std::string& inside,
                  const std::string& outside) {
@@ -75,7 +76,7 @@ inline std::vector<Pose> read_poses(const Hdf5Reader& file, const std::string& g
   return poses;
 }
 
-// Indices as 64-bit integers and back.
+// Indices as 64-bit integers, and back.
 template <typename Indices>
 std::vector<std::int64_t> plain(const Indices& indices) {
   return column(indices, [](const auto& index) -> std::int64_t { return index.value; });
@@ -88,7 +89,8 @@ std::vector<Index> indices(const std::vector<std::int64_t>& values) {
   return result;
 }
 
-// First differences, the first against zero: small numbers where values ascend. cumulate() undoes it.
+// First differences, the first one against zero: small numbers if the values ascend, which compress well. cumulate() is
+// the inverse.
 inline std::vector<std::int64_t> differences(std::vector<std::int64_t> values) {
   for (std::size_t i = values.size(); i-- > 1;) values[i] -= values[i - 1];
   return values;
@@ -98,13 +100,13 @@ inline std::vector<std::int64_t> cumulate(std::vector<std::int64_t> values) {
   return values;
 }
 
-// Row offsets of lists stored one behind the other: counts [n] in files, begin [n + 1] in memory.
+// Row offsets of lists that are stored one after the other: files have counts [n], memory has begin [n + 1].
 inline std::vector<std::int64_t> counts_of(const std::vector<std::int64_t>& begin) {
   std::vector<std::int64_t> counts;
   for (std::size_t i = 1; i < begin.size(); ++i) counts.push_back(begin[i] - begin[i - 1]);
   return counts;
 }
-// Throws StoreError when a count is negative or they do not add up to `total` (not tested when negative).
+// Throws StoreError if a count is negative, or if the sum is not `total` (not tested if negative).
 inline std::vector<std::int64_t> begin_of(const Hdf5Reader& file, const std::string& name,
                                           const std::vector<std::int64_t>& counts, std::int64_t total = -1) {
   std::vector<std::int64_t> begin(counts.size() + 1, 0);

@@ -1,5 +1,4 @@
-// Types and checks that the HDF5 reader and writer share. Internal to io/store/hdf5/: the only header that includes
-// HDF5.
+// Common parts of the HDF5 reader and writer. Only io/store/hdf5/hdf5_*.cpp include it.
 #pragma once
 
 #include <hdf5.h>
@@ -10,17 +9,17 @@
 
 namespace megablock {
 
-// Type in memory, and the little-endian type in files.
+// The type in memory, and the little-endian type in files.
 hid_t memory_type(ElementType type);
 hid_t file_type(ElementType type);
 
-// Turns off HDF5's printing of its error stack; errors are reported through exceptions.
+// Turns off HDF5's own output of errors; they are reported as exceptions.
 void silence_hdf5();
 
 // The innermost entry of HDF5's error stack.
 std::string last_hdf5_failure();
 
-// File access properties of every file: libver latest, no file locking, closing takes open objects along.
+// File access properties for all files: libver latest, no file locking, and closing a file closes its open objects.
 Hdf5Handle file_access();
 
 }  // namespace megablock

@@ -16,13 +16,14 @@ namespace megablock {
 
 namespace {
 
-constexpr std::size_t kCompressFrom = 16384;  // bytes; smaller datasets are stored as they are
-constexpr hsize_t kChunkBytes = 1 << 16;      // of one chunk before compression: what a query of some rows reads
-constexpr hsize_t kTextChunks = 16;           // of texts that are written at a time
+constexpr std::size_t kCompressFrom = 16384;  // bytes; smaller datasets are not compressed
+// Bytes of a chunk before compression, which is what a query for some rows reads.
+constexpr hsize_t kChunkBytes = 1 << 16;
+constexpr hsize_t kTextChunks = 16;           // number of chunks of text that are written at a time
 constexpr std::size_t kMemoryStep = 1 << 20;  // bytes by which the file in memory grows
-constexpr unsigned kDeflateLevel = 1;         // higher levels gain a few per cent for several times the time
+constexpr unsigned kDeflateLevel = 1;         // higher levels save a few per cent and take several times as long
 
-// Where the superblock (version 2 or 3, 8-byte addresses) tells the end of the file.
+// Position in the superblock (version 2 or 3, 8-byte addresses) of the end of the file.
 constexpr std::int64_t kEndOfFile = 28;
 
 Hdf5Handle without_times(hid_t property_class) {
@@ -39,13 +40,13 @@ Hdf5Handle text_type(std::size_t length) {
   return type;
 }
 
-// Of a floating-point value all digits are significant: deflate leaves 87 % of them, at 60 MB/s.
+// All digits of floating-point values are significant: deflate would keep 87 % of them, at 60 MB/s.
 bool worth_compressing(hid_t type) { return H5Tget_class(type) != H5T_FLOAT; }
 
 void set_chunks(hid_t properties, int rank, const std::vector<hsize_t>& chunk, hid_t type) {
   H5Pset_chunk(properties, rank, chunk.data());
   if (!worth_compressing(type)) {
-    H5Pset_fletcher32(properties);  // deflate has a checksum of its own
+    H5Pset_fletcher32(properties);  // deflate has its own checksum
     return;
   }
   H5Pset_shuffle(properties);
@@ -54,7 +55,7 @@ void set_chunks(hid_t properties, int rank, const std::vector<hsize_t>& chunk, h
 
 hsize_t rows_of_chunk(std::size_t row_bytes) { return std::max<hsize_t>(1, kChunkBytes / row_bytes); }
 
-// Chunks are whole rows; the longest dimension is the first.
+// Chunks consist of whole rows; the first dimension is the longest.
 void set_compression(hid_t properties, const std::vector<hsize_t>& extent, hid_t type) {
   if (!worth_compressing(type)) return;
   std::size_t row_bytes = H5Tget_size(type);
@@ -70,14 +71,14 @@ bool fits(std::int64_t lowest, std::int64_t highest) {
   return lowest >= std::numeric_limits<T>::min() && highest <= std::numeric_limits<T>::max();
 }
 
-// Rows of one shape.
+// The shape of a number of rows.
 std::vector<hsize_t> shape_of(hsize_t rows, const std::vector<std::int64_t>& row) {
   std::vector<hsize_t> shape = {rows};
   shape.insert(shape.end(), row.begin(), row.end());
   return shape;
 }
 
-// Gives back what is reserved beyond the end of a closed file.
+// Releases the disk space that is reserved beyond the end of a closed file.
 void give_back_disk(const std::string& path) {
   const Descriptor file(path, O_RDWR);
   std::uint64_t end = 0;
@@ -88,7 +89,7 @@ void give_back_disk(const std::string& path) {
 
 }  // namespace
 
-// HDF5's memory driver asks these callbacks for its buffer and hands it back when the file is closed.
+// HDF5's memory driver asks these callbacks for its buffer and returns it when the file is closed.
 struct Hdf5Writer::Image {
   void* data = nullptr;
   ~Image() { std::free(data); }
@@ -106,7 +107,7 @@ struct Hdf5Writer::Image {
   static void* share(void* image) { return image; }
   static herr_t unshare(void*) { return 0; }
 
-  // The buffer itself is longer than the file.
+  // The size of the file; the buffer is longer.
   std::size_t size() const {
     std::uint64_t end = 0;
     if (data) std::memcpy(&end, static_cast<const char*>(data) + kEndOfFile, sizeof end);
@@ -128,10 +129,10 @@ Hdf5Writer::Hdf5Writer(const std::string& path, const std::string& kind, Hdf5Sto
   } else {
     const Descriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
     if (file.id() < 0) throw_file_error(path, "created", errno);
-    reserve_disk(0);  // is there any room? HDF5 must not find out
+    reserve_disk(0);  // HDF5 must not find out that there is no space
   }
   file_ = Hdf5Handle(checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()), ""), &H5Fclose);
-  reserve_disk(0);  // creating gave it back
+  reserve_disk(0);  // creating the file released it
   attribute("/", "kind", kind);
   attribute("/", "format_version", kFormatVersion);
 }
@@ -155,7 +156,7 @@ void Hdf5Writer::close() {
   write_fully(file.id(), path_, image_->data, image_->size());
 }
 
-// Room for `bytes` of new rows, for chunks that are not full yet, and for HDF5's own tables.
+// Reserves space for `bytes` of new rows, for chunks that are not yet full, and for HDF5's own tables.
 void Hdf5Writer::reserve_disk(std::int64_t bytes) {
   if (storage_ == Hdf5Storage::kMemory) return;
   hsize_t written = 0;
@@ -241,7 +242,7 @@ Hdf5Handle Hdf5Writer::make_dataset(const std::string& name, std::int64_t file_t
           &H5Dclose};
 }
 
-// Rows of the shape `row` each.
+// Writes rows that each have the shape `row`.
 void Hdf5Writer::write_rows(std::int64_t set, const std::string& name, std::int64_t memory_type, const void* values,
                             const std::vector<std::int64_t>& row, RowRange range) {
   std::vector<hsize_t> start(row.size() + 1, 0);
