@@ -7,8 +7,8 @@ namespace megablock {
 namespace {
 
 struct Value {
-  double f = 0, slope = 0, magnitude = 0;  // magnitude: sum of the terms' absolute values
-};                                         // magnitude: sum of |c_i x^i|, which bounds the rounding error of f
+  double f = 0, slope = 0, magnitude = 0;  // magnitude: sum of |c_i x^i|, which bounds the rounding error of f
+};
 
 Value value_of(std::span<const double> c, double x) {
   // Horner's scheme for the value, its derivative and the sum of magnitudes.

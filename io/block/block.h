@@ -141,7 +141,7 @@ struct Block {
   GroundFrame ground;
   std::string image_folder;  // absolute, ends with '/'; empty for simulated tie points
   IndexedVector<CameraIndex, Camera> cameras;
-  IndexedVector<RigIndex, Rig> rigs;  // absolute, ends with '/'; empty for simulated tie points
+  IndexedVector<RigIndex, Rig> rigs;
   IndexedVector<FrameIndex, Frame> frames;
   IndexedVector<ImageIndex, Image> images;
   NameTable<ImageIndex> image_names;  // [images] relative paths in the image folder, all different

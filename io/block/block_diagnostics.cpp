@@ -167,18 +167,18 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
   for (const auto& link : d.weak_links)
     text += fmt::format("weak link of {} between {}\n", counted(link.points, "point"), between(link.a, link.b));
   for (const auto& link : d.single_links)
-    text +=
-        fmt::format("{} on the link between {}\n",
-                    counted(link.frames, "frame") + (link.frames == 1 ? " hangs" : " hang"), between(link.a, link.b));
+    text += fmt::format("{} to the rest of the block only by the link between {}\n",
+                        counted(link.frames, "frame") + (link.frames == 1 ? " is connected" : " are connected"),
+                        between(link.a, link.b));
   if (!d.proposals.empty())
     text += fmt::format("{} proposed\n", d.proposals.size() == 1 ? "1 exposure is"
                                                                  : fmt::format("{} exposures are", d.proposals.size()));
-  if (text.empty()) text = "nothing of what was looked for is missing\n";
+  if (text.empty()) text = "no weakness was found\n";
   if (!d.aerial)
     text +=
-        "not looked for, as the images do not look down, or nothing tells where down is: flight lines, ground, bases, "
+        "not examined, because the images do not look down or the vertical is unknown: flight lines, ground, bases, "
         "overlaps\n";
-  if (!d.links_known) text += "not looked for, as there are no matches or tie points yet: links\n";
+  if (!d.links_known) text += "not examined, because there are no matches or tie points yet: links\n";
   return text;
 }
 

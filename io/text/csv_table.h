@@ -1,4 +1,5 @@
-// A small CSV file: comments ("# key: value"), a header line, rows. Fields may be quoted ("a, b"). Internal to io/.
+// Reads a small CSV file: comments ("# key: value"), a header line, rows. Fields may be quoted ("a, b"). Internal to
+// io/.
 #pragma once
 
 #include <map>
@@ -10,25 +11,29 @@
 
 namespace megablock {
 
-// InputError "where: ..." for a header whose columns are separated by semicolons.
+// Throws InputError "where: ..." for a header with semicolons between its columns.
 void refuse_semicolons(const std::string& header, const std::string& where);
 
+// The table of a file. Columns are addressed by their names in the header.
 class CsvTable {
  public:
-  explicit CsvTable(const std::string& path);  // InputError when it cannot be read, is empty, or a row is too long
+  // Throws InputError if the file cannot be read or is empty, or a row is too long.
+  explicit CsvTable(const std::string& path);
 
   std::size_t row_count() const { return rows_.size(); }
   bool has(const std::string& column) const { return columns_.contains(column); }
-  void require(const std::vector<std::string>& columns) const;         // InputError naming the missing one
-  void refuse_others(const std::vector<std::string>& columns) const;   // InputError for a column not in the list
-  std::string text(std::size_t row, const std::string& column) const;  // "" when empty or absent
-  std::optional<double> number(std::size_t row, const std::string& column) const;  // none when empty or NaN
-  // And InputError outside of the limits.
+  void require(const std::vector<std::string>& columns) const;  // throws InputError with the name of a missing column
+  // Throws InputError for a column that is not in the list.
+  void refuse_others(const std::vector<std::string>& columns) const;
+  std::string text(std::size_t row, const std::string& column) const;              // "" if empty or absent
+  std::optional<double> number(std::size_t row, const std::string& column) const;  // nothing if empty or NaN
+  // The same; throws InputError outside the limits.
   std::optional<double> number(std::size_t row, const std::string& column, const Limits& limits) const;
-  double needed_number(std::size_t row, const std::string& column) const;  // InputError when empty or NaN
-  double needed_metres(std::size_t row, const std::string& column) const;  // and when beyond any place on Earth
+  double needed_number(std::size_t row, const std::string& column) const;  // throws InputError if empty or NaN
+  // And if farther away than any place on Earth.
+  double needed_metres(std::size_t row, const std::string& column) const;
   std::string where(std::size_t row) const;
-  // Value of a comment line "# key: value"; empty when absent.
+  // The value of a comment line "# key: value"; empty if there is none.
   std::string comment(const std::string& key) const;
 
  private:

@@ -1,4 +1,4 @@
-// Lists of file formats with a name each. Internal to io/.
+// Lists of file formats with names. Internal to io/.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ std::vector<std::string> names_of(const std::vector<Format>& formats) {
   return names;
 }
 
-// InputError that lists the names when there is none of this name; `kind`: "export", "import".
+// The format of this name. Throws InputError with a list of all names if there is none; `kind` is "export" or "import".
 template <typename Format>
 const Format& format_named(const std::vector<Format>& formats, const std::string& name, const std::string& kind) {
   std::string list;

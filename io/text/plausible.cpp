@@ -20,7 +20,7 @@ void check_within(double value, const Limits& limits, const std::string& what, c
 }
 
 void check_on_earth(double coordinate, const std::string& what, const std::string& where) {
-  constexpr double kFarthest = 1e8;  // northings reach 1e7 m, eastings with the zone in front 6e7 m
+  constexpr double kFarthest = 1e8;  // northings reach 1e7 m, eastings with the number of the zone in front 6e7 m
   if (!(std::abs(coordinate) <= kFarthest))
     throw InputError(
         fmt::format("{}: {}: {:g} is beyond any place on Earth; correct the number or its unit, or take the line out",

@@ -12,7 +12,7 @@ namespace megablock {
 
 namespace {
 
-// What stands behind the number, or everything when it does not begin with one.
+// The text after the number, or the whole text if it does not begin with a number.
 template <typename Value>
 std::string parse_leading(const std::string& text, Value& value) {
   const char* begin = text.data() + (text.size() > 1 && text[0] == '+' ? 1 : 0);
@@ -22,7 +22,7 @@ std::string parse_leading(const std::string& text, Value& value) {
 
 std::string in_apostrophes(const std::string& text) { return "'" + text + "'"; }
 
-// Edit distance of Levenshtein, for the suggestion in a message.
+// Levenshtein's edit distance, for the suggestion in a message.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), 0);

@@ -1,5 +1,5 @@
-// Applies one section of the project file (StageSettings) to the fields of an option struct, with messages that name
-// file and line. Where the options live is where their keys are known:
+// Copies one section of the project file (StageSettings) into the fields of an option struct, with messages that name
+// file and line. The keys are declared next to the options that they set:
 //
 //     SettingsReader reader(project.settings, "adjustment");
 //     reader.number("max_residual_sigmas", options.max_residual_sigmas);
@@ -19,17 +19,18 @@ class SettingsReader {
  public:
   SettingsReader(const StageSettings& settings, std::string section);
 
-  // Each declares a key and, when the project file has it, sets the field and returns true. InputError "file:line: ..."
-  // when the value is not of the kind: a unit after a number is refused (units are in the names of the keys).
+  // Each function declares a key. If the project file has it, the function sets the field and returns true. Throws
+  // InputError "file:line: ..." for a value of the wrong kind. A unit after a number is refused, because the names of
+  // keys contain it.
   bool number(const std::string& key, double& field);
   bool integer(const std::string& key, int& field);
   bool integer(const std::string& key, std::int64_t& field);
   bool flag(const std::string& key, bool& field);  // true | false
   bool text(const std::string& key, std::string& field);
-  // One of `choices`; the field becomes its position.
+  // One of `choices`; the field is set to its position.
   bool choice(const std::string& key, const std::vector<std::string>& choices, int& field);
 
-  // InputError naming the first key of the section that was never declared, and the keys there are.
+  // Throws InputError for the first key of the section that was not declared, with the list of known keys.
   void finish() const;
 
  private:
@@ -40,17 +41,17 @@ class SettingsReader {
   std::vector<std::string> known_;
 };
 
-// The sections that go to the stages, in the order of the pipeline.
+// The sections that belong to stages, in the order of the pipeline.
 const std::vector<std::string>& stage_sections();
 
-// Parsers of one scalar, shared with the rest of the project file; `what` is the key, `where` file:line.
+// Parsers of single values, shared by all readers of the project file. `what` is the key, `where` is file:line.
 double parse_number(const std::string& text, const std::string& what, const std::string& where);
 std::int64_t parse_integer(const std::string& text, const std::string& what, const std::string& where);
 bool parse_flag(const std::string& text, const std::string& what, const std::string& where);
 
-// The known name nearest to a misspelled one; empty when none is near.
+// The known name most similar to a misspelled one; empty if none is similar.
 std::string nearest_name(const std::string& name, const std::vector<std::string>& known);
-// "unknown key 'x' in 'section'; did you mean 'y'? known keys: ..." with the nearest known key when there is one.
+// "unknown key 'x' in 'section'; did you mean 'y'? known keys: ...", with the most similar known key if there is one.
 std::string unknown_key_message(const std::string& key, const std::string& section,
                                 const std::vector<std::string>& known);
 

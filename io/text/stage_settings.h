@@ -1,4 +1,4 @@
-// The options of the stages as the project file states them, before the stages read them.
+// The options of the stages as written in the project file, before the stages read them.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace megablock {
 
-// Options of the stages, by the names of the project file. Defaults: see the option structs of the rooms; an unset
-// value means "the room's default" so that defaults live in one place.
+// Options by their names in the project file. An option that is not set has the default of the option struct of its
+// room; in this way each default has only one place.
 struct StageSettings {
   struct Entry {
     std::string section, key, value;  // e.g. "features", "max_features", "8000"

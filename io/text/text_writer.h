@@ -1,4 +1,4 @@
-// Buffered text and binary output with one check for every failure. Internal to io/.
+// Buffered output of text and binary numbers. A single check at the end reports every failure. Internal to io/.
 #pragma once
 
 #include <fmt/core.h>
@@ -15,7 +15,7 @@ namespace megablock {
 
 class TextWriter {
  public:
-  // Opens (and empties) the file; InputError when that is not possible.
+  // Opens and empties the file. Throws InputError if that is impossible.
   explicit TextWriter(const std::string& path) : path_(path), file_(std::fopen(path.c_str(), "wb")) {
     if (!file_) fail();
   }
@@ -25,14 +25,14 @@ class TextWriter {
   TextWriter(const TextWriter&) = delete;
   TextWriter& operator=(const TextWriter&) = delete;
 
-  // {} of a double is the shortest text that reads back to the same bits.
+  // {} prints a double as the shortest text that reads back to the same bits.
   template <typename... Arguments>
   void print(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
     fmt::vformat_to(std::back_inserter(buffer_), format, fmt::make_format_args(arguments...));
     if (buffer_.size() > kChunk) flush();
   }
 
-  // The bytes of a number, little endian as every machine we build for.
+  // The bytes of a number, little-endian, as on all supported machines.
   template <typename Value>
   requires std::is_arithmetic_v<Value>
   void bytes(Value value) {
@@ -41,7 +41,7 @@ class TextWriter {
     if (buffer_.size() > kChunk) flush();
   }
 
-  // Must be called at the end; InputError when anything could not be written (full disk).
+  // Must be called at the end. Throws InputError if anything could not be written, for example to a full disk.
   void close() {
     flush();
     const bool failed = std::fclose(file_) != 0;

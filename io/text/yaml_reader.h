@@ -1,4 +1,4 @@
-// A YAML mapping read key by key, with messages that name file and line. Internal to io/.
+// Reads a YAML mapping key by key, with messages that name file and line. Internal to io/.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -13,10 +13,12 @@ namespace megablock {
 
 class YamlReader {
  public:
-  // `node` must be a mapping without repeated keys (InputError otherwise); `context` names it in messages ("" at top).
+  // `node` must be a mapping without repeated keys; otherwise InputError. `context` is its name in messages, "" at the
+  // top.
   YamlReader(YAML::Node node, std::string file, std::string context);
 
-  // Each declares a key and gives its value when it is there.
+  // Each function declares a key and returns its value if there is one. Throws InputError for a value of the wrong
+  // kind.
   std::optional<YAML::Node> node(const std::string& key);
   std::optional<double> number(const std::string& key);
   std::optional<double> number(const std::string& key, const Limits& limits);
@@ -25,15 +27,15 @@ class YamlReader {
   std::optional<std::vector<std::string>> texts(const std::string& key);  // a list
   std::optional<std::vector<double>> numbers(const std::string& key, std::size_t count);
   std::optional<YamlReader> mapping(const std::string& key);
-  // A path, made absolute against the folder of the file; must exist as a file (or folder).
+  // A path, made absolute relative to the folder of the file. It must exist as a file, or as a folder.
   std::optional<std::string> existing_file(const std::string& key);
   std::optional<std::string> existing_folder(const std::string& key);
 
   std::vector<std::string> keys() const;
-  void finish() const;  // InputError for keys never declared
+  void finish() const;  // throws InputError for keys that were not declared
 
-  std::string where() const;                        // of the mapping
-  std::string where(const std::string& key) const;  // of the key's value
+  std::string where() const;                        // file and line of the mapping
+  std::string where(const std::string& key) const;  // file and line of the key
   std::string absolute(const std::string& path) const;
   const std::string& file() const { return file_; }
 
@@ -46,7 +48,7 @@ class YamlReader {
   std::vector<std::string> known_;
 };
 
-// Parses a file; InputError with file:line for malformed YAML or when it cannot be read.
+// Reads a file. Throws InputError with file:line for malformed YAML, and if the file cannot be read.
 YamlReader read_yaml(const std::string& path);
 
 }  // namespace megablock

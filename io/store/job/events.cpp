@@ -25,7 +25,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// "<job>/events/20261121T070000Z-3.jsonl"
+// The file of this run and rank: "<job>/events/20261121T070000Z-3.jsonl".
 std::string path_for(const JobStore& store, int rank) {
   const std::time_t now = std::time(nullptr);
   std::tm utc{};
@@ -35,7 +35,7 @@ std::string path_for(const JobStore& store, int rank) {
   return store.path("events/" + std::string(start.data()) + "-" + std::to_string(rank) + ".jsonl");
 }
 
-// Makes the folder on the way, so that the file can be opened in the constructor's list.
+// Makes the folder of a path and returns the path, so that a constructor can open the file in its initialiser list.
 std::string with_folder(const std::string& path) {
   make_folder(std::filesystem::path(path).parent_path().string());
   return path;
@@ -70,11 +70,11 @@ void read_file(const std::string& path, std::vector<UnitEvent>& events) {
   std::ifstream file(path);
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
-    if (file.eof()) return;  // no end of line: torn
+    if (file.eof()) return;  // the line has no end: it was cut off
     try {
       events.push_back(from_json(Json::parse(line)));
     } catch (const Json::exception&) {
-      // After a power cut the file system may end a file with zero bytes where a line should be.
+      // After a power failure, the file system may have zero bytes at the end of the file instead of a line.
       if (file.peek() == std::ifstream::traits_type::eof()) return;
       throw StoreError(path + ":" + std::to_string(number) + ": is no event; delete the file, nothing depends on it");
     }
@@ -90,7 +90,7 @@ EventLog::EventLog(const JobStore& store, int rank)
 
 void EventLog::append(UnitEvent event) {
   event.time_s = seconds_since_1970();
-  // File names may hold any bytes; those that are no UTF-8 are replaced.
+  // File names may contain any bytes; those that are not UTF-8 are replaced.
   const std::string line = to_json(event).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
   write_fully(file_.id(), path_, line.data(), line.size());
 }

@@ -1,5 +1,6 @@
-// Events of a job: one line of JSON per unit done or failed, in one file per run and rank, events/<start>-<rank>.jsonl.
-// For the report and for people; what is done and what is not follows from the unit files alone.
+// The events of a job: one line of JSON for each unit that was finished or failed. Each run and rank has its own file,
+// events/<start>-<rank>.jsonl. Events serve the report and people; the progress of the job follows from the unit files
+// alone.
 #pragma once
 
 #include <cstdint>
@@ -12,23 +13,25 @@
 
 namespace megablock {
 
+// The end of one unit of work.
 struct UnitEvent {
-  double time_s = 0;        // end of the unit, seconds since 1970; set by EventLog::append
+  double time_s = 0;        // end of the unit, seconds since 1970; EventLog::append sets it
   std::string stage, unit;  // "features", "features/000003.h5"
   int rank = 0;
-  double seconds = 0;        // wall clock of the unit
-  double claim_seconds = 0;  // of it, waiting for the claim
-  std::int64_t bytes = 0;    // of the unit's file
-  double peak_rss_mib = 0;   // of the rank until now
-  std::string failure;       // reason; empty when the unit was done
-  // Further figures of the unit by name: what the merge cost (cluster/stages/merge/merge_tiles.h).
+  double seconds = 0;        // duration of the unit by the wall clock
+  double claim_seconds = 0;  // part of it spent waiting for the claim
+  std::int64_t bytes = 0;    // size of the unit's file
+  double peak_rss_mib = 0;   // largest memory of the rank so far
+  std::string failure;       // the reason of a failure; empty for a finished unit
+  // Further figures of the unit by name, such as the cost of the merge (cluster/stages/merge/merge_tiles.h).
   std::map<std::string, double> figures;
 };
 
-// Appends to this run's file of one rank. Each line goes out in one write, so that a killed run tears at most its last.
+// Appends events to this run's file of one rank. Each line is written at once, so a killed run can cut off only its
+// last line.
 class EventLog {
  public:
-  // Errors as throw_file_error (io/base/file_error.h).
+  // Throws as throw_file_error does (io/base/file_error.h).
   EventLog(const JobStore& store, int rank);
   void append(UnitEvent event);
   const std::string& path() const { return path_; }
@@ -38,10 +41,10 @@ class EventLog {
   Descriptor file_;
 };
 
-double seconds_since_1970();  // now, by the system's clock
+double seconds_since_1970();  // the present, by the system's clock
 
-// All events of all runs and ranks, ordered by time, then rank, then unit. A torn last line of a file is left out; a
-// malformed line before it is a StoreError with file and line.
+// Returns the events of all runs and ranks, ordered by time, then rank, then unit. A last line that was cut off is left
+// out. A malformed line before it is a StoreError with file and line.
 std::vector<UnitEvent> read_events(const JobStore& store);
 
 }  // namespace megablock

@@ -25,7 +25,7 @@ std::string own_host() {
   return name.data();
 }
 
-// "process 1234 on host, started 2026-11-21T07:00:00Z"
+// The text in the lock: "process 1234 on host, started 2026-11-21T07:00:00Z".
 std::string own_description() {
   const std::time_t now = std::time(nullptr);
   std::tm utc{};
@@ -35,7 +35,7 @@ std::string own_description() {
   return "process " + std::to_string(::getpid()) + " on " + own_host() + ", started " + start.data();
 }
 
-// Reads own_description() of another process.
+// Reads the text that another process has written.
 JobHolder holder(int file) {
   std::array<char, 1024> text{};
   const ssize_t n = ::pread(file, text.data(), text.size() - 1, 0);
@@ -91,7 +91,8 @@ JobLock::JobLock(const JobStore& store, double patience_s) {
 }
 
 JobLock::~JobLock() {
-  // Emptied, not deleted: a waiting process may have opened it already. A failure only leaves a stale name in it.
+  // The file is emptied, not deleted, because a waiting process may have opened it already. If this fails, only an
+  // outdated name remains in it.
   if (::ftruncate(file_, 0) != 0) errno = 0;
   ::close(file_);
 }

@@ -1,10 +1,10 @@
-// Trailer of a sealed unit, 64 bytes, little-endian, behind the payload:
+// The trailer of a sealed unit: 64 bytes, little-endian, after the payload.
 //
 //     0  magic "MBUNIT\r\n"      8  u32 format version     12  u32 zero
 //    16  u64 payload length     24  u64 XXH3 of payload    32  u64 fingerprint
 //    40  16 bytes zero          56  u64 XXH3 of bytes 0..55
 //
-// Magic, version and the trailer's own hash keep their places in every version.
+// Magic, version and the trailer's own hash have the same place in every version.
 #include "io/store/job/job_store.h"
 
 #include <fcntl.h>
@@ -73,7 +73,7 @@ std::uint64_t hash_payload(int file, const std::string& path, std::uint64_t leng
   return hasher.value();
 }
 
-// The trailer of an open unit; `problem` says why there is none.
+// Reads the trailer of an open unit. Where there is no valid one, `problem` tells the reason.
 std::optional<Trailer> read_trailer(int file, std::string& problem) {
   const std::int64_t size = file_size(file);
   Trailer trailer;
@@ -101,13 +101,13 @@ std::string host_name() {
   return name.data();
 }
 
-// When a process started, in clock ticks since the machine did; empty when there is no such process. Process numbers
-// are used again, this pair is not.
+// The start time of a process in clock ticks since the machine started; empty if there is no such process. Process
+// numbers are reused, but this pair is unique.
 std::string process_start(const std::string& pid) {
   std::ifstream file("/proc/" + pid + "/stat");
   std::string text;
   std::getline(file, text);
-  const auto name_end = text.rfind(')');  // the program's name may hold spaces and brackets
+  const auto name_end = text.rfind(')');  // the program's name may contain spaces and brackets
   if (name_end == std::string::npos) return {};
   std::istringstream fields(text.substr(name_end + 1));
   std::string field;
@@ -115,7 +115,7 @@ std::string process_start(const std::string& pid) {
   return field;
 }
 
-// "<directory>/.<name>~<host>~<pid>~<start>.tmp"
+// Path of the temporary file: "<directory>/.<name>~<host>~<pid>~<start>.tmp".
 std::string temporary_path(const fs::path& target) {
   const std::string pid = std::to_string(::getpid());
   std::string name = ".";
@@ -126,7 +126,7 @@ std::string temporary_path(const fs::path& target) {
 
 bool is_temporary(const fs::path& path) { return path.extension() == kTemporarySuffix; }
 
-// Written by a process that still runs on this machine.
+// Whether the process that wrote a temporary file still runs on this machine.
 bool belongs_to_living_process(const fs::path& path) {
   std::vector<std::string> parts;
   std::istringstream name(path.stem().string());
@@ -136,7 +136,7 @@ bool belongs_to_living_process(const fs::path& path) {
   return host == host_name() && !start.empty() && process_start(pid) == start;
 }
 
-// Removes the temporary when the writing did not come to its end.
+// A temporary file beside the target. It is removed unless rename() was reached.
 class Temporary {
  public:
   explicit Temporary(const std::string& target) : target_(target), path_(temporary_path(target)) {
@@ -148,7 +148,7 @@ class Temporary {
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
   const std::string& path() const { return path_; }
-  // Puts the file, already flushed, in its place.
+  // Puts the file, which must be flushed, in place of the target.
   void rename() {
     if (::rename(path_.c_str(), target_.c_str()) != 0) throw_file_error(target_, "replaced", errno);
     done_ = true;
@@ -160,7 +160,7 @@ class Temporary {
   bool done_ = false;
 };
 
-// Errors of the writers name the temporary; the user knows the unit.
+// The errors of writers name the temporary file; the user knows only the unit.
 [[noreturn]] void rethrow_for(const std::string& target, const std::string& temporary, const std::string& message,
                               bool input) {
   std::string text = message;

@@ -1,10 +1,12 @@
-// The job directory: one sealed file per unit of work (architecture.md section 4, docs/job-format.md).
+// The job directory: one sealed file for each unit of work (docs/job-format.md).
 //
-// A unit file is written under a temporary name in its final directory, sealed by a 64-byte trailer (magic, format
-// version, payload length, XXH3 of the payload, fingerprint), fsynced, renamed, and its directory fsynced. HDF5 ignores
-// bytes behind its own end of file, so a sealed unit opens in any HDF5 reader. The fingerprint is the hash of
-// everything the unit was computed from; a unit is up to date when it is there, whole, and has the fingerprint asked
-// for.
+// A unit is first written to a temporary file in its final directory. It is sealed by a trailer of 64 bytes (magic,
+// format version, payload length, XXH3 of the payload, fingerprint), flushed to the disk and renamed; then the
+// directory is flushed. A crash at any time therefore leaves either the old unit or the new one. HDF5 ignores bytes
+// after its own end of file, so every HDF5 reader can open a sealed unit.
+//
+// The fingerprint is the hash of everything that the unit was computed from. A unit is up to date when it exists, is
+// complete, and has the requested fingerprint.
 #pragma once
 
 #include <cstdint>
@@ -24,46 +26,71 @@ struct UnitSeal {
   std::uint64_t fingerprint = 0;
 };
 
+// The units of one job directory.
 class JobStore {
  public:
-  // Names a job directory; creates nothing.
+  // Refers to a job directory; creates nothing.
   explicit JobStore(std::string directory);
 
   const std::string& directory() const { return directory_; }
-  std::string path(const std::string& unit) const;  // e.g. unit = "features/000003.h5"
+  std::string path(const std::string& unit) const;  // unit = "features/000003.h5", for example
 
-  // Makes the directories of a job. Throws InputError when that is not possible (read-only, a file in the way).
+  // Makes the directories of a job. Throws InputError if that is impossible (read-only file system, a file in the way).
   void create() const;
 
-  // The seal of a unit, empty when the file is missing, too short or carries no valid trailer. Reads 64 bytes.
+  // The seal of a unit. Empty if the file is missing, too short, or has no valid trailer. Reads 64 bytes.
   std::optional<UnitSeal> seal(const std::string& unit) const;
-  // There, sealed with this fingerprint, and its payload's length right. Does not read the payload.
+  // Whether the unit exists with this fingerprint and the right length. Does not read the payload.
   bool up_to_date(const std::string& unit, std::uint64_t fingerprint) const;
-  // Reads the payload and compares its hash; says what is wrong with the unit, empty: nothing.
+  // Reads the payload and compares its hash. Returns what is wrong with the unit, or an empty string.
   std::string problem(const std::string& unit) const;
-  // There, whole and with this fingerprint. `damage` gets the problem() of one that is there and not whole.
+  // Whether the unit exists, is complete and has this fingerprint. `damage` is set to the problem() of an incomplete
+  // one.
   bool is_current(const std::string& unit, std::uint64_t fingerprint, std::string& damage) const;
-  // Throws StoreError naming the file, its problem() and the remedy.
+  // Throws StoreError with the file, its problem() and the remedy.
   void verify(const std::string& unit) const;
-  // Path of a unit after verify(); verified once per process and file version.
+  // The path of a unit after verify(). Each version of a file is verified once in a process.
   std::string verified_path(const std::string& unit) const;
 
-  // Runs writer(temporary path), seals, renames. Nothing is left behind when the writer throws. ENOSPC and EROFS become
-  // InputError that say so. Returns the new seal.
+  // Calls writer(temporary path), seals the file and renames it. Returns the new seal. If the writer throws, nothing
+  // remains. A full disk and a read-only file system are InputErrors that say so.
   UnitSeal write(const std::string& unit, std::uint64_t fingerprint,
                  const std::function<void(const std::string& path)>& writer) const;
 
-  // Atomic text file without a seal (job.json, report.html, exports).
+  // Writes a text file without a seal in one step (job.json, report.html, exports).
   void write_text(const std::string& name, const std::string& text) const;
 
-  std::vector<std::string> list(const std::string& folder) const;  // sorted unit names under a folder
+  std::vector<std::string> list(const std::string& folder) const;  // the names of all units under a folder, sorted
   void remove(const std::string& unit) const;
-  // Deletes leftover temporaries of killed runs (never those of a living process on this host).
+  // Deletes the temporary files of killed runs, but not those of a process that still runs on this host.
   void remove_temporaries() const;
 
  private:
   std::string directory_;
-  mutable std::map<std::string, std::pair<std::int64_t, std::int64_t>> verified_;  // unit -> (size, mtime in ns)
+  // For each unit (size, time of modification in ns).
+  mutable std::map<std::string, std::pair<std::int64_t, std::int64_t>> verified_;
+};
+
+// The run that holds the lock of a job.
+struct JobHolder {
+  std::string who = "another process";  // "process 1234 on host, started 2026-11-21T07:00:00Z"
+  // Stops it after its current units: "kill -USR1 1234", with the name of another host added.
+  std::string how_to_stop = "kill -USR1 <process>";
+};
+std::optional<JobHolder> holder_of(const JobStore& store);  // empty: nobody
+
+// The lock of a job, which rank 0 holds during the life of the object: flock on job/lock, which contains host, process
+// and start time.
+class JobLock {
+ public:
+  // Waits up to `patience_s` for a run that is ending, then throws InputError with the name of the holder.
+  explicit JobLock(const JobStore& store, double patience_s = 10);
+  ~JobLock();
+  JobLock(const JobLock&) = delete;
+  JobLock& operator=(const JobLock&) = delete;
+
+ private:
+  int file_ = -1;
 };
 
 }  // namespace megablock

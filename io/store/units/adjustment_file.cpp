@@ -1,6 +1,4 @@
-// What a tile's adjustment leaves: docs/job-format.md, "Adjustment".
-#include "io/store/units/adjustment_file.h"
-
+// The result of a tile's adjustment: docs/job-format.md, "Adjustment".
 #include "io/store/hdf5/hdf5_cameras.h"
 
 namespace megablock {

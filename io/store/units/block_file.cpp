@@ -1,6 +1,4 @@
-// The block as read from project file and image headers: docs/job-format.md, "Block".
-#include "io/store/units/block_file.h"
-
+// The block, as read from the project file and the image headers: docs/job-format.md, "Block".
 #include <algorithm>
 #include <functional>
 
@@ -111,7 +109,7 @@ IndexedVector<RigIndex, Rig> get_rigs(const Hdf5Reader& file) {
   return rigs;
 }
 
-// A prior that a frame may lack is a row of NaN together with a 0 in `present`.
+// A frame without a prior has 0 in `present` and a row of NaN.
 void put_frame_priors(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& frames) {
   const auto position = [](auto member) {
     return [member](const Frame& f) -> Eigen::Vector3d {
@@ -155,7 +153,7 @@ void put_frame_priors(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& 
               "rig", "ground frame");
 }
 
-// Kind by kind, so that the columns of one kind are there at a time.
+// Priors are read kind by kind, so that only the columns of one kind are in memory.
 void get_position_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {
   const auto count = static_cast<std::int64_t>(frames.size());
   const auto present = file.vector<std::uint8_t>("frames/position_prior/present", count);
@@ -232,7 +230,8 @@ void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images
   cameras.reserve(images.size());
   for (const Image& image : images) {
     if (cameras.size() % kImagesAtATime == 0) file.rest();
-    // A block that was not checked may dangle; its camera is then unknown, and the reader does not use this column.
+    // The block may not have been checked, and its indices may refer to nothing. The camera is then unknown; the reader
+    // does not use this column.
     const bool sound = block.frames.contains(image.frame) && block.rigs.contains(block.frames[image.frame].rig) &&
                        image.mount >= 0 &&
                        static_cast<std::size_t>(image.mount) < block.rig_of(image.frame).mounts.size();
@@ -244,7 +243,7 @@ void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images
               {"", "XXH3 of the image file, 0: none"});
 }
 
-// What stands before the images' names in their paths, of which all but one would only be repeated.
+// The folder before the image names in their paths. It is the same for all images, so only the first path is read.
 std::string get_image_folder(const Hdf5Reader& file) {
   if (file.shape("images/path") != file.shape("images/name")) file.fail("images/path", "has not a row per image");
   if (file.shape("images/name") == std::vector<std::int64_t>{0}) return "";
@@ -260,7 +259,7 @@ std::int64_t image_count(const Hdf5Reader& file) {
   return shape[0];
 }
 
-// Calls visit(rows) for so many rows, a batch at a time.
+// Calls visit(rows) for `count` rows in batches.
 void visit_rows(std::int64_t count, const std::function<void(const std::vector<RowRange>&)>& visit) {
   constexpr std::int64_t kBatch = 1 << 16;
   for (std::int64_t first = 0; first < count; first += kBatch) visit({{first, std::min(kBatch, count - first)}});
@@ -319,7 +318,7 @@ void put_block(Hdf5Writer& file, const Block& block) {
 }
 
 Block get_block(const Hdf5Reader& file) {
-  NameTable<ImageIndex> names = get_image_names(file);  // before the tables, as it moves while it grows
+  NameTable<ImageIndex> names = get_image_names(file);  // before the tables, because it moves in memory while it grows
   Block block = get_block_without_names(file);
   block.image_names = std::move(names);
   return block;

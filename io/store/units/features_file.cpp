@@ -1,6 +1,4 @@
-// Features of the images of a shard: docs/job-format.md, "Features".
-#include "io/store/units/features_file.h"
-
+// The features of the images of one shard: docs/job-format.md, "Features".
 #include <algorithm>
 
 #include "io/base/error.h"

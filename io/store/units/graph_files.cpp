@@ -40,7 +40,7 @@ CandidateGraph read_candidates(const std::string& path) {
 
 namespace {
 
-// The columns of relative orientations, in a group.
+// The columns of relative orientations within a group.
 void put_orientations(Hdf5Writer& file, const std::string& group, const std::vector<const PairOrientation*>& of) {
   const auto column = [&](auto member) {
     std::vector<double> values;
@@ -76,7 +76,7 @@ std::vector<PairOrientation> get_orientations(const Hdf5Reader& file, const std:
   return result;
 }
 
-// Pairs over planes that have a second orientation.
+// The second orientations of pairs over planes.
 void put_twins(Hdf5Writer& file, const std::vector<VerifiedPair>& pairs) {
   std::vector<std::int64_t> row;
   std::vector<const PairOrientation*> twins;
@@ -106,7 +106,7 @@ void write_matches(const std::string& path, const std::vector<VerifiedPair>& pai
   std::vector<std::int64_t> feature_a, feature_b;
   for (const VerifiedPair& pair : pairs) {
     orientations.push_back(&pair);
-    // Row differences restart in each pair.
+    // Differences of rows start anew in each pair.
     std::int64_t previous = 0;
     for (const std::int32_t row : pair.feature_a) {
       feature_a.push_back(row - previous);
@@ -212,7 +212,7 @@ Tiles get_tiles(const Hdf5Reader& file) {
     if (tile.value < -1 || tile.value >= tiles.tile_count) file.fail("tiles/tile_of_frame", "names no tile");
   tiles.component = IndexedVector<FrameIndex, std::int32_t>(
       file.vector<std::int32_t>("tiles/component_of_frame", static_cast<std::int64_t>(tiles.tile_of_frame.size())));
-  if (file.has("tiles/separator_depth"))  // earlier programs knew none
+  if (file.has("tiles/separator_depth"))  // earlier versions of the program did not write it
     tiles.separator_depth = IndexedVector<FrameIndex, std::int32_t>(
         file.vector<std::int32_t>("tiles/separator_depth", static_cast<std::int64_t>(tiles.tile_of_frame.size())));
   for (const std::int32_t depth : tiles.separator_depth)

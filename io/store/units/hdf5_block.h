@@ -1,4 +1,4 @@
-// The block's groups in a file, shared by block.h5 and result/block.h5 (docs/job-format.md, "Block").
+// The groups of the block in a file; block.h5 and result/block.h5 share them (docs/job-format.md, "Block").
 #pragma once
 
 #include "io/block/block.h"

@@ -1,5 +1,5 @@
-// What is observed of a block besides tie points, as groups of its file (docs/job-format.md, "Block"): relative poses,
-// control points, lines of known direction, verticals. A file without lines or verticals has none of these groups.
+// The observations of a block other than tie points, as groups of its file (docs/job-format.md, "Block"): relative
+// poses, control points, lines of known direction, verticals. Without lines or verticals, the file has no such group.
 #pragma once
 
 #include <vector>

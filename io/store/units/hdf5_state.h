@@ -1,5 +1,5 @@
-// The groups of a block's current values in a file, shared by state files and result/block.h5. The groups frames,
-// cameras, rigs and mounts must be there (docs/job-format.md, "State").
+// The groups of a block's current values in a file; state files and result/block.h5 share them. The groups frames,
+// cameras, rigs and mounts must exist already (docs/job-format.md, "State").
 #pragma once
 
 #include "io/block/block.h"
@@ -8,8 +8,8 @@
 namespace megablock {
 
 void put_state(Hdf5Writer& file, const BlockState& state);
-// Mounts per rig are read from rigs/mounts, camera models from cameras/model: put_block and write_state both write
-// them.
+// Reads the number of mounts of each rig from rigs/mounts and the camera models from cameras/model, which put_block and
+// write_state both write.
 BlockState get_state(const Hdf5Reader& file);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// The groups of tiles and merge tree in a file, shared by tiles.h5 and result/block.h5 (docs/job-format.md, "Tiles").
+// The groups of tiles and merge tree in a file; tiles.h5 and result/block.h5 share them (docs/job-format.md, "Tiles").
 #pragma once
 
 #include "io/block/image_graph.h"

@@ -1,6 +1,4 @@
-// Current values of poses, intrinsics and mounts: docs/job-format.md, "State".
-#include "io/store/units/state_file.h"
-
+// The current values of poses, intrinsics and mounts: docs/job-format.md, "State".
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_cameras.h"
 #include "io/store/units/hdf5_state.h"

@@ -1,5 +1,5 @@
-// Reads parts of a file of tracks (docs/job-format.md, "Tracks"): its image column, which is its index by image, and
-// the measurements of some rows.
+// Reads parts of a file of tracks (docs/job-format.md, "Tracks"): the column of images, by which observations are
+// found, and the coordinates of some rows.
 #pragma once
 
 #include <functional>
@@ -13,21 +13,21 @@ namespace megablock {
 
 class TrackReader {
  public:
-  // Errors of all functions: as Hdf5Reader.
+  // All functions throw as Hdf5Reader does.
   explicit TrackReader(const std::string& path) : file_(path, "tracks") {}
 
-  // All tracks and the images of all observations; x, y and feature stay empty.
+  // All tracks with the images of all observations; x, y and feature remain empty.
   TrackSet images() const;
 
-  // All tracks in order, in batches of whole tracks with about so many observations; a batch's x, y and feature are
-  // read where `wanted` (of its first track's row and number of tracks) says so, else they stay empty.
+  // Visits all tracks in order, in batches of whole tracks with about this number of observations. The x, y and feature
+  // of a batch are read if wanted(row of its first track, number of tracks) is true; otherwise they remain empty.
   using Wanted = std::function<bool(std::int64_t, std::int64_t)>;
   void visit(
       const std::function<void(const TrackSet&)>& take,
       const Wanted& wanted = [](std::int64_t, std::int64_t) { return true; },
       std::int64_t batch_observations = std::int64_t{1} << 18) const;
 
-  // The observations in some images (ascending), in the order of the rows. Reads and keeps less than images().
+  // The observations in some images (ascending), in the order of the rows. It reads and keeps less than images().
   struct Found {
     std::vector<std::int64_t> row;
     std::vector<ImageIndex> image;
@@ -35,7 +35,7 @@ class TrackReader {
   };
   Found find(const std::vector<ImageIndex>& images) const;
 
-  // Of some rows of the observations, range behind range.
+  // The coordinates of some rows of the observations, one range after the other.
   struct Measured {
     std::vector<std::int32_t> x, y, feature;  // as in TrackSet
   };

@@ -1,4 +1,4 @@
-// Writes a file of tracks that is too large for memory, batch by batch (docs/job-format.md, "Tracks").
+// Writes a file of tracks in batches, for a block whose tracks do not fit into memory (docs/job-format.md, "Tracks").
 #pragma once
 
 #include <memory>
@@ -10,14 +10,14 @@ namespace megablock {
 
 class TrackWriter {
  public:
-  // Creates the file. Errors of all functions: as Hdf5Writer.
+  // Creates the file. All functions throw as Hdf5Writer does.
   explicit TrackWriter(const std::string& path);
-  // Without close(), as after an exception, no file is left.
+  // Without close(), as after an exception, no file remains.
   ~TrackWriter();
 
-  // Tracks whose global indices ascend, within the batch and from batch to batch.
+  // Appends tracks. Their global indices must ascend, within the batch and from batch to batch.
   void append(const TrackSet& batch);
-  // read_tracks then gives all batches behind one another.
+  // Completes the file. read_tracks then returns the batches one after the other.
   void close();
 
  private:

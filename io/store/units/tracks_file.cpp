@@ -10,7 +10,7 @@
 
 namespace megablock {
 
-// Where the delta coding of a file stands after the rows written so far.
+// The state of the delta coding after the rows written so far.
 struct TrackCoding {
   std::int64_t last_id = 0, last_first_image = 0;
 };
@@ -21,8 +21,9 @@ struct Columns {
   std::vector<std::int64_t> id_difference, observations, image_difference;
 };
 
-// Image of each observation minus that of the observation before it in the track; a track's first minus the first of
-// the track before. Neighbouring tracks begin in neighbouring images, so the numbers are small.
+// For each observation its image minus that of the previous observation of the track; for the first one, minus the
+// first image of the previous track. Neighbouring tracks begin in neighbouring images, so the numbers are small and
+// compress well.
 std::vector<std::int64_t> image_differences(const TrackSet& tracks, std::int64_t& previous_first) {
   std::vector<std::int64_t> values(tracks.image.size());
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
@@ -70,7 +71,8 @@ void make_groups(Hdf5Writer& file) {
   file.group(kObservations, "one row per observation, in the order of the tracks");
 }
 
-// previous_first: first image of the track before these; then that of the last one.
+// The inverse of image_differences(). `previous_first` is the first image of the track before these, and then of the
+// last one.
 std::vector<ImageIndex> images_from(const std::vector<std::int64_t>& values, const std::vector<std::int64_t>& begin,
                                     std::int64_t& previous_first) {
   std::vector<ImageIndex> images(values.size());
@@ -116,7 +118,7 @@ void write_tracks(const std::string& path, const TrackSet& tracks) {
 
 namespace {
 
-// The types of growing datasets are settled before their values are known; half the width saves a quarter of the file.
+// Growing datasets get their type before their values are known. Half the width saves a quarter of the file.
 std::vector<std::int32_t> narrow(const std::vector<std::int64_t>& values) {
   std::vector<std::int32_t> narrowed;
   narrowed.reserve(values.size());
@@ -158,7 +160,7 @@ void TrackWriter::close() { file_->hdf5.close(); }
 
 namespace {
 
-// All but x, y and feature.
+// Everything except x, y and feature.
 TrackSet structure_of(const Hdf5Reader& file) {
   TrackSet tracks;
   tracks.id = indices<TrackIndex>(cumulate(file.vector<std::int64_t>(kIds)));
@@ -209,7 +211,8 @@ void TrackReader::visit(const std::function<void(const TrackSet&)>& take, const 
   if (row != observations) file_.fail(kCounts, "does not add up to the number of observations");
 }
 
-// Numbers of images fit into 32 bits (as for TrackWriter): half the memory, whose fetching costs more than the search.
+// Image numbers fit into 32 bits (as TrackWriter ensures). That halves the memory, and reading memory takes longer than
+// the search.
 TrackReader::Found TrackReader::find(const std::vector<ImageIndex>& images) const {
   Found found;
   if (images.empty()) return found;
@@ -228,7 +231,8 @@ TrackReader::Found TrackReader::find(const std::vector<ImageIndex>& images) cons
     for (const std::size_t begin = row, end = row + static_cast<std::size_t>(count[t]); row < end; ++row) {
       image += difference[row];
       if (row == begin) previous_first = image;
-      const auto offset = static_cast<std::uint64_t>(image - first);  // negative: far behind the end
+      // A negative value becomes far larger than the end.
+      const auto offset = static_cast<std::uint64_t>(image - first);
       if (offset >= wanted.size() || !wanted[offset]) continue;
       found.row.push_back(static_cast<std::int64_t>(row));
       found.image.emplace_back(image);

@@ -69,7 +69,7 @@ TEST(P3p, NothingForBadPoints) {
   EXPECT_TRUE(solve_p3p(rays, bad).empty());
   auto bad_rays = rays;
   bad_rays[1] = bad_rays[0];
-  for (const Pose& pose : solve_p3p(bad_rays, points))  // one ray against another
+  for (const Pose& pose : solve_p3p(bad_rays, points))  // two points on one ray, one behind the other
     for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(to_inside(pose, points[k]).normalized().dot(bad_rays[k]), 1 - 1e-9);
   bad_rays = rays;
   bad_rays[1].z() = std::nan("");
