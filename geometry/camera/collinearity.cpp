@@ -60,6 +60,7 @@ std::optional<ElevenParameters> eleven_from(const NineParameters& image, const E
   const Eigen::Vector3d s = image.centre - origin;
   const double g = l3.dot(s);
   if (!(std::abs(g) > 1e-6 * s.norm())) return std::nullopt;
+  // Equation (3).
   ElevenParameters e{origin, (image.principal_distance * l1 - image.principal_point.x() * l3) / g,
                      (image.principal_distance * l2 - image.principal_point.y() * l3) / g, -l3 / g};
   e.a4 = -e.a.dot(s);

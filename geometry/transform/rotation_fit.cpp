@@ -45,6 +45,7 @@ Eigen::Quaterniond fit_rotation_robust(std::span<const Eigen::Vector3d> from, st
   std::vector<double> residual(from.size()), weight(from.size());
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t i = 0; i < from.size(); ++i) residual[i] = (to[i] - rotation * from[i]).norm();
+    // Exact directions leave nothing to weigh.
     const double scale = 3 * median(residual);
     if (!(scale > 1e-12)) break;
     for (std::size_t i = 0; i < from.size(); ++i)

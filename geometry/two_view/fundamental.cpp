@@ -34,6 +34,8 @@ std::optional<Eigen::Matrix3d> normalising_transformation(std::span<const Eigen:
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& p : points) mean += p;
   mean /= static_cast<double>(points.size());
+  // The scale brings the mean distance from the centroid to sqrt(2), which makes all elements of the equations of order
+  // one.
   double distance = 0;
   for (const Eigen::Vector2d& p : points) distance += (p - mean).norm();
   const double scale = std::sqrt(2.0) * static_cast<double>(points.size()) / distance;

@@ -39,6 +39,7 @@ std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector3d> a
   const auto h = algebraic_homography(
       a.size(), [&](std::size_t i) { return a[i]; }, [&](std::size_t i) { return b[i]; });
   if (!h) return std::nullopt;
+  // The sign of H is such that most points have positive depth; its scale makes the middle singular value one.
   std::size_t front = 0;
   for (std::size_t i = 0; i < a.size(); ++i) front += b[i].dot(*h * a[i]) > 0;
   if (a.size() == 4 && front != 0 && front != 4) return std::nullopt;

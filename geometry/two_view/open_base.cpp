@@ -102,6 +102,7 @@ class BaseOdds {
       normal.noalias() += weighted * j.transpose();
       gradient += r / (q * q) * weighted;
       sum += match.weight * r * r / q;
+      // k of the head: the part of the error that the turn of m brings in.
       const double turn = 1 - same * same;
       turned += match.weight * turn;
       spread += square(match.weight * turn);
@@ -116,6 +117,7 @@ class BaseOdds {
     place.rotation_by_base = -factor.solve(normal.rightCols<2>());
     place.rotation_covariance = cost_.variance * factor.solve(Eigen::Matrix3d::Identity());
     place.cost = (sum + gradient.dot(step)) / (cost_.slope * cost_.variance);
+    // S + K and K of the head, both times sigma^2.
     const double both = corrected_sum - of_corrected.dot(factor.solve(of_corrected));
     const double by_errors = noise_ * (turned + kChosen * std::sqrt(2 * spread));
     place.told = both > by_errors ? 1 - by_errors / both : 0;

@@ -8,6 +8,8 @@ namespace megablock {
 
 Solutions<RelativeOrientation, 4> orientations_of_essential(const Eigen::Matrix3d& essential) {
   Solutions<RelativeOrientation, 4> found;
+  // Scaled to |t| = 1: the squared norm of an essential matrix is 2 |t|^2. The columns of its cofactor matrix are
+  // multiples of t.
   const double scale = std::sqrt(0.5 * essential.squaredNorm());
   const Eigen::Matrix3d e = essential / scale;
   const Eigen::Matrix3d cofactor = cofactors(e);

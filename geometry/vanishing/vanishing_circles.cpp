@@ -63,6 +63,7 @@ std::optional<Eigen::Vector2d> null_vector_fit(std::span<const LineFoot> feet, i
   double size = 0;
   for (const LineFoot& foot : feet) size += foot.point.norm() / static_cast<double>(feet.size());
   if (!(size > 0) || !std::isfinite(size)) return std::nullopt;
+  // H is counted in units of its mean length, which makes the three columns comparable.
   Eigen::Vector3d solution;
   for (int round = 0; round < rounds; ++round) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();

@@ -81,6 +81,7 @@ class AxisSearch {
   VanishingPoints run() {
     left_ = usable_;
     while (true) {
+      // One vanishing point per pass, until the best one may be an accident.
       gather_lines();
       if (x_.size() < kFewestLines) break;
       std::int64_t captured = 0;
@@ -121,6 +122,7 @@ class AxisSearch {
     std::stable_sort(by_height.begin(), by_height.end(), [&](auto a, auto b) { return height(a) < height(b); });
     std::stable_sort(by_sigma.begin(), by_sigma.end(), [&](auto a, auto b) { return sigmas[a] < sigmas[b]; });
     for (std::size_t k = 0; k < by_height.size(); ++k) place[by_height[k]] = k;
+    // The most certain line of a set represents it, so lines are visited by their sigmas.
     const double largest = sigmas[by_sigma.back()];
     for (const std::size_t best : by_sigma) {
       const int line = usable_[best];
@@ -248,6 +250,7 @@ class AxisSearch {
 
   // Assigns every line to one axis, estimates the axes from their lines, and drops those that no longer pass the test.
   void deal_out() {
+    // Assignment and estimation depend on each other, so both are repeated.
     std::vector<std::vector<int>> lines(axes_.size());
     for (int round = 0; round < 3; ++round) {
       for (auto& own : lines) own.clear();

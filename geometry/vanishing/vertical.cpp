@@ -144,6 +144,7 @@ std::optional<AttitudeFromAxes> attitude_from_axes(std::span<const SeenAxis> axe
     covariances.push_back(axis.seen.covariance);
     if (!axis.ground.allFinite() || !axis.seen.direction.allFinite()) return std::nullopt;
   }
+  // The closed form without weights is the approximation; the adjustment weighs the axes by their covariances.
   const auto fit =
       fit_gauss_helmert(AttitudeEquations{axes}, fit_rotation(ground, seen), std::span<const Eigen::Vector3d>(seen),
                         std::span<const Eigen::Matrix3d>(covariances));

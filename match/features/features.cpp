@@ -35,6 +35,7 @@ struct ReducedImage {
   double scale_x = 1, scale_y = 1;  // pixels of the full image per reduced pixel
 };
 
+// Width and height are rounded separately, so the two scales may differ a little; positions are scaled back with both.
 ReducedImage reduce(const cv::Mat& full, double max_megapixels) {
   const double megapixels = 1e-6 * static_cast<double>(full.cols) * static_cast<double>(full.rows);
   if (megapixels <= max_megapixels) return {full};

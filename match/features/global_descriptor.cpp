@@ -37,6 +37,7 @@ std::array<float, 128> global_descriptor(const std::vector<SiftDescriptor>& desc
   for (const SiftDescriptor& descriptor : descriptors) {
     std::size_t cell = 0;
     for (const auto& plane : planes) {
+      // The signs of the seven scalar products are the seven bits of the cell's number.
       int side = 0;
       for (std::size_t i = 0; i < kDimension; ++i) side += plane[i] * descriptor[i];
       cell = 2 * cell + (side > 0 ? 1 : 0);
@@ -46,6 +47,7 @@ std::array<float, 128> global_descriptor(const std::vector<SiftDescriptor>& desc
   std::array<float, 128> result{};
   if (descriptors.empty()) return result;
   for (std::size_t i = 0; i < result.size(); ++i) {
+    // Square roots of shares have the norm one and damp cells that many descriptors share (Hellinger distance).
     result[i] = static_cast<float>(std::sqrt(static_cast<double>(counts[i]) / static_cast<double>(descriptors.size())));
   }
   return result;

@@ -172,6 +172,8 @@ std::vector<LabelledMatch> labelled_matches(const Block& block, const TrackSet& 
 TrainedFilter train_filter(const std::vector<LabelledMatch>& matches, const TrainingOptions& options) {
   std::vector<const LabelledMatch*> of_kind[2];
   for (const LabelledMatch& match : matches) of_kind[match.right].push_back(&match);
+  // Training and testing use right and wrong matches in equal number. With their natural shares, a machine that accepts
+  // everything would look good.
   const auto half = static_cast<std::size_t>(options.samples) / 2;
   for (const auto& kind : of_kind)
     if (half < kFolds || kind.size() <= half)
@@ -187,6 +189,7 @@ TrainedFilter train_filter(const std::vector<LabelledMatch>& matches, const Trai
   const auto machine = best_machine(matrix_of(training, options.features, scaling));
 
   TrainedFilter result;
+  // The test uses matches that were not trained on.
   constexpr std::size_t kMostTested = 5000;  // of each kind
   const std::size_t tested = std::min({of_kind[0].size() - half, of_kind[1].size() - half, kMostTested});
   for (const std::size_t kind : {0, 1}) {

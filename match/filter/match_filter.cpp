@@ -57,6 +57,7 @@ MatchFilter::MatchFilter(const std::string& yaml) : model_(std::make_unique<Mode
   } catch (const cv::Exception& error) {
     throw InputError("match filter: not a model of 'megablock train-filter': " + error.err);
   }
+  // OpenCV accepts any YAML and leaves what is missing empty, so everything is checked here.
   const std::size_t count = model_->features.size();
   const bool known =
       std::all_of(model_->features.begin(), model_->features.end(), [](int f) { return f >= 0 && f <= 3; });

@@ -42,6 +42,7 @@ std::size_t end_of_scan(std::span<const unsigned char> file, std::size_t at) {
   return file.size();
 }
 
+// Reads a whole file. False for anything but a regular file, such as a folder.
 bool read_bytes(const std::string& path, std::vector<unsigned char>& bytes) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return false;
@@ -90,6 +91,7 @@ GreyImage read_grey_image(const std::string& path) {
   std::vector<unsigned char> bytes;
   if (!read_bytes(path, bytes)) return {{}, "file missing or not readable"};
   if (bytes.empty()) return {{}, "empty file (0 bytes)"};
+  // Decoders fill the missing part of a truncated file with grey, without an error.
   if (is_jpeg(bytes) && !is_complete_jpeg(bytes)) return {{}, "truncated JPEG: the file ends before the image does"};
   try {
     const cv::Mat decoded =

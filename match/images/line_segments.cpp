@@ -90,6 +90,7 @@ StraightFit fit_places(const EdgePlaces& places) {
   fit.kept = places;
   double limit = kReach;
   for (int round = 0; round < 4 && fit.kept.along.size() >= 5; ++round) {
+    // Linear regression about the centroid (t, d).
     const auto n = static_cast<double>(fit.kept.along.size());
     double t = 0, d = 0, tt = 0, td = 0;
     for (std::size_t i = 0; i < fit.kept.along.size(); ++i) {
@@ -107,6 +108,8 @@ StraightFit fit_places(const EdgePlaces& places) {
       squares += std::pow(fit.kept.across[i] - fit.offset - fit.slope * fit.kept.along[i], 2);
     fit.sigma = std::sqrt(squares / (n - 2));
     if (round == 3) break;
+    // The limit only shrinks, and the points are chosen anew from all, so that a point rejected by a bad first fit can
+    // return.
     limit = std::clamp(3 * fit.sigma, 0.2, limit);
     fit.kept = {};
     for (std::size_t i = 0; i < places.along.size(); ++i) {
@@ -127,6 +130,7 @@ class Correlation {
     const auto residual = [&](std::size_t i) {
       return (fit.kept.across[i] - fit.offset - fit.slope * fit.kept.along[i]) / std::max(fit.sigma, 1e-9);
     };
+    // Sums of products of normalised residuals, by their distance along the edge.
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = i; j < n; ++j) {
         const auto lag = static_cast<std::size_t>(std::lround(fit.kept.along[j] - fit.kept.along[i]));

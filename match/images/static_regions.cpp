@@ -40,6 +40,7 @@ Variation variation_of(const std::vector<cv::Mat>& gradients) {
         const auto& g = gradients[k].at<cv::Vec2s>(r, c);
         x[k] = g[0], y[k] = g[1];
       }
+      // The median of each component: a passing object in a minority of the images does not change it.
       const float mx = quantile(x, 0.5), my = quantile(y, 0.5);
       for (std::size_t k = 0; k < gradients.size(); ++k) {
         const auto& g = gradients[k].at<cv::Vec2s>(r, c);
@@ -71,6 +72,7 @@ cv::Mat pieces_with_firm_rim(const cv::Mat& candidates, const cv::Mat& firm, dou
     cv::dilate(piece, near, disc(1));
     cv::dilate(piece, rim, disc(kRim));
     rim = rim & ~near;
+    // A rim of length zero is the border of the image all around; nothing speaks against such a piece.
     const int length = cv::countNonZero(rim);
     if (length > 0 && cv::countNonZero(rim & firm(box)) < share * length) continue;
     kept(box).setTo(255, piece);
@@ -110,6 +112,8 @@ cv::Mat StaticRegionFinder::gradients(const cv::Mat& grey) const {
   grey.convertTo(logarithm, CV_32F);
   const double factor = static_cast<double>(options_.width_px) / std::max(grey.cols, grey.rows);
   if (factor < 1) cv::resize(logarithm, logarithm, {}, factor, factor, cv::INTER_AREA);
+  // The logarithm turns a factor of the exposure into a constant, which the gradient removes. The gradients are stored
+  // as 16-bit integers to halve the memory.
   cv::log(logarithm + kDark, logarithm);
   cv::Sobel(logarithm, x, CV_32F, 1, 0, 3, 1 / (8 * kUnit));
   cv::Sobel(logarithm, y, CV_32F, 0, 1, 3, 1 / (8 * kUnit));
@@ -135,6 +139,7 @@ cv::Mat StaticRegionFinder::mask() const {
   std::vector<float> typical(v.usual.begin<float>(), v.usual.end<float>());
   const double t = std::clamp(options_.variation_share * quantile(typical, 0.75), kLeastVariation, kMostVariation);
 
+  // See the head of static_regions.h for these three sets of pixels.
   const cv::Mat still = v.high < t;
   const cv::Mat structure = still & (v.structure > t);
   const cv::Mat firm = structure | (v.usual >= t);

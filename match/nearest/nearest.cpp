@@ -10,6 +10,8 @@ namespace megablock {
 
 namespace nearest_kernel {
 
+// The reference for the other kernels. Rows come in blocks, so that a panel of columns is read from the cache for all
+// of them.
 void run_portable(const Problem& p) {
   for (std::size_t block = 0; block < p.rows; block += kRowBlock) {
     const std::size_t end = std::min(block + kRowBlock, p.rows);
@@ -126,11 +128,13 @@ MutualNeighbours nearest_neighbours(const std::vector<SiftDescriptor>& a, const 
                                     std::size_t k, NearestKernel wanted) {
   if (k < 1 || k > 8) throw InputError("nearest neighbours: k must be 1 to 8");
   const NearestKernel kernel = std::min(wanted, fastest_nearest_kernel());
+  // Both sets are padded to whole tiles. Padding has the norm kFar, so it is never nearer than a real descriptor.
   const std::size_t rows = round_up(a.size(), kRowMultiple), columns = round_up(b.size(), kColumnTile);
   const std::vector<std::int32_t> norm_a = squared_norms(a, rows);
   std::vector<std::int32_t> norm_b = squared_norms(b, columns);
   std::vector<std::int32_t> row_distance(rows * k, Neighbours::kFar), row_index(rows * k, -1);
   std::vector<std::int32_t> column_distance(columns * k, Neighbours::kFar), column_index(columns * k, -1);
+  // The 16-bit sums of the short kernel are exact only for short descriptors, as RootSIFT gives them.
   const bool short_ones = kernel == NearestKernel::kAvx2 && are_short(size_of(a, norm_a), size_of(b, norm_b));
   if (kernel == NearestKernel::kAvx512) norm_b = shifted_norms(b, std::move(norm_b));
   Problem problem{rows,

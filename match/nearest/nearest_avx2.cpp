@@ -80,6 +80,7 @@ void keep_nearest(const Problem& p, std::size_t row, std::size_t column, const S
     }
     any |= candidates[r];
   }
+  // This is the usual case: once the lists are filled, hardly any distance enters one.
   if (any == 0) return;
   for (std::size_t r = 0; r < kRowTile; ++r) {
     for (unsigned rest = candidates[r]; rest != 0; rest &= rest - 1) {

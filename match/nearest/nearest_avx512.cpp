@@ -94,6 +94,7 @@ void tile(const Problem& p, std::size_t row, std::size_t column) {
 
 }  // namespace
 
+// Columns are treated in pairs of panels; an odd last panel is done alone.
 void run_avx512(const Problem& p) {
   static_assert(kRowMultiple % kRows == 0 && kRowBlock % kRows == 0);
   constexpr std::size_t kColumns = kPanels * kColumnTile;

@@ -106,6 +106,7 @@ class GuidedMatcher {
       if (ray) widths.push_back(compare_along(*ray, static_cast<std::int32_t>(row)));
     }
     result_.half_width_px = median(std::move(widths));
+    // A match must pass the ratio test in the lists of both features.
     for (std::size_t row = 0; row < a_.keypoints.size(); ++row)
       for (std::size_t n = 0; n < k(); ++n) {
         const std::int32_t other = of_a_.row[row * of_a_.k + n];
@@ -158,6 +159,7 @@ class GuidedMatcher {
     const double length = along.norm();
     const Eigen::Vector2d direction = length > 1e-9 ? Eigen::Vector2d(along / length) : Eigen::Vector2d::UnitX();
     const int steps = std::max(1, static_cast<int>(std::ceil(length / kStep)));
+    // Visits the cells along the piece; the exact distance from the line then decides for each keypoint.
     for (int s = 0; s <= steps; ++s) {
       const Eigen::Vector2d place = from + along * s / steps;
       if (place.x() < -width || place.y() < -width || place.x() > camera_b_.width + width ||

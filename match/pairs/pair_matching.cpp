@@ -182,6 +182,7 @@ VerifiedPair verify(const ImageFeatures& a, const ImageFeatures& b, const Camera
 
   TwoViewOptions two_view;
   const double focal = 0.5 * (camera_a.intrinsics[kFocal] + camera_b.intrinsics[kFocal]);
+  // The geometry works in normalised coordinates, in which a pixel is 1 / focal length.
   two_view.max_residual = options.max_residual_px / focal;
   two_view.sample_spacing = options.sample_spacing_px / camera_a.intrinsics[kFocal];
   two_view.min_inliers = options.min_inliers;
@@ -247,6 +248,8 @@ VerifiedPair match_pair(const ImageFeatures& a, const ImageFeatures& b, const Ca
                         const MatchOptions& options, const PairKnowledge& known) {
   if (!(a.image < b.image)) throw InputError("match_pair: the first image must have the lower index of the two");
   VerifiedPair pair;
+  // With a trusted orientation only the epipolar band is searched; if that fails, the trust may be misplaced and the
+  // pair is matched without it.
   if (known.orientation && options.guided) {
     const GuidedMatches guided = match_along_epipolar(a, b, camera_a, camera_b, *known.orientation, options);
     // Wrong matches lie anywhere in the band, so this share of them fits by chance.

@@ -140,6 +140,7 @@ Standing compare_standing(std::span<const std::pair<std::int32_t, std::int32_t>>
 }
 
 std::vector<std::uint8_t> upright_pairs(std::span<const StandingPair> pairs) {
+  // Pairs that say nothing themselves are decided by the other pairs of their images.
   std::map<ImageIndex, int> belief;  // number of other images it agrees with, less those it is turned against
   for (const StandingPair& pair : pairs) {
     const int said = pair.standing == Standing::kAlike ? 1 : pair.standing == Standing::kTurned ? -1 : 0;

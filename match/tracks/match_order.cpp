@@ -41,6 +41,7 @@ void MatchOrder::add(const VerifiedPair& pair, std::int32_t generation) {
   if (!memory_.scratch_file.empty() && bytes > static_cast<std::size_t>(memory_.bytes)) write_run();
 }
 
+// Writes the matches in memory to the file as one sorted run, each pair as its header and its rows.
 void MatchOrder::write_run() {
   if (!file_) {
     std::error_code ignored;  // only the result counts: whether the file can be made
@@ -101,6 +102,7 @@ class MatchOrder::Run {
     ended_ = next_ == end_ && position_ == buffer_.size();
     if (!ended_) std::memcpy(&header_, fetch(sizeof header_), sizeof header_);
   }
+  // The next bytes of the run. Reads at least a buffer at a time; the result is valid until the next call.
   const char* fetch(std::size_t bytes) {
     if (buffer_.size() - position_ < bytes) {
       buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(position_));
@@ -136,6 +138,7 @@ void MatchOrder::visit(const std::function<void(const PairMatches&)>& visit) {
   visit_runs(visit);
 }
 
+// All matches are in memory: only the headers are sorted.
 void MatchOrder::visit_memory(const std::function<void(const PairMatches&)>& visit) {
   std::sort(headers_.begin(), headers_.end());
   PairMatches pair;

@@ -20,6 +20,7 @@ void MatchedFeatures::mark(ImageIndex image, const std::vector<std::int32_t>& ro
   const auto [lowest, highest] = std::minmax_element(rows.begin(), rows.end());
   if (!images_.contains(image) || *lowest < 0)
     throw InputError("matches of image " + std::to_string(image.value) + ": the image or the feature does not exist");
+  // One bit per feature; the vector grows to the largest marked row only.
   std::vector<std::uint64_t>& words = images_[image].words;
   const std::size_t needed = static_cast<std::size_t>(*highest) / kWordBits + 1;
   if (words.size() < needed) words.resize(needed);
@@ -28,6 +29,7 @@ void MatchedFeatures::mark(ImageIndex image, const std::vector<std::int32_t>& ro
 }
 
 void MatchedFeatures::number() {
+  // Counts of bits before each group of words make rank a table look-up plus at most eight population counts.
   begin_.assign(1, 0);
   for (Image& image : images_) {
     std::uint32_t in_image = 0;
@@ -67,6 +69,7 @@ ImageIndex MatchedFeatures::image_of(FeatureNumber number) const {
 std::int32_t MatchedFeatures::row_of(FeatureNumber number) const {
   const ImageIndex image = image_of(number);
   const Image& own = images_[image];
+  // Select, the inverse of rank: first the group, then the word, then the bit.
   auto rank = static_cast<std::uint32_t>(number - begin_[static_cast<std::size_t>(image.value)]);
   const auto group = std::upper_bound(own.before.begin(), own.before.end(), rank) - own.before.begin() - 1;
   rank -= own.before[static_cast<std::size_t>(group)];

@@ -91,6 +91,7 @@ void TrackBuilder::add(const VerifiedPair& pair, std::int32_t generation) {
 void TrackBuilder::build() {
   features_.number();
   sets_ = std::make_unique<FeatureSets>(features_);
+  // Pairs arrive by generation; the numbers of long tracks are counted whenever a generation is complete.
   std::int32_t current = 0;
   order_.visit([&](const PairMatches& pair) {
     for (; current < pair.generation; ++current) count_long_tracks(current);

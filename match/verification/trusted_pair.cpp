@@ -46,6 +46,7 @@ TrustedPairs::TrustedPairs(const Block& block, const TrustOptions& options) : bl
 }
 
 std::optional<TrustedPairs::Relative> TrustedPairs::along_chain(FrameIndex from, FrameIndex to) const {
+  // Concatenates the observed relative poses of successive frames; their variances add up.
   Relative sum;
   FrameIndex at = from;
   double rotation = 0, position = 0;
@@ -76,6 +77,7 @@ std::optional<TrustedPairs::Relative> TrustedPairs::between(FrameIndex from, Fra
 std::optional<TrustedPair> TrustedPairs::relate(ImageIndex a, ImageIndex b) const {
   if (!options_.use_trajectory) return std::nullopt;
   const Image &image_a = block_.images[a], &image_b = block_.images[b];
+  // Only rigs of several cameras are trusted.
   if (block_.rig_of(image_a.frame).mounts.size() < 2) return std::nullopt;
   std::optional<Relative> frames = Relative{};
   if (image_b.frame < image_a.frame) {

@@ -309,6 +309,7 @@ class PairEstimation {
     result.inlier_count = support.count;
     result.inlier = std::move(support.inlier);
     result.draws = draws_;
+    // The median intersection angle tells later stages how well the pair determines depths.
     std::vector<double> angles;
     for (const std::size_t i : rows_of(result.inlier))
       angles.push_back(intersection_angle(rotation, points_.a[i], points_.b[i]));
@@ -327,12 +328,15 @@ class PairEstimation {
   }
 
   TwoView oriented(bool planar) {
+    // Adjust over the inliers first, then narrow the inliers by the sigma of the adjusted residuals.
     const Hypothesis best = polished(hypotheses_.front());
     const Hypothesis last = selected(best);
     TwoView result =
         finish(planar ? PairModel::kHomography : PairModel::kEssential, last.orientation.rotation, last.support);
     set_base(result, last);
     result.by_vertical = by_vertical_;
+    // For a plane, another orientation with nearly the same support and a clearly different base or rotation is the
+    // twin.
     for (const Hypothesis& other : std::span(hypotheses_).subspan(1)) {
       if (!planar || other.support.score < kTwinShare * best.support.score) continue;
       const Hypothesis twin = polished(other);
@@ -378,6 +382,8 @@ class PairEstimation {
                            : sampled_from<FundamentalEstimator>(
                                  consensus_of(estimator, hypotheses_.front().orientation, limit), options);
     if (!found || found->consensus.count < needed_) return std::nullopt;
+    // The four orientations of the nearest essential matrix, each with and without adjustment; the best supported one
+    // is taken.
     std::optional<Hypothesis> best;
     for (const RelativeOrientation& start : orientations_of_essential(nearest_essential(found->model))) {
       const RelativeOrientation refined = adjust_orientation(start, points_, adjustment(0.5 * limit));

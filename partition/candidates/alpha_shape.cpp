@@ -44,11 +44,13 @@ std::vector<PanoramaEdge> panorama_graph(const std::vector<Eigen::Vector3d>& pos
   std::vector<std::pair<Kernel::Point_3, std::int64_t>> points;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const Eigen::Vector3d p = positions[i] - positions[0];
+    // Multiplication by a large odd number scatters the rows evenly; the result is the same in every run.
     const double unevenness = 1e-3 * static_cast<double>((i * 2654435761u) % 1024) / 1024;
     points.emplace_back(Kernel::Point_3(p.x(), p.y(), options.z_stretch * (p.z() + unevenness)),
                         static_cast<std::int64_t>(i));
   }
   Delaunay delaunay(points.begin(), points.end());
+  // All positions in one plane in spite of the unevenness, for example because they coincide.
   if (delaunay.dimension() < 3) return {};
   const AlphaShape shape(delaunay, options.alpha_m * options.alpha_m, AlphaShape::GENERAL);
   std::vector<PanoramaEdge> edges;

@@ -48,6 +48,7 @@ class PairFinder {
   }
 
   std::vector<ImagePair> run() {
+    // Without any position a small block takes all pairs; a large one relies on order and similarity.
     const bool any_located = std::any_of(images_.begin(), images_.end(), [&](auto i) { return view(i).located; });
     if (!any_located && small()) {
       add_all();
@@ -96,6 +97,7 @@ class PairFinder {
       coned_images.push_back(image);
       centres.push_back(cones_.centre(image).head<2>());
     }
+    // All coned images within the radius are examined, and the overlap of the cones decides.
     const KdTree tree(centres);
     const double radius = rig_distance_m_ > 0 ? rig_distance_m_ : kConeRange;
     for (std::size_t i = 0; i < coned_images.size(); ++i) {
@@ -250,6 +252,7 @@ class PairFinder {
       for (std::size_t k = 0; k < 128; ++k) product += std::int32_t{mine[k]} * codes[o][k];
       found.emplace_back(-product, view(other).rank, other);
     }
+    // Ties are broken by the rank of the name, which makes the result independent of the order of images.
     const std::size_t wanted = std::min(static_cast<std::size_t>(options_.descriptor_neighbours), found.size());
     std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(wanted), found.end());
     for (std::size_t n = 0; n < wanted; ++n) add(image, std::get<2>(found[n]));
@@ -357,6 +360,8 @@ CandidateGraph extend_candidates(const CandidateGraph& previous, const Block& bl
     if (pair.b >= first_new_image)
       throw InputError("candidate pairs: the earlier pairs name images that the earlier block does not have");
   PairFinder finder(block, global_descriptors, options);
+  // The whole block is searched, but only pairs with a new image are added: earlier pairs keep their cells, whose
+  // results exist.
   std::vector<ImagePair> added = finder.run();
   std::erase_if(added, [&](const ImagePair& pair) { return pair.b < first_new_image; });
 

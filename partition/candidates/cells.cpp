@@ -23,6 +23,7 @@ class CellMaker {
     double& side = axis == 0 ? width : height;
     side /= 2;
     const double middle = low[axis] + side;
+    // erase_if keeps the order, so the places of a cell stay ascending.
     std::vector<std::int64_t> upper;
     std::erase_if(members, [&](std::int64_t i) {
       const bool above = places_[static_cast<std::size_t>(i)][axis] >= middle;
@@ -37,6 +38,7 @@ class CellMaker {
   std::vector<std::vector<std::int64_t>> take() { return std::move(cells_); }
 
  private:
+  // Places that no cut can separate are divided in their order.
   void cut_by_number(const std::vector<std::int64_t>& members) {
     for (std::size_t i = 0; i < members.size(); i += limit_)
       cells_.emplace_back(members.begin() + static_cast<std::ptrdiff_t>(i),

@@ -47,6 +47,7 @@ class Diagnosis {
   }
 
   BlockDiagnostics find(const std::function<TieEvidence(bool)>& gather) {
+    // Ground heights come from tie points, so in aerial blocks these are collected first.
     found_.aerial = looks_down();
     if (found_.aerial) ties_ = gather(true);
     const std::vector<std::vector<FrameIndex>> order = acquisition_order(block_, state_);
@@ -179,6 +180,7 @@ class Diagnosis {
       if (i == down_image_[frame]) footprint_row_[frame] = static_cast<std::int64_t>(found_.footprints.size());
       found_.footprints.push_back({i, *corners});
     }
+    // The median of the larger sides is the unit in which distances to neighbouring lines are judged.
     std::vector<double> sides;
     for (const auto& footprint : found_.footprints)
       sides.push_back(std::max((footprint.corners[1] - footprint.corners[0]).norm(),
@@ -233,6 +235,7 @@ class Diagnosis {
   }
 
   std::vector<OnLine> exposures_on_lines() const {
+    // The direction at an exposure is that between its neighbours on the line.
     const std::vector<double> signs = signs_of_lines();
     std::vector<OnLine> on;
     for (std::size_t l = 0; l < lines_.size(); ++l) {
@@ -263,6 +266,7 @@ class Diagnosis {
         const OnLine& o = on[static_cast<std::size_t>(other)];
         return o.line != on[i].line && std::abs(u.dot(o.along)) > kParallel;
       };
+      // Of a line flown twice only the line listed first searches, so that each gap is reported once.
       const auto looks_for_this = [&](std::int64_t other) {
         return on[static_cast<std::size_t>(other)].line < on[i].line && parallel(other) &&
                std::abs(left.dot(to(other))) <= close && std::abs(u.dot(to(other))) < kSamePlace * found_.usual_step_m;
@@ -283,6 +287,7 @@ class Diagnosis {
     for (const OnLine& o : on)
       if (std::isfinite(o.to_left)) distances.push_back(o.to_left);
     if (distances.empty()) return;
+    // Neighbouring exposures of one line that all see a wide gap on their left form one missing line.
     const double usual = median(std::move(distances));
     found_.line_distance_m = usual;
     const auto wide = [&](const OnLine& o) { return o.to_left > found_.requested.gap_factor * usual; };

@@ -74,6 +74,7 @@ GroundCover::GroundCover(const std::vector<BlockDiagnostics::Footprint>& footpri
   if (!(side_ > 0)) return;
   const double most = kFewestCells + kMostCells * static_cast<double>(footprints.size());
   const Eigen::Vector2d size = high - low;
+  // A block that is spread over a large area with few images would otherwise need an enormous grid.
   while ((size.x() / side_ + 1) * (size.y() / side_ + 1) > most) side_ *= 2;
   origin_ = low;
   columns_ = static_cast<std::int64_t>(size.x() / side_) + 1;
@@ -94,6 +95,7 @@ void GroundCover::add(const Quadrilateral& footprint) {
     for (std::int64_t column = index(low.x(), origin_.x(), columns_); column <= index(high.x(), origin_.x(), columns_);
          ++column) {
       const Eigen::Vector2d c = centre(column, row);
+      // The cell counts if its centre lies to the left of all sides of the counter-clockwise polygon.
       bool inside = true;
       for (std::size_t i = 0; i < p.size() && inside; ++i) inside = cross(p[(i + 1) % p.size()] - p[i], c - p[i]) >= 0;
       std::uint8_t& count = count_[static_cast<std::size_t>(row * columns_ + column)];

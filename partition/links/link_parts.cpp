@@ -51,6 +51,7 @@ class Bridges {
  public:
   Bridges(std::int64_t frames, const std::vector<GoodLink>& links) : links_(links) {
     const auto n = static_cast<std::size_t>(frames);
+    // Links of each frame in compressed rows: count, sum up, fill in.
     begin_.assign(n + 1, 0);
     for (const GoodLink& link : links) {
       ++begin_[static_cast<std::size_t>(link.a.value) + 1];
@@ -97,6 +98,7 @@ class Bridges {
           }
           continue;
         }
+        // All links of the frame are done: hand its lowest number and its count to the frame above.
         const std::size_t by = step.by;
         path.pop_back();
         if (path.empty()) break;
@@ -142,6 +144,7 @@ void find_link_parts(const Block& block, const BlockState& state, const LinkWeig
     d.part_of_frame.assign(state.oriented.size(), -1);
     return;
   }
+  // The two forests contain every bridge and are small, so the search does not depend on the number of links.
   DisjointSets sets(static_cast<std::int64_t>(state.oriented.size()));
   const std::vector<GoodLink> good = two_forests(block, state, links, d.requested.min_link_points, sets);
   number_parts(state, sets, d);

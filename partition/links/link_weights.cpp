@@ -22,6 +22,7 @@ void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
   if (apart > kLargest)
     throw ComputeError("frames " + std::to_string(a.value) + " and " + std::to_string(b.value) +
                        " are linked, but a block holds at most 2^32 frames; divide it into several blocks");
+  // The distance to the later frame needs four bytes instead of eight.
   const auto further = static_cast<std::uint32_t>(apart);
   if (first >= links_.size()) links_.resize(first + 1);
   std::vector<Link>& links = links_[first];
@@ -41,6 +42,7 @@ void LinkWeights::add(FrameIndex a, FrameIndex b, std::int64_t tracks) {
 
 FrameGraph LinkWeights::graph(std::int64_t frames) const {
   const auto within = [&](const FrameEdge& edge) { return edge.b.value < frames; };
+  // Counting first avoids a list that is reallocated, and thus held twice, while it grows.
   std::size_t count = 0;
   visit([&](const FrameEdge& edge) { count += within(edge); });
   FrameGraph graph{frames, {}};

@@ -56,6 +56,7 @@ Adjacency adjacency(const FrameGraph& graph) {
     ++result.begin[static_cast<std::size_t>(edge.b.value) + 1];
   }
   std::partial_sum(result.begin.begin(), result.begin.end(), result.begin.begin());
+  // Weights are scaled down where their sum would overflow METIS's 32 bits.
   const std::int64_t divisor = total / kWeightLimit + 1;
   std::vector<idx_t> next(result.begin.begin(), result.begin.end() - 1);
   result.neighbour.resize(2 * graph.edges.size());
@@ -115,6 +116,7 @@ Fragments fragments_of(const Adjacency& graph, const std::vector<idx_t>& side) {
     result.size.push_back(0);
     result.side.push_back(side[start]);
     result.outward.push_back(0);
+    // Depth-first search with its own stack: recursion would be as deep as a street is long.
     stack.assign(1, static_cast<idx_t>(start));
     result.of_node[start] = fragment;
     while (!stack.empty()) {
@@ -139,6 +141,7 @@ Fragments fragments_of(const Adjacency& graph, const std::vector<idx_t>& side) {
 void join_fragments(const Adjacency& graph, std::vector<idx_t>& side) {
   const Fragments fragments = fragments_of(graph, side);
   if (fragments.size.size() <= 2) return;
+  // The largest fragment of each side stays; another one moves if its side keeps a quarter of all nodes without it.
   std::array<idx_t, 2> largest = {-1, -1}, count = {0, 0};
   for (std::size_t i = 0; i < fragments.size.size(); ++i) {
     const auto s = static_cast<std::size_t>(fragments.side[i]);

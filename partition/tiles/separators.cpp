@@ -44,6 +44,7 @@ class Parting {
         part(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), take);
       }
     };
+    // Two passes over the links: the first counts those of each node, the second fills them in.
     visit([&](std::int64_t node, Link) { ++result.begin[static_cast<std::size_t>(node) + 1]; });
     std::partial_sum(result.begin.begin(), result.begin.end(), result.begin.begin());
     result.links.resize(result.begin.back());
@@ -62,6 +63,7 @@ class Parting {
     };
     const auto parent = [&](std::int64_t node) { return tree_.nodes[static_cast<std::size_t>(node)].parent; };
     const auto deep = [&](std::int64_t node) { return depth_[static_cast<std::size_t>(node)]; };
+    // Climb from both leaves to the same depth, then together until the parents coincide.
     std::int64_t x = leaf(a), y = leaf(b);
     while (deep(x) > deep(y)) x = parent(x);
     while (deep(y) > deep(x)) y = parent(y);
@@ -94,6 +96,7 @@ class VertexCover {
     };
     list(&Link::left, left_);
     list(&Link::right, right_);
+    // Links in compressed rows by the left frames, with numbers instead of frame indices.
     begin_.assign(left_.size() + 1, 0);
     for (const Link& link : links) ++begin_[row(link.left, number) + 1];
     std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
@@ -108,6 +111,7 @@ class VertexCover {
   }
 
   std::vector<std::int32_t> frames() {
+    // Hopcroft and Karp: each phase augments along a maximal set of shortest paths, so there are few phases.
     while (layer()) {
       next_.assign(begin_.begin(), begin_.end() - 1);
       for (std::size_t i = 0; i < left_.size(); ++i)
@@ -210,6 +214,7 @@ std::vector<std::int32_t> separator_depths(const FrameGraph& graph, const std::v
   const Parting parting(leaf_of_frame, tree);
   const LinksOfNodes parted = parting.run(graph, apart);
   std::vector<std::int32_t> depth(leaf_of_frame.size(), -1), number(leaf_of_frame.size(), -1);
+  // From the root downwards: links that a separator further up already cuts are left out below.
   std::vector<Link> open;
   for (std::size_t node = tree.nodes.size(); node-- > 0;) {
     open.clear();

@@ -84,6 +84,8 @@ class TileMaker {
     std::vector<Component> result;
     for (std::size_t i = 0; i < work.size(); ++i) {  // `work` grows while components fall apart
       Frames frames = std::move(work[i]);
+      // Bisect, drop the weak links between the leaves, and look whether the component is still connected. If not, its
+      // pieces are bisected in their turn.
       const bool whole = static_cast<std::int64_t>(frames.size()) == graph_.frame_count;
       const FrameGraph links = whole ? FrameGraph() : part_of(frames);
       const FrameGraph& part = whole ? graph_ : links;  // without a copy
@@ -362,6 +364,7 @@ class TileExtender {
   }
 
   void build_tree(std::size_t components) {
+    // The largest subtrees of the former tree that lie within one component are kept as they are.
     const std::vector<MergeTree::Node>& old = previous_.tree.nodes;
     std::vector<std::int32_t> label(old.size(), -1);  // the component below a former node; -1: several
     for (std::size_t n = 0; n < old.size(); ++n) {

@@ -49,6 +49,7 @@ class LineFinder {
 
 std::vector<std::vector<FrameIndex>> acquisition_order(const Block& block, const BlockState& state) {
   std::vector<std::vector<FrameIndex>> order;
+  // A frame of a rig appears in the passes of all its mounts, but counts once.
   IndexedVector<FrameIndex, std::uint8_t> taken(block.frames.size(), 0);
   for (const std::vector<ImageIndex>& pass : passes_of(block)) {
     std::vector<FrameIndex> frames;

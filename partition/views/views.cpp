@@ -34,6 +34,7 @@ bool natural_less(std::string_view a, std::string_view b) {
   std::size_t i = 0, j = 0;
   while (i < a.size() && j < b.size()) {
     if (is_digit(a[i]) && is_digit(b[j])) {
+      // Without leading zeros, the number with more digits is larger, and equal lengths compare as text.
       const auto digits = [](std::string_view text, std::size_t& at) {
         while (at < text.size() && text[at] == '0') ++at;
         const std::size_t begin = at;
@@ -122,6 +123,7 @@ View view_of(const Block& block, ImageIndex image, double spacing, double ground
   if (!view.located) return view;
   const Camera& camera = block.cameras[mount.camera];
   double height = position.z() - ground;
+  // Without control, or with positions below it, the height follows from the usual overlap of the frames.
   if (!(height > 0))
     height = spacing / kSpacingPerSide * camera.intrinsics[kFocal] / std::min(camera.width, camera.height);
   const Eigen::Vector2d to_footprint = depth_of(view, height, spacing) * view.direction.head<2>();
@@ -184,6 +186,7 @@ void place_between(const std::vector<ImageIndex>& pass, Views& views) {
   const auto good = [&](std::ptrdiff_t i) { return at(i).located && !at(i).doubtful; };
   for (std::ptrdiff_t i = 0; i < count; ++i) {
     if (good(i)) continue;
+    // The nearest good image before and after, within a window.
     std::vector<Eigen::Vector2d> beside;
     for (std::ptrdiff_t direction : {-1, 1})
       for (std::ptrdiff_t d = 1; d <= kPlaceWindow; ++d) {
