@@ -21,6 +21,7 @@ std::int64_t file_size(int file) {
   return ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) ? status.st_size : -1;
 }
 
+// The system may read less than asked for, or be interrupted by a signal; both are no errors.
 bool read_fully(int file, void* data, std::size_t size, std::int64_t offset) {
   auto* bytes = static_cast<char*>(data);
   while (size > 0) {

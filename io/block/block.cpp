@@ -52,6 +52,7 @@ void check_image_names(const Block& block) {
   require(block.image_names.size() == block.images.size(), std::to_string(block.images.size()) + " images have " +
                                                                std::to_string(block.image_names.size()) +
                                                                " names; the file of the block is damaged");
+  // Names usually arrive in order; then neighbours alone must differ.
   bool ascending = true;
   for (ImageIndex i(1); block.images.contains(i) && ascending; ++i.value)
     ascending = block.image_names[ImageIndex(i.value - 1)] < block.image_names[i];
@@ -75,6 +76,7 @@ void check_verticals(const Block& block) {
     require(before < vertical.image, what + ": appears twice, or out of the order of images");
     before = vertical.image;
     require(std::abs(vertical.down.norm() - 1) < 1e-6, what + ": is no unit vector");
+    // A unit vector has no error along itself, so only the covariance across it must be positive.
     const Eigen::Matrix<double, 3, 2> plane = tangent_plane(vertical.down);
     const Eigen::Matrix2d covariance = plane.transpose() * vertical.covariance * plane;
     require(covariance.allFinite() && covariance(0, 0) > 0 && covariance.determinant() > 0,

@@ -38,6 +38,7 @@ class JsonWriter {
     json["thin_ground"] = list(d_.thin_ground, [&](const auto& ground) {
       return OrderedJson{{"centre_m", {ground.centre.x(), ground.centre.y()}}, {"area_m2", ground.area_m2}};
     });
+    // Only the pairs outside the requirements are listed; a large block has many.
     json["pair_count"] = d_.pairs.size();
     json["pairs"] = OrderedJson::array();
     for (const auto& pair : d_.pairs)

@@ -32,6 +32,7 @@ std::string camera_yaml(const CameraCalibration& camera) {
   std::string text = fmt::format("  {}:\n    model: {}\n", quoted_name(camera.name), model_name(model));
   if (!is_fixed(model, kFocal)) text += fmt::format("    focal_px: {}\n", k[kFocal]);
   text += fmt::format("    principal_point_px: [{}, {}]\n", k[kPrincipalX], k[kPrincipalY]);
+  // Fixed parameters follow from the size of the image and are not written.
   std::string distortion, sigma;
   for (int p = 0; p < k.size(); ++p) {
     if (is_fixed(model, p)) continue;
@@ -127,6 +128,7 @@ void apply_calibration(const RigCalibration& calibration, bool hold, Block& bloc
       Mount& mount = block.rigs[rig].mounts[m];
       const double rotation = mean_axis(from->covariance.topLeftCorner<3, 3>());
       const double position = mean_axis(from->covariance.bottomRightCorner<3, 3>());
+      // A mount without posterior sigmas, or the reference of the rig, is held fixed.
       const bool known = rotation > 0 && position > 0;
       mount.pose = from->pose;
       mount.rotation_sigma_rad = hold || m == 0 || !known ? 0 : rotation;

@@ -6,6 +6,7 @@ void append_tracks(const TrackSet& from, std::int64_t first, std::int64_t last, 
   if (to.begin.empty()) to.begin.push_back(0);
   const std::int64_t row = from.begin[static_cast<std::size_t>(first)];
   const std::int64_t end = from.begin[static_cast<std::size_t>(last)];
+  // The offsets of `from` are moved to the rows in `to`.
   const std::int64_t shift = to.observation_count() - row;
   append_rows(from.id, first, last, to.id);
   for (std::int64_t t = first + 1; t <= last; ++t) to.begin.push_back(from.begin[static_cast<std::size_t>(t)] + shift);

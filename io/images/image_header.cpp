@@ -87,6 +87,7 @@ void read_position(const ExifFields& exif, const Exiv2::XmpData& xmp, ImageHeade
 
   header.dop = exif.number("Exif.GPSInfo.GPSDOP");
   header.position_sigma_horizontal_m = exif.number("Exif.GPSInfo.0x001f");  // GPSHPositioningError
+  // RTK values are the standard deviations of this image and replace the general estimate.
   const double east = xmp_number(xmp, "drone-dji", "RtkStdLon"), north = xmp_number(xmp, "drone-dji", "RtkStdLat");
   const double up = xmp_number(xmp, "drone-dji", "RtkStdHgt");
   if (east > 0 && north > 0) header.position_sigma_horizontal_m = std::max(east, north);
@@ -159,6 +160,7 @@ ImageHeader read_image_header(const std::string& path) {
   if (size == 0) throw InputError("the file is empty");
 
   const std::lock_guard lock(exiv2_mutex());
+  // Exiv2 would print warnings about harmless errors in the metadata of many cameras.
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   ImageHeader header;
   try {

@@ -17,6 +17,7 @@ std::string trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, last - first + 1);
 }
 
+// The fields of a line. Commas inside quotes belong to the field; blanks at its ends do not.
 std::vector<std::string> split(const std::string& line) {
   std::vector<std::string> fields(1);
   bool in_quotes = false;
@@ -44,6 +45,7 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
   std::int64_t number = 0;
   for (std::string line; std::getline(stream, line);) {
     ++number;
+    // Programs on Windows often write a byte order mark before the text.
     if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
     if (trimmed(line).empty()) continue;
     if (line.front() == '#') {

@@ -31,6 +31,7 @@ bool NumberReader::line_has_more() {
   return at_ < text_.size() && text_[at_] != '\n';
 }
 
+// last_line_ is set here, so that messages name the line of the word that follows.
 bool NumberReader::at_end() {
   while (!line_has_more() && at_ < text_.size()) {
     ++at_;

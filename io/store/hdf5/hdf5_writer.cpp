@@ -176,6 +176,7 @@ void Hdf5Writer::group(const std::string& name, const std::string& description) 
 }
 
 void Hdf5Writer::integers(const std::string& name, const std::vector<std::int64_t>& values, const DatasetNote& note) {
+  // A small type is small in the file also without compression, and HDF5 converts it when it is read.
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   const std::int64_t lowest = values.empty() ? 0 : *low, highest = values.empty() ? 0 : *high;
   hid_t type = H5T_STD_I64LE;

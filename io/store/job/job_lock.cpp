@@ -68,6 +68,7 @@ JobLock::JobLock(const JobStore& store, double patience_s) {
   const std::string path = store.path("lock");
   file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (file_ < 0) throw_file_error(path, "created", errno);
+  // flock has no waiting time, so the lock is tried again and again. A signal does not end the waiting.
   const auto start = std::chrono::steady_clock::now();
   while (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;

@@ -62,6 +62,7 @@ void flush_directory(const std::string& path) {
 
 std::uint64_t hash_payload(int file, const std::string& path, std::uint64_t length) {
   Hasher hasher;
+  // A buffer of at most 1 MiB: units may be larger than memory.
   std::vector<char> buffer(static_cast<std::size_t>(std::min<std::uint64_t>(length, 1 << 20)));
   for (std::uint64_t done = 0; done < length;) {
     const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(buffer.size(), length - done));
@@ -173,6 +174,7 @@ UnitSeal append_seal(const std::string& path, std::uint64_t fingerprint) {
   const Descriptor file(path, O_RDWR | O_APPEND);
   if (file.id() < 0) throw_file_error(path, "opened", errno);
   Trailer trailer;
+  // The payload is read back from the file, so the seal also covers what was actually written.
   trailer.seal.length = static_cast<std::uint64_t>(std::max<std::int64_t>(file_size(file.id()), 0));
   trailer.seal.content_hash = hash_payload(file.id(), path, trailer.seal.length);
   trailer.seal.fingerprint = fingerprint;
@@ -244,6 +246,7 @@ std::string JobStore::verified_path(const std::string& unit) const {
   std::pair<std::int64_t, std::int64_t> version(-1, -1);
   if (::stat(name.c_str(), &status) == 0)
     version = {status.st_size, status.st_mtim.tv_sec * std::int64_t{1000000000} + status.st_mtim.tv_nsec};
+  // Size and time of modification identify the version of the file; a unit is never changed in place.
   const auto known = verified_.find(unit);
   if (known != verified_.end() && known->second == version && version.first >= 0) return name;
   verify(unit);

@@ -23,6 +23,7 @@ void write_candidates(const std::string& path, const CandidateGraph& graph) {
 
 CandidateGraph read_candidates(const std::string& path) {
   const Hdf5Reader file(path, "candidates");
+  // The columns hold differences, which are small numbers and take little space.
   const auto first = cumulate(file.vector<std::int64_t>("pairs/a_difference"));
   const auto offset = file.vector<std::int64_t>("pairs/b_minus_a", static_cast<std::int64_t>(first.size()));
   CandidateGraph graph;
