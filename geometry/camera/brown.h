@@ -1,11 +1,12 @@
-// Brown's projection with its derivatives, inline for loops over many observations; formulas in projection.h.
+// Brown's projection with its derivatives. It is inline, because most blocks use this model and loops over many
+// observations call it. The formulas are in projection.h.
 #pragma once
 
 #include "geometry/camera/camera.h"
 
 namespace megablock {
 
-// Distorted normalised coordinates with their derivatives by (x, y).
+// Distorted normalised coordinates, with their derivatives by the undistorted (x, y).
 struct BrownDistortion {
   Eigen::Vector2d point;
   Eigen::Matrix2d jacobian;
@@ -23,7 +24,8 @@ inline BrownDistortion distort_brown(const Intrinsics& k, double x, double y) {
   return d;
 }
 
-// As project_with_jacobian; `by_intrinsics` is left alone where nobody asks for it.
+// As project_with_jacobian(). Leaves `by_intrinsics` untouched unless with_intrinsics is true. Returns false for a
+// point behind the camera.
 inline bool project_brown(const Intrinsics& k, const Eigen::Vector3d& point, bool with_intrinsics,
                           ProjectionJacobian& result) {
   if (!(point.z() > 0)) return false;
@@ -33,6 +35,7 @@ inline bool project_brown(const Intrinsics& k, const Eigen::Vector3d& point, boo
   const double f = k[kFocal];
   result.pixel = {k[kPrincipalX] + f * d.point.x(), k[kPrincipalY] + f * d.point.y()};
   result.by_point.leftCols<2>() = (f * inverse_z) * d.jacobian;
+  // x and y depend on Z only by the quotients, so dx/dZ = -x/Z.
   result.by_point.col(2) = -x * result.by_point.col(0) - y * result.by_point.col(1);
   if (!with_intrinsics) return true;
 

@@ -13,7 +13,7 @@ namespace {
 
 using Kind = CameraModelKind;
 
-// Without distortion; the columns of further parameters are zero.
+// Projection without distortion. The columns of further parameters are zero.
 bool pinhole_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, ProjectionJacobian& result) {
   if (!(point.z() > 0)) return false;
   const double x = point.x() / point.z(), y = point.y() / point.z(), scale = k[kFocal] / point.z();
@@ -24,7 +24,7 @@ bool pinhole_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, Project
   return true;
 }
 
-// The fisheye's distorted angle and its derivative.
+// The fisheye's distorted angle t_d(t) and its derivative t_d'.
 struct Angle {
   double value, slope;
 };
@@ -35,13 +35,15 @@ Angle distort_angle(const Intrinsics& k, double angle) {
           1 + a2 * (3 * c[0] + a2 * (5 * c[1] + a2 * (7 * c[2] + a2 * 9 * c[3])))};
 }
 
+// Whether the polynomial still grows at this angle; beyond, two angles would share a pixel.
 bool fisheye_sees(const Intrinsics& k, const Eigen::Vector3d& point) {
   const double radius = point.head<2>().norm();
   if (radius == 0) return point.z() > 0;
   return distort_angle(k, std::atan2(radius, point.z())).slope > 0;
 }
 
-// With s = t_d / R: pixel = c + f s (X, Y), and ds = (t_d' dt - s dR) / R, dt = (Z dR - R dZ) / |X|^2.
+// With s = t_d / R the pixel is c + f s (X, Y). Its derivatives follow from ds = (t_d' dt - s dR) / R and dt = (Z
+// dR - R dZ) / |X|^2.
 bool fisheye_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, ProjectionJacobian& result) {
   const double radius = point.head<2>().norm(), f = k[kFocal];
   if (radius == 0) return pinhole_jacobian(k, point, result);
@@ -62,7 +64,7 @@ bool fisheye_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, Project
   return true;
 }
 
-// At the poles a panorama has a line of pixels for a point; closer than this (tangent) nothing is measured.
+// A pole of a panorama is a whole line of pixels. Points closer to it than this (tangent of the angle) have no pixel.
 constexpr double kNearestToPole = 1e-6;
 
 bool panorama_sees(const Eigen::Vector3d& point) {
@@ -81,7 +83,8 @@ bool panorama_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, Projec
   return true;
 }
 
-// By the implicit function theorem, from the projection without distortion.
+// Derivatives by the implicit function theorem, from those of the projection without distortion (see the head of
+// correction.h).
 bool corrected_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, ProjectionJacobian& result) {
   if (!pinhole_jacobian(k, point, result)) return false;
   result.pixel = solve_correction(k, result.pixel);
@@ -93,6 +96,8 @@ bool corrected_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, Proje
   return true;
 }
 
+// Inverts Brown's distortion by Newton's method. Empty beyond the radius where the distortion folds, that is where its
+// Jacobian is no longer positive.
 std::optional<Eigen::Vector2d> unproject_brown(const Intrinsics& k, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d target((pixel.x() - k[kPrincipalX]) / k[kFocal], (pixel.y() - k[kPrincipalY]) / k[kFocal]);
   Eigen::Vector2d p = target;
@@ -108,12 +113,14 @@ std::optional<Eigen::Vector2d> unproject_brown(const Intrinsics& k, const Eigen:
   return std::nullopt;
 }
 
-// Of a pixel without distortion.
+// The normalised image point of a pixel without distortion.
 std::optional<Eigen::Vector2d> unproject_pinhole(const Intrinsics& k, const Eigen::Vector2d& pixel) {
   if (!pixel.allFinite()) return std::nullopt;
   return Eigen::Vector2d((pixel.x() - k[kPrincipalX]) / k[kFocal], (pixel.y() - k[kPrincipalY]) / k[kFocal]);
 }
 
+// Solves t_d(t) = r for the angle t by Newton's method, where r is the distance of the pixel from the principal point
+// in focal lengths.
 std::optional<Eigen::Vector3d> fisheye_ray(const Intrinsics& k, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d image((pixel.x() - k[kPrincipalX]) / k[kFocal], (pixel.y() - k[kPrincipalY]) / k[kFocal]);
   const double radius = image.norm();

@@ -1,8 +1,11 @@
-// Projection of a camera, its inverse and its derivatives, for every model: formulas in projection.h and correction.h.
+// Projection of a point into an image, its inverse, and its derivatives, for every camera model. The formulas are in
+// projection.h and correction.h.
 //
-// What is in front of a camera is the model's own matter: pinhole, Brown and all corrections see Z > 0 (corrections as
-// far as they do not fold the image); the fisheye sees every direction up to where its polynomial stops growing, also
-// beyond 90 degrees; the panorama everything but its poles.
+// Each model decides which points are in front of the camera. Pinhole, Brown and all correction models see points with
+// Z > 0 (correction models only as far as they do not fold the image). The fisheye sees every direction up to the angle
+// where its polynomial stops growing, also beyond 90 degrees. The panorama sees everything except its poles.
+//
+// Points are in camera axes (x right, y down, z along the view) in any unit. Pixels have their centres at +0.5.
 #pragma once
 
 #include <limits>
@@ -13,7 +16,7 @@
 
 namespace megablock {
 
-// NaN where the model has no pixel for the point.
+// The pixel of a point. NaN where the model has none.
 Eigen::Vector2d project_other(const Intrinsics& k, const Eigen::Vector3d& point);  // all models but Brown
 inline Eigen::Vector2d no_pixel() { return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()); }
 inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point) {
@@ -21,8 +24,8 @@ inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point
   return point.z() > 0 ? projection::brown(k.data(), point) : no_pixel();
 }
 
-// Adjusted minus measured pixel. The two edges of a panorama are the same place: its differences are less than half a
-// turn.
+// Adjusted minus measured pixel. In a panorama both edges of the image are the same place, so its difference is taken
+// modulo a full turn and is at most half of one.
 template <typename Scalar>
 Eigen::Matrix<Scalar, 2, 1> pixel_difference(const CameraModel& model, const Scalar* k,
                                              const Eigen::Matrix<Scalar, 2, 1>& adjusted,
@@ -40,16 +43,16 @@ inline Eigen::Vector2d pixel_difference(const Intrinsics& k, const Eigen::Vector
   return pixel_difference<double>(k.model(), k.data(), adjusted, measured);
 }
 
-// Projected minus measured; NaN where the model has no pixel for the point.
+// Projected minus measured pixel. NaN where the model has no pixel for the point.
 inline Eigen::Vector2d reprojection(const Intrinsics& k, const Eigen::Vector3d& point,
                                     const Eigen::Vector2d& measured) {
   return pixel_difference(k, project(k, point), measured);
 }
 
-// Columns: the model's parameters. In place, without heap.
+// Derivatives of a pixel by the model's parameters, one column each. Held in place, without heap memory.
 using IntrinsicJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxIntrinsics>;
 
-// Projection with derivatives by camera coordinates and by the parameters (fixed ones: zero).
+// A projection with its derivatives by the camera coordinates and by the parameters (zero for fixed ones).
 struct ProjectionJacobian {
   bool valid = false;  // otherwise the rest is undefined: the model has no pixel for the point
   Eigen::Vector2d pixel;
@@ -58,12 +61,13 @@ struct ProjectionJacobian {
 };
 ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point);
 
-// Unit viewing direction of a pixel in camera coordinates. Empty where the model cannot be inverted: beyond the radius
-// at which the radial polynomial turns back, where a correction folds the image, above the poles of a panorama.
+// The unit viewing direction of a pixel in camera axes. Empty where the model cannot be inverted: beyond the radius
+// where the radial polynomial turns back, where a correction folds the image, and above the poles of a panorama.
 std::optional<Eigen::Vector3d> viewing_ray(const Intrinsics& k, const Eigen::Vector2d& pixel);
 
-// The ray of viewing_ray with its derivatives by the pixel and by the parameters (fixed ones: zero), by the implicit
-// function theorem: with the tangent basis T of the ray and the projection p, dray = T (p_X T)^-1 (dm - p_k dk).
+// The ray of viewing_ray() with its derivatives by the pixel m and by the parameters k (zero for fixed ones). By the
+// implicit function theorem, with the tangent basis T of the ray and the projection p, dray = T (p_X T)^-1 (dm - p_k
+// dk).
 struct RayJacobian {
   bool valid = false;  // otherwise the rest is undefined
   Eigen::Vector3d ray;
@@ -72,10 +76,10 @@ struct RayJacobian {
 };
 RayJacobian ray_with_jacobian(const Intrinsics& k, const Eigen::Vector2d& pixel);
 
-// Two unit vectors (columns) that complete the unit vector `direction` to an orthogonal basis.
+// Two unit vectors (columns) that form an orthonormal basis with the unit vector `direction`.
 Eigen::Matrix<double, 3, 2> tangent_plane(const Eigen::Vector3d& direction);
 
-// The normalised image point (x, y) = (X/Z, Y/Z) of a pixel. Empty as viewing_ray, and where the ray has Z <= 0.
+// The normalised image point (x, y) = (X/Z, Y/Z) of a pixel. Empty where viewing_ray() is, and for rays with Z <= 0.
 std::optional<Eigen::Vector2d> unproject(const Intrinsics& k, const Eigen::Vector2d& pixel);
 
 }  // namespace megablock

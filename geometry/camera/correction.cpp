@@ -1,4 +1,4 @@
-// Derivatives. Radial, with u = 1 px or f, rho = r/u, g = sum c_i rho^e_i:
+// Derivatives of the corrections. Radial, with u = 1 px or f, rho = r/u, g = sum c_i rho^e_i:
 //     d_q = g I + q q' (sum e_i c_i rho^(e_i - 2)) / u^2,   d_s = -d_q,   d_c_i = q rho^e_i,
 //     d_f = -q/f sum e_i c_i rho^e_i   (u = f only)
 #include "geometry/camera/correction.h"
@@ -15,6 +15,7 @@ namespace {
 using Kind = CameraModelKind;
 constexpr int kHighestDegree = 6;
 
+// Whether the term x^i y^j belongs to a component; see the head of correction.h for those that are left out.
 bool belongs(int component, int i, int j) {
   if (component == 1 && i + j == 1) return false;
   return i + j >= 1 && !(i == 1 && j == 1);
@@ -37,7 +38,7 @@ std::vector<CorrectionTerm> make_terms(const CameraModel& model) {
   return terms;
 }
 
-// Tables of all additive models, by kind and order.
+// Term tables of all additive models, by kind and order.
 class TermTables {
  public:
   TermTables() {
@@ -69,7 +70,7 @@ Correction radial(const Intrinsics& k, const Eigen::Vector2d& pixel, bool parame
   const Eigen::Vector2d q = pixel - Eigen::Vector2d(k[kSymmetryX], k[kSymmetryY]);
   const double rho2 = q.squaredNorm() / (unit * unit);
   if (!(rho2 > 0)) return c;
-  double power = kind == Kind::kEvenRadial ? std::sqrt(rho2) : rho2;  // rho^e
+  double power = kind == Kind::kEvenRadial ? std::sqrt(rho2) : rho2;  // rho^e, e the exponent of the first term
   int exponent = kind == Kind::kEvenRadial ? 1 : 2;
   double g = 0, slope = 0;  // slope: sum e c rho^e
   for (int p = kRadialTerms; p < k.size(); ++p, power *= rho2, exponent += 2) {
@@ -86,7 +87,7 @@ Correction radial(const Intrinsics& k, const Eigen::Vector2d& pixel, bool parame
   return c;
 }
 
-// Values and derivatives of x^i or P_i(x), i = 0 to n.
+// Values and derivatives of x^i or of the Legendre polynomial P_i(x), i = 0 to n.
 struct Basis {
   std::array<double, kHighestDegree + 1> value{}, slope{};
   Basis(Kind kind, int n, double x) {
@@ -104,7 +105,7 @@ struct Basis {
   }
 };
 
-// A function of an additive correction and its derivatives by x and y.
+// A function of an additive correction with its derivatives by x and y.
 struct ValueAndSlopes {
   double value, by_x, by_y;
 };
@@ -127,7 +128,7 @@ Correction additive(const Intrinsics& k, const Eigen::Vector2d& pixel, bool para
   const CameraModel& model = k.model();
   const double free_x = 2 * pixel.x() / k[kImageWidth] - 1, free_y = 2 * pixel.y() / k[kImageHeight] - 1;
   const double x = detail::within_extent(free_x), y = detail::within_extent(free_y);
-  // Derivatives of the scaled coordinates: none where they are held at the border.
+  // Derivatives of the scaled coordinates; zero where these are held at the border.
   const double scale_x = x == free_x ? 2 / k[kImageWidth] : 0, scale_y = y == free_y ? 2 / k[kImageHeight] : 0;
   const bool fourier = model.kind == Kind::kFourier;
   const Basis basis_x(model.kind, fourier ? 0 : model.order, x), basis_y(model.kind, fourier ? 0 : model.order, y);
@@ -160,7 +161,7 @@ Correction correction_at(const Intrinsics& k, const Eigen::Vector2d& pixel) {
 
 Eigen::Vector2d solve_correction(const Intrinsics& k, const Eigen::Vector2d& corrected) {
   constexpr int kMaxIterations = 30;
-  // A step of this size is followed by an error of its square times the curvature (px^-1, far below 1): rounding.
+  // After a step of this length the error is its square times the curvature (far below 1 per pixel), that is rounding.
   constexpr double kLastStepPx = 1e-7;
   Eigen::Vector2d m = corrected;
   for (int i = 0; i < kMaxIterations; ++i) {

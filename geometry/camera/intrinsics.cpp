@@ -16,7 +16,7 @@ const CameraModelForm& form_of(Kind kind) {
   return *std::find_if(all.begin(), all.end(), [&](const CameraModelForm& form) { return form.kind == kind; });
 }
 
-// "x20", "y11", "xc10", "ys2m1": component, function, powers or frequencies.
+// Names of additive terms: component, function, powers or frequencies, as "x20", "y11", "xc10", "ys2m1".
 std::string term_name(const CameraModel& model, int term) {
   const CorrectionTerm& t = correction_term_list(model)[static_cast<std::size_t>(term)];
   std::string name = t.component == 0 ? "x" : "y";

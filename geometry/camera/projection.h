@@ -1,5 +1,5 @@
-// Projection of the models that go from the ground to the image, templated for automatic differentiation. Camera
-// coordinates X, Y, Z look along +z, y down; pixels have their centres at +0.5.
+// Projection of the models that go from the ground to the image, as templates for automatic differentiation. Camera
+// axes are x right, y down, z along the view; pixels have their centres at +0.5.
 //
 //     pinhole          u = cx + f x,  v = cy + f y,  x = X/Z, y = Y/Z
 //     brown            r2 = x^2 + y^2,
@@ -9,7 +9,8 @@
 //                      u = cx + f t_d X/R,  v = cy + f t_d Y/R
 //     equirectangular  u = cx + f atan2(X, Z),  v = cy + f atan2(Y, |X, Z|),  f = width / 2 pi
 //
-// Brown (1971), parameter order and signs as in OpenCV; fisheye: Kannala and Brandt (2006) as in OpenCV.
+// Brown's model (D. C. Brown, 1971) has OpenCV's order and signs of parameters. The fisheye is that of OpenCV (J.
+// Kannala and S. Brandt, 2006).
 #pragma once
 
 #include <Eigen/Core>
@@ -66,7 +67,7 @@ Pixel<Scalar> equirectangular(const Scalar* k, const Point<Scalar>& point) {
 
 }  // namespace projection
 
-// The pixel of a point that the model can project (camera.h), for all models but those of correction.h.
+// The pixel of a point that the model can project (see camera.h), for all models except those of correction.h.
 template <typename Scalar>
 Eigen::Matrix<Scalar, 2, 1> project_directly(CameraModelKind kind, const Scalar* k,
                                              const Eigen::Matrix<Scalar, 3, 1>& point) {
