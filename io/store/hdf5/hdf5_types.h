@@ -1,4 +1,4 @@
-// Common parts of the HDF5 reader and writer. Only io/store/hdf5/hdf5_*.cpp include it.
+// Common parts of the HDF5 reader and writer. Internal to io/store/hdf5/.
 #pragma once
 
 #include <hdf5.h>

@@ -12,24 +12,26 @@
 
 namespace megablock {
 
-// What a tile's adjustment leaves: its view of the unknowns, its points and the verdict on each observation, aligned
-// with the rows of the tile's track file (then its control points in block order).
+// The result of a tile's adjustment: its values of the unknowns, its points, and a verdict on each observation. The
+// observations have the order of the rows of the tile's track file, followed by those of its control points in block
+// order.
 struct TileAdjustment {
   std::vector<FrameIndex> frames;
-  std::vector<Pose> poses;                 // [frames]
-  std::vector<std::int64_t> observations;  // [frames], kept ones: the boundary frame starts from the richest tile
+  std::vector<Pose> poses;  // [frames]
+  // [frames] kept ones: a frame of several tiles starts from the tile with most of them.
+  std::vector<std::int64_t> observations;
   std::vector<CameraIndex> cameras;
   std::vector<Intrinsics> intrinsics;             // [cameras]
   std::vector<std::int64_t> camera_observations;  // [cameras]
   std::vector<RigIndex> mount_rigs;
-  std::vector<std::int32_t> mount_numbers;       // [mount_rigs] of the mount in its rig
+  std::vector<std::int32_t> mount_numbers;       // [mount_rigs] number of the mount in its rig
   std::vector<Pose> mounts;                      // [mount_rigs]
   std::vector<std::int64_t> mount_observations;  // [mount_rigs]
   std::vector<std::uint8_t> parts;  // [rows of the track file] part of its track (adjust/tile/track_parts.h)
-  // Of the tracks split into these parts:
+  // For the tracks after they were split into these parts:
   std::vector<Eigen::Vector3d> points;  // [tracks + control points]; NaN = not triangulated
   std::vector<std::uint8_t> kept;       // [observations of tracks, then of control points] 1 = kept
-  double image_sigma_px = 0;            // of tie point measurements, with which the tile was adjusted
+  double image_sigma_px = 0;            // of tie points, as used in the adjustment of the tile
   std::string summary;                  // one line for the log and the report
 };
 void write_adjustment(const std::string& path, const TileAdjustment& adjustment);

@@ -11,10 +11,10 @@
 
 namespace megablock {
 
-// `after_table` is called behind every table that is written.
+// `after_table` is called after every table that is written.
 void write_block(const std::string& path, const Block& block, std::function<void()> after_table = {});
 Block read_block(const std::string& path);
-Block read_block_without_names(const std::string& path);          // all but Block::image_names
-NameTable<ImageIndex> read_image_names(const std::string& path);  // these
+Block read_block_without_names(const std::string& path);          // everything except Block::image_names
+NameTable<ImageIndex> read_image_names(const std::string& path);  // the image names alone
 
 }  // namespace megablock

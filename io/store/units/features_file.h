@@ -13,7 +13,7 @@ namespace megablock {
 
 void write_features(const std::string& path, const std::vector<ImageFeatures>& images);
 std::vector<ImageFeatures> read_features(const std::string& path);
-// Without the keypoints' descriptors: an eighth of the bytes.
+// Without the descriptors of the keypoints: an eighth of the bytes.
 std::vector<ImageFeatures> read_keypoints(const std::string& path);
 
 }  // namespace megablock

@@ -14,11 +14,11 @@
 
 namespace megablock {
 
-// Poses, intrinsics and mounts of the whole block (after orientation, after each global iteration).
+// Poses, intrinsics and mounts of the whole block, after the initial orientation and after each iteration.
 void write_state(const std::string& path, const BlockState& state);
 BlockState read_state(const std::string& path);
 
-// The initial orientation: a state, why frames got no pose, and verticals that are not believed.
+// The initial orientation: a state, the reasons why frames have no pose, and the rejected verticals.
 struct InitialOrientation {
   BlockState state;
   std::vector<std::pair<FrameIndex, std::string>> failed;
