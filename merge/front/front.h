@@ -1,7 +1,8 @@
-// Dense fronts: the elimination step shared by the cells of a tile and the nodes of the merge tree.
+// Dense fronts: one step of the elimination, for the cells of a tile and for the nodes of the merge tree alike.
 //
-// A front holds the normal equations K x = b over the unknowns E that are eliminated here and the unknowns P that are
-// passed up. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update matrix is
+// A front holds the normal equations K x = b of the unknowns E, which are eliminated here, and of the separator P,
+// which is passed to the parent. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update matrix
+// is
 //
 //     S = K_PP - Y Y',   s = b_P - Y z,
 //
@@ -10,8 +11,9 @@
 // A pivot below 1e-12 of the un-eliminated diagonal of J'J (of the damped one when lambda > 0) marks a direction that
 // the observations do not determine: the scalar unknown is held (x = 0: a minimal constraint) and reported.
 //
-// Sign: b = -J'r, so x is the step. Right-hand side 0 is b; further ones (inner constraints of a free block) ride
-// along. Everything is a pure function of its inputs; children are added in their order.
+// Sign: b = -J'r, so x is the step. Right-hand side 0 is b; a free block adds further ones for its inner constraints.
+// Every function depends on its inputs alone, and children are added in their order, so that the bits are always the
+// same.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +33,7 @@ struct HeldUnknown {
   double ratio = 0;            // pivot / un-eliminated diagonal; 0 / 0 counts as 0
 };
 
-// What is summed up the tree besides the matrices.
+// Sums over a subtree besides the matrices.
 struct SubtreeSums {
   double cost = 0;                // 1/2 sum rho(|r|^2)
   double weighted_squares = 0;    // sum rho' |r|^2
@@ -45,13 +47,13 @@ struct SubtreeSums {
   void add(const SubtreeSums& other);  // in the order of the calls
 };
 
-// What x'Sx - 2 b'x can be lowered by from x = 0, b'S^+ b, and the rank of S.
+// The decrease of x'Sx - 2 b'x from x = 0 to its minimum, b'S^+ b, and the rank of S.
 struct LeastSquares {
   double value = 0;
   std::int64_t rank = 0;
 };
 
-// Condensed normal equations on the passed unknowns: what a child hands to its parent.
+// The update of a child: its normal equations condensed on the unknowns that it passes to its parent.
 struct UpdateMatrix {
   UnknownList unknowns;  // passed, ascending
   std::int64_t right_hand_sides = 1;
@@ -59,7 +61,7 @@ struct UpdateMatrix {
   std::vector<double> rhs;       // [n x right_hand_sides], column-major
   std::vector<double> diagonal;  // [n] of the un-eliminated J'J below here: what lambda multiplies
   SubtreeSums sums;
-  LeastSquares alone;  // of these equations by themselves; where seams are checked (seam_check.h)
+  LeastSquares alone;  // of these equations by themselves; filled in where seams are checked (seam_check.h)
 
   std::int64_t byte_count() const;  // of its values
   void write(ByteWriter& out) const;
@@ -68,7 +70,7 @@ struct UpdateMatrix {
   static UpdateMatrix from_bytes(const Bytes& bytes);
 };
 
-// What back-substitution and covariances need of an eliminated front.
+// The factors of an eliminated front, for back-substitution and covariances.
 struct FrontFactor {
   UnknownList eliminated, passed;  // each ascending
   std::int64_t right_hand_sides = 1;
@@ -81,7 +83,7 @@ struct FrontFactor {
   static FrontFactor read(ByteReader& in);
 };
 
-// Values of a list of unknowns, e.g. a step.
+// Values of a list of unknowns, such as a step of the adjustment.
 struct Step {
   UnknownList unknowns;  // ascending
   std::int64_t columns = 1;
@@ -106,11 +108,11 @@ struct CovarianceMatrix {
   static CovarianceMatrix from_bytes(const Bytes& bytes);
 };
 
-// Memory of what small fronts leave behind, for the next ones: fetching it anew from the system costs as much as their
+// Keeps the memory of small fronts for the next ones. To fetch it anew from the system would cost as much as their
 // arithmetic.
 class FrontMemory {
  public:
-  // Empty, with a capacity of at least `size` values.
+  // An empty vector with a capacity of at least `size` values.
   std::vector<double> take(std::size_t size);
   void give(std::vector<double> buffer);
 
@@ -118,16 +120,17 @@ class FrontMemory {
   std::vector<std::vector<double>> free_;  // ascending by capacity
 };
 
-// A front being filled. Rows: eliminated unknowns first, then passed ones; the columns of the two lie apart, so that
-// the first become the factor as they are. Only the lower triangle is used.
+// A front that is being filled. The rows of the eliminated unknowns come first, those of the passed ones behind them.
+// The columns of the two are stored apart, so that the first become the factor without a copy. Only the lower triangle
+// is used.
 class Front {
  public:
-  // `memory` (may be null) outlives the front.
+  // `memory` may be null; else it outlives the front.
   Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1, FrontMemory* memory = nullptr);
 
   std::int64_t dimension() const { return dimension_; }
   std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
-  // A block of the lower triangle, whose columns belong to one unknown: its first element and what is between columns.
+  // A block of the lower triangle whose columns belong to one unknown: its first element, and the distance of columns.
   struct Place {
     double* values;
     std::int64_t stride;
@@ -144,10 +147,11 @@ class Front {
   double* diagonal() { return diagonal_.data(); }  // [n] of J'J
   SubtreeSums& sums() { return sums_; }
 
-  void add(const UpdateMatrix& child);  // extend-add; right-hand sides beyond this front's are left out
+  void add(const UpdateMatrix& child);  // extend-add; further right-hand sides than this front has are left out
 
   struct Result;
-  // Adds lambda * diagonal to the eliminated rows, factorises them, leaves the update matrix. Consumes the front.
+  // Adds lambda * diagonal to the eliminated rows and factorises them. Returns the update and the factors; the front is
+  // used up.
   Result eliminate(double lambda) &&;
 
  private:
@@ -166,10 +170,10 @@ struct Front::Result {
   FrontFactor factor;
 };
 
-// x over E and P (ascending) from x over at least P.
+// The values of E and P, ascending, from those of at least P.
 Step back_substitute(const FrontFactor& factor, const Step& passed);
 
-// Covariance over E and P of a front, by its parts: the whole of an upper front is never put together.
+// Covariance of the unknowns E and P of a front, in three blocks. That of a large front is never formed as a whole.
 struct FrontCovariance {
   UnknownList eliminated, passed;  // each ascending
   std::vector<double> inner;       // C_EE [e x e] column-major, lower triangle
@@ -177,11 +181,11 @@ struct FrontCovariance {
   std::vector<double> outer;       // C_PP [p x p]
 
   CovarianceMatrix restricted_to(const UnknownList& wanted) const;  // throws ComputeError when one is missing
-  Bytes bytes_of(const UnknownList& wanted) const;                  // of restricted_to(), which is not put together
+  Bytes bytes_of(const UnknownList& wanted) const;                  // of restricted_to(), which is not formed
   CovarianceMatrix whole() const;                                   // of E and P, ascending
 };
 
-// From the covariance of P (all of it, nothing else):
+// From the covariance of P, of all its unknowns and no others:
 // C_EE = K_EE^-1 + K_EE^-1 K_EP C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
 FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix passed);
 

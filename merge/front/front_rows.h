@@ -1,4 +1,4 @@
-// Rows and triangles of fronts' matrices. Internal to merge/front/.
+// Finds the rows of unknowns in the matrices of fronts, and packs triangles. Internal to merge/front/.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
-// Flat byte strings of plain values and vectors: what travels between ranks and to the scratch directory.
-// Host byte order: a job's ranks and its scratch live on machines of one kind.
+// Writes plain values and vectors as a flat string of bytes, and reads them back: messages between ranks and files in
+// the scratch directory. The byte order is that of the host, because the ranks of a job and its scratch are on machines
+// of one kind.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ namespace megablock {
 
 using Bytes = std::string;
 
-// Into memory, or straight into a file, whose state says afterwards whether all of it went there.
+// Writes into memory, or straight into a file. The state of the file then says whether everything was written.
 class ByteWriter {
  public:
   ByteWriter() = default;
@@ -34,13 +35,13 @@ class ByteWriter {
   }
   template <typename T>
   requires std::is_trivially_copyable_v<T>
-  void elements(const T* first, std::size_t count) { append(first, count * sizeof(T)); }  // without their number
+  void elements(const T* first, std::size_t count) { append(first, count * sizeof(T)); }  // without a count before them
   void bytes(const Bytes& b) {
     value<std::uint64_t>(b.size());
     append(b.data(), b.size());
   }
-  void reserve(std::size_t size) { bytes_.reserve(size); }  // of what goes into memory
-  Bytes take() { return std::move(bytes_); }                // what went into memory
+  void reserve(std::size_t size) { bytes_.reserve(size); }  // only of a writer into memory
+  Bytes take() { return std::move(bytes_); }                // the bytes written so far
 
  private:
   void append(const void* data, std::size_t size) {
@@ -53,7 +54,7 @@ class ByteWriter {
   std::ostream* file_ = nullptr;
 };
 
-// From memory, or from the first `size` bytes of a file. Throws StoreError when they end too early.
+// Reads from memory, or from the first `size` bytes of a file. Throws StoreError when the bytes end too early.
 class ByteReader {
  public:
   explicit ByteReader(const Bytes& bytes) : data_(bytes.data()), size_(bytes.size()) {}
@@ -73,7 +74,7 @@ class ByteReader {
   }
   template <typename T>
   requires std::is_trivially_copyable_v<T>
-  void elements(T* first, std::size_t count) { copy(first, count * sizeof(T)); }  // as many as the caller knows of
+  void elements(T* first, std::size_t count) { copy(first, count * sizeof(T)); }  // the caller knows their number
   Bytes bytes() {
     Bytes b(count_of(1), '\0');
     copy(b.data(), b.size());

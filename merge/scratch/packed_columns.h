@@ -1,14 +1,15 @@
-// Columns of a tile on their way to scratch and back, in a narrow one of a few forms that give every bit back: a tile
-// is read twice a step, and what it is read from is most of what a large block moves through memory.
+// Packs the columns of a tile for its file in scratch, and unpacks them without the loss of a bit. An iteration reads a
+// tile twice, and for a large block these reads are most of the traffic through memory, so that narrow columns save
+// time. The form of a column depends on its type:
 //
-//   integers   less their least one, in 0, 1, 2, 4 or 8 bytes each
-//   steps      the first integer, and the others less the one before as integers (what ascends: ranges, indices)
-//   doubles    runs of one value (sigmas), or multiples of kPixelUnit in 4 bytes (measurements of tie points) up to the
-//              first value that is none (those of control points, which come last), and from there as they are
-//   bytes      runs of one value (flags), or as they are
-//   others     as they are; of plain values, and of positions of three doubles each
+//   integers   the difference from the smallest one, in 0, 1, 2, 4 or 8 bytes each
+//   steps      the first integer, then the differences of neighbours as integers (for ascending ranges and indices)
+//   doubles    runs of equal values (sigmas), or multiples of kPixelUnit in 4 bytes (observations of tie points) up to
+//              the first value that is no multiple (those of control points come last); the rest unchanged
+//   bytes      runs of equal values (flags), or unchanged
+//   others     unchanged: plain values, and positions of three doubles each
 //
-// Writers leave the file's state to say whether all went there; readers, whether all came back.
+// The state of the file says whether everything was written, or read.
 #pragma once
 
 #include <cstdint>

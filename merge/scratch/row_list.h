@@ -1,6 +1,7 @@
-// Ascending rows of a table, held as the distances between them: in a byte each while they are below 255, and that is
-// nearly always so where the rows of a table are dealt to some dozen lists. The plans of all tiles wait in memory while
-// their measurements are in scratch; of a million images their lists of points would take 80 MiB as numbers.
+// An ascending list of rows of a table, stored as the distances between neighbours, one byte each. A distance of 255
+// and more takes further bytes; it is rare where the rows of a table are shared out among some dozen lists. The plans
+// of all tiles stay in memory while their observations are in scratch. For a million images their lists of points would
+// take 80 MiB as 32-bit numbers.
 #pragma once
 
 #include <cassert>
@@ -13,7 +14,7 @@ namespace megablock {
 
 class RowList {
  public:
-  // Larger than all before, and not the largest number there is.
+  // `row` is larger than all rows before it and smaller than the largest 32-bit number.
   void push_back(std::int32_t row) {
     assert(row > last_);
     std::int32_t distance = row - last_;
@@ -48,7 +49,7 @@ class RowList {
   }
 
  private:
-  static constexpr std::uint8_t kMore = 255;  // the next byte goes on
+  static constexpr std::uint8_t kMore = 255;  // the distance continues in the next byte
   std::vector<std::uint8_t> distances_;
   std::int32_t last_ = -1;
   std::int32_t size_ = 0;

@@ -1,10 +1,10 @@
-// What lies in a rank's scratch directory, and how much of it may: tiles, their plans, factors and records of passes
-// share one budget, the bytes of all files there at any time.
+// The scratch directory of a rank and its budget. Tiles, their plans, factors and records of sweeps share the budget,
+// which bounds the bytes of all files in the directory at any time.
 //
-// Files are written over again and again with much the same length: pages and blocks fetched anew cost more than the
-// copy. So one that is not needed any more stays, as a spare one, until others need its room.
+// The same files are written again and again with nearly the same length, and to fetch new pages and blocks costs more
+// than the copy. A file that is not needed any more therefore stays as a spare one until others need its room.
 //
-// Where the budget ends a file fails as on a full disk: what it should have held stays with its owner.
+// A write that would exceed the budget fails like one on a full disk. The owner then keeps the data in memory.
 #pragma once
 
 #include <cstddef>
@@ -22,30 +22,32 @@ namespace megablock {
 // One thread at a time.
 class ScratchSpace {
  public:
-  ScratchSpace() = default;  // nowhere: takes nothing
-  // Makes the directory; what an earlier run left there counts. Throws InputError.
+  ScratchSpace() = default;  // no directory: every write fails
+  // Makes the directory. Files that an earlier run left there count towards the budget. Throws InputError.
   explicit ScratchSpace(std::string directory, std::int64_t budget = std::numeric_limits<std::int64_t>::max());
   ScratchSpace(const ScratchSpace&) = delete;
   ScratchSpace& operator=(const ScratchSpace&) = delete;
 
   std::string path(const std::string& name) const { return directory_ + "/" + name; }
-  std::int64_t bytes() const { return bytes_; }  // of all files, and reserved
+  std::int64_t bytes() const { return bytes_; }  // of all files, and those reserved
   std::int64_t bytes_of(const std::string& name) const;
   std::int64_t budget() const { return budget_; }
 
-  // Leaves a file of what `write` writes. False, and no file: the disk is full, or the budget spent.
+  // Makes a file with the bytes that `write` writes. Returns false, and leaves no file, when the disk is full or the
+  // budget is spent.
   using Write = std::function<void(std::ostream&)>;
   bool write(const std::string& name, const Write& write);
-  // Calls `read` with a file and its size. Throws StoreError, which names it, where it is not there, ends too early or
-  // has more than was read; and removes it then, so that a resumed run does without.
+  // Calls `read` with a file and its size. Throws StoreError naming the file when it is missing, ends too early or is
+  // longer than what was read. It removes the file then, so that a resumed run does not meet it again.
   using Read = std::function<void(std::istream&, std::size_t)>;
   void read(const std::string& name, const Read& read);
-  // Holds so many bytes of the budget for a file, or what it has if that is more. False, and no file: there is no room.
+  // Reserves so many bytes of the budget for a file, or its present size if that is larger. Returns false, and leaves
+  // no file, when there is no room.
   bool reserve(const std::string& name, std::int64_t bytes);
   bool rename(const std::string& from, const std::string& to);
-  void spare(const std::string& name);  // its content is not needed any more
+  void spare(const std::string& name);  // its contents are not needed any more
   void remove(const std::string& name);
-  void keep_only(const std::set<std::string>& names);  // of all files that count
+  void keep_only(const std::set<std::string>& names);  // removes all other files
 
  private:
   void need(const std::string& name);

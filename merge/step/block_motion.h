@@ -1,14 +1,17 @@
-// Applying a step: what moves a whole component of the block is applied as a similarity, the rest along straight lines.
+// Applies a step of the adjustment. The part of the step that moves a whole component of the block is applied as a
+// similarity, the rest along straight lines.
 //
 // Priors of metres fix the datum of a small block to fractions of a degree. A step that turns it by phi moves frames
 // and points along tangents, C + phi x (C - c): across the axis everything grows by 1 + phi^2 / 2, along it nothing.
-// Images see that as soon as phi^2 / 2 of their width exceeds the noise (phi = 0.3 degrees: 0.02 px), so that damping
-// holds every step down to it and the iteration creeps. The similarity (phi, t, s) nearest to a component's step,
+// The images show that as soon as phi^2 / 2 of their width exceeds the noise (phi = 0.3 degrees: 0.02 px). Damping then
+// holds every step down to this size, and the adjustment needs many iterations. The similarity (phi, t, s) nearest to a
+// component's step,
 //
 //     min  sum over frames  |w + phi|^2 + |d - t - phi x (C - c) - s (C - c)|^2 / L^2,
 //
-// c the centroid, L the extent, is therefore split off and applied as X -> c + t + (1 + s) Exp(phi) (X' - c) to X'
-// moved by the rest of the step. To first order that is the step itself: the normal equations know nothing of it.
+// with c the centroid and L the extent, is therefore split off. It is applied as X -> c + t + (1 + s) Exp(phi) (X' -
+// c), where X' has been moved by the rest of the step. To first order this is the step itself, so that the normal
+// equations are unchanged.
 //
 // Sums are formed per tile over the frames that it owns, and added in tile order.
 #pragma once
@@ -45,17 +48,17 @@ struct BlockMotion {
     return shift + rotation.cross(arm) + scale * arm;
   }
 };
-// Of every component of the block, from the sums of all tiles, in tile order.
+// The motion of every component of the block, from the sums of all tiles in tile order.
 std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vector<MotionSums>& tiles);
 
-// A step as it is applied to a tile, with the motions of the components of its parts; every tile that holds a frame
-// computes the same bits. Without motions: along straight lines.
+// Applies a step to a tile, with the motions of the components to which its parts belong. All tiles that hold a frame
+// compute the same bits for it. Without motions everything moves along straight lines.
 class TileMotion {
  public:
-  // Problem and plan outlive it.
+  // Problem and plan outlive the object.
   TileMotion(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
              const TileProblem& problem, const TilePlan& plan);
-  // Everything but the points, which stay where they are.
+  // Moves everything except the points.
   TileState unknowns(const TileState& state, const Step& step) const;
   Eigen::Vector3d point(const TileState& state, std::int64_t point, const Eigen::Vector3d& step) const {
     const Mover& mover = movers_.size() == 1 ? movers_.front() : mover_of(point);
@@ -64,7 +67,7 @@ class TileMotion {
   }
 
  private:
-  struct Mover {  // a component's motion, ready to move things
+  struct Mover {  // the motion of a component, prepared for use
     BlockMotion motion;
     Eigen::Quaterniond turn;
     Eigen::Vector3d moved(const Eigen::Vector3d& position) const {
@@ -78,7 +81,7 @@ class TileMotion {
   std::vector<Mover> movers_;  // of the tile's parts
 };
 
-// state (+) step.
+// The state after the step.
 TileState apply_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                      const TileProblem& problem, const TilePlan& plan, const TileState& state, const TileStep& step);
 

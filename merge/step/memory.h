@@ -1,11 +1,12 @@
-// What a rank keeps, and where: budgets, and the factors between the two passes. The tiles: tile_store.h.
+// The memory budgets of a rank, and its store of factors between the sweep up and the sweep down. tile_store.h holds
+// the tiles.
 //
-// Keeping factors between the upward and the downward pass within a byte budget: in memory while they fit, else in the
-// rank's scratch directory while it has room (scratch_space.h), else not at all (recomputed on the way down). The
-// choice never changes tiles or bits.
+// Factors stay in memory within a budget of bytes. Beyond it they go to the scratch directory of the rank while that
+// has room (scratch_space.h); beyond that they are dropped and computed again in the sweep down. The choice never
+// changes tiles or bits.
 //
-// The downward pass visits nodes in the reverse order of the upward pass, so the earliest factor is needed last and
-// leaves first.
+// The sweep down visits the nodes in the reverse order of the sweep up. The oldest factor is needed last, so it leaves
+// memory first.
 #pragma once
 
 #include <cstdint>
@@ -21,22 +22,23 @@
 namespace megablock {
 
 struct MemoryOptions {
-  std::int64_t factor_bytes = std::int64_t{4} << 30;  // budget of kept factors; the newest is kept in any case
-  // Of this process alone; one nowhere: keep all tiles, recompute factors instead of spilling them.
+  std::int64_t factor_bytes = std::int64_t{4} << 30;  // budget of factors in memory; the newest stays in any case
+  // Directory of this process alone. Without one all tiles stay in memory, and factors beyond the budget are
+  // recomputed.
   std::shared_ptr<ScratchSpace> scratch = std::make_shared<ScratchSpace>();
-  std::int64_t tile_bytes = std::int64_t{4} << 30;  // budget of tiles' measurements and points (tile_store.h)
+  std::int64_t tile_bytes = std::int64_t{4} << 30;  // budget of the observations and points of tiles (tile_store.h)
 };
-// Of a node's factors in a scratch directory.
+// Name of the file that holds the factors of a node.
 std::string factor_file(std::int64_t node);
 
 struct MemoryStatistics {
-  std::int64_t put = 0, spilled = 0;  // factors put, moved to scratch
+  std::int64_t put = 0, spilled = 0;  // factors stored, and those moved to scratch
   std::int64_t recomputed = 0;        // subtrees condensed again
-  std::int64_t peak_bytes = 0;        // of kept factors
+  std::int64_t peak_bytes = 0;        // of factors in memory
 };
 
-// Factors of one node of the merge tree: a tile's cells or an inner node's front; while seams are checked also a tile's
-// condensed normal equations.
+// Factors of one node of the merge tree: those of the cells of a tile, or of the front of an inner node. While seams
+// are checked, also the condensed normal equations of a tile.
 struct NodeFactors {
   TileFactor tile;
   FrontFactor front;
@@ -53,19 +55,20 @@ class FactorStore {
   FactorStore(const FactorStore&) = delete;
   FactorStore& operator=(const FactorStore&) = delete;
 
-  // What may happen to factors that fit neither in memory nor in scratch.
+  // The fate of factors that fit neither in memory nor in scratch.
   enum class Loss { kRecompute, kNever };
   void put(std::int64_t node, NodeFactors factors, Loss loss = Loss::kRecompute);
-  // nullptr: dropped, compute it again. The pointer holds until the next put or get.
+  // nullptr: the factors were dropped and must be computed again. The pointer is valid until the next put or get.
   const NodeFactors* get(std::int64_t node);
-  void discard(std::int64_t node);  // it is not needed any more
-  // From now on so much of the budget is taken by others: fronts at work, what waits for a parent or a child.
+  void discard(std::int64_t node);  // the factors are not needed any more
+  // Reduces the budget by the memory that others use from now on: fronts at work and updates that wait for a parent or
+  // a child, bytes.
   void leave_room(std::int64_t bytes);
   void clear();
 
-  // For records of a pass (pass_record.h). Bytes in memory that are not in scratch; copies them there: false where they
-  // have no room; the nodes whose factors are in scratch; after clear(): takes over those that an earlier run left
-  // there.
+  // For records of a sweep (pass_record.h): the bytes in memory that have no copy in scratch; copies them there, false
+  // when there is no room; the nodes whose factors are in scratch; after clear(), takes over the factors of these nodes
+  // that an earlier run left there.
   std::int64_t bytes_without_copy() const;
   bool copy_to_scratch();
   std::vector<std::int64_t> nodes_in_scratch() const;
@@ -75,7 +78,7 @@ class FactorStore {
   const MemoryStatistics& statistics() const { return statistics_; }
 
  private:
-  bool spill(std::int64_t node, const NodeFactors& factors);  // false: no room
+  bool spill(std::int64_t node, const NodeFactors& factors);  // false when there is no room
   void make_room();
 
   MemoryOptions options_;
@@ -87,8 +90,8 @@ class FactorStore {
   std::map<std::int64_t, std::int64_t> time_of_node_;
   std::set<std::int64_t> never_lost_;
   std::set<std::int64_t> spilled_;  // nodes whose factors are in scratch
-  std::set<std::int64_t> written_;  // and those that passes before wrote: spare, to be written over
-  NodeFactors loaded_;              // last one read back
+  std::set<std::int64_t> written_;  // and the spare files of earlier sweeps, which are written over
+  NodeFactors loaded_;              // the factors that were read last
 };
 
 }  // namespace megablock

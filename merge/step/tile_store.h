@@ -1,16 +1,19 @@
-// The tiles of one rank, out of core: whole in memory while they fit a byte budget; of the others the measurements and
-// points lie in the rank's scratch directory and are read when the tile's turn comes, one tile at a time.
+// The tiles of one rank, out of core. Tiles stay in memory as a whole within a budget of bytes. Of the other tiles the
+// observations and points are in the scratch directory of the rank; they are read when the tile's turn comes, one tile
+// at a time.
 //
-// Those in scratch are packed (packed_columns.h): about 15 bytes a measurement of a street instead of 39. Whether one
-// has room there (scratch_space.h), with a trial's points beside the present ones, is asked with its unpacked size and
-// once. What is screened later may lengthen its flags' runs; where these have no room the tile moves to memory.
+// A tile in scratch is packed (packed_columns.h): about 15 bytes an observation of a street instead of 39. The store
+// asks once whether the tile has room there (scratch_space.h), with its unpacked size and the points of a trial beside
+// the present ones. Later screening may lengthen the runs of its flags; when these do not fit, the tile moves to
+// memory.
 //
-// Which tiles stay is decided once, in the order in which they are added: passes go over all tiles again and again, now
-// upwards, now downwards, and with a fixed choice each of them reads the others exactly once. A scratch disk that is
-// full keeps a tile in memory: it costs memory, never the tile. The choice never changes bits.
+// Which tiles stay in memory is decided once, in the order in which they are added. Sweeps go over all tiles again and
+// again, up and down, and with a fixed choice each sweep reads every other tile exactly once. When the scratch disk is
+// full, a tile stays in memory. The choice never changes bits.
 //
-// Frames, cameras, mounts and their values ("outline") are small and always there, and so are lines, verticals and the
-// priors of points, cameras and mounts; images, measurements and the other observations of a tile in scratch are not.
+// Frames, cameras, mounts and their values (the "outline" of a tile) are small and always in memory, as are lines,
+// verticals and the priors of points, cameras and mounts. Images, image observations and the other observations of a
+// tile in scratch are not.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +25,7 @@
 
 namespace megablock {
 
-// One tile as its rank holds it.
+// A tile of this rank.
 struct RankTile {
   std::int64_t tile = -1;
   TileProblem problem;
@@ -31,7 +34,7 @@ struct RankTile {
 
 class TileStore {
  public:
-  // Uses options.tile_bytes and the scratch.
+  // Uses options.tile_bytes and options.scratch.
   explicit TileStore(const MemoryOptions& options);
   ~TileStore();  // removes its scratch files
   TileStore(const TileStore&) = delete;
@@ -44,43 +47,44 @@ class TileStore {
 
   bool in_scratch(std::size_t row) const { return slots_[row].in_scratch; }
 
-  // Without what is in scratch: its tables may be empty.
+  // The tile without its data in scratch: some of its tables may be empty.
   const RankTile& outline(std::size_t row) const { return slots_[row].tile; }
-  // Whole. The reference holds until another row is asked for.
+  // The whole tile. The reference is valid until another row is asked for.
   const RankTile& whole(std::size_t row);
-  // Calls change(RankTile&) on the whole tile and keeps what it made of it.
+  // Calls change(RankTile&) on the whole tile and stores the changed tile.
   template <typename Change>
   void change(std::size_t row, Change&& change) {
     change(load(row));
     save(row);
   }
 
-  // States after a step, beside the present ones until all are accepted or none.
+  // Stores the state after a step beside the present one, until accept() or reject() decides on the states of all
+  // tiles.
   void put_trial(std::size_t row, TileState trial);
   void accept();
   void reject();
 
   std::int64_t spilled() const { return spilled_; }        // tiles in scratch
-  std::int64_t kept_bytes() const { return kept_bytes_; }  // measurements and points in memory, all time
+  std::int64_t kept_bytes() const { return kept_bytes_; }  // observations and points that stay in memory
 
  private:
   struct Slot {
     RankTile tile;
     TileState trial;
     bool in_scratch = false;
-    bool points_here = false, trial_here = false;  // of a tile in scratch whose points did not fit there
-    int points_file = 0;                           // of two: the present ones; the other has the trial's
+    bool points_here = false, trial_here = false;  // the points of a tile in scratch that did not fit there
+    int points_file = 0;  // number of the file with the present points; the other of the two files holds the trial's
   };
 
   RankTile& load(std::size_t row);
   void save(std::size_t row);
-  void forget(Slot& slot);  // its measurements and points, which are in scratch
-  bool spill(Slot& slot);   // its files; false, and none of them: they have no room
+  void forget(Slot& slot);  // frees the observations and points, which are in scratch
+  bool spill(Slot& slot);   // writes its files; false, and no file, when there is no room
   void remove_files(const Slot& slot) const;
 
   MemoryOptions options_;
   std::vector<Slot> slots_;
-  std::int64_t loaded_ = -1;  // row of the tile in scratch that is whole
+  std::int64_t loaded_ = -1;  // row of the tile in scratch that is in memory now
   std::int64_t kept_bytes_ = 0, spilled_ = 0;
 };
 

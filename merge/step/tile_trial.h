@@ -1,7 +1,9 @@
-// The state of a tile that a step leads to, and its cost: what comes of condense.h's solve_tile_down, block_motion.h's
-// apply_step and point_refinement.h's refine_points one behind the other, bit for bit. In one go every point's
-// measurements are read once instead of twice and still stand in the lanes when the new state is evaluated, no steps of
-// points are kept, and threads meet once.
+// The trial state of a tile after a step, and its cost.
+//
+// The result is that of solve_tile_down (condense.h), apply_step (block_motion.h) and refine_points
+// (point_refinement.h) one after the other, bit for bit. Done together they read the observations of a point once
+// instead of twice and evaluate the new state while the observations are still in the lanes; they store no steps of
+// points, and the threads synchronise once.
 #pragma once
 
 #include <memory>
@@ -16,22 +18,22 @@ struct TileTrial {
   double cost = 0;
   double damping_norm = 0;  // as TileStep
 };
-// `step`: of the unknowns (solve_tile_unknowns).
+// `step`: of the unknowns alone, from solve_tile_unknowns.
 TileTrial try_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                    const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                    const TileStep& step, double settled = kPointSettled);
 
-// The same in parts, by threads that may be at work on other tiles, too (geometry/threads/rounds.h).
+// The same in portions, for threads that may work on other tiles as well (geometry/threads/rounds.h).
 class TileTrialMaker {
  public:
-  // All but the pass outlive it.
+  // All arguments except the pass outlive the object.
   TileTrialMaker(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                  const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                  const TileStep& step, double settled = kPointSettled);
   ~TileTrialMaker();
   std::int64_t portions() const;
-  void visit(std::int64_t portion);  // every one once
-  TileTrial take();                  // once all are done
+  void visit(std::int64_t portion);  // call once for every portion
+  TileTrial take();                  // after the last portion
 
  private:
   class Work;
