@@ -1,8 +1,8 @@
-// The reference: the whole block as one system, from one Ceres problem with automatic derivatives. None of the
-// linearisation or elimination code of this room takes part, so that agreement means something.
+// The reference for the merge: the whole block as one system, from one Ceres problem with automatic derivatives. It
+// uses none of the linearisation and elimination code of this room, so that agreement of the two is evidence.
 //
-// For blocks that fit in memory. Steps are found with sparse matrices; covariances are dense, 6 times the number of
-// frames squared (2 GiB for 2 500 frames).
+// Only for blocks that fit in memory. Steps are solved with sparse matrices. Covariances are dense, with six times the
+// number of frames as their dimension (2 GiB for 2 500 frames).
 #pragma once
 
 #include <Eigen/Core>
@@ -27,10 +27,11 @@ struct MonolithicSystem {
   Eigen::VectorXd diagonal() const;  // of J'J
 };
 
-// `problem`: one tile that holds everything.
+// `problem`: one tile that holds the whole block.
 MonolithicSystem monolithic_system(const TileProblem& problem, const TileState& state);
 
-// The datum of a free block: rows [k x columns] that hold it, squared and added to J'J; empty where priors fix it.
+// The datum of a free block: rows [k x columns] that hold it, added to J'J as squares; empty where priors fix the
+// datum.
 using DatumRows = Eigen::SparseMatrix<double>;
 
 // x of (J'J + lambda diag(J'J)) x = -J'r by CHOLMOD. Throws ComputeError when it is not positive definite.
@@ -40,7 +41,8 @@ Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda);
 // Throws ComputeError when the datum is free.
 Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const DatumRows& datum = {});
 
-// Of the frames' unknowns (rotation, radians; position, metres), a column per row of the problem's table of frames.
+// Standard deviations of the frames (rotation, radians; position, metres), one column for each row of the table of
+// frames.
 using FrameSigmas = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 // Largest component of the undamped Newton step at `state` over its posterior sigma, over all frames.

@@ -1,14 +1,14 @@
-// Seam check: do two halves of the block agree about the unknowns they share?
+// The seam check tests whether two halves of the block agree about the unknowns that they share.
 //
 // For the condensed normal equations q_a, q_b of two children at a common linearisation point with lambda = 0,
 //
 //     T = 2 (min(q_a + q_b) - min q_a - min q_b) = s_a'S_a^+ s_a + s_b'S_b^+ s_b - (s_a + s_b)'(S_a + S_b)^+ (s_a +
 //     s_b)
 //
-// is chi-square distributed with rank S_a + rank S_b - rank(S_a + S_b) degrees of freedom; it holds for singular S too
-// (halves without a datum), and for unknowns that only one half has. What both have together has been eliminated in
-// part: s'S^+ s = |z|^2 + s_p'S_p^+ s_p with z and S_p of the front's factor and update matrix (front.h), so that each
-// node of the tree takes one factorisation, of what it passes on.
+// is chi-square distributed with rank S_a + rank S_b - rank(S_a + S_b) degrees of freedom. This also holds for singular
+// S (halves without a datum), and for unknowns that only one half has. Part of the common unknowns has been eliminated:
+// s'S^+ s = |z|^2 + s_p'S_p^+ s_p with z and S_p of the front's factor and update matrix (front.h), so that each node
+// of the tree takes one factorisation, that of its separator.
 #pragma once
 
 #include <array>
@@ -32,27 +32,28 @@ struct SeamReport {
   bool alarm() const { return degrees > 0 && statistic > threshold; }
 };
 
-// Of condensed normal equations by themselves; their right-hand side lies in the range of their matrix.
+// The least squares of condensed normal equations by themselves. Their right-hand side lies in the range of their
+// matrix.
 LeastSquares least_squares(const UpdateMatrix& condensed);
 
-// `left`, `right`: of the halves alone; `together`: the front of their sum, its update matrix with what it is alone.
+// `left`, `right`: least squares of the halves alone; `together`: the front of their sum, with UpdateMatrix::alone.
 // `probability`: of a false alarm at this seam. variance_factor: T is divided by it (1 = a priori).
 SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSquares& right,
                       const Front::Result& together, double probability, double variance_factor = 1);
 
-// T asks all common unknowns at once, and one or two frames that a tile sees differently drown in hundreds of degrees
-// of freedom. So what a tile says of a few scalar unknowns u is tested by itself: were they free to differ by v between
-// the tile and the rest, the block's optimum would have the score g = b_u of the tile alone for v, and
+// T tests all common unknowns at once, and one or two frames that a tile sees differently drown in hundreds of degrees
+// of freedom. The information of a tile on a few scalar unknowns u is therefore tested by itself. If u could differ by
+// v between the tile and the rest, the score for v at the block's optimum would be g = b_u of the tile alone, and
 //
 //     T_u = g' A^+ g,   A = S_uu - S_u C S_u'   (v's normal equations after elimination of the block)
 //
 // is chi-square distributed with rank A degrees of freedom, and with non-centrality v'Av where they do differ. S_u:
-// rows of the tile's condensed normal equations. All else, the neighbouring frames and the points of both sides, is
-// adjusted with it: this is Baarda's test of a bias v, and of tests that do not know v's direction none has more power.
-// Only what u is remains open. It is, with a third of the alarm probability each,
+// rows of the tile's condensed normal equations. The neighbouring frames and the points of both sides are adjusted
+// along with v. This is Baarda's test of a bias v; no test that does not know the direction of v has more power. The
+// choice of u remains. It is, with a third of the alarm probability each,
 //   * every boundary or shared unknown as a whole,
-//   * the turn of every frame,
-//   * the turns of every two frames,
+//   * the rotation of every frame,
+//   * the rotations of every two frames,
 // turns of those frames alone that show half as well as the best of the tile: the others would only raise the limits.
 struct UnknownCheck {
   UnknownId id, other;       // other.index < 0: one unknown
@@ -76,16 +77,16 @@ struct TileCheck {
   std::array<UnknownCheck, 4> worst;  // by excess, the worst first; no two share an unknown
   bool alarm() const { return degrees > 0 && statistic > threshold; }
 };
-// From the tile's condensed normal equations and the block's covariance of its boundary unknowns (lambda = 0, at the
-// optimum, where the rest's gradient is minus the tile's).
+// Checks a tile from its condensed normal equations and the block's covariance of its boundary unknowns, with lambda =
+// 0 and at the optimum, where the gradient of the rest is minus that of the tile.
 TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const CovarianceMatrix& boundary,
                      double probability, double variance_factor = 1);
 
-// A tile whose residuals do not fit together even by themselves is wrong whatever its neighbours say. The measure of
-// its own chi-square is the variance factor of the other tiles, not one: the sigma of the measurements is estimated
-// from all of them, to 2 %, and losses and limits take from the tails of what is right; with a million degrees of
-// freedom any of that would fail. The ratio of both factors has an F distribution; and photographs of one block are not
-// all equally sharp, so that only what exceeds kUsualVarianceRatio counts.
+// A tile whose own residuals do not fit together is wrong whatever its neighbours say. Its chi-square is compared with
+// the variance factor of the other tiles, not with one: the sigma of the observations is estimated from all of them, to
+// 2 %, and losses and limits cut the tails of correct observations; with a million degrees of freedom either would
+// raise an alarm. The ratio of the two factors has an F distribution. The photographs of one block are not all equally
+// sharp, so that only a ratio above kUsualVarianceRatio counts.
 inline constexpr double kUsualVarianceRatio = 1.5;
 struct NoisyTile {
   std::int64_t tile = -1;

@@ -1,9 +1,9 @@
-// Covariances of a free block: the S-transformation (Baarda 1973)
+// Covariances of a free block by the S-transformation (Baarda 1973)
 //
 //     C' = S C S',   S = I - N M^-1 N'W,   M = N'WN over the component's frames,  W = (1, 1, 1, 1/L^2, ...)
 //
-// moves them from the minimal constraints of gauge.h to inner constraints; C N W is formed by as many further
-// right-hand sides through the tree.
+// which moves them from the minimal constraints of gauge.h to inner constraints. C N W comes from as many further
+// right-hand sides in the sweeps over the tree.
 #pragma once
 
 #include "merge/datum/gauge.h"

@@ -1,11 +1,11 @@
-// The calibration of the rigs of a block (CN-05 to CN-08): adjustment, posterior sigmas, comparison with the start.
+// Calibrates the rigs of a block (Cannelle 2013): adjustment, posterior sigmas, comparison with the start.
 #pragma once
 
 #include "adjust/calibration/rig_observations.h"
 
 namespace megablock {
 
-// Another block that the same rig recorded, on which start and result are compared with the rig held.
+// Another block that the same rig recorded. Start and result are compared on it with the rig held.
 struct VerificationSite {
   Block block;
   TrackSet tracks;
@@ -17,8 +17,8 @@ struct CalibratedRig {
 };
 
 // `start`: frames with their approximate poses, cameras and mounts as the block gives them. The result is compared with
-// the start on tracks that took no part (then they do), or on the other site, and refused (RigCalibration::refused)
-// when it fits no better. Throws InputError for blocks without anything to calibrate or measure, ComputeError when the
+// the start on tracks that were left out at first, or on the other site. It is refused (RigCalibration::refused) when
+// it fits no better. Throws InputError for blocks without anything to calibrate or measure, ComputeError when the
 // adjustment fails. Deterministic.
 CalibratedRig calibrate_rig(const Block& block, const BlockState& start, const TrackSet& tracks,
                             const RigCalibrationOptions& options,

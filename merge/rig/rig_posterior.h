@@ -1,10 +1,10 @@
-// What the measurements of a block say of the mounts of its rigs: the normal equations condensed on the free mounts,
-// frames, cameras and points eliminated.
+// The information of the observations of a block on the mounts of its rigs: the normal equations condensed on the free
+// mounts, with frames, cameras and points eliminated.
 //
-// With S the condensed matrix without the mounts' priors, directions that S knows to no better than 0.1 m or 5 degrees
-// are not determined by the measurements. The movement of all free mounts of a rig away from its reference is its
-// scale, which tie points alone never give. With P the information of the priors the covariance is (S + P)^-1; or, for
-// mounts that are tied to their start only so that the system is regular, that at the scale which the rig has.
+// S is the condensed matrix without the priors of the mounts. Directions with a standard deviation above 0.1 m or 5
+// degrees in S are not determined by the observations. The movement of all free mounts of a rig away from its reference
+// is the scale of the rig, which tie points alone never determine. With P the information of the priors, the covariance
+// is (S + P)^-1. For mounts whose priors only keep the system regular it is the covariance at the present scale.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +25,7 @@ struct RigPosterior {
 };
 
 // `problem` holds the whole block at its solution; every free mount has a prior. `without_scale`: covariances at the
-// scale that the rig has, where the measurements do not determine it.
+// present scale of the rig where the observations do not determine it.
 RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool without_scale);
 
 }  // namespace megablock

@@ -1,15 +1,16 @@
-// Tiles that were adjusted on their own, brought into one frame before they are merged: a similarity for each, adjusted
-// jointly on the frames that tiles have in common.
+// Brings tiles that were adjusted on their own into one ground frame before the merge. Each tile gets a similarity; all
+// are adjusted jointly on the frames that tiles have in common.
 //
-// Each tile carries the datum that its own priors or start values give it. Where those are weak (positions of metres),
-// neighbours differ by many times what their images see, and a block put together from them is far from any optimum.
-// With S_t near the identity, for every frame and every tile t that holds it besides the one with most observations, h:
+// Each tile has the datum of its own priors or start values. Where these are weak (positions good to metres),
+// neighbours differ by many times the precision of their observations, and a block assembled from them is far from any
+// optimum. With S_t near the identity, for every frame and every tile t that holds it besides the one with most
+// observations, h:
 //
 //     sum rho(|S_t C_t - S_h C_h|^2 / p^2) + rho(angle(S_t R_t, S_h R_h)^2 / r^2)  +  sum over tiles |S_t - 1|^2 / a^2
 //
-// rho = Cauchy: frames at the rim hang on few points; p, r = medians of the differences themselves, taken anew in each
-// of a few rounds; the last term keeps the block where its tiles say it is: a = the first p, and acts on the tile's
-// shift and on what rotation and scale do at its extent.
+// rho is the Cauchy loss, because frames at the rim of a tile depend on few points. p and r are the medians of the
+// differences, updated in each of a few iterations. The last term keeps the block at the mean place of its tiles; a is
+// the first p, and the term acts on the shift of a tile and on the displacement by rotation and scale at its extent.
 #pragma once
 
 #include <vector>
@@ -19,7 +20,7 @@
 
 namespace megablock {
 
-// Frames with fewer observations say nothing of where a tile is.
+// Frames with fewer observations are not used.
 constexpr std::int64_t kFewestAlignmentObservations = 20;
 
 struct AlignmentTile {
@@ -28,7 +29,7 @@ struct AlignmentTile {
   std::vector<std::int64_t> observations;  // [frames] kept ones
 };
 
-// One similarity per tile, applied as S(pose). Identity for tiles that share no frame.
+// Returns one similarity for each tile, applied as S(pose); the identity for a tile that shares no frame.
 std::vector<Similarity> align_tiles(const std::vector<AlignmentTile>& tiles);
 
 }  // namespace megablock

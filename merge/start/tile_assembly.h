@@ -1,13 +1,14 @@
-// Tiles without a common datum, as independent models (M51, M52), brought into one frame.
+// Brings tiles without a common datum into one ground frame, as a block adjustment of independent models (Kalantari
+// 2009).
 //
-// Each was adjusted with the datum of its start values alone, and neighbours differ in place, attitude and scale by
-// what these are good for. What they share are frames: the similarities between these join them
-// (adjust/models/model_assembly.h). Each part that hangs together is then brought back to where its tiles were, in the
-// mean: its attitude by the turns that the assembly made,
+// Each tile was adjusted with the datum of its start values alone. Neighbours therefore differ in place, attitude and
+// scale by the errors of these. The frames that tiles share give the similarities between them, which join them
+// (adjust/models/model_assembly.h). Each connected part is then moved back to the mean place of its tiles: its attitude
+// by the rotations that the assembly made,
 //
 //     R = mean R_t',     weighted by the frames of tile t,
 //
-// as centres on a line would leave it open, and its size and place by the centres.
+// because projection centres on a line would leave it undetermined, its size and place by the projection centres.
 #pragma once
 
 #include <vector>
@@ -16,8 +17,8 @@
 
 namespace megablock {
 
-// One similarity per tile, applied as S(pose). Identity for a tile that nothing joins, or that does not fit its
-// neighbours, and for all where the assembly fails.
+// Returns one similarity for each tile, applied as S(pose). It is the identity for a tile that nothing joins or that
+// does not fit its neighbours, and for all tiles when the assembly fails.
 std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles);
 
 }  // namespace megablock

@@ -44,13 +44,14 @@ struct SweepSeconds {
   std::int64_t sweeps_up = 0;
 };
 
-// Contiguous runs of tiles in the order of the tree's leaves, balanced by observations: neighbours on one rank.
+// Gives every rank a contiguous run of tiles in the order of the leaves of the tree, balanced by observations, so that
+// neighbours are on one rank. Returns the rank of each tile.
 std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
 
 class MergeTreeRunner : public TreeRunner {
  public:
-  // `tiles`: this rank's, ascending, longer-lived than the runner, as is `solver`; rank_of_tile: of all tiles.
-  // Collective.
+  // Collective. `tiles`: the tiles of this rank, ascending; rank_of_tile: of all tiles. `tiles` and `solver` outlive
+  // the runner.
   MergeTreeRunner(TreeCommunicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
                   const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
   ~MergeTreeRunner() override;
@@ -60,15 +61,15 @@ class MergeTreeRunner : public TreeRunner {
   void accept() override;
   void reject() override;
 
-  // Upward passes are recorded from now on, and the first one goes on where the record that was found ends. Of subtrees
-  // on this rank alone: what joins several ranks is computed again. `recorder` outlives the runner.
+  // Records sweeps up from now on; the first one resumes where the record that was found ends. Records hold subtrees
+  // that are on this rank alone; nodes that join several ranks are computed again. `recorder` outlives the runner.
   void record_passes(PassRecorder& recorder) { recorder_ = &recorder; }
 
-  // The next pass with lambda = 0 may be the last one: what the posterior needs of it is kept, so that it has not to be
-  // gone again. Not of free blocks.
+  // The next sweep with lambda = 0 may be the last one. It stores what the posterior needs, so that the posterior takes
+  // no sweep of its own. This does not work for free blocks, whose covariances take further right-hand sides.
   void expect_posterior() { posterior_expected_ = true; }
 
-  // Collective, at the solution: an upward pass with lambda = 0, seams and gauge, then covariances.
+  // Collective, at the solution: a sweep up with lambda = 0, the seams and the datum, then covariances.
   struct Posterior {
     SubtreeSums sums;  // of the whole block
     BlockGauge gauge;
@@ -76,11 +77,11 @@ class MergeTreeRunner : public TreeRunner {
     std::vector<TileCheck> tile_checks;  // of all tiles, in tile order; on every rank
     ObservationTable observations;       // of the whole block, on every rank
   };
-  // `visit` gets each of this rank's tiles once, as soon as its covariances are there: they are kept nowhere.
+  // Calls `visit` once for each tile of this rank with its covariances, which are not stored.
   using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
   Posterior posterior(const VisitCovariance& visit = {});
 
-  // The unknowns that a tile's kept residuals touch; until another tile is asked for.
+  // The unknowns that the kept residuals of a tile touch. The reference is valid until another tile is asked for.
   const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
   const EliminationPlan& plan() const { return plan_; }
   const SweepSeconds& seconds() const { return seconds_; }
@@ -91,55 +92,57 @@ class MergeTreeRunner : public TreeRunner {
   // The datum of a tile in the last sweep up.
   TileDatum datum_of(std::size_t row) const;
   const MemoryStatistics& memory() const { return factors_.statistics(); }
-  // The most that a front above the tiles, its children's updates and what waited for others took at a time.
+  // Largest memory of a front above the tiles together with the updates of its children and all pending updates, bytes.
   std::int64_t peak_front_bytes() const { return peak_front_bytes_; }
 
  private:
   bool mine(std::int64_t node) const;
   UpdateMatrix child_update(std::int64_t child);
   void deliver_update(std::int64_t node, UpdateMatrix update);
-  // The part of a front's values that each child needs, and a node's from its parent.
+  // Sends each child its part of the values of a front; receives the values of a node from its parent.
   template <typename Values>
   void pass_down(std::int64_t node, const Values& front);
   template <typename Values>
   Values from_parent(std::int64_t node);
-  std::size_t row_of_leaf(std::int64_t leaf) const {  // in tiles_, of a node that is one of this rank's tiles
+  std::size_t row_of_leaf(std::int64_t leaf) const {  // row in tiles_ of a node that is a tile of this rank
     return static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(leaf)]);
   }
-  // Tile and plan of this row are there beside those of any other. A tile may leave scratch without its plan.
+  // Whether tile and plan of this row are in memory beside those of any other row. A tile may leave scratch without its
+  // plan.
   bool in_memory(std::size_t row) const { return !tiles_.in_scratch(row) && !tile_plans_.in_scratch(row); }
-  UpdateMatrix store_factors(std::int64_t leaf, TileCondensation condensed);  // keeps the factors
-  // Tiles of these nodes, ascending; `take` gets one after the other.
+  UpdateMatrix store_factors(std::int64_t leaf,
+                             TileCondensation condensed);  // stores its factors and returns its update
+  // Condenses the tiles of these nodes, ascending, and calls `visit` for one after the other.
   using VisitCondensation = std::function<void(std::size_t i, TileCondensation)>;
   void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const VisitCondensation& visit);
   UpdateMatrix join_children(std::int64_t node, const Pass& pass);
-  void send_update(std::int64_t node, UpdateMatrix update);  // records it, too
+  void send_update(std::int64_t node, UpdateMatrix update);  // records it as well
   UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
                                bool check_seam_here);
-  // Bytes of a node's front at work, whether its unknowns or their covariances; of what waits for a parent or a child.
+  // Bytes of the front of a node at work, in either direction; bytes of all values that wait for a parent or a child.
   std::int64_t front_bytes(std::int64_t node) const;
   std::int64_t pending_update_bytes() const;
-  // The subtree of a node that lies on this rank alone, once more.
+  // Condenses again the subtree of a node, which is on this rank alone.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
-  // Nodes of these subtrees. [nodes]
+  // Marks the nodes of these subtrees. [nodes]
   std::vector<bool> nodes_of(const std::vector<std::int64_t>& subtrees) const;
-  // Takes over what a killed run did of the pass; the nodes that are done.
+  // Takes over the part of the sweep that a killed run has done. Returns the nodes that are done.
   std::vector<bool> resume(const PassRecord& record);
-  // Records the pass, if it is time to, once a node's front is eliminated.
+  // Records the sweep, if a record is due, after the front of a node is eliminated.
   void record(std::int64_t node, const UpdateMatrix& update);
-  // The node's update goes where no other subtree of this rank alone holds it.
+  // Whether the update of the node leaves the subtrees that are on this rank alone.
   bool update_leaves(std::int64_t node) const;
-  // One upward pass with the datum in gauge_.
+  // A sweep up with the datum in gauge_.
   UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   void find_gauges();
   double seam_probability() const;  // of a false alarm at one seam
   BlockGauge gather_gauge() const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
-  // Down with the current factors: steps of this rank's tiles without those of their points.
+  // A sweep down with the present factors: the steps of the unknowns of this rank's tiles, points excepted.
   std::vector<TileStep> steps_down(const Pass& pass);
-  // Where they lead to, tile by tile; `take` gets one after the other.
+  // Forms the trial states of these steps and calls `visit` for one tile after the other.
   using VisitTrial = std::function<void(std::size_t row, TileTrial)>;
   void try_steps(const std::vector<BlockMotion>& motions, const Pass& pass, const std::vector<TileStep>& steps,
                  const VisitTrial& visit);
@@ -156,17 +159,17 @@ class MergeTreeRunner : public TreeRunner {
   FactorStore factors_;                           // of this rank's nodes
   std::map<std::int64_t, UpdateMatrix> updates_;  // waiting for their parent on this rank
   PassRecorder* recorder_ = nullptr;
-  std::vector<std::int64_t> left_;  // recorded subtrees of this pass that leaves() is true of
+  std::vector<std::int64_t> left_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
-  bool with_columns_ = false;  // the pass carries the further right-hand sides of a free datum
+  bool with_columns_ = false;  // the sweep has the further right-hand sides of a free datum
   bool check_seams_ = false;
   bool posterior_expected_ = false;
-  std::optional<SubtreeSums> last_pass_;  // of a pass at the present state with what the posterior needs
+  std::optional<SubtreeSums> last_pass_;  // of a sweep at the present state that stored what the posterior needs
   std::vector<SeamReport> seams_;
   SweepSeconds seconds_;
   std::int64_t peak_front_bytes_ = 0;
   std::function<void(std::size_t, const Step&)> on_step_;
-  std::map<std::int64_t, Bytes> downward_;  // what a parent on this rank left for its child
+  std::map<std::int64_t, Bytes> downward_;  // values from a parent on this rank for its child
 };
 
 }  // namespace megablock

@@ -1,9 +1,9 @@
-// What a rank has done of an upward pass, so that a run that was killed goes on in its middle: the update matrices of
-// finished subtrees, and of all their nodes the factors, which lie in the rank's scratch directory anyway or are copied
-// there (memory.h). Going on changes no bits: what is read back is what was computed.
+// The record of a sweep up, from which a killed run resumes in the middle of the sweep. It holds the updates of
+// finished subtrees. The factors of their nodes are in the scratch directory of the rank, or are copied there
+// (memory.h). A resumed sweep has the same bits, because it reads back the values that were computed.
 //
-// Records outlive the process, not the machine: nothing is forced to the disk, and one that an earlier start of the
-// machine wrote, or another machine, does not count. Then the pass begins again.
+// A record survives the process, but not a restart of the machine: nothing is forced to the disk. A record of an
+// earlier start of the machine, or of another machine, is ignored, and the sweep begins again.
 #pragma once
 
 #include <cstdint>
@@ -20,13 +20,13 @@
 namespace megablock {
 
 struct PassRecord {
-  std::uint64_t state = 0;             // hash of what the pass starts from
-  std::uint64_t pass = 0;              // of this and of the kind of the pass
-  Bytes position;                      // of the global adjustment in that pass, as its owner writes it
-  std::int64_t tiles = 0;              // in the finished subtrees
+  std::uint64_t state = 0;             // hash of the state at which the sweep linearises
+  std::uint64_t pass = 0;              // hash of this state and of the kind of the sweep
+  Bytes position;                      // where the global adjustment stands, as its owner writes it
+  std::int64_t tiles = 0;              // number of them in the finished subtrees
   std::vector<std::int64_t> subtrees;  // nodes whose subtree is finished, none within another's
   std::vector<std::int64_t> factors;   // nodes of the subtrees whose factors are in scratch
-  std::vector<SeamReport> seams;       // of the nodes of the subtrees, where the pass checks seams
+  std::vector<SeamReport> seams;       // of the nodes of the subtrees, where the sweep checks seams
 };
 
 // The record of one rank in its scratch directory.
@@ -34,20 +34,20 @@ class PassRecordFiles {
  public:
   explicit PassRecordFiles(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
 
-  // A subtree's update matrix; before the record that names it. False: there is no room for it.
+  // Writes the update of a subtree. It comes before the record that names it. False when there is no room.
   bool write_update(std::int64_t node, const UpdateMatrix& update) const;
   // Throws StoreError.
   UpdateMatrix read_update(std::int64_t node) const;
   void remove_update(std::int64_t node) const;
 
-  // Replaces the record as a whole. False: there is no room, or no start of a machine is to be told from another here.
+  // Replaces the record as a whole. False when there is no room, or when this system does not tell when it was started.
   bool write(const PassRecord& record) const;
-  // Nothing: there is none, it is of another start of the machine, files that it names are gone or have another size,
-  // or all of these are more than the scratch's budget.
+  // Returns nothing when there is no record, when it is of another start of the machine, when files that it names are
+  // missing or have another size, or when they exceed the budget of the scratch directory.
   std::optional<PassRecord> read() const;
   void remove() const;  // the record alone
   void remove_files_of(const PassRecord& record) const;
-  // Removes all files of the scratch directory but those of this record; nothing: all.
+  // Removes all files of the scratch directory except those of this record.
   void keep_only(const std::optional<PassRecord>& record) const;
 
  private:
