@@ -1,4 +1,4 @@
-// The command `calibrate`: of rigs, and its other modes.
+// The command `calibrate`: the calibration of rigs, and its modes for single cameras.
 #pragma once
 
 #include <functional>
@@ -12,10 +12,10 @@ namespace megablock {
 class Communicator;
 struct RunOptions;
 
-// Another mode of `calibrate`, in a file of its own. It adds its options to the command; when one of them chooses it,
-// it runs in place of the calibration of rigs, with the project and the folder (RunOptions::directory) of the command.
+// A mode of `calibrate` besides the calibration of rigs. It adds its options to the command. When one of these options
+// is given, the mode runs instead, with the project and the folder (RunOptions::directory) of the command.
 struct CalibrateMode {
-  std::function<bool()> chosen;               // asked after parsing
+  std::function<bool()> chosen;               // whether one of its options is given; asked after parsing
   std::function<int(const RunOptions&)> run;  // exit code
 };
 

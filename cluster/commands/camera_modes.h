@@ -5,9 +5,9 @@
 
 namespace megablock {
 
-// Camera turned about its centre (adjust/calibration/panoramic.h).
+// --panoramic: a camera that was rotated about its projection centre (adjust/calibration/panoramic.h).
 CalibrateMode add_panoramic(CLI::App& command);
-// Camera models on the same measurements (adjust/calibration/model_comparison.h).
+// --compare-models: camera models on the same observations (adjust/calibration/model_comparison.h).
 CalibrateMode add_compare_models(CLI::App& command);
 
 }  // namespace megablock

@@ -1,9 +1,10 @@
-// The command line (architecture.md section 6).
+// The command line of the program.
 #pragma once
 
 namespace megablock {
 
-// Parses, runs, and turns every error into one line on standard error and an exit code: the one place that does.
+// Parses the command line, runs the command and returns the exit code. This is the only place where an error becomes a
+// line on standard error and an exit code.
 int command_line(int argc, char** argv);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// `megablock coplanarity`: attitudes of a job's frames by the determinant method
+// The command `coplanarity`: computes the attitudes of the frames of a job by the determinant method
 // (adjust/coplanarity/coplanarity_adjustment.h).
 #pragma once
 

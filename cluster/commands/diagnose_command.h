@@ -1,4 +1,5 @@
-// The command 'diagnose': what a block lacks, before or after its adjustment (M57).
+// The command `diagnose`: finds gaps, weak links and missing overlap of a block, before or after its adjustment
+// (Kalantari 2009).
 #pragma once
 
 #include <functional>

@@ -1,9 +1,9 @@
-// What the command 'verticals' has found so far, in a file beside its table, so that a run after a kill, or one with
-// more images, looks at the other pictures only.
+// The verticals that the command `verticals` has found so far, in a file beside its table. A run after a kill, or one
+// with more images, reads only the images that are not in the file.
 //
-// A sealed text file (io/store/job/job_store.h): per picture a line "key found roll segments length", then as many
-// bytes, its row of the table. The key is the hash of all that the row follows from. Pictures that could not be read
-// are not in it.
+// A sealed text file (io/store/job/job_store.h): for each image a line "key found roll segments length",
+// then its row of the table, of `length` bytes. The key is the hash of everything on which the row depends. Images that
+// could not be read are not in the file.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@
 namespace megablock {
 
 struct PictureVertical {
-  std::string row;      // of the table, with its line's end
-  std::string failure;  // of reading the picture
+  std::string row;      // of the table, with the end of the line
+  std::string failure;  // why the image could not be read; empty when it could
   bool found = false;   // there is a vertical
   double roll = 0;      // ImageVertical::roll
   std::int64_t segments = 0;
@@ -26,13 +26,13 @@ struct PictureVertical {
 
 class FoundVerticals {
  public:
-  // One key per picture. What a file there says of other keys is forgotten with the next save, a damaged file
-  // altogether.
+  // One key for each image. Entries of an existing file with other keys disappear with the next save. A damaged file is
+  // ignored.
   FoundVerticals(const JobStore& store, std::string file, std::vector<std::uint64_t> keys);
 
-  std::size_t count() const;  // that are there
+  std::size_t count() const;  // number of images that are done
   bool has(std::size_t picture) const { return pictures_[picture].has_value(); }
-  std::vector<PictureVertical> pictures() const;  // once all are there
+  std::vector<PictureVertical> pictures() const;  // when all are done
   // One thread at a time.
   void add(std::size_t picture, PictureVertical vertical);
   void save_now_and_then();

@@ -1,4 +1,5 @@
-// The command 'masks': proposals of masks from what never changes over the images of a camera (CN-10).
+// The command `masks`: proposes a mask for each camera from the parts of its images that never change, such as the
+// vehicle (Cannelle 2013).
 #pragma once
 
 #include <functional>

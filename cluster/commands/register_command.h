@@ -1,4 +1,4 @@
-// The commands `resect` and `register`.
+// The commands `resect` (poses from control points) and `register` (registration of a trajectory).
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// The command `megablock simulate`.
+// The command `simulate`: makes a block with known truth.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@ class App;
 
 namespace megablock {
 
-// A command fills this in when it was chosen; it is run after parsing, so that all errors leave by one door.
+// The action of the command that was chosen. It runs after parsing, so that command_line() handles all errors.
 using Action = std::function<int()>;
 
 void add_simulate(CLI::App& app, Action& action);

@@ -1,4 +1,4 @@
-// The command 'verticals': where down is in every picture, from its straight edges (M44, M45).
+// The command `verticals`: finds the vertical of every image from its straight edges (Kalantari 2009).
 #pragma once
 
 #include <functional>
@@ -15,10 +15,11 @@ class App;
 
 namespace megablock {
 
-// Where down should be: by the attitude of the frame, else by its given pose, else by how the camera was held (EXIF).
+// The expected direction of down: from the attitude of the frame, else from its given pose, else from the orientation
+// in the EXIF header.
 VerticalPrior expected_vertical(const Block& block, ImageIndex image);
 
-// What is said of verticals of which most lie where no camera is held; else empty.
+// A warning when most verticals lie in directions in which no camera is held; else empty.
 std::string remark_on(const std::vector<PictureVertical>& pictures);
 
 void add_verticals(CLI::App& app, std::function<int()>& action);

@@ -1,4 +1,5 @@
-// What every stage of a run shares: the store, the ranks, the options, the record of what happened.
+// A run of a job, as every stage sees it: the store, the ranks, the options, the block, and the record of what
+// happened.
 #pragma once
 
 #include <map>
@@ -19,17 +20,17 @@
 
 namespace megablock {
 
-// Of memory or scratch of a rank, so that their bytes are far from the end of 64 bits.
+// Largest memory or scratch of a rank, MiB. Their bytes then stay far below the end of 64 bits.
 constexpr double kMostMib = 1e12;
 
 struct RunOptions {
-  std::string project;      // block.yaml
-  std::string directory;    // of the job
+  std::string project;      // the project file
+  std::string directory;    // the job directory
   int threads = 0;          // per rank; 0 = cores of the host / ranks on it
   double memory_mib = 0;    // per rank for factors of the merge; 0 = half of the host's memory / ranks on it
-  double record_s = 30;     // of work between two records of a pass of the merge; 0: after every subtree
-  double scratch_mib = -1;  // per rank for the merge's files in the job's scratch; -1 = as long as its disk lasts
-  bool strict = false;      // a failed unit ends the run
+  double record_s = 30;     // work between two records of a sweep of the merge, s; 0: a record after every subtree
+  double scratch_mib = -1;  // per rank for the merge's files in the job's scratch; -1 = no limit but the disk
+  bool strict = false;      // the first failed unit ends the run
   bool quiet = false;       // no progress
   std::string last_stage;   // stop after this stage; empty = all
   JobLogOptions log;        // of the log of each rank
@@ -44,13 +45,13 @@ struct Job {
   JobLog log;
   Block block;
   std::vector<std::int64_t> generations;                // image counts at which the block grew; the last is its size
-  std::vector<StageRecord> records;                     // of the stages so far, in order
+  std::vector<StageRecord> records;                     // of the stages that have begun, in order
   std::vector<FailedUnit> failures;                     // of all stages so far
-  std::map<FrameIndex, std::string> not_oriented;       // by the initial orientation, and why
+  std::map<FrameIndex, std::string> not_oriented;       // frames without a pose from the initial orientation, and why
   std::vector<std::string> notes;                       // warnings for the report
-  std::int64_t parts_done = 0;                          // of the unit in hand (work_queue.h)
+  std::int64_t parts_done = 0;                          // of the present unit (work_queue.h)
   PeakMemory peak_memory = {};                          // of this rank
-  PagedTables tables = PagedTables(store.directory());  // where those of the block lie
+  PagedTables tables = PagedTables(store.directory());  // the large tables of the block
 
   bool is_first_rank() const { return ranks.rank() == 0; }
 };

@@ -1,5 +1,5 @@
-// job.json (docs/job-format.md) as another program may have left it: what cannot be read is said in one line, with the
-// file, the key and what to do.
+// Reads job.json (docs/reference/file-formats.md), which another program may have changed. Whatever cannot be read
+// becomes one line that names the file, the key and the remedy.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,13 +13,13 @@ namespace megablock {
 
 class JobJson {
  public:
-  static constexpr int kVersion = 1;  // of what this program writes
+  static constexpr int kVersion = 1;  // version that this program writes
 
-  // `text` of the file at `path`. Throws InputError where it is no JSON object.
+  // `text`: contents of the file at `path`. Throws InputError when it is no JSON object.
   JobJson(const std::string& path, const std::string& text);
-  // Empty: there is no file.
+  // Returns nothing when there is no file.
   static std::optional<JobJson> read(const JobStore& store);
-  // Of a folder that must be a job; else InputError.
+  // Of a folder that must be a job. Throws InputError when it is none.
   static JobJson of_job(const JobStore& store);
 
   // Throws InputError for another version.
@@ -27,13 +27,13 @@ class JobJson {
   // The project file's settings as they were read. Throws InputError.
   StageSettings settings() const;
 
-  // Of a key that must be there. Throws InputError.
+  // The value of a key that must be there. Throws InputError.
   template <typename Value>
   Value at(const std::string& key) const {
     if (!json_.contains(key)) refuse(key, "is missing");
     return converted<Value>(key);
   }
-  // Of a key that may be missing. Throws InputError.
+  // The value of a key, or `otherwise` when it is missing. Throws InputError.
   template <typename Value>
   Value value(const std::string& key, const Value& otherwise) const {
     return json_.contains(key) ? converted<Value>(key) : otherwise;

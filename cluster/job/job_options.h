@@ -1,4 +1,5 @@
-// The options of all stages: read from the project file's sections, hashed into the fingerprints of the units.
+// The options of all stages. They are read from the sections of the project file and hashed into the fingerprints of
+// the units.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +23,11 @@ namespace megablock {
 
 // Options of the merge that a project file can set.
 struct MergeSettings {
-  int max_iterations = 50;   // global Levenberg-Marquardt steps per round
-  double decrement = 1e-4;   // Newton decrement at which the block is adjusted (merge.md, 5)
-  int screening_rounds = 2;  // re-tests of kept/rejected after convergence
-  // Sigmas of positions, attitudes and relative poses from their residuals (adjust/tile/sigma_scales.h), in at most ten
-  // rounds.
+  int max_iterations = 50;   // global Levenberg-Marquardt steps between two screenings
+  double decrement = 1e-4;   // Newton decrement at which the block is adjusted (no unit)
+  int screening_rounds = 2;  // tests of all observations after convergence, each followed by an adjustment
+  // Estimates the sigmas of positions, attitudes and relative poses from their residuals (adjust/tile/sigma_scales.h),
+  // in at most ten adjustments.
   bool estimate_sigmas = false;
   bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
   void check() const;        // throws InputError
@@ -42,21 +43,21 @@ struct JobOptions {
   EnvironmentOptions environment;
   AdjustOptions adjustment;
   MergeSettings merge;
-  DiagnosticsOptions diagnostics;  // of the report alone: no unit depends on them
+  DiagnosticsOptions diagnostics;  // only for the report: no unit depends on them
 };
 
-// Defaults, overridden by the project file; InputError with file:line for unknown keys and bad values.
+// The defaults with the values of the project file. Throws InputError with file:line for unknown keys and bad values.
 JobOptions read_options(const StageSettings& settings);
-// Those that a job was last run with.
+// The options of the last run of a job.
 JobOptions options_of_job(const JobStore& store);
 
-// The values in force, in the order of the docs.
+// The values in force, in the order of the documents.
 struct OptionValue {
   std::string section, key, value;
 };
 std::vector<OptionValue> option_values(const JobOptions& options);
 
-// The values that matter to a stage's results.
+// Hashes the values that influence the results of a stage.
 void add_to_hash(Hasher& hasher, const FeatureOptions& options);
 void add_to_hash(Hasher& hasher, const CandidateOptions& options);
 void add_to_hash(Hasher& hasher, const MatchOptions& options);

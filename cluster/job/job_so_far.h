@@ -1,4 +1,4 @@
-// What a job holds before its result: the block, poses, tracks.
+// The block, poses and tracks of a job that has no result yet.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ struct JobSoFar {
 // Throws InputError for a job without a block.
 JobSoFar read_job_so_far(const JobStore& store);
 
-// Tile by tile in their order, as far as there are any.
+// Tile by tile in their order, as far as the job has tracks.
 void visit_tracks(const JobStore& store, const std::function<void(TrackSet&&)>& take);
 
 }  // namespace megablock

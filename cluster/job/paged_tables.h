@@ -1,6 +1,6 @@
-// Tables of the block out of memory. A table that stays as it is moves to a file of this process, mapped under the
-// table's own addresses: what asks for a row reads its page from there, and release() takes the pages that were read
-// out of memory again. Whoever reads a paged table sees no difference, whoever writes to it gets a page of his own.
+// Moves tables of the block out of memory. A table that does not change moves to a file of this process, which is
+// mapped at the addresses of the table. A read of a row loads its page from the file, and release() takes the loaded
+// pages out of memory again. A reader of such a table sees no difference; a writer gets a private copy of the page.
 #pragma once
 
 #include <cstddef>
@@ -12,16 +12,16 @@ namespace megablock {
 
 class PagedTables {
  public:
-  // In a folder of the job: its file has no name there and is gone with the process.
+  // The file is made in this folder of the job. It has no name there, and it disappears with the process.
   explicit PagedTables(std::string directory) : directory_(std::move(directory)) {}
 
-  // Memory below a megabyte stays where it is, and so does a table for which the disk has no room.
+  // A table below a megabyte stays in memory, as does a table for which the disk has no room.
   template <typename Value>
   void put(const std::vector<Value>& table) {
     put(table.data(), table.size() * sizeof(Value));
   }
-  // Before a table is freed while others stay: what comes to its place would be taken out of memory, to where the
-  // system swaps. Its bits are safe either way.
+  // Call it before a table is freed while others stay. Otherwise release() would push the data that take its place to
+  // the swap space of the system. The bits are safe in either case.
   template <typename Value>
   void forget(const std::vector<Value>& table) {
     forget(table.data(), table.size() * sizeof(Value));

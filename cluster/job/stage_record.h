@@ -1,8 +1,8 @@
-// What a stage was asked to do and what failed in it: job/stages/<stage>.json, written by rank 0 when the stage begins
-// and when it ends. `status` compares the records with the unit files; the events only tell how long it took.
+// The record of a stage: its units and its failures, in job/stages/<stage>.json. Rank 0 writes it when the stage begins
+// and when it ends. `status` compares the records with the unit files; the events only say how long the units took.
 //
-// Each record holds a hash of the records before it (`basis`), so that a stage whose forerunners were asked for
-// something else since is known to be stale, whatever files it has.
+// Each record holds a hash of the records before it (`basis`). A stage is known to be stale when the units of an
+// earlier stage have changed since, whatever files it has.
 #pragma once
 
 #include <cstdint>
@@ -26,9 +26,9 @@ struct StageRecord {
 };
 
 void write_record(const JobStore& store, const StageRecord& record);
-// Empty when there is none; StoreError when it is not readable.
+// Returns nothing when there is no record. Throws StoreError when it is not readable.
 std::optional<StageRecord> read_record(const JobStore& store, const std::string& stage);
-// Of a stage that the job as it is asked for now does without. Fine when there is none.
+// Removes the record of a stage that the job does without now, if there is one.
 void remove_record(const JobStore& store, const std::string& stage);
 
 enum class StageState { kWaiting, kPartial, kDone, kStale };
@@ -46,8 +46,8 @@ struct ExpectedStage {
 // The states of these stages, which are in the order in which they run (cluster/stages/stages.h).
 std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<ExpectedStage>& expected);
 
-// Wall clock and memory of a stage: the time during which any rank worked on its units (each unit's latest event;
-// those of a merge since the one before), over all runs that took part.
+// Wall clock and memory of a stage over all runs that took part: the time during which any rank worked on its units. Of
+// each unit the latest event counts; of a merge all events since the merge before.
 StageStatistics stage_statistics(const StageRecord& record, const std::vector<UnitEvent>& events);
 
 }  // namespace megablock

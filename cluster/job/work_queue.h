@@ -1,8 +1,8 @@
-// A stage = a list of units; ranks claim them from the shared counter (architecture.md section 5).
+// Runs the units of a stage over all ranks. The ranks claim units from a shared counter, so that no rank is a master.
 //
-// A unit is skipped when its file is up to date and whole, else computed by the rank that claimed it. An error in one
-// unit is recorded with its reason and the stage goes on. The list must be the same on every rank; a unit's result
-// depends on its inputs alone, so it does not matter who computes it.
+// A unit whose file is up to date and undamaged is skipped; any other is computed by the rank that claimed it. An error
+// in a unit is recorded with its reason, and the stage goes on. The list of units must be the same on every rank. The
+// result of a unit depends on its inputs alone, so that it does not matter which rank computes it.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@ namespace megablock {
 
 struct Unit {
   std::string name;               // its file in the job: "features/000003.h5"
-  std::uint64_t fingerprint = 0;  // of everything it is computed from
+  std::uint64_t fingerprint = 0;  // hash of everything from which it is computed
   double cost = 0;                // any scale; units are claimed by decreasing cost, then in list order
   std::function<void(const std::string& path)> write;  // computes and writes the payload
-  std::int64_t parts = 1;  // that progress counts; write() reports what it has done of them by part_done()
+  std::int64_t parts = 1;  // parts that progress counts; write() reports finished ones by part_done()
 };
 
 struct StageOutcome {
@@ -28,22 +28,21 @@ struct StageOutcome {
   std::int64_t computed = 0;         // by all ranks
 };
 
-// Collective. Throws Interrupted (on every rank) after a graceful stop. With job.options.strict a failed unit ends the
-// run with ComputeError.
-// The stage's record (stage_record.h) grows by these units. Progress counts their parts by this name.
+// Collective. Throws Interrupted on every rank after a graceful stop. With job.options.strict a failed unit ends the
+// run with ComputeError. The units are added to the record of the stage (stage_record.h). `parts`: name of the parts
+// that progress counts.
 StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units,
                        const std::string& parts = "units");
-// Of the unit in hand, from one thread at a time.
+// Reports finished parts of the present unit; from one thread at a time.
 void part_done(Job& job, std::int64_t parts = 1);
 
-// Whether a unit is there, whole and made of what it is to be made of now. One that is damaged is named on standard
-// error.
+// Whether the file of a unit is there, undamaged and made from the present inputs. A warning names a damaged file.
 bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerprint);
 
-// What run_stage does around its units, for a stage that has another way of computing: its units join the record of
-// the stage, which rank 0 writes.
+// The first part of run_stage, for a stage that computes its units in another way: adds the units to the record of the
+// stage, which rank 0 writes.
 void begin_stage(Job& job, const std::string& stage, const std::vector<Unit>& units);
-// Failures found after a stage, such as images of a unit: listed with the job's, recorded by rank 0.
+// Adds failures that were found after a stage, such as single images of a unit, to those of the job and to the record.
 void add_failures(Job& job, const std::vector<FailedUnit>& failures);
 
 }  // namespace megablock

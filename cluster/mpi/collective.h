@@ -1,4 +1,4 @@
-// Work of one rank whose failure is everybody's: the error is thrown on all ranks, so that none waits for ever.
+// Work of one rank whose failure ends all ranks: the error is thrown on every rank, so that none waits for ever.
 #pragma once
 
 #include <functional>
@@ -9,8 +9,8 @@
 
 namespace megablock {
 
-// Marks an error that every rank throws alike. Any other error is one rank's own: the others would wait for it for
-// ever, so that it ends the run (command_line.cpp).
+// Marks an error that every rank throws alike. Any other error concerns one rank alone. The others would wait for this
+// rank for ever, so that such an error ends the run (command_line.cpp).
 struct Agreed {
   virtual ~Agreed() = default;
 };
@@ -24,7 +24,7 @@ class AgreedError : public Kind, public Agreed {
 // Runs `work` on rank 0 and returns its text on every rank; an error of the project's family is rethrown everywhere.
 std::string on_first_rank(Communicator& ranks, const std::function<std::string()>& work);
 
-// The exit code of work that knows nothing of ranks: rank 0 does it, the others wait.
+// Runs work without ranks on rank 0 while the others wait; returns its exit code on every rank.
 int exit_code_on_first_rank(Communicator& ranks, const std::function<int()>& work);
 
 // Collective: throws on every rank when any rank has an error; the lowest rank's is taken. `kind` is 'i' for

@@ -1,7 +1,7 @@
-// The ranks of a run: the only place that talks to MPI.
+// The ranks of a run. This is the only place that calls MPI.
 //
-// Without mpirun there is one rank and MPI is never initialised. Waits poll with short sleeps instead of spinning, so
-// that more ranks than cores, and a rank in the middle of a unit, do not starve one another.
+// Without mpirun there is one rank, and MPI is never initialised. Waiting ranks poll with short sleeps instead of
+// spinning. Ranks that share a core therefore do not hold up one another.
 #pragma once
 
 #include <atomic>
@@ -25,7 +25,7 @@ class Communicator : public TreeCommunicator {
 
   int rank() const override { return rank_; }
   int size() const override { return size_; }
-  // Ranks on this rank's host, for sharing its cores.
+  // Number of ranks on the host of this rank, which share its cores.
   int ranks_on_host() const { return ranks_on_host_; }
 
   void barrier();
@@ -33,11 +33,10 @@ class Communicator : public TreeCommunicator {
   std::string broadcast(const std::string& bytes, int root = 0) override;
   // Every rank's bytes, in rank order, on every rank.
   std::vector<std::string> gather_all(const std::string& bytes) override;
-  // True everywhere when it is true on any rank.
+  // True on every rank when it is true on any rank.
   bool any(bool value);
 
-  // Point to point, for the merge tree: messages between two other ranks are told apart by their tag (>= 0).
-  // send() returns at once; flush_sends() waits for all of them.
+  // Point to point, for the merge tree (merge/tree/tree_communicator.h).
   void send(int to, int tag, std::string bytes) override;
   std::string receive(int from, int tag) override;
   void flush_sends() override;
@@ -46,7 +45,7 @@ class Communicator : public TreeCommunicator {
   void reset_counter();
   std::int64_t claim();   // next number, from 0; never given twice between resets
   void use_up_counter();  // every later claim gets a number beyond any list
-  // How far all ranks together are, for display; 0 after a reset. One thread of a rank at a time.
+  // Progress of all ranks together, for display; 0 after a reset. One thread of a rank at a time.
   void add_done(std::int64_t parts);
   std::int64_t done() const;  // on rank 0 only, 0 elsewhere
 

@@ -1,12 +1,13 @@
-// What a job's poses and points say of themselves, with nothing to compare them with (KP-12, KP-14, KP-17):
+// Checks of the poses and points of a job without external data (Barrier and Martin):
 //
-// * flight lines: whether exposures stand on a line at even distances, as those of one overpass of a satellite do;
-// * ground: whether the tie points of a block that looks down lie on two levels, as they do where parts of a block
-// whose
-//   ground is flat disagree;
-// * point subsets: how far disjoint subsets of the tie points disagree in the attitudes, and the sigma of what they
-//   share; of results whose datum is not free, up to 200 frames and 200 000 measurements;
-// * common tracks: subsets of images that are asked for, by the tie points that all of their images share.
+// * flight lines: whether the projection centres of a strip lie on a line at even distances, as those of one overpass
+// of
+//   a satellite do;
+// * ground: whether the tie points of a block that looks down lie on two levels, a sign that parts of a block over flat
+//   ground disagree;
+// * point subsets: how far the attitudes from disjoint subsets of the tie points differ, and the sigma of their common
+//   error; for results with a fixed datum, up to 200 frames and 200 000 observations;
+// * common tracks: the number of tie points that all images of given subsets share.
 #pragma once
 
 #include <optional>
@@ -27,14 +28,15 @@ struct BlockChecks {
     std::int64_t exposures = 0;
     StripCheck check;
   };
-  std::vector<Line> lines;  // of blocks that look down, as they were flown
+  std::vector<Line> lines;  // of blocks that look down, in the order of the flight
   std::optional<LevelCheck> level;
   std::optional<SubsetCheck> subsets;
-  std::string no_subsets;  // why not
+  std::string no_subsets;  // why there is no check of subsets
   std::vector<ImageSubset> common;
 };
 
-// Of the result, else of what there is before. `aerial`: it looks down (BlockDiagnostics); `subsets`: names of images.
+// Checks the result of a job, or its poses before there is a result. `aerial`: the block looks down (BlockDiagnostics);
+// `subsets`: names of images.
 // Throws InputError for names that the block does not have.
 BlockChecks check_job(const JobStore& store, bool aerial, const std::vector<std::vector<std::string>>& subsets);
 

@@ -1,4 +1,4 @@
-// What the calibrations of single cameras read: a project with given tie points, or a job.
+// The input of the calibration of single cameras: a project with given tie points, or a job.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ struct CalibrationInput {
 };
 
 enum class JobTracks {
-  kAll,      // as they were matched (a job from the stage 'match' on)
-  kAdjusted  // measurements that the finished job keeps
+  kAll,      // all matches (of a job that has run as far as `match`)
+  kAdjusted  // the observations that a finished job keeps
 };
 
 // `path`: project file or job directory. Throws InputError when it is neither, or has no tie points.

@@ -1,4 +1,4 @@
-// The diagnostics of a job (io/block/block_diagnostics.h): of its result, or of what there is before.
+// The diagnostics of a job (io/block/block_diagnostics.h), from its result or from its state before there is one.
 #pragma once
 
 #include <string>
@@ -12,13 +12,13 @@
 namespace megablock {
 
 inline constexpr const char* kDiagnostics = "result/diagnostics.json";
-inline constexpr const char* kReportPage = "result/report.html";  // shows them
+inline constexpr const char* kReportPage = "result/report.html";  // the page that shows them
 
 // From poses and kept observations of a result. Passes once through its tracks.
 BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
                                  const DiagnosticsOptions& options);
 
-// Of the job's result; without one, of its initial orientation or given poses, and its tracks as far as there are any.
+// From the result of the job. Without one, from its initial orientation or given poses and from its tracks, if any.
 struct JobDiagnostics {
   Block block;
   BlockDiagnostics found;

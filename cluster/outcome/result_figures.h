@@ -1,4 +1,4 @@
-// What 'status' says of a result: written beside it, as finding it anew goes through all of its tracks.
+// The figures of a result for `status`. They are stored beside the result, because to compute them takes all tracks.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace megablock {
 
 inline constexpr const char* kResultFigures = "result/figures.json";
 
-// What takes passes through the tracks.
+// The figures that take all tracks.
 struct ResultFigures {
   ReprojectionStatistics statistics;
   std::vector<std::string> remarks;
@@ -20,12 +20,12 @@ struct ResultFigures {
 // One JSON object; keys as in 'status --json', `failures` with the images that got no pose.
 std::string to_json(const ResultFigures& figures, const BlockResult& result);
 
-// Of the job's result, which is there: as they were written with it, else found anew.
+// The figures of the result of a job, which exists: as they were stored, else computed again.
 std::string result_figures(const JobStore& store);
 
-// The remarks among them: what a reader must not overlook. None without a result.
+// The remarks among the figures, which a reader must not overlook. None without a result.
 std::vector<std::string> result_remarks(const JobStore& store);
-// A line "  look: ..." each, wherever they are printed.
+// The remarks as lines "  look: ...".
 std::string look_text(const std::vector<std::string>& remarks);
 
 }  // namespace megablock

@@ -1,5 +1,4 @@
-// A job's result as one tile: poses, points and kept observations as adjusted, with the sigmas that they were adjusted
-// with.
+// The result of a job as one tile: its poses, points and kept observations, with the sigmas of the adjustment.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"

@@ -1,4 +1,5 @@
-// Progress of a stage on rank 0: a bar with rate and time left on a terminal, a plain line every few seconds otherwise.
+// Shows the progress of a stage on rank 0: a bar with rate and time left on a terminal, else a plain line every few
+// seconds.
 // "features     12/24 images, 9 s, 1.3/s, 9 s left"
 #pragma once
 
@@ -14,7 +15,7 @@ namespace megablock {
 
 class Progress {
  public:
-  // Of `count` things of that name; `done` is polled from a thread of its own. quiet: prints nothing at all.
+  // `count` things of this name are to be done; a thread polls `done`. quiet: prints nothing at all.
   Progress(std::string stage, std::int64_t count, std::string name, std::function<std::int64_t()> done, bool quiet);
   ~Progress();
   Progress(const Progress&) = delete;
@@ -36,7 +37,7 @@ class Progress {
   std::thread thread_;
 };
 
-// Of whatever else goes to standard error: ends the line that a progress bar stands on, if one does.
+// Ends the line of the progress bar, if there is one. Call it before anything else goes to standard error.
 void end_progress_line();
 
 // Seconds on a clock that only goes forward.

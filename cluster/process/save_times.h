@@ -1,5 +1,5 @@
-// When to save what is in the making: a second after the last time at the soonest, and seldom enough that at most a
-// twentieth of the time goes into saving.
+// Decides when to save unfinished work: at the earliest a second after the last time, and so seldom that saving takes
+// at most a twentieth of the time.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
-// Stopping (architecture.md section 5).
+// Signals that stop a run.
 //
-// SIGUSR1: graceful; the work queue hands out no further units, all ranks finish the one in hand and return 75.
-// SIGTERM, SIGINT: the units in hand are abandoned at once and the process leaves with 75. The store is valid either
-// way: units appear whole or not at all.
+// SIGUSR1 stops gracefully: ranks claim no further units, finish the present one and return 75. SIGTERM and SIGINT
+// abandon the present units at once, and the process ends with 75. The store is valid in either case, because a unit
+// file appears complete or not at all.
 #pragma once
 
 namespace megablock {
@@ -10,11 +10,11 @@ namespace megablock {
 // Blocks the three signals in this and all later threads and starts the thread that waits for them. Call first in main.
 void watch_signals();
 
-// True once a graceful stop was asked for.
+// True after SIGUSR1.
 bool stop_requested();
 
-// The ranks have come to their end together and have nothing in hand: SIGTERM, which mpirun sends to those that leave
-// after one with an exit code, still ends the process, but says nothing.
+// Call it when all ranks have finished. mpirun sends SIGTERM to ranks that end after one with an exit code; the signal
+// then still ends the process, but without a message.
 void end_of_work();
 
 }  // namespace megablock

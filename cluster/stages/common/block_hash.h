@@ -1,4 +1,4 @@
-// Values of the block in fingerprints.
+// Adds values of the block to the fingerprints of units.
 #pragma once
 
 #include "io/base/hash.h"
@@ -33,7 +33,7 @@ inline void add_to_hash(Hasher& hasher, const Intrinsics& k) {
   for (const double value : k) hasher.add(value);
 }
 
-// What an adjustment takes of a frame besides its pose.
+// The values of a frame, besides its pose, that an adjustment uses.
 inline void add_priors_to_hash(Hasher& hasher, const Frame& frame) {
   if (frame.position_prior) add_to_hash(hasher.add('p'), *frame.position_prior);
   if (frame.attitude_prior) add_to_hash(hasher.add('a'), *frame.attitude_prior);

@@ -1,5 +1,5 @@
-// The block as it was when it had fewer images. A block grows at its end: images, frames, rigs and cameras that are
-// added follow those that were there, so that a generation is a number of images (Job::generations).
+// The block at an earlier generation, when it had fewer images. A block grows at its end: new images, frames, rigs and
+// cameras follow the existing ones, so that a number of images identifies a generation (Job::generations).
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ Block first_images(const Block& block, std::int64_t n);
 
 std::int64_t frames_of_first_images(const Block& block, std::int64_t n);
 
-// The generation in which an image came.
+// The generation in which an image was added.
 std::size_t generation_of(const std::vector<std::int64_t>& generations, ImageIndex image);
 
 }  // namespace megablock

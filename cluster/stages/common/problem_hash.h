@@ -1,4 +1,4 @@
-// A tile's problem in fingerprints: everything that can reach its adjustment and nothing else of the block.
+// Adds the problem of a tile to a fingerprint: everything that can influence its adjustment, and nothing else.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"
@@ -6,7 +6,8 @@
 
 namespace megablock {
 
-// Without the points' places in the block, which the adjustment does not use and which may move when a block grows.
+// Leaves out the indices of points in the block, which the adjustment does not use and which may change when the block
+// grows.
 void add_to_hash(Hasher& hasher, const TileProblem& problem, const TileState& start);
 
 }  // namespace megablock

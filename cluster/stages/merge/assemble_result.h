@@ -1,4 +1,4 @@
-// The result of a job from its merged tiles.
+// Assembles the result of a job from its merged tiles.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace megablock {
 
-// Everything of the result but its tracks and digest. `parts`: of all tiles. Takes over the job's block, which is empty
-// afterwards, and the outcome: of a million images there should not be two.
+// The result without its tracks and digest. `parts`: of all tiles. It takes over the block of the job, which is empty
+// afterwards, and the outcome, so that a block of a million images is not in memory twice.
 BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, const std::vector<TilePart>& parts);
 
 }  // namespace megablock

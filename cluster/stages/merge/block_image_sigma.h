@@ -1,5 +1,5 @@
-// The sigma of tie point measurements (adjust/tile/image_sigma.h) of the whole block: all tiles are adjusted with the
-// same.
+// The sigma of the observations of tie points (adjust/tile/image_sigma.h). All tiles of a block are adjusted with the
+// same value.
 #pragma once
 
 #include <string>
@@ -10,14 +10,15 @@
 
 namespace megablock {
 
-// Before the block is adjusted: the root mean square of the tiles' own estimates, by kept observations.
+// Before the adjustment of the block: the root mean square of the tiles' own estimates, weighted by kept observations.
 double start_image_sigma(const Job& job, const std::vector<std::string>& adjusted);
 
-// At a solution, collective: the block's estimate, given to this rank's tiles when it differs enough from theirs to be
-// worth another adjustment. The same answer on every rank. `oriented`: which frames are unknowns.
+// Collective, at a solution: estimates the sigma of the block, and gives it to the tiles of this rank when it differs
+// so much that another adjustment is worth while. The answer is the same on every rank. `oriented`: which frames are
+// unknowns.
 bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented);
 
-// Collective: what the tiles were adjusted with, on ranks without tiles too.
+// Collective: the sigma with which the tiles were adjusted, also on ranks without tiles.
 double common_image_sigma(Job& job, const TileStore& own);
 
 }  // namespace megablock
