@@ -1,5 +1,5 @@
-// What a job says of itself: `megablock status`, derived from the stages' records, the unit files and the result. Times
-// and memory come from the events.
+// `megablock status`: the state of a job from the records of its stages, the unit files and the result. Times and
+// memory come from the events.
 #pragma once
 
 #include <string>
@@ -11,9 +11,9 @@ namespace megablock {
 
 std::string status_json(const JobStore& store);
 std::string status_text(const JobStore& store);
-// Every stage is done and nothing was asked for since.
+// Whether every stage is done and nothing has changed since.
 bool job_is_done(const JobStore& store);
-// One line per stage that has begun and whose units are not all there, or that was asked for something else since.
+// One line for each stage that has begun and misses units, or whose inputs have changed since.
 std::vector<std::string> unfinished_stages(const JobStore& store);
 // The digest of the finished result; InputError when the job has none yet.
 std::string status_digest(const JobStore& store);

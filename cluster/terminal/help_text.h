@@ -1,4 +1,4 @@
-// Help as wide as the terminal.
+// Formats the help of commands for the width of the terminal.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -6,8 +6,8 @@
 
 namespace megablock {
 
-// Wraps to the terminal (terminal_text.h), else to 80 columns. Footers, which are commands to be
-// copied, stay as they are.
+// Wraps lines at the width of the terminal (terminal_text.h), else at 80 columns. Footers hold commands to copy; they
+// are not wrapped.
 class HelpText : public CLI::Formatter {
  public:
   std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;

@@ -1,4 +1,4 @@
-// Checks of values on the command line, with messages of our own.
+// Checks the values of options on the command line, with messages that name the remedy.
 #pragma once
 
 #include <fmt/core.h>
@@ -19,7 +19,7 @@ inline CLI::Validator named() {
       "named");
 }
 
-// A number that `holds`; `words`: which numbers these are.
+// A number for which `holds` is true; `words` names these numbers in the message.
 template <typename Holds>
 CLI::Validator number(Holds holds, const std::string& words, const std::string& name) {
   return CLI::Validator(
@@ -39,13 +39,13 @@ inline CLI::Validator positive() {
   return number([](double value) { return value > 0; }, "above 0", "positive");
 }
 
-// Of a process; 0: as many as there are cores. Each has a stack and tables of its own, so that thousands of them end a
-// process without a word.
+// Threads of a process; 0: as many as there are cores. Each has a stack and tables of its own; thousands of them would
+// end the process without a message.
 inline CLI::Validator threads() {
   return number([](double value) { return value >= 0 && value <= 1024; }, "of 0 to 1024", "threads");
 }
 
-// Adds the option for the level of the log, which the environment variable MEGABLOCK_LOG_LEVEL sets, too.
+// Adds the option for the level of the log. The environment variable MEGABLOCK_LOG_LEVEL sets it as well.
 inline void add_log_level(CLI::App& command, LogLevel& level) {
   command
       .add_option_function<std::string>(
@@ -55,7 +55,7 @@ inline void add_log_level(CLI::App& command, LogLevel& level) {
       ->check(CLI::IsMember(log_level_names()));
 }
 
-// Of memory or of a disk.
+// An amount of memory or of disk space, MiB.
 inline CLI::Validator mebibytes(double most) {
   return number([=](double value) { return value >= 0 && value <= most; }, fmt::format("of 0 to {:g} MiB", most),
                 "mebibytes");

@@ -1,4 +1,4 @@
-// Where a command may write what -o names: over its own earlier output, over nothing that cannot be had back.
+// Checks the output that -o names. A command may replace its own earlier output, but nothing that cannot be made again.
 #pragma once
 
 #include <string>
@@ -6,14 +6,14 @@
 
 namespace megablock {
 
-// What a command reads: the project file and the files and folders that it names; of a job directory, those of its
-// project. `made`: the key of a project file whose file the command makes. What is wrong with the source is said where
-// it is read.
+// The inputs of a command: the project file and the files and folders that it names; for a job directory, those of its
+// project. `made`: the key of the project file whose file the command makes. Errors in the source are left to its
+// reader.
 std::vector<std::string> inputs_of(const std::string& source, const std::string& made = "");
 
-// InputError when the file or folder `output` would take the place of one of the inputs (of a folder: of a picture
-// below it), or lies in a job directory: there a command writes new files in result/ alone, and `own`, a name in the
-// job that it makes itself. Links are followed.
+// Throws InputError when the file or folder `output` would replace one of the inputs (in a folder: an image), or is in
+// a job directory. There a command writes only new files in result/, and `own`, a name in the job that it makes itself.
+// Links are followed.
 void check_output(const std::string& output, const std::vector<std::string>& inputs = {}, const std::string& own = "");
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// Text as wide as the terminal.
+// Fits text to the width of the terminal.
 #pragma once
 
 #include <cstddef>
@@ -7,14 +7,14 @@
 
 namespace megablock {
 
-// The environment variable COLUMNS, else the terminal's width; none where the output goes elsewhere.
+// The environment variable COLUMNS, else the width of the terminal; none when the output goes elsewhere.
 std::optional<std::size_t> terminal_columns();
 
-// Breaks lines longer than `columns` between words and behind commas. What follows of an option's line stands below its
-// description, which begins at column `description`; of any other `hanging` columns right of the line's own beginning.
+// Breaks lines longer than `columns` between words and after commas. The rest of an option's line begins at column
+// `description`, below its description; the rest of any other line `hanging` columns to the right of its beginning.
 std::string wrapped(const std::string& text, std::size_t columns, std::size_t description, std::size_t hanging = 0);
 
-// What a person reads on a terminal; a program or a file gets whole lines, whatever COLUMNS says.
+// Wraps text for a person at a terminal. A program or a file gets whole lines, whatever COLUMNS says.
 std::string for_terminal(const std::string& text);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// What the adjusted block says of itself: covariances, figures, and each tile's part of the result.
+// The outcome of the global adjustment: covariances, figures, and the part of each tile in the result.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ struct MergeOutcome {
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
   double variance_factor() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 1; }
-  double image_sigma_px = 0;  // of tie point measurements, as adjusted with
+  double image_sigma_px = 0;  // sigma of the observations of tie points in the adjustment
   int global_iterations = 0;
   double newton_decrement = 0;
   std::string gauge;
@@ -29,19 +29,19 @@ struct MergeOutcome {
   ObservationTable observations;
 };
 
-// An adjusted block as a rank knows it.
+// An adjusted block as one rank holds it.
 struct Adjusted {
   MergeTreeRunner::Posterior posterior;
-  std::vector<TilePart> parts;  // of this rank's tiles
-  double image_sigma_px = 0;    // of tie point measurements
+  std::vector<TilePart> parts;  // parts of the tiles of this rank
+  double image_sigma_px = 0;    // of the observations of tie points
   MergePosition position;
-  MergeCosts costs;  // of the last round
+  MergeCosts costs;  // of the last adjustment
   BlockState state;
   bool converged = false;
 };
 
-// Files of a tile until the result is written: its tracks, and the covariances of what others may share with it. They
-// lie with the checkpoints and go with them.
+// Files of a tile until the result is written: its tracks, and the covariances of the unknowns that it may share. They
+// are beside the checkpoints and are removed with them.
 std::string part_path(const Job& job, std::int64_t tile);
 std::string covariance_path(const Job& job, std::int64_t tile);
 
@@ -53,15 +53,16 @@ void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<Motio
 // All tiles' parts, on every rank; collective.
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);
 
-// What attitude priors alone tell of the orientation (common_motion.h), a line per case and part of the block.
+// The parts of the orientation that only attitude priors determine (common_motion.h), one line for each case and part
+// of the block.
 std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts);
 
-// Tiles of which most tie point measurements were rejected, less than half the share kept of all others', the worst
-// first: what is left of them may agree by chance, with itself and with other tiles, and then no test of residuals or
-// seams (merge/checks/seam_check.h) tells them. A line each, of three at most.
+// Names tiles that keep less than half the share of observations that all others keep, the worst first, one line each,
+// three at most. The few observations left may agree by chance, among themselves and with other tiles; no test of
+// residuals or seams (merge/checks/seam_check.h) then finds such a tile.
 std::vector<std::string> judge_kept(const std::vector<TilePart>& parts);
 
-// When all ranks have written their tiles' files, of which covariances are read: takes the state over.
+// Takes over the state when all ranks have written the files of their tiles; reads the covariances from these.
 MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles);
 
 }  // namespace megablock

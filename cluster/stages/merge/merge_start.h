@@ -1,4 +1,4 @@
-// From the tiles' own adjustments to one start of the global adjustment, and from its end to the result.
+// Forms the start of the global adjustment from the adjustments of the single tiles.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace megablock {
 
-// One tile as the merge works on it.
+// A tile in the merge.
 struct MergeTile {
   TileIndex tile;
   TrackSet tracks;
@@ -21,24 +21,26 @@ struct MergeTile {
   TileState state;
 };
 
-// The tiles' adjustments put together: without a common datum (no position priors, fewer than three control points)
-// they are assembled first (merge/start/tile_assembly.h); then all are aligned jointly (merge/start/tile_alignment.h),
-// a frame takes its pose from the tile that holds most of its observations (ties: lower tile), stretches that
-// contradict their relative poses are turned back (adjust/orientation/turned_stretches.h), intrinsics and free mounts
-// are means over the tiles weighted by observations. Frames that no adjusted tile holds lose their orientation.
+// Joins the adjustments of the tiles. Tiles without a common datum (no position priors, fewer than three control
+// points) are first assembled (merge/start/tile_assembly.h). All tiles are then aligned jointly
+// (merge/start/tile_alignment.h). A frame takes its pose from the tile with most of its observations (if equal, the
+// lower tile). Stretches of frames that contradict their relative poses are turned back
+// (adjust/orientation/turned_stretches.h). Intrinsics and free mounts are means over the tiles, weighted by
+// observations. Frames that no adjusted tile holds lose their orientation.
 struct MergeStart {
   BlockState state;
-  std::vector<Similarity> motions;                     // [tiles] that aligned them; empty: of a checkpoint
-  IndexedVector<FrameIndex, TileIndex> tile_of_frame;  // whose motion brought the frame here; invalid: more than that
+  std::vector<Similarity> motions;  // [tiles] by which the tiles were aligned; empty when a checkpoint is the start
+  IndexedVector<FrameIndex, TileIndex>
+      tile_of_frame;  // the tile whose motion moved the frame; invalid when more than that moved it
 };
 MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
 
-// The tracks of a tile, split into the parts that its adjustment found. `adjusted` empty: as they are.
+// The tracks of a tile, split into the parts that its adjustment found; unsplit when `adjusted` is empty.
 TrackSet read_split_tracks(const Job& job, const std::string& tracks, const std::string& adjusted);
 
-// A tile's problem with the kept flags of its adjustment. Its points go with the tile; those whose frames have not all
-// done so, or whose cameras are the mean of several tiles', are triangulated anew. Of a checkpoint, which has points of
-// its own, they are left as they were. `oriented`: what stays the same when the merge is resumed.
+// The problem of a tile with the kept flags of its adjustment. Its points move with the tile. Points whose frames have
+// not all moved with it, or whose cameras are means of several tiles, are intersected again. A checkpoint has points of
+// its own, which replace them. `oriented`: the state that stays the same when the merge is resumed.
 MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const MergeStart& start, const Tiles& tiles,
                           TileIndex tile, const RowsOfTile& rows, const std::string& tracks,
                           const std::string& adjusted);

@@ -1,5 +1,5 @@
-// This rank's tiles in the merge: from the tiles' own adjustments, between rounds of screening, back to the block's
-// state.
+// The tiles of this rank in the merge: loading them, screening between adjustments, and gathering the state of the
+// block.
 #pragma once
 
 #include <functional>
@@ -14,52 +14,53 @@
 
 namespace megablock {
 
-// What the merge is computed from; unit names by tile, empty ones of tiles that could not be adjusted.
+// The inputs of the merge. Unit names are by tile, and empty for tiles that could not be adjusted.
 struct MergeInputs {
-  BlockState oriented;  // until the tiles are loaded
+  BlockState oriented;  // empty after the tiles are loaded
   const Tiles& tiles;
   const std::vector<std::string>& tracks;
   const std::vector<std::string>& adjusted;
 };
 
-// Adds this rank's tiles to `own`, each as `prepare` leaves it.
+// Adds the tiles of this rank to `own`, each after `prepare` has changed it.
 void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart& start,
                     const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
                     TileStore& own);
 
-// The block's state from all ranks' tiles. Tiles hold the same bits of what they share, so their order does not matter.
-// Collective.
+// Collective: the state of the block from the tiles of all ranks. Tiles hold the same bits of the unknowns that they
+// share, so that their order does not matter.
 BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner);
 
-// Every tile takes over what others have moved: before observations are tested against it.
+// Gives every tile the present state, before its observations are tested against it.
 void follow(const BlockState& state, TileStore& tiles);
 
-// Whether the sigmas of positions, attitudes and relative poses have changed enough to matter. Collective.
+// Collective: whether the sigmas of positions, attitudes and relative poses have changed so much that another
+// adjustment is needed.
 bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales);
 
-// Re-tests every observation at the solution; how many verdicts changed in the whole block. Collective.
+// Collective: tests every observation at the solution again. Returns the number of changed verdicts in the whole block.
 std::int64_t screen(Job& job, TileStore& tiles);
 
-// Of this rank, in the job's scratch.
+// Folder of this rank in the scratch of the job.
 std::string scratch_folder_of_rank(const Job& job);
-// The memory of this rank, half of it for tiles, and its scratch, once a job; what tiles leave of it for factors.
+// The memory of this rank, half of it for tiles, and its scratch; then the part that the tiles leave for factors.
 MemoryOptions memory_of_rank(const Job& job);
 MemoryOptions memory_of_factors(MemoryOptions memory, const TileStore& tiles);
 
-// What a runner's passes cost, over all ranks: a round of the merge.
+// The cost of the sweeps of one adjustment, over all ranks.
 struct MergeCosts {
-  double tile_seconds = 0, front_seconds = 0;  // work on tiles, on fronts above them: sums over the ranks
-  double seconds = 0;                          // of all passes, of the slowest rank
-  std::int64_t passes = 0;                     // upwards
+  double tile_seconds = 0, front_seconds = 0;  // work on tiles and on fronts above them: sums over the ranks, s
+  double seconds = 0;                          // all sweeps, on the slowest rank
+  std::int64_t passes = 0;                     // sweeps up
   std::int64_t tiles = 0, tiles_in_scratch = 0;
-  MemoryStatistics factors;           // peak_bytes: of the rank with most
-  std::int64_t peak_front_bytes = 0;  // of the rank with most: a front at work, and what waits for others
+  MemoryStatistics factors;           // peak_bytes: of the rank with the largest
+  std::int64_t peak_front_bytes = 0;  // of the rank with the largest: a front at work and all pending updates
   FrontCosts fronts;
   std::map<std::string, double> figures() const;  // by name, for the event of the merge
 };
 // Collective.
 MergeCosts gather_costs(Job& job, const TileStore& tiles, const MergeTreeRunner& runner);
-// How large the fronts were, where the time went, and what `--memory` led to.
+// Reports the size of the fronts, the share of the time, and the effect of `--memory`.
 void say_costs(const Job& job, const MergeCosts& costs);
 
 }  // namespace megablock

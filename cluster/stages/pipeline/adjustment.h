@@ -9,7 +9,7 @@
 
 namespace megablock {
 
-// Tile adjustments: adjust/<tile>.h5. Returns the unit names by tile; empty for tiles that could not be adjusted.
+// Collective. Returns the unit names by tile; empty for tiles that could not be adjusted.
 std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks);
 

@@ -1,5 +1,5 @@
-// Calibration of the rigs of a job's block, on the first rank; the other ranks take part in what comes before it
-// (matching of pictures).
+// Calibrates the rigs of a block on the first rank. The other ranks take part in the stages before it, such as
+// matching.
 #pragma once
 
 #include <string>
@@ -16,12 +16,12 @@ struct CalibrationSettings {
   bool json = false;         // figures instead of the table
 };
 
-// Collective. `start`: frames with poses where they are known. Writes calibration.yaml (calibration-refused.yaml when
-// it is no better than the start) and calibration.html into the job's folder and prints the figures. Throws when the
-// calibration is refused, on every rank.
+// Collective. `start`: frames, with poses where they are known. Writes calibration.yaml (calibration-refused.yaml when
+// the result is no better than the start) and calibration.html into the job folder, and prints the figures. Throws on
+// every rank when the calibration is refused.
 void run_calibration(Job& job, const BlockState& start, const TrackSet& tracks, const CalibrationSettings& settings);
 
-// Poses of frames that have none, from the control points that they see.
+// Adds poses of frames without one, from the control points that they see.
 void resect_missing(const Block& block, BlockState& state);
 
 }  // namespace megablock

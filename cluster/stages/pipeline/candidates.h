@@ -7,7 +7,7 @@
 
 namespace megablock {
 
-// Candidate pairs and cells: graph.h5.
+// Collective.
 CandidateGraph run_candidates(Job& job, const FeatureStage& features);
 
 }  // namespace megablock

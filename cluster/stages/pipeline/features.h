@@ -11,19 +11,20 @@
 
 namespace megablock {
 
-// Features. fingerprint[image]: what the features of one image are computed from (file, mask, options).
+// The outcome of the stage: the fingerprint of the features of each image (of its file, mask and options), and the
+// units.
 struct FeatureStage {
   std::vector<std::uint64_t> image_fingerprint;
   std::vector<std::string> shards;
 };
 FeatureStage run_features(Job& job);
 
-// Keypoints and descriptors by image, a few shards in memory at a time.
+// Reads keypoints and descriptors by image, with a few shards in memory at a time.
 class FeatureCache {
  public:
   FeatureCache(const JobStore& store, std::size_t capacity_shards) : store_(store), capacity_(capacity_shards) {}
   const ImageFeatures& features(ImageIndex image);
-  // Makes the shards of these images resident together; pointers stay valid until the next call.
+  // Loads the shards of these images together. References stay valid until the next call.
   void load(const std::vector<ImageIndex>& images);
 
  private:
@@ -37,7 +38,7 @@ class FeatureCache {
   std::vector<Shard> shards_;  // least recently used first
 };
 
-// Keypoints of every image (empty where extraction failed).
+// The keypoints of every image; empty where extraction failed.
 IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job);
 
 }  // namespace megablock

@@ -10,10 +10,10 @@
 
 namespace megablock {
 
-// Matching: matches/<cell>.h5. Returns the unit names.
+// Collective. Returns the unit names.
 std::vector<std::string> run_matching(Job& job, const FeatureStage& features, const CandidateGraph& graph);
 
-// Reads all matches of the units (in unit order).
+// Reads all matches of the units, in the order of the units.
 std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches);
 
 }  // namespace megablock

@@ -8,7 +8,7 @@
 
 namespace megablock {
 
-// Initial orientation: orient/<generation>.h5. Returns the block's state.
+// Collective. Returns the state of the block.
 BlockState run_orientation(Job& job, const std::vector<std::string>& matches);
 
 }  // namespace megablock

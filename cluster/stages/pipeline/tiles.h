@@ -9,7 +9,7 @@
 
 namespace megablock {
 
-// Tiles and merge tree: tiles.h5, from verified matches or from given tracks.
+// Collective; from verified matches, or from given tracks.
 Tiles run_tiles(Job& job, const std::vector<std::string>& matches);
 Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points);
 

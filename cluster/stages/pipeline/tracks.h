@@ -9,8 +9,8 @@
 
 namespace megablock {
 
-// Tracks by owner tile: tracks/<tile>.h5 (ids: first image x 2^24 + feature, stable when a block grows; dense indices
-// are given in the result). Returns the unit names by tile.
+// Collective. Returns the unit names by tile. The id of a track is its first image times 2^24 plus the feature, so that
+// it stays the same when the block grows; the result has dense indices.
 std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& matches, const Tiles& tiles);
 std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles);
 

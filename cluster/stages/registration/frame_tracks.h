@@ -1,4 +1,4 @@
-// Tracks by the frames that see them, and those that four frames have in common.
+// Lists the tracks that a frame sees, and those that four frames have in common.
 #pragma once
 
 #include "adjust/registration/pair_registration.h"
@@ -14,13 +14,14 @@ class FrameTracks {
 
   const TrackSet& tracks() const { return tracks_; }
 
-  // Of a place and the ones a frame before or after along either pass: that with most tracks in `min_frames` frames.
+  // Of this place and the places one frame before or after it along either pass, the one with most tracks in at least
+  // `min_frames` frames.
   Place richest(const Place& place, int min_frames) const;
 
   std::vector<FourFrameTrack> common(const Place& place, int min_frames) const;
 
  private:
-  // Tracks of either pass and at least min_frames of a, b, c, d; ascending.
+  // Tracks that both passes see and at least min_frames of the frames a, b, c, d; ascending.
   std::vector<std::int64_t> shared(const Place& place, int min_frames) const;
   bool successive(FrameIndex a, FrameIndex b) const;
 

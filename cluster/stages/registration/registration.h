@@ -1,4 +1,4 @@
-// Registration of a trajectory as stages of a job: register/rig.h5 (one unit, where cameras or mounts are free),
+// The registration of a trajectory, as stages of a job: register/rig.h5 (one unit, where cameras or mounts are free),
 // register/places.h5 (one unit), register/pairs/<n>.h5 (some hundred places each, claimed by the ranks),
 // register/trajectory.h5 (one unit).
 #pragma once
@@ -17,39 +17,40 @@
 namespace megablock {
 
 struct RegistrationSettings {
-  bool estimate_rig = true;  // free cameras and mounts, first of all, from the tracks along the passes
+  bool estimate_rig = true;  // first estimates free cameras and mounts from the tracks along the passes
   RigEstimateOptions rig;
   PlaceOptions places;
   PairRegistrationOptions pairs{.min_frames = 3};
   TrajectoryOptions trajectory;
   JointOptions joint;
-  bool use_registrations = true;  // false: the chain and what is absolute alone
-  bool use_resections = false;    // of frames that see three control points or more (CN-23, CN-29)
-  int units_places = 250;         // per unit
+  bool use_registrations = true;  // false: relative poses of successive frames and absolute observations alone
+  bool use_resections = false;    // resections of frames that see three control points or more
+  int units_places = 250;         // places in a unit
   void check() const;             // throws InputError
 };
 
-// The tracks of the block, read when they are needed first; `fingerprint`: of all of them.
+// The tracks of the block, which are read when they are first needed. `fingerprint`: of all tracks.
 struct TrackSource {
-  std::string file;  // of given tracks; empty: the job's own
+  std::string file;  // file of given tracks; empty: tracks of the job
   std::uint64_t fingerprint = 0;
   std::function<TrackSet()> read;
-  std::vector<std::string> matches;  // units of verified pairs that they were made of; empty: given tracks
+  std::vector<std::string> matches;  // units of the verified pairs from which they were built; empty for given tracks
 };
 
 struct RegistrationSummary {
   std::int64_t frames = 0, chain = 0, places = 0, accepted = 0, different = 0, used = 0, resections = 0, points = 0;
-  std::string rig;                                                    // what was done to cameras and mounts
-  using Reasons = std::vector<std::pair<std::string, std::int64_t>>;  // without their numbers, and how often
+  std::string rig;  // the outcome for cameras and mounts, in words
+  using Reasons =
+      std::vector<std::pair<std::string, std::int64_t>>;  // the reason without its numbers, and how often it occurs
   Reasons refusals, not_resected;
-  double median_move_m = 0, largest_move_m = 0;  // of frames against the start
+  double median_move_m = 0, largest_move_m = 0;  // movement of frames from the start
   std::vector<std::string> check_points;         // one line each
   double check_rms_m = 0;                        // of check points adjusted as tie points; 0: none
   std::vector<std::string> notes;                // on the trajectory: gaps, copies
-  std::uint64_t digest = 0;                      // of the trajectory's bits
+  std::uint64_t digest = 0;                      // hash of the bits of the trajectory
 };
 
-// Collective. Writes besides, by rank 0: register/poses.csv, register/registrations.csv, and register/block.yaml with
+// Collective. Rank 0 also writes register/poses.csv, register/registrations.csv, and register/block.yaml with
 // register/block.h5 (registration_output.h).
 RegistrationSummary run_registration(Job& job, const TrackSource& tracks, const RegistrationSettings& settings);
 

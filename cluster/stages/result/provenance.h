@@ -1,4 +1,4 @@
-// What a result says of its origin besides the adjustment itself.
+// The provenance of a result: program, options and images.
 #pragma once
 
 #include <functional>
@@ -9,13 +9,13 @@
 
 namespace megablock {
 
-// Program, arithmetic level and the options in force.
+// The program, the arithmetic level and the options in force.
 Provenance provenance_of(const Job& job);
 
-// Size, features and matches of every image, from the job's files; empty when the block was given by tie points.
+// Size, features and matches of every image, from the files of the job; empty for a block of given tie points.
 IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job);
 
-// Unknowns as the user calls them: "image 'a.jpg'", "frame 'f12'" (of a rig), "camera 'left'", "mount 2 of rig 'car'".
+// The name of an unknown for users: "image 'a.jpg'", "frame 'f12'" (of a rig), "camera 'left'", "mount 2 of rig 'car'".
 std::function<std::string(const UnknownId&)> names_of(const Block& block);
 
 }  // namespace megablock

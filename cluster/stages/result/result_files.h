@@ -1,4 +1,4 @@
-// What a job leaves in its folder 'result': the result itself, its figures, what the block lacks, and the report.
+// Writes the folder `result` of a job: the result, its figures, the diagnostics of the block, and the report.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace megablock {
 
-// `result` without its tracks, which are in `parts`. Its tables that grow with the block lie in `tables` and leave
-// memory behind each batch of tracks, dataset and section that asked for them.
+// `result` has no tracks; these are in `parts`. Its tables that grow with the block are in `tables`, and they leave
+// memory after each batch of tracks, dataset and section that has used them.
 void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_t fingerprint, BlockResult result,
                         std::vector<PartTracks::File> parts, const DiagnosticsOptions& options);
 

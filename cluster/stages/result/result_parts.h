@@ -1,6 +1,6 @@
-// From merged tiles to the tracks of the result. Each rank writes the tracks of its tiles to the job's disk as
-// soon as their covariances are there; the first rank then reads them all, merged by their keys, a small piece of each
-// tile at a time: no rank holds more of the result than a tile.
+// Collects the tracks of the result from the merged tiles. Each rank writes the tracks of its tiles to the disk of the
+// job when their covariances are known. The first rank then reads the tracks of all tiles, merged by their keys, in
+// small pieces. No rank holds more of the result than one tile.
 #pragma once
 
 #include <functional>
@@ -14,36 +14,35 @@
 
 namespace megablock {
 
-// What a tile contributes besides its tracks.
+// The part of a tile in the result besides its tracks.
 struct TilePart {
   std::int64_t tile = -1;
   std::int64_t track_count = 0;
-  std::int64_t measured = 0, kept = 0;     // tie point measurements; those that take part
-  std::vector<FrameIndex> frames;          // touched by observations that take part
+  std::int64_t measured = 0, kept = 0;     // observations of tie points; the kept ones among them
+  std::vector<FrameIndex> frames;          // frames of kept observations
   std::vector<std::int64_t> control_rows;  // in block.control_points
   std::vector<BlockResult::ControlResult> control;
-  std::vector<std::vector<Eigen::Vector2d>> control_measured;  // px, corrected as they were adjusted
-  std::int32_t component = -1;                                 // of the block; -1: nothing to judge of its motion
+  std::vector<std::vector<Eigen::Vector2d>> control_measured;  // px, with the corrections of the adjustment
+  std::int32_t component = -1;  // component of the block; -1: its motion cannot be judged
   CommonMotion motion;
   Bytes to_bytes() const;
   static TilePart from_bytes(const Bytes& bytes);
 };
 
-// Writes the tracks of a merged tile, whose first points they are, to `path`, ascending by their keys; positions are
-// those that the tile was adjusted with (adjust/problem/environment_correction.h).
-// A full disk is an InputError.
+// Writes the tracks of a merged tile, which are its first points, to `path`, ascending by their keys. The image
+// coordinates are those of the adjustment (adjust/problem/environment_correction.h). Throws InputError on a full disk.
 TilePart write_part(const std::string& path, const RankTile& tile, const TrackSet& tracks,
                     const TileCovariance& covariance);
 
-// All tiles' tracks with dense indices in the order of their keys; file_tracks has the keys. Covariances are multiplied
-// by `covariance_factor`. Throws StoreError when a file cannot be read.
+// The tracks of all tiles with dense indices in the order of their keys; file_tracks has the keys. Covariances are
+// multiplied by `covariance_factor`. Throws StoreError when a file cannot be read.
 class PartTracks final : public TrackBatches {
  public:
   struct File {
     std::string path;
     std::int64_t track_count = 0;
   };
-  // `after_batch` is called behind every batch of a visit, of which there may be several at a time.
+  // `after_batch` is called after every batch of a visit. Several visits may run at a time.
   PartTracks(std::vector<File> files, double covariance_factor, std::function<void()> after_batch = {});
   std::int64_t track_count() const override { return count_; }
   void visit(const Visit& visit) const override;
