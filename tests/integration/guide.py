@@ -47,7 +47,8 @@ def run(command, folder):
     """The lines that a command prints; ends the test when it fails."""
     done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, text=True, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT)
-    lines = [line.rstrip() for line in done.stdout.splitlines() if not PROGRESS.match(line)]
+    output = done.stdout.replace(folder, "/home/me/blocks")
+    lines = [line.rstrip() for line in output.splitlines() if not PROGRESS.match(line)]
     if done.returncode:
         sys.exit("\n".join([f"exit code {done.returncode}: {command}", *lines]))
     return lines
