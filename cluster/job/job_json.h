@@ -1,5 +1,5 @@
-// job.json (docs/job-format.md) as another program may have left it: what cannot be read is said in one line, with the
-// file, the key and what to do.
+// job.json (docs/reference/file-formats.md) as another program may have left it: what cannot be read is said in one
+// line, with the file, the key and what to do.
 #pragma once
 
 #include <nlohmann/json.hpp>
