@@ -1,4 +1,4 @@
-// The command line (architecture.md section 6).
+// The command line.
 #pragma once
 
 namespace megablock {

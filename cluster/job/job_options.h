@@ -23,7 +23,7 @@ namespace megablock {
 // Options of the merge that a project file can set.
 struct MergeSettings {
   int max_iterations = 50;   // global Levenberg-Marquardt steps per round
-  double decrement = 1e-4;   // Newton decrement at which the block is adjusted (merge.md, 5)
+  double decrement = 1e-4;   // Newton decrement at which the block is adjusted
   int screening_rounds = 2;  // re-tests of kept/rejected after convergence
   // Sigmas of positions, attitudes and relative poses from their residuals (adjust/tile/sigma_scales.h), in at most ten
   // rounds.

@@ -1,4 +1,4 @@
-// A stage = a list of units; ranks claim them from the shared counter (architecture.md section 5).
+// A stage = a list of units; ranks claim them from the shared counter.
 //
 // A unit is skipped when its file is up to date and whole, else computed by the rank that claimed it. An error in one
 // unit is recorded with its reason and the stage goes on. The list must be the same on every rank; a unit's result

@@ -1,4 +1,4 @@
-// The arithmetic level of a job: same bits on every processor that has it (architecture.md section 5).
+// The arithmetic level of a job: same bits on every processor that has it.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Exit codes of the program (architecture.md section 6).
+// Exit codes of the program.
 #pragma once
 
 namespace megablock {

@@ -1,4 +1,4 @@
-// Stopping (architecture.md section 5).
+// Stopping.
 //
 // SIGUSR1: graceful; the work queue hands out no further units, all ranks finish the one in hand and return 75.
 // SIGTERM, SIGINT: the units in hand are abandoned at once and the process leaves with 75. The store is valid either

@@ -15,11 +15,11 @@ namespace megablock {
 // kExitFailedUnits). Throws the project's errors, the same on every rank.
 int run_job(const RunOptions& options, Communicator& ranks);
 
-// Collective. Opens the same job, brings its tracks up to date and registers its trajectory (stages/registration.h).
+// Collective. Opens the same job, brings its tracks up to date and registers its trajectory (registration/registration.h).
 int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks);
 
 // Collective. Opens the same kind of job, brings its tracks and poses up to date and calibrates its rigs
-// (stages/calibration.h).
+// (pipeline/calibration.h).
 int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks);
 
 }  // namespace megablock
