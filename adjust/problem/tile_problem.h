@@ -183,8 +183,8 @@ struct ObservationOptions {
   void check() const;  // throws InputError
 };
 
-// Which tile owns what (owner.h; docs/design.md, "Whose a point is"): a track, by its images, invalid where none lies
-// in a tile; a relative pose or a line, by its frames, invalid unless both do.
+// Which tile owns what (owner.h; docs/developer/decisions.md, "Whose a point is"): a track, by its images, invalid
+// where none lies in a tile; a relative pose or a line, by its frames, invalid unless both do.
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end);
 TileIndex owner_tile(const Tiles& tiles, FrameIndex first, FrameIndex second);
 

@@ -40,7 +40,7 @@ struct BlockChecks {
 // Throws InputError for names that the block does not have.
 BlockChecks check_job(const JobStore& store, bool aerial, const std::vector<std::vector<std::string>>& subsets);
 
-// A JSON object (docs/job-format.md, "Diagnostics").
+// A JSON object (docs/reference/file-formats.md, "Diagnostics").
 std::string to_json(const BlockChecks& checks, const Block& block);
 // A line for each check.
 std::string to_text(const BlockChecks& checks, const Block& block);

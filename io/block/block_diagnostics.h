@@ -94,8 +94,8 @@ struct BlockDiagnostics {
   std::vector<Proposal> proposals;
 };
 
-// One JSON object, as described in docs/job-format.md. Positions are in the block's frame, and in georeferenced blocks
-// also as latitude and longitude.
+// One JSON object, as described in docs/reference/file-formats.md. Positions are in the block's frame, and in
+// georeferenced blocks also as latitude and longitude.
 std::string to_json(const BlockDiagnostics& diagnostics, const Block& block);
 // The same in a few lines of text. Lines at the end name what could not be examined.
 std::string to_text(const BlockDiagnostics& diagnostics, const Block& block);

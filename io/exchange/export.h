@@ -1,4 +1,5 @@
-// Exports of a result: one entry for all formats. What each file holds: docs/export.md and the writers' headers.
+// Exports of a result: one entry for all formats. What each file holds: docs/reference/exports.md and the writers'
+// headers.
 #pragma once
 
 #include <string>

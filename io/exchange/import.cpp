@@ -33,7 +33,7 @@ const std::vector<ImportFormat>& readers() {
 }
 
 constexpr const char* kProject =
-    "# Imported block; keys: docs/project-file.md\nblock: given.h5\ntie_points: tie_points.h5\n";
+    "# Imported block; keys: docs/reference/project-file.md\nblock: given.h5\ntie_points: tie_points.h5\n";
 
 // Of another block, or of this one with options that were set since.
 void refuse_other_project(const fs::path& path) {

@@ -1,4 +1,5 @@
-// The project file (YAML, docs/project-file.md): where the images are, what is known of them, the options of the job.
+// The project file (YAML, docs/reference/project-file.md): where the images are, what is known of them, the options of
+// the job.
 #pragma once
 
 #include <functional>

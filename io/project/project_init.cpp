@@ -37,9 +37,8 @@ std::string quoted(const std::string& text) {
 }
 
 std::string head(const InitOptions& options, const fs::path& folder) {
-  std::string text =
-      "# Project of an image block; keys: docs/project-file.md\nimages: " + quoted(path_for(options.images, folder)) +
-      "\n";
+  std::string text = "# Project of an image block; keys: docs/reference/project-file.md\nimages: " +
+                     quoted(path_for(options.images, folder)) + "\n";
   if (!options.mask_folder.empty()) text += "masks: " + quoted(path_for(options.mask_folder, folder)) + "\n";
   if (!options.gcp_file.empty()) text += "control: " + quoted(path_for(options.gcp_file, folder)) + "\n";
   return text + "cameras:\n  grouping: " + options.camera_grouping + "\n";

@@ -1,5 +1,5 @@
 // The measurement store: a block's measurements of tie points by image and by place, from the few parts of the job's
-// files that hold them, so that the size of the block hardly matters (docs/job-format.md, "Measurements").
+// files that hold them, so that the size of the block hardly matters (docs/reference/file-formats.md, "Measurements").
 //
 // By image: `measurements.h5` tells the tiles an image is seen in; the image column of a tile's file of tracks is its
 // index by image. By place: `points/district` and `points/box` of the result tell where the points of runs of

@@ -1,4 +1,4 @@
-// result/block.h5: docs/job-format.md, "Result".
+// result/block.h5: docs/reference/file-formats.md, "Result".
 #include <algorithm>
 #include <utility>
 

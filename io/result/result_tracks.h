@@ -1,4 +1,4 @@
-// The tracks of result/block.h5 (docs/job-format.md, "Result"), batch behind batch. Internal to io/.
+// The tracks of result/block.h5 (docs/reference/file-formats.md, "Result"), batch behind batch. Internal to io/.
 #pragma once
 
 #include <Eigen/Core>

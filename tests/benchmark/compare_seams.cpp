@@ -1,5 +1,5 @@
 // What the seam check finds against what could be found: a tile's measurements of two boundary frames are turned by
-// 1e-4 rad (docs/benchmarks.md, "Seam check"). Every tile of every block in turn; alarm limits are
+// 1e-4 rad (docs/results/whole-blocks.md, "Seam check"). Every tile of every block in turn; alarm limits are
 // those of a block of 200 tiles, whatever the number of tiles.
 //
 //   compare_seams street|rig|aerial [image_noise_px = 0.5] [blocks = 4]

@@ -2,7 +2,7 @@
 """Plot of the simulations of panoramic self-calibration, and their table in Markdown.
 
     build/release/tests/benchmark/compare_panoramic 5 > panoramic.csv
-    tests/benchmark/panoramic_plot.py panoramic.csv docs/panoramic.svg
+    tests/benchmark/panoramic_plot.py panoramic.csv docs/results/panoramic.svg
 """
 import csv
 import math

@@ -147,7 +147,8 @@ TEST_F(BlockInput, TileWithoutOneGoodObservation) {
     EXPECT_THAT(said(result), testing::ContainsRegex(tile + " disagrees (most )?with")) << seed;
     EXPECT_THAT(said(result), testing::ContainsRegex(tile + " disagrees with itself: it keeps [0-9]+ of [0-9]+ tie"))
         << seed;
-    // Poses with which all agree may be found for 46 measurements of 1 240, as arithmetic rounds (docs/benchmarks.md).
+    // Poses with which all agree may be found for 46 measurements of 1 240, as arithmetic rounds
+    // (docs/results/whole-blocks.md).
     by_fit +=
         testing::Matches(testing::ContainsRegex(tile + " disagrees (most with|with itself: residuals)"))(said(result));
     for (FrameIndex f(0); f.value < 60; ++f.value) {

@@ -1,6 +1,6 @@
 #include "cluster/stages/merge/merge.h"
 
-// The merge: exact block-wise compensation of all tiles over all ranks (design: merge.md), then the result.
+// The merge: exact block-wise compensation of all tiles over all ranks, then the result.
 
 #include <fmt/core.h>
 

@@ -41,7 +41,7 @@ TileAdjustment snapshot(const RankTile& tile) {
 
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
-// The layout that docs/job-format.md gives.
+// The layout that docs/reference/file-formats.md gives.
 static_assert(sizeof(MergePosition) == 224 && offsetof(MergePosition, tried_steps) == 4 &&
               offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&

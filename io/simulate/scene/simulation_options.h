@@ -8,7 +8,7 @@ namespace megablock {
 
 struct SimulationOptions {
   enum class Scene { kAerial, kStreet, kStereopolis, kTargetField, kPanorama } scene = Scene::kAerial;
-  // Target field: how the vehicle moves (docs/simulate.md).
+  // Target field: how the vehicle moves (docs/reference/simulate.md).
   enum class Path { kSingle, kLine, kLoop, kS, kAll, kSparse } path = Path::kS;
   // The defaults of a scene (and of a path on the target field); those below are of the aerial and the street scene.
   static SimulationOptions of(Scene scene, Path path = Path::kS);

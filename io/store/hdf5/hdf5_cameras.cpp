@@ -21,7 +21,7 @@ std::size_t count(const CameraModel& model) { return static_cast<std::size_t>(pa
 
 void put_models(Hdf5Writer& file, const std::vector<CameraModel>& models) {
   file.texts("cameras/model", column(models, [](const CameraModel& m) { return model_name(m); }),
-             {"", "docs/job-format.md, Cameras"});
+             {"", "docs/reference/file-formats.md, Cameras"});
   file.texts("cameras/parameters", column(models, [](const CameraModel& m) { return parameter_names(m); }),
              {"", "names of the parameters, in the order of the columns"});
 }

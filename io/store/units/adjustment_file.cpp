@@ -1,4 +1,4 @@
-// The result of a tile's adjustment: docs/job-format.md, "Adjustment".
+// The result of a tile's adjustment: docs/reference/file-formats.md, "Adjustment".
 #include "io/store/hdf5/hdf5_cameras.h"
 
 namespace megablock {

@@ -1,4 +1,4 @@
-// The block, as read from the project file and the image headers: docs/job-format.md, "Block".
+// The block, as read from the project file and the image headers: docs/reference/file-formats.md, "Block".
 #include <algorithm>
 #include <functional>
 

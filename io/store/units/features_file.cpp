@@ -1,4 +1,4 @@
-// The features of the images of one shard: docs/job-format.md, "Features".
+// The features of the images of one shard: docs/reference/file-formats.md, "Features".
 #include <algorithm>
 
 #include "io/base/error.h"

@@ -1,4 +1,4 @@
-// Candidate pairs, verified matches and tiles: docs/job-format.md, "Candidates", "Matches", "Tiles".
+// Candidate pairs, verified matches and tiles: docs/reference/file-formats.md, "Candidates", "Matches", "Tiles".
 #include "io/store/units/graph_files.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The groups of the block in a file; block.h5 and result/block.h5 share them (docs/job-format.md, "Block").
+// The groups of the block in a file; block.h5 and result/block.h5 share them (docs/reference/file-formats.md, "Block").
 #pragma once
 
 #include "io/block/block.h"

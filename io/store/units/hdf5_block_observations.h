@@ -1,5 +1,6 @@
-// The observations of a block other than tie points, as groups of its file (docs/job-format.md, "Block"): relative
-// poses, control points, lines of known direction, verticals. Without lines or verticals, the file has no such group.
+// The observations of a block other than tie points, as groups of its file (docs/reference/file-formats.md, "Block"):
+// relative poses, control points, lines of known direction, verticals. Without lines or verticals, the file has no such
+// group.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,5 @@
-// The groups of tiles and merge tree in a file; tiles.h5 and result/block.h5 share them (docs/job-format.md, "Tiles").
+// The groups of tiles and merge tree in a file; tiles.h5 and result/block.h5 share them
+// (docs/reference/file-formats.md, "Tiles").
 #pragma once
 
 #include "io/block/image_graph.h"

@@ -1,4 +1,4 @@
-// The current values of poses, intrinsics and mounts: docs/job-format.md, "State".
+// The current values of poses, intrinsics and mounts: docs/reference/file-formats.md, "State".
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_cameras.h"
 #include "io/store/units/hdf5_state.h"

@@ -1,5 +1,5 @@
-// Reads parts of a file of tracks (docs/job-format.md, "Tracks"): the column of images, by which observations are
-// found, and the coordinates of some rows.
+// Reads parts of a file of tracks (docs/reference/file-formats.md, "Tracks"): the column of images, by which
+// observations are found, and the coordinates of some rows.
 #pragma once
 
 #include <functional>

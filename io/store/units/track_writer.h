@@ -1,4 +1,5 @@
-// Writes a file of tracks in batches, for a block whose tracks do not fit into memory (docs/job-format.md, "Tracks").
+// Writes a file of tracks in batches, for a block whose tracks do not fit into memory (docs/reference/file-formats.md,
+// "Tracks").
 #pragma once
 
 #include <memory>

@@ -92,7 +92,7 @@ struct Documented {
 
 // The rows "| `section.key` | default | limits | ..." of the project file's documentation.
 std::map<std::string, Documented> documented_options() {
-  std::ifstream in(MEGABLOCK_SOURCE "/docs/project-file.md");
+  std::ifstream in(MEGABLOCK_SOURCE "/docs/reference/project-file.md");
   EXPECT_TRUE(in);
   const std::regex row(R"(\| `([\w.]+)` \| *(.*?) *\| *(.*?) *\| .*)");
   std::map<std::string, Documented> rows;

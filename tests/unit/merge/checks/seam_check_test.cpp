@@ -268,8 +268,8 @@ TEST(SeamCheck, NamesTheTileUnderTheSeamWhoseRemovalClearsMostAlarms) {
 }
 
 // A rig that looks all around. 10^-4 rad are 0.14 px; with 300 measurements of 0.5 px on either side that is less than
-// what any test that is silent on 200 clean tiles can tell from chance (docs/benchmarks.md). The same with 0.25 px, or
-// with 1 200 measurements, can be told.
+// what any test that is silent on 200 clean tiles can tell from chance (docs/results/whole-blocks.md). The same with
+// 0.25 px, or with 1 200 measurements, can be told.
 SimulationOptions dense_street() {
   SimulationOptions options = clean_scene();
   options.scene = SimulationOptions::Scene::kStreet;
