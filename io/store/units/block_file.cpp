@@ -1,4 +1,6 @@
 // The block, as read from the project file and the image headers: docs/reference/file-formats.md, "Block".
+#include "io/store/units/block_file.h"
+
 #include <algorithm>
 #include <functional>
 

@@ -1,4 +1,6 @@
 // The features of the images of one shard: docs/reference/file-formats.md, "Features".
+#include "io/store/units/features_file.h"
+
 #include <algorithm>
 
 #include "io/base/error.h"

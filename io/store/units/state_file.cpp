@@ -1,4 +1,6 @@
 // The current values of poses, intrinsics and mounts: docs/reference/file-formats.md, "State".
+#include "io/store/units/state_file.h"
+
 #include "io/base/error.h"
 #include "io/store/hdf5/hdf5_cameras.h"
 #include "io/store/units/hdf5_state.h"
