@@ -8,17 +8,19 @@
 
 namespace megablock {
 
-// The run that holds a job's lock.
+// The run that holds the lock of a job.
 struct JobHolder {
-  std::string who = "another process";               // "process 1234 on host, started 2026-11-21T07:00:00Z"
-  std::string how_to_stop = "kill -USR1 <process>";  // after the units in hand: "kill -USR1 1234", on another host so
+  std::string who = "another process";  // "process 1234 on host, started 2026-11-21T07:00:00Z"
+  // Stops it after its current units: "kill -USR1 1234", with the name of another host added.
+  std::string how_to_stop = "kill -USR1 <process>";
 };
 std::optional<JobHolder> holder_of(const JobStore& store);  // empty: nobody
 
-// The job's lock, held by rank 0 for the life of the object: flock on job/lock with host, pid and start time in it.
+// The lock of a job, which rank 0 holds during the life of the object: flock on job/lock, which contains host, process
+// and start time.
 class JobLock {
  public:
-  // Waits up to `patience_s` for a dying predecessor, then throws InputError naming the holder.
+  // Waits up to `patience_s` for a run that is ending, then throws InputError with the name of the holder.
   explicit JobLock(const JobStore& store, double patience_s = 10);
   ~JobLock();
   JobLock(const JobLock&) = delete;
