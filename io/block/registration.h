@@ -47,14 +47,4 @@ struct RegisteredTrajectory {
   std::vector<std::string> not_resected;     // the reason, for each other frame that sees control
 };
 
-// Files of places, registrations and trajectories. They throw StoreError for files that cannot be read.
-void write_places(const std::string& path, const std::vector<Place>& places);
-std::vector<Place> read_places(const std::string& path);
-
-void write_registrations(const std::string& path, const std::vector<RegisteredPlace>& places);
-std::vector<RegisteredPlace> read_registrations(const std::string& path);
-
-void write_trajectory(const std::string& path, const RegisteredTrajectory& trajectory);
-RegisteredTrajectory read_trajectory(const std::string& path);
-
 }  // namespace megablock

@@ -9,6 +9,7 @@
 
 namespace megablock {
 
+// Files of places, registrations and trajectories. They throw StoreError for files that cannot be read.
 void write_places(const std::string& path, const std::vector<Place>& places);
 std::vector<Place> read_places(const std::string& path);
 
