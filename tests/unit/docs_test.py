@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What the documents name is there: links and their headings, paths, ctest patterns; and keys that a command prints stand
-in the documents. usage: docs_test.py SOURCE_FOLDER"""
+"""What the documents name is there: links and their headings, paths, ctest patterns. What the code has stands in the
+documents: folders, commands with their options, keys that a command prints. usage: docs_test.py SOURCE_FOLDER"""
 import pathlib
 import re
 import sys
@@ -76,6 +76,25 @@ for path in documents:
                 continue
             if not any(pattern.search(name) for name in (names if kind == "R" else labels)):
                 complain(path, number, f"ctest -{kind} {pattern.pattern} finds no test")
+
+# The reference of the commands has every command and option of the command line.
+commands = (source / "docs/reference/commands.md").read_text()
+code = "".join(path.read_text() for folder in ("commands", "terminal")
+               for path in sorted((source / "cluster" / folder).glob("*.*")))
+options = set(re.findall(r'"(?:-\w,)?(--[a-z][a-z0-9-]*)"', code)) - {"--version", "--output"}
+checked += len(options)
+problems += [f"docs/reference/commands.md: the option {option} is missing"
+             for option in sorted(options) if f"`{option}`" not in commands]
+problems += [f"docs/reference/commands.md: the command {name} is missing"
+             for name in re.findall(r'add_subcommand\(\s*"([\w-]+)"', code) if f"\n## {name}\n" not in commands]
+
+# Folders and files of the code that a document names.
+for path in documents:
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        for name in re.findall(r"`((?:geometry|io|partition|match|adjust|merge|cluster|examples|cmake)/[\w./-]*\w)`", line):
+            checked += 1
+            if not (source / name).exists():
+                complain(path, number, f"no such file: {name}")
 
 # (where a command's JSON is made, what its keys look like there, document, heading above their table)
 for code, key, document, heading in [("io/evaluation/evaluate.cpp", r'json\["(\w+)"\]', "docs/reference/simulate.md",
