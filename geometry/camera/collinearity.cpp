@@ -13,7 +13,7 @@ namespace megablock {
 
 namespace {
 
-// Turns the camera axes (y down, z forward) into the photo axes (y up, looking along -z), and back.
+// Turns the camera axes (y down, z forward) into the image axes (y up, looking along -z), and back.
 const Eigen::Matrix3d kHalfTurnAboutX = Eigen::Vector3d(1, -1, -1).asDiagonal();
 
 // Relative to the extent of the points: how far two points must be apart, or off a common plane, to count as different.

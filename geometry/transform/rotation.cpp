@@ -21,7 +21,7 @@ double rotation_angle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) 
 
 namespace {
 
-// Camera axes (x right, y down, z forward) from photo axes (x right, y up, looking along -z).
+// Camera axes (x right, y down, z forward) from image axes (x right, y up, looking along -z).
 const Eigen::Matrix3d kCameraFromPhoto = Eigen::Vector3d(1, -1, -1).asDiagonal();
 
 Eigen::Matrix3d axis_rotation(double angle, const Eigen::Vector3d& axis) {
@@ -35,7 +35,7 @@ const Eigen::Matrix3d kCameraFromBody = (Eigen::Matrix3d() << 0, 1, 0, 0, 0, 1, 
 
 const Eigen::Matrix3d kEnuFromNed = (Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished();
 
-// M = Rx(omega) Ry(phi) Rz(kappa) turns photo axes into ground axes. The angles follow from its elements: M(0,2) = sin
+// M = Rx(omega) Ry(phi) Rz(kappa) turns image axes into ground axes. The angles follow from its elements: M(0,2) = sin
 // phi, M(1,2) = -sin omega cos phi, M(2,2) = cos omega cos phi, M(0,1) = -cos phi sin kappa, M(0,0) = cos phi cos
 // kappa.
 OmegaPhiKappa omega_phi_kappa(const Eigen::Quaterniond& rotation_cw) {

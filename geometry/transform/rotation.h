@@ -75,7 +75,7 @@ double rotation_angle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 // inverse.
 extern const Eigen::Matrix3d kEnuFromNed;
 
-// Photogrammetric angles omega, phi, kappa in radians: Rx(omega) Ry(phi) Rz(kappa) turns the photo axes (x right, y up,
+// Photogrammetric angles omega, phi, kappa in radians: Rx(omega) Ry(phi) Rz(kappa) turns the image axes (x right, y up,
 // looking along -z) into the ground axes. The functions convert from and to R_cw, whose camera axes are x right, y
 // down, z along the view. Singular at phi = +-90 deg.
 struct OmegaPhiKappa {

@@ -147,7 +147,7 @@ std::vector<LabelledMatch> labelled_matches(const Block& block, const TrackSet& 
     for (std::int64_t i = tracks.begin[t]; i < tracks.begin[t + 1]; ++i)
       for (std::int64_t j = i + 1; j < tracks.begin[t + 1]; ++j) pairs.emplace_back(i, j);
     shuffle(pairs, generator);
-    // Wrong matches are rare, so a track with a wrong observation contributes a wrong match if it can.
+    // Wrong matches are rare, so a track with an outlier contributes a wrong match if it can.
     std::optional<LabelledMatch> chosen;
     for (const auto& [i, j] : pairs) {
       const ImageIndex a = tracks.image[static_cast<std::size_t>(i)], b = tracks.image[static_cast<std::size_t>(j)];

@@ -1,4 +1,4 @@
-// Trains the match filter (match_filter.h) on tracks whose wrong observations are known, from simulated blocks for
+// Trains the match filter (match_filter.h) on tracks whose outliers are known, from simulated blocks for
 // example.
 #pragma once
 

@@ -1,7 +1,7 @@
 // Separators of a bisection: for every node of the tree, a set of frames without which its two halves have no links.
 //
 // The tie points of the two halves can be distributed so that only these frames occur in points of both halves
-// (adjust/problem/owner.h); they are what the elimination passes up to the node. The smallest such set is a smallest
+// (adjust/problem/owner.h); the elimination sends their unknowns up to the node. The smallest such set is a smallest
 // vertex cover of the bipartite graph of links between the halves. It has as many frames as a largest matching has
 // links (D. Koenig, 1931), and follows from one (J. Hopcroft and R. Karp, SIAM J. Comput. 2(4), 1973). Links of frames
 // that already separate a node higher up are left out.
