@@ -30,7 +30,7 @@ CODES_ALLOWED = ("docs/reference/methods.md", "tests/")
 # (word, what to say instead, contexts in which it is ordinary English)
 WORDS = [
     (r"\bpictures?\b", "image", r"(with|as|draws?|see|this) (a|an|the) picture\b|picture \(SVG"),
-    (r"\bphotos?\b", "image", None),
+    (r"\bphotos?\b", "image", r"Exif\.Photo"),
     (r"\bstations?\b", "frame", r"scan(ner)? stations?|(base|total|reference|weather) stations?"),
     (r"\bstrays?\b", "outlier", None),
     (r"\bsights?\b", "observation", r"(in|out of|at first|lines? of) sight"),
@@ -71,8 +71,9 @@ def files():
 
 def cpp_pieces(text):
     """Comments and string literals of C++ with their offsets, and which they are."""
-    token = re.compile(r'//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|^\s*#\s*include[^\n]*',
-                       re.DOTALL | re.MULTILINE)
+    comment = r"//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/"
+    literal = r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"'
+    token = re.compile(rf"{comment}|{literal}|^\s*#\s*include[^\n]*", re.DOTALL | re.MULTILINE)
     for match in token.finditer(text):
         found = match.group()
         if not found.lstrip().startswith("#"):
