@@ -118,7 +118,7 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
   return judged;
 }
 
-// The picture with the masked regions in red, at most 800 pixels wide.
+// The image with the masked regions in red, at most 800 pixels wide.
 std::string preview(const Judged& judged) {
   cv::Mat picture = judged.sample.empty() ? cv::Mat(judged.mask.size(), CV_8UC3, cv::Scalar::all(128)) : judged.sample;
   if (picture.size() != judged.mask.size()) cv::resize(picture, picture, judged.mask.size());

@@ -33,7 +33,7 @@ struct VerticalsOptions {
   SegmentOptions segments;
 };
 
-// Part of what a picture's row follows from; raised when results change.
+// Part of what an image's row follows from; raised when results change.
 constexpr int kAlgorithm = 1;
 
 // Attitudes of sensors are those of the sensor: mountings, and edges of buildings, are off by this much.
@@ -62,7 +62,7 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
   try {
     prior.down = down_of_exif_orientation(read_image_header(block.path_of(i)).orientation);
   } catch (const InputError&) {
-  }  // reading the picture says what is wrong with it
+  }  // reading the image says what is wrong with it
   return prior;
 }
 
@@ -80,7 +80,7 @@ std::string remark_on(const std::vector<PictureVertical>& pictures) {
 
 namespace {
 
-// One line that names the first pictures in which no straight edge was found; empty where there are none.
+// One line that names the first images in which no straight edge was found; empty where there are none.
 std::string edgeless_text(const Block& block, const std::vector<PictureVertical>& pictures) {
   constexpr std::size_t kNamed = 5;
   std::size_t count = 0;
@@ -112,7 +112,7 @@ std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
                                                  std::sqrt(whole(1, 1)) * kDegreesPerRadian);
 }
 
-// Of all that the row of a picture follows from.
+// Of all that the row of an image follows from.
 std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prior, std::uint64_t mask,
                      const SegmentOptions& segments) {
   const Camera& camera = block.cameras[block.camera_of(i)];
@@ -127,7 +127,7 @@ std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prio
   return hasher.value();
 }
 
-// What the command says of every picture: of those in `file` as it is there, the others are looked at.
+// What the command says of every image: of those in `file` as it is there, the others are looked at.
 std::vector<PictureVertical> look_at_pictures(const Block& block, const SegmentOptions& segments, const JobStore& store,
                                               const std::string& file) {
   IndexedVector<CameraIndex, std::uint64_t> masks;

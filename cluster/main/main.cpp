@@ -1,6 +1,6 @@
 // megablock: orients blocks of images, tile by tile, on any number of ranks.
 // Sample runs:
-//   megablock init photos -o block.yaml
+//   megablock init images -o block.yaml
 //   megablock run block.yaml -j job
 //   mpirun --bind-to none -n 2 megablock run block.yaml -j job
 

@@ -291,7 +291,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   const JobJson written(store.path("job.json"), text);
   const auto tie_points = written.at<std::string>("tie_points");
   if (tie_points.empty())
-    keep_freed_memory();  // pictures come next
+    keep_freed_memory();  // images come next
   else
     use_memory_sparingly();  // the heap, too, that preparing has left
   Job job{.options = run_options,

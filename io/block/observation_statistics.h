@@ -15,7 +15,7 @@
 namespace megablock {
 
 enum class ObservationKind : std::uint8_t {
-  kTieImage,            // image measurements of tie points
+  kTieImage,            // image observations of tie points
   kControlImage,        // of control points
   kCheckImage,          // of check points
   kPositionHorizontal,  // GNSS positions of frames

@@ -64,7 +64,7 @@ struct MeasurementResidual {
   double ratio;                    // larger component / stated sigma
 };
 
-// Reliability of the tie point measurements (io/evaluation/reliability.h): each axis of an image is an observation.
+// Reliability of the tie point observations (io/evaluation/reliability.h): each axis of an image is an observation.
 struct TestedMeasurement {
   TrackIndex track;  // of the result
   ImageIndex image;
@@ -88,7 +88,7 @@ struct Reliability {
   double worst_external = kUnknown;        // largest external reliability of the tested, sigmas
 };
 
-// Tie point measurements whose residuals are near the limit of screening, kept or not: whether they take part hangs on
+// Tie point observations whose residuals are near the limit of screening, kept or not: whether they take part hangs on
 // what else does.
 struct NearLimit {
   static constexpr double kNear = 0.1;  // of the limit, to both sides

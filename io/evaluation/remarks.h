@@ -40,8 +40,8 @@ std::vector<std::string> misstated_texts(const BlockResult& result);
 // worst by name: "6 of 18 attitudes differ from the block by more than 6 sigmas: DJI_0034.JPG by 178.9 degrees, ...".
 // Robust losses keep them from bending the block, and so from the statistics of their kind.
 std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures);
-// Whether so many tie point measurements of a block without a datum of its own are near the limit of screening that the
-// result depends on the tiles: "359 of 83718 tie point measurements (0.43 %) lie within 10 % of the limit of screening,
+// Whether so many tie point observations of a block without a datum of its own are near the limit of screening that the
+// result depends on the tiles: "359 of 83718 tie point observations (0.43 %) lie within 10 % of the limit of screening,
 // ...". Empty where not.
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures);
 // By how much a factor between shown and stated sigma differs from one by chance: five standard deviations.

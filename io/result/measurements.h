@@ -1,4 +1,4 @@
-// The measurement store: a block's measurements of tie points by image and by place, from the few parts of the job's
+// The measurement store: a block's observations of tie points by image and by place, from the few parts of the job's
 // files that hold them, so that the size of the block hardly matters (docs/reference/file-formats.md, "Measurements").
 //
 // By image: `measurements.h5` tells the tiles an image is seen in; the image column of a tile's file of tracks is its

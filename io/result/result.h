@@ -113,7 +113,7 @@ struct BlockResult : TrackResults {
   double variance_factor = 1;  // a-posteriori, = chi2_per_dof
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
-  double image_sigma_px = 0;           // of tie point measurements per axis, as adjusted with (stated or estimated)
+  double image_sigma_px = 0;           // of tie point observations per axis, as adjusted with (stated or estimated)
   ObservationTable observation_table;  // by kind: count, weighted squares, redundancy; empty: not known
   bool sigma_scaled = false;           // covariances are multiplied by variance_factor
   int global_iterations = 0;

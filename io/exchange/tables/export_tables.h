@@ -1,4 +1,4 @@
-// Tables and pictures of a result for other programs: CSV, PLY, GeoJSON.
+// Tables and images of a result for other programs: CSV, PLY, GeoJSON.
 #pragma once
 
 #include <string>

@@ -4,7 +4,7 @@
 //     name,qw,qx,qy,qz,x,y,z[,pass]
 //     f000012.jpg,0.707...,...
 //
-// name: the frame's (of a single photo: the image's). qw qx qy qz: unit quaternion of the rotation ground -> rig (R_cw;
+// name: the frame's (of a single image: the image's). qw qx qy qz: unit quaternion of the rotation ground -> rig (R_cw;
 // camera x right, y down, looking along +z). x y z: the rig's origin in the ground frame, metres (east, north, up).
 // Columns are found by the names in the header line and may stand in any order; further ones are ignored. Lines that
 // start with '#' are comments.

@@ -36,7 +36,7 @@ std::string verdict(const Reliability& r) {
       significant(found / expected, 2));
 }
 
-// Baarda's and Pope's tests of the tie point measurements, and how large an error must be to be found.
+// Baarda's and Pope's tests of the tie point observations, and how large an error must be to be found.
 std::string reliability_part(const BlockResult& result, const Reliability& r) {
   if (r.tested == 0) return "";
   Table tests({"test of tie point measurements", "limit", "beyond it", "expected by chance"});

@@ -1,4 +1,4 @@
-// Aerial block: flight lines east and west over smooth terrain, nadir photos, the long image side across the line.
+// Aerial block: flight lines east and west over smooth terrain, nadir images, the long image side across the line.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -230,7 +230,7 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
       name.append("_c").append(std::to_string(m));
     layout.block.add_image(name.append(".jpg"), {index, static_cast<int>(m), 0});
   }
-  if (cameras == 1) frame.name += ".jpg";  // a single photo's frame carries the name of its image
+  if (cameras == 1) frame.name += ".jpg";  // a single image's frame carries the name of its image
   layout.block.frames.push_back(std::move(frame));
   layout.truth.frames.push_back(pose);
   layout.truth.oriented.push_back(1);

@@ -1,4 +1,4 @@
-// A simulated block as pictures with the project files around them.
+// A simulated block as images with the project files around them.
 #include "io/simulate/files/write_rendered.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ std::string name_by_headers(const Camera& camera) {
   return name.str();
 }
 
-// The vehicle in a camera's pictures; its mount is that of the rig with this camera.
+// The vehicle in a camera's images; its mount is that of the rig with this camera.
 std::optional<VehicleView> vehicle_seen(const SimulationOptions& options, const Layout& layout, CameraIndex camera,
                                         const RayTable& rays) {
   if (!options.vehicle) return std::nullopt;

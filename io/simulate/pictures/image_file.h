@@ -1,4 +1,4 @@
-// Writes a rendered picture as a camera would: JPEG with EXIF.
+// Writes a rendered image as a camera would: JPEG with EXIF.
 #pragma once
 
 #include <opencv2/core.hpp>

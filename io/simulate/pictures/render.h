@@ -1,4 +1,4 @@
-// Pictures of a City as a camera sees them.
+// Images of a City as a camera sees them.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -24,13 +24,13 @@ class RayTable {
   std::vector<Eigen::Vector2f> rays_;
 };
 
-// The vehicle in a camera's pictures, and the light on it where this one was taken.
+// The vehicle in a camera's images, and the light on it where this one was taken.
 struct SeenVehicle {
-  const VehicleView* view = nullptr;  // none: the picture shows the scene alone
+  const VehicleView* view = nullptr;  // none: the image shows the scene alone
   VehicleView::Light light{};
 };
 
-// 8-bit BGR picture; `camera` is the pose ground -> camera. Sensor noise depends on `seed` alone, and the picture not
+// 8-bit BGR image; `camera` is the pose ground -> camera. Sensor noise depends on `seed` alone, and the image not
 // on the number of threads.
 cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed,
                      const SeenVehicle& vehicle = {});

@@ -1,4 +1,4 @@
-// What the cameras of the Stereopolis vehicle see of the vehicle itself: the same in all pictures of a camera, light
+// What the cameras of the Stereopolis vehicle see of the vehicle itself: the same in all images of a camera, light
 // apart. Roof, a dome and a thin mast on it, and a scanner at the left side, seen by the level cameras; those that look
 // up the facades see nothing of it.
 #pragma once

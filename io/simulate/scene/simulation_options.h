@@ -13,7 +13,7 @@ struct SimulationOptions {
   // The defaults of a scene (and of a path on the target field); those below are of the aerial and the street scene.
   static SimulationOptions of(Scene scene, Path path = Path::kS);
 
-  std::int64_t frames = 100;  // number of frames (aerial: single photos; else: rigs)
+  std::int64_t frames = 100;  // number of frames (aerial: single images; else: rigs)
   std::uint64_t seed = 1;
   // Aerial: rows with overlaps over terrain.
   double forward_overlap = 0.8, side_overlap = 0.6;
@@ -35,7 +35,7 @@ struct SimulationOptions {
   // `held_out_zone` are (-1: of none).
   int control_zones = 0, held_out_zone = -1;
   std::uint64_t vehicle_seed = 0;  // Stereopolis, target field: seed of cameras and mounts; 0: `seed`
-  // Stereopolis, rendered: parts of the vehicle are in the pictures of the level cameras.
+  // Stereopolis, rendered: parts of the vehicle are in the images of the level cameras.
   bool vehicle = false;
   // Street, Stereopolis, rendered: share of the houses whose facades repeat every 3.4 m along and 3 m up.
   double repeated_facades = 0;
