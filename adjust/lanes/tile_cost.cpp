@@ -4,10 +4,7 @@
 #include <limits>
 
 #include "adjust/lanes/residual_squares.h"
-#include "adjust/terms/line_terms.h"
-#include "adjust/terms/linearise.h"
-#include "adjust/terms/prior_loss.h"
-#include "adjust/terms/vertical_terms.h"
+#include "adjust/terms/terms.h"
 
 namespace megablock {
 
@@ -27,34 +24,9 @@ double image_cost(const TileProblem& problem, const TileState& state) {
 
 double other_cost(const TileProblem& problem, const TileState& state) {
   double sum = 0;
-  for (const auto& term : problem.positions) {
-    const double s = linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm();
-    sum += loss_of(problem, term).evaluate(s)[0];
-  }
-  for (const auto& term : problem.attitudes)
-    sum += loss_of(problem, term)
-               .evaluate(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm())[0];
-  for (const auto& term : problem.relatives) {
-    const auto r = linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual;
-    sum += problem.relative_loss.evaluate(r.squaredNorm())[0];
-  }
-  for (const auto& term : problem.lines) {
-    const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
-    sum += problem.line_loss.evaluate(r * r)[0];
-  }
-  for (const auto& term : problem.verticals)
-    sum += problem.vertical_loss.evaluate(linearise_vertical(problem, state, term).residual.squaredNorm())[0];
-  for (const auto& term : problem.point_priors)
-    if (problem.active(term.point.value))
-      sum += point_prior_residual(state.points[term.point.value], term).squaredNorm();
-  for (const auto& term : problem.intrinsic_priors) {
-    for (int k = 0; k < term.value.size(); ++k) {
-      const double r = intrinsic_prior_residual(state.cameras[term.camera.value], term, k);
-      sum += r * r;
-    }
-  }
-  for (const auto& term : problem.mount_priors)
-    sum += linearise_mount(state.mounts[term.mount], term).residual.squaredNorm();
+  const TermVisit add = [&](const LinearTerm& term) { sum += term.loss.evaluate(term.squares)[0]; };
+  for (const ObservationType* type : observation_types_of_cost())
+    for (std::size_t row = 0; row < type->count(problem); ++row) type->linearise(problem, state, row, add);
   return 0.5 * sum;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "adjust/terms/automatic_terms.h"
+#include "adjust/terms/terms.h"
 #include "adjust/terms/vertical_terms.h"
 #include "geometry/transform/rotation.h"
 
@@ -116,6 +118,51 @@ LineResidual linearise_line(const Pose& frame, const Pose& other, const TileProb
   result.by_frame.head<3>() = -off.by_direction * rotation * skew<double>(direction);
   result.by_other.head<3>() = off.by_direction * rotation * by_other;
   return result;
+}
+
+namespace {
+
+class KnownLines final : public ObservationType {
+ public:
+  std::size_t count(const TileProblem& problem) const override { return problem.lines.size(); }
+  TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
+    const TileProblem::LineTerm& term = problem.lines[row];
+    return {{term.frame.value, term.other.value}, term.other.valid() ? 2 : 1};
+  }
+  void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
+                 const TermVisit& visit) const override {
+    const TileProblem::LineTerm& term = problem.lines[row];
+    const LineResidual r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term);
+    LinearTerm out;
+    out.set_residual(Eigen::Matrix<double, 1, 1>(r.residual));
+    out.kinds.fill(ObservationKind::kLine);
+    out.add_block(LinearTerm::By::kFrame, term.frame.value, r.by_frame);
+    if (term.other.valid()) out.add_block(LinearTerm::By::kFrame, term.other.value, r.by_other);
+    out.loss = problem.line_loss;
+    visit(out);
+  }
+  // Lines look at rotations alone, and a similarity turns both frames alike.
+  TermDatum datum(const TileProblem& problem, const TileState& state, std::size_t row) const override {
+    const TileProblem::LineTerm& term = problem.lines[row];
+    const LineResidual r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term);
+    TermDatum datum;
+    datum.frame = term.frame.value;
+    datum.by_frame = Eigen::Matrix<double, 1, 6>(r.by_frame + r.by_other);
+    return datum;
+  }
+  RobustLoss loss(const TileProblem& problem, std::size_t) const override { return problem.line_loss; }
+  ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
+    const TileProblem::LineTerm& term = problem.lines[row];
+    return term.other.valid() ? automatic_term<1, kPoseBlock, kPoseBlock>(residual::HorizontalLine{term})
+                              : automatic_term<1, kPoseBlock>(residual::VerticalLine{term});
+  }
+};
+
+}  // namespace
+
+const ObservationType& line_observations() {
+  static const KnownLines type;
+  return type;
 }
 
 }  // namespace megablock

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "adjust/terms/automatic_terms.h"
+#include "adjust/terms/terms.h"
 #include "geometry/camera/camera.h"
 
 namespace megablock {
@@ -68,6 +70,76 @@ VerticalResidual linearise_vertical(const TileProblem& problem, const TileState&
   return linearise_vertical(state.frames[static_cast<std::size_t>(image.frame.value)],
                             state.mounts[static_cast<std::size_t>(image.mount)],
                             state.cameras[static_cast<std::size_t>(image.camera.value)], term);
+}
+
+namespace {
+
+// Of a camera of any model, or of none.
+struct DynamicVertical {
+  residual::VerticalSeen vertical;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return vertical(blocks[0], blocks[1], vertical.term.camera.size() > 0 ? blocks[2] : nullptr, result);
+  }
+};
+
+class SeenVerticals final : public ObservationType {
+ public:
+  std::size_t count(const TileProblem& problem) const override { return problem.verticals.size(); }
+  TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
+    const TileProblem::VerticalTerm& term = problem.verticals[row];
+    const TileImage& image = image_of(problem, term);
+    TermUnknowns unknowns{{image.frame.value}, 1};
+    unknowns.mount = image.mount;
+    if (term.camera.size() > 0) unknowns.camera = image.camera.value;
+    return unknowns;
+  }
+  void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
+                 const TermVisit& visit) const override {
+    const TileProblem::VerticalTerm& term = problem.verticals[row];
+    const TileImage& image = image_of(problem, term);
+    const VerticalResidual r = linearise_vertical(problem, state, term);
+    LinearTerm out;
+    out.set_residual(r.residual);
+    out.kinds.fill(ObservationKind::kVertical);
+    out.add_block(LinearTerm::By::kFrame, image.frame.value, r.by_frame);
+    out.add_block(LinearTerm::By::kMount, image.mount, r.by_mount);
+    if (term.camera.size() > 0) out.add_block(LinearTerm::By::kCamera, image.camera.value, -term.by_camera);
+    out.loss = problem.vertical_loss;
+    visit(out);
+  }
+  TermDatum datum(const TileProblem& problem, const TileState& state, std::size_t row) const override {
+    const TileProblem::VerticalTerm& term = problem.verticals[row];
+    TermDatum datum;
+    datum.frame = image_of(problem, term).frame.value;
+    datum.by_frame = linearise_vertical(problem, state, term).by_frame;
+    return datum;
+  }
+  RobustLoss loss(const TileProblem& problem, std::size_t) const override { return problem.vertical_loss; }
+  void scale_sigmas(TileProblem& problem, const SigmaScales& scales) const override {
+    for (TileProblem::VerticalTerm& term : problem.verticals) {
+      term.weight /= scales[ObservationKind::kVertical];
+      term.by_camera /= scales[ObservationKind::kVertical];
+    }
+  }
+  ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
+    const TileProblem::VerticalTerm& term = problem.verticals[row];
+    std::vector<int> blocks{kPoseBlock, kPoseBlock};
+    if (term.camera.size() > 0) blocks.push_back(static_cast<int>(term.camera.size()));
+    return automatic_dynamic_term(DynamicVertical{residual::VerticalSeen{term}}, 2, blocks);
+  }
+
+ private:
+  static const TileImage& image_of(const TileProblem& problem, const TileProblem::VerticalTerm& term) {
+    return problem.images[static_cast<std::size_t>(term.image.value)];
+  }
+};
+
+}  // namespace
+
+const ObservationType& vertical_observations() {
+  static const SeenVerticals type;
+  return type;
 }
 
 }  // namespace megablock

@@ -1,16 +1,15 @@
 #include "adjust/tile/ceres_problem.h"
 
-#include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
-#include <ceres/dynamic_autodiff_cost_function.h>
 #include <ceres/loss_function.h>
 
 #include <algorithm>
 #include <functional>
 
+#include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
+#include "adjust/terms/terms.h"
 #include "io/base/error.h"
-#include "io/block/held_priors.h"
 
 namespace megablock {
 
@@ -149,11 +148,6 @@ ceres::Problem::Options problem_options() {
   return options;
 }
 
-template <int kResiduals, int... kBlocks, typename Functor>
-ceres::CostFunction* automatic(Functor functor) {
-  return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlocks...>(new Functor(std::move(functor)));
-}
-
 struct DynamicImage {
   residual::ImageMeasured image;
   template <typename Scalar>
@@ -164,46 +158,8 @@ struct DynamicImage {
 
 ceres::CostFunction* automatic_image(const residual::ImageMeasured& image) {
   if (image.model == CameraModel())
-    return automatic<2, kPoseBlock, kPoseBlock, parameter_count(CameraModel()), 3>(image);
-  auto* cost = new ceres::DynamicAutoDiffCostFunction<DynamicImage, 8>(new DynamicImage{image});
-  for (const int size : {kPoseBlock, kPoseBlock, parameter_count(image.model), 3}) cost->AddParameterBlock(size);
-  cost->SetNumResiduals(2);
-  return cost;
-}
-
-// Of a camera of any model, or of none.
-struct DynamicVertical {
-  residual::VerticalSeen vertical;
-  template <typename Scalar>
-  bool operator()(const Scalar* const* blocks, Scalar* result) const {
-    return vertical(blocks[0], blocks[1], vertical.term.camera.size() > 0 ? blocks[2] : nullptr, result);
-  }
-};
-
-ceres::CostFunction* automatic_vertical(const TileProblem::VerticalTerm& term) {
-  auto* cost =
-      new ceres::DynamicAutoDiffCostFunction<DynamicVertical, 8>(new DynamicVertical{residual::VerticalSeen{term}});
-  for (const int size : {kPoseBlock, kPoseBlock}) cost->AddParameterBlock(size);
-  if (term.camera.size() > 0) cost->AddParameterBlock(static_cast<int>(term.camera.size()));
-  cost->SetNumResiduals(2);
-  return cost;
-}
-
-// A prior has as many residuals as its camera has parameters.
-struct DynamicIntrinsicsKnown {
-  residual::IntrinsicsKnown known;
-  template <typename Scalar>
-  bool operator()(const Scalar* const* blocks, Scalar* result) const {
-    return known(blocks[0], result);
-  }
-};
-
-ceres::CostFunction* automatic_prior(const TileProblem::IntrinsicTerm& term) {
-  auto* cost = new ceres::DynamicAutoDiffCostFunction<DynamicIntrinsicsKnown, 8>(
-      new DynamicIntrinsicsKnown{residual::IntrinsicsKnown{term}});
-  cost->AddParameterBlock(term.value.size());
-  cost->SetNumResiduals(term.value.size());
-  return cost;
+    return automatic_term<2, kPoseBlock, kPoseBlock, parameter_count(CameraModel()), 3>(image);
+  return automatic_dynamic_term(DynamicImage{image}, 2, {kPoseBlock, kPoseBlock, parameter_count(image.model), 3});
 }
 
 }  // namespace
@@ -215,12 +171,6 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
       point_count_(std::ssize(state.points)),
       mounts_begin_(frame_count_ * kPoseBlock),
       point_used_(problem.points.size(), 0),
-      image_loss_(ceres_loss(problem.image_loss)),
-      position_loss_(ceres_loss(problem.position_loss)),
-      attitude_loss_(ceres_loss(problem.attitude_loss)),
-      relative_loss_(ceres_loss(problem.relative_loss)),
-      line_loss_(ceres_loss(problem.line_loss)),
-      vertical_loss_(ceres_loss(problem.vertical_loss)),
       ceres_(std::make_unique<ceres::Problem>(problem_options())) {
   const auto& camera_free = options.camera_free.empty() ? problem.camera_free : options.camera_free;
   if (state.frames.size() != problem.frames.size() || state.cameras.size() != problem.cameras.size() ||
@@ -239,13 +189,14 @@ CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const C
     std::copy(state.cameras[c].begin(), state.cameras[c].end(), camera(c));
   for (std::int64_t p = 0; p < point_count_; ++p) Eigen::Map<Eigen::Vector3d>(point(p)) = state.points[p];
   add_images(problem, state, options.derivatives);
-  add_priors(problem);
+  add_others(problem);
   hold_parameters(problem, state, camera_free);
 }
 
 CeresTile::~CeresTile() = default;
 
 void CeresTile::add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives) {
+  ceres::LossFunction* image_loss = loss(problem.image_loss);
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
     if (!problem.active(p)) continue;
     point_used_[p] = 1;
@@ -258,43 +209,33 @@ void CeresTile::add_images(const TileProblem& problem, const TileState& state, C
       ceres::CostFunction* cost = derivatives == CeresOptions::Derivatives::kAnalytic
                                       ? static_cast<ceres::CostFunction*>(new AnalyticImage(model, measured, weight))
                                       : automatic_image({model, measured, weight});
-      ceres_->AddResidualBlock(cost, image_loss_.get(), frame(image.frame.value), mount(image.mount),
+      ceres_->AddResidualBlock(cost, image_loss, frame(image.frame.value), mount(image.mount),
                                camera(image.camera.value), point(p));
     }
   }
 }
 
-void CeresTile::add_priors(const TileProblem& problem) {
-  for (const auto& term : problem.positions)
-    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::PositionMeasured{term.prior}),
-                             held(term.prior) ? nullptr : position_loss_.get(), frame(term.frame.value));
-  for (const auto& term : problem.attitudes)
-    ceres_->AddResidualBlock(automatic<3, kPoseBlock>(residual::AttitudeMeasured{term.prior}),
-                             held(term.prior) ? nullptr : attitude_loss_.get(), frame(term.frame.value));
-  for (const auto& term : problem.lines) {
-    if (term.other.valid())
-      ceres_->AddResidualBlock(automatic<1, kPoseBlock, kPoseBlock>(residual::HorizontalLine{term}), line_loss_.get(),
-                               frame(term.frame.value), frame(term.other.value));
-    else
-      ceres_->AddResidualBlock(automatic<1, kPoseBlock>(residual::VerticalLine{term}), line_loss_.get(),
-                               frame(term.frame.value));
+void CeresTile::add_others(const TileProblem& problem) {
+  for (const ObservationType* type : observation_types()) {
+    for (std::size_t row = 0; row < type->count(problem); ++row) {
+      const TermUnknowns term = type->unknowns(problem, row);
+      if (term.point >= 0 && !point_used_[term.point]) continue;
+      std::vector<double*> blocks;
+      for (int f = 0; f < term.frame_count; ++f) blocks.push_back(frame(term.frame[static_cast<std::size_t>(f)]));
+      if (term.mount >= 0) blocks.push_back(mount(term.mount));
+      if (term.camera >= 0) blocks.push_back(camera(term.camera));
+      if (term.point >= 0) blocks.push_back(point(term.point));
+      ceres_->AddResidualBlock(type->automatic(problem, row), loss(type->loss(problem, row)), blocks);
+    }
   }
-  for (const auto& term : problem.verticals) {
-    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
-    std::vector<double*> blocks{frame(image.frame.value), mount(image.mount)};
-    if (term.camera.size() > 0) blocks.push_back(camera(image.camera.value));
-    ceres_->AddResidualBlock(automatic_vertical(term), vertical_loss_.get(), blocks);
-  }
-  for (const auto& term : problem.relatives)
-    ceres_->AddResidualBlock(automatic<6, kPoseBlock, kPoseBlock>(residual::RelativeMeasured{term}),
-                             relative_loss_.get(), frame(term.from.value), frame(term.to.value));
-  for (const auto& term : problem.point_priors)
-    if (point_used_[term.point.value])
-      ceres_->AddResidualBlock(automatic<3, 3>(residual::PointKnown{term}), nullptr, point(term.point.value));
-  for (const auto& term : problem.intrinsic_priors)
-    ceres_->AddResidualBlock(automatic_prior(term), nullptr, camera(term.camera.value));
-  for (const auto& term : problem.mount_priors)
-    ceres_->AddResidualBlock(automatic<6, kPoseBlock>(residual::MountKnown{term}), nullptr, mount(term.mount));
+}
+
+// One object for all residuals of the same loss.
+ceres::LossFunction* CeresTile::loss(const RobustLoss& loss) {
+  if (loss.kind == RobustLoss::Kind::kNone) return nullptr;
+  for (const auto& [known, function] : losses_)
+    if (known.kind == loss.kind && known.scale == loss.scale) return function.get();
+  return losses_.emplace_back(loss, ceres_loss(loss)).second.get();
 }
 
 void CeresTile::hold_parameters(const TileProblem& problem, const TileState& state,

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "adjust/terms/ceres_residuals.h"
@@ -47,7 +48,8 @@ class CeresTile {
 
  private:
   void add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives);
-  void add_priors(const TileProblem& problem);
+  void add_others(const TileProblem& problem);
+  ceres::LossFunction* loss(const RobustLoss& loss);  // nullptr: none
   void hold_parameters(const TileProblem& problem, const TileState& state,
                        const std::vector<ParameterMask>& camera_free);
   bool unknown(const double* block) const;
@@ -62,8 +64,7 @@ class CeresTile {
   std::vector<std::uint8_t> point_used_;
   PoseManifold pose_manifold_;
   std::vector<std::unique_ptr<ceres::Manifold>> camera_manifolds_;
-  std::unique_ptr<ceres::LossFunction> image_loss_, position_loss_, attitude_loss_, relative_loss_, line_loss_,
-      vertical_loss_;
+  std::vector<std::pair<RobustLoss, std::unique_ptr<ceres::LossFunction>>> losses_;
   std::unique_ptr<ceres::Problem> ceres_;
 };
 

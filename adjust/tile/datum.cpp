@@ -5,12 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <type_traits>
 
-#include "adjust/terms/line_terms.h"
 #include "adjust/terms/linearise.h"
-#include "adjust/terms/vertical_terms.h"
+#include "adjust/terms/terms.h"
 #include "geometry/numbers/decompositions.h"
-#include "io/block/held_priors.h"
 
 namespace megablock {
 
@@ -20,7 +19,8 @@ using Similarity6 = Eigen::Matrix<double, 6, 7>;  // columns: phi, t, s
 using Similarity3 = Eigen::Matrix<double, 3, 7>;
 using Normal7 = Eigen::Matrix<double, 7, 7>;
 
-// Components of the frames, joined by active points and relative poses; the lowest frame names its component.
+// Components of the frames, joined by active points and observations between frames; the lowest frame names its
+// component.
 class Components {
  public:
   explicit Components(const TileProblem& problem) : parent_(problem.frames.size()) {
@@ -31,8 +31,12 @@ class Components {
       for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row)
         if (problem.kept[row]) join(first, problem.images[problem.image[row].value].frame.value);
     }
-    for (const auto& term : problem.relatives) join(term.from.value, term.to.value);
-    for (const auto& term : problem.lines) join(term.frame.value, term.seen_by().value);
+    for (const ObservationType* type : observation_types()) {
+      for (std::size_t row = 0; row < type->count(problem); ++row) {
+        const TermUnknowns term = type->unknowns(problem, row);
+        if (term.frame_count == 2) join(term.frame[0], term.frame[1]);
+      }
+    }
   }
   std::int32_t of(std::int32_t frame) {
     while (parent_[frame] != frame) frame = parent_[frame] = parent_[parent_[frame]];
@@ -94,35 +98,28 @@ void add_mounts(const TileProblem& problem, const TileState& state, Components& 
   }
 }
 
+void add_term(const TermDatum& term, const TileState& state, Component& c) {
+  const Pose& frame = state.frames[term.frame];
+  if (term.base_to >= 0) {
+    const Eigen::Vector3d base = state.frames[term.base_to].centre - frame.centre;
+    c.normal(6, 6) += base.squaredNorm() / (term.base_sigma_m * term.base_sigma_m);
+    return;
+  }
+  std::visit(
+      [&](const auto& by_frame) {
+        if constexpr (!std::is_same_v<std::decay_t<decltype(by_frame)>, std::monostate>)
+          c.add(by_frame * c.move(frame));
+      },
+      term.by_frame);
+}
+
 void add_priors(const TileProblem& problem, const TileState& state, Components& components,
                 std::vector<Component>& all) {
-  for (const auto& term : problem.positions) {
-    Component& c = all[components.of(term.frame.value)];
-    const Pose& frame = state.frames[term.frame.value];
-    c.add(linearise_position(frame, comparable(term.prior)).by_frame * c.move(frame));
-  }
-  for (const auto& term : problem.attitudes) {
-    Component& c = all[components.of(term.frame.value)];
-    const Pose& frame = state.frames[term.frame.value];
-    c.add(linearise_attitude(frame, comparable(term.prior)).by_frame * c.move(frame));
-  }
-  for (const auto& term : problem.lines) {
-    Component& c = all[components.of(term.frame.value)];
-    const Pose& frame = state.frames[term.frame.value];
-    const LineResidual line = linearise_line(frame, state.frames[term.seen_by().value], term);
-    c.add((line.by_frame + line.by_other) * c.move(frame));
-  }
-  for (const auto& term : problem.verticals) {
-    const std::int32_t frame = problem.images[static_cast<std::size_t>(term.image.value)].frame.value;
-    Component& c = all[components.of(frame)];
-    c.add(linearise_vertical(problem, state, term).by_frame * c.move(state.frames[frame]));
-  }
-  for (const auto& term : problem.relatives) {
-    Component& c = all[components.of(term.from.value)];
-    const Pose &from = state.frames[term.from.value], &to = state.frames[term.to.value];
-    // Only the scale changes a relative pose; written out, as the other directions cancel by rounding alone.
-    const Eigen::Vector3d base = to.centre - from.centre;
-    c.normal(6, 6) += base.squaredNorm() / (term.position_sigma_m * term.position_sigma_m);
+  for (const ObservationType* type : observation_types()) {
+    for (std::size_t row = 0; row < type->count(problem); ++row) {
+      const TermDatum term = type->datum(problem, state, row);
+      if (term.frame >= 0) add_term(term, state, all[components.of(term.frame)]);
+    }
   }
   for (const auto& term : problem.point_priors) {
     if (!problem.active(term.point.value)) continue;

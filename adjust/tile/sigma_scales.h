@@ -2,22 +2,9 @@
 // trusted: sigmas of positions, attitudes, relative poses and verticals are multiplied by what their residuals show.
 #pragma once
 
-#include <array>
-
-#include "adjust/problem/tile_problem.h"
-#include "io/block/observation_statistics.h"
+#include "adjust/terms/terms.h"
 
 namespace megablock {
-
-// Factor of the sigmas of each kind of observation.
-struct SigmaScales {
-  std::array<double, kObservationKinds> of;
-  SigmaScales() { of.fill(1); }
-  double& operator[](ObservationKind kind) { return of[static_cast<std::size_t>(kind)]; }
-  double operator[](ObservationKind kind) const { return of[static_cast<std::size_t>(kind)]; }
-  // Whether a factor is more than 2 % off 1.
-  bool matter() const;
-};
 
 // What to multiply the sigmas with that a block was adjusted with (`now` times the stated ones). Kinds with a
 // redundancy below 30 (the factor would not be good to 13 %) and those whose sigmas are not estimated: 1. No sigma

@@ -4,10 +4,7 @@
 #include <cmath>
 
 #include "adjust/lanes/residual_squares.h"
-#include "adjust/terms/line_terms.h"
-#include "adjust/terms/linearise.h"
-#include "adjust/terms/prior_loss.h"
-#include "adjust/terms/vertical_terms.h"
+#include "adjust/terms/terms.h"
 #include "adjust/tile/ceres_problem.h"
 #include "adjust/tile/datum.h"
 #include "adjust/tile/tile_adjustment.h"
@@ -36,37 +33,13 @@ void add_images(const TileProblem& problem, const TileState& state, ResidualSum&
   sum.residuals += 2 * sum.observations;
 }
 
-void add_priors(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
-  const auto add = [&](double squares, std::int64_t count, const RobustLoss& loss = {}) {
-    sum.squares += loss.evaluate(squares)[1] * squares;
-    sum.residuals += count;
+void add_others(const TileProblem& problem, const TileState& state, ResidualSum& sum) {
+  const TermVisit add = [&](const LinearTerm& term) {
+    sum.squares += term.loss.evaluate(term.squares)[1] * term.squares;
+    sum.residuals += term.number;
   };
-  for (const auto& term : problem.positions)
-    add(linearise_position(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
-        loss_of(problem, term));
-  for (const auto& term : problem.attitudes)
-    add(linearise_attitude(state.frames[term.frame.value], term.prior).residual.squaredNorm(), 3,
-        loss_of(problem, term));
-  for (const auto& term : problem.lines) {
-    const double r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term).residual;
-    add(r * r, 1, problem.line_loss);
-  }
-  for (const auto& term : problem.verticals)
-    add(linearise_vertical(problem, state, term).residual.squaredNorm(), 2, problem.vertical_loss);
-  for (const auto& term : problem.relatives)
-    add(linearise_relative(state.frames[term.from.value], state.frames[term.to.value], term).residual.squaredNorm(), 6,
-        problem.relative_loss);
-  for (const auto& term : problem.point_priors)
-    if (problem.active(term.point.value))
-      add(point_prior_residual(state.points[term.point.value], term).squaredNorm(),
-          term.sigma.array().isFinite().count());
-  for (const auto& term : problem.intrinsic_priors)
-    for (int k = 0; k < term.value.size(); ++k) {
-      const double r = intrinsic_prior_residual(state.cameras[term.camera.value], term, k);
-      add(r * r, intrinsic_prior_weight(term, k) > 0);
-    }
-  for (const auto& term : problem.mount_priors)
-    add(linearise_mount(state.mounts[term.mount], term).residual.squaredNorm(), 6);
+  for (const ObservationType* type : observation_types())
+    for (std::size_t row = 0; row < type->count(problem); ++row) type->linearise(problem, state, row, add);
 }
 
 ceres::Solver::Options solver_options(CeresTile& tile, std::size_t frames, const SolveOptions& options) {
@@ -96,7 +69,7 @@ void describe_solution(const TileProblem& problem, const TileState& state, std::
                        std::int64_t datum_defect, AdjustSummary& summary) {
   ResidualSum sum;
   add_images(problem, state, sum);
-  add_priors(problem, state, sum);
+  add_others(problem, state, sum);
   const std::int64_t freedom = sum.residuals - unknowns + datum_defect;
   summary.observations = sum.observations;
   summary.points = sum.points;

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 
 namespace megablock {
 
@@ -30,12 +31,40 @@ enum class ObservationKind : std::uint8_t {
   kLine,        // lines known to be vertical or horizontal
   kVertical,    // where images see down
 };
-inline constexpr std::size_t kObservationKinds = 14;
 
-// A name for tables: "image, tie points".
-const char* name_of(ObservationKind kind);
-// A word for JSON and HDF5: "image_tie".
-const char* word_of(ObservationKind kind);
+// By ObservationKind.
+struct ObservationKindRow {
+  const char* name;              // for tables
+  const char* word;              // for json and HDF5
+  bool estimates_sigma = false;  // adjustment: {estimate_sigmas: true} (adjust/tile/sigma_scales.h)
+};
+inline constexpr ObservationKindRow kObservationKindTable[] = {
+    {"image, tie points", "image_tie"},
+    {"image, control points", "image_control"},
+    {"image, check points", "image_check"},
+    {"position, horizontal", "position_horizontal", true},
+    {"position, height", "position_height", true},
+    {"attitude", "attitude", true},
+    {"relative rotation", "relative_rotation", true},
+    {"relative position", "relative_position", true},
+    {"control, horizontal", "control_horizontal"},
+    {"control, height", "control_height"},
+    {"camera, prior values", "intrinsics"},
+    {"mount, prior values", "mount"},
+    {"lines of known direction", "line"},
+    {"vertical in images", "vertical", true},
+};
+inline constexpr std::size_t kObservationKinds = std::size(kObservationKindTable);
+
+constexpr const char* name_of(ObservationKind kind) {
+  return kObservationKindTable[static_cast<std::size_t>(kind)].name;
+}
+constexpr const char* word_of(ObservationKind kind) {
+  return kObservationKindTable[static_cast<std::size_t>(kind)].word;
+}
+constexpr bool estimates_sigma(ObservationKind kind) {
+  return kObservationKindTable[static_cast<std::size_t>(kind)].estimates_sigma;
+}
 
 struct ObservationStatistics {
   std::int64_t count = 0;       // number of scalar residuals

@@ -1,10 +1,9 @@
 // What one tile says of the datum: the information of its priors on the similarities of each part.
 #include <algorithm>
+#include <type_traits>
 
-#include "adjust/terms/line_terms.h"
 #include "adjust/terms/linearise.h"
-#include "adjust/terms/vertical_terms.h"
-#include "io/block/held_priors.h"
+#include "adjust/terms/terms.h"
 #include "merge/datum/gauge.h"
 #include "merge/plan/unknowns.h"
 
@@ -24,10 +23,7 @@ class PartBuilder {
   std::vector<GaugePart> build() {
     parts_.resize(at(plan_.part_count));
     describe_frames();
-    add_frame_priors();
-    add_relatives();
-    add_lines();
-    add_verticals();
+    add_terms();
     add_point_priors();
     add_mounts();
     list_free_mounts();
@@ -76,44 +72,26 @@ class PartBuilder {
     return similarity_of_frame(state_.frames[at(frame.value)].centre, reference(frame), part.centre, part.extent);
   }
 
-  void add_frame_priors() {
-    for (const auto& term : problem_.positions) {
-      GaugePart& part = part_of(term.frame);
-      const Matrix67 moved = move(part, term.frame);
-      add(part, linearise_position(state_.frames[at(term.frame.value)], comparable(term.prior)).by_frame * moved);
-      if (held(term.prior)) part.held += moved.bottomRows<3>().transpose() * moved.bottomRows<3>();
-    }
-    for (const auto& term : problem_.attitudes) {
-      GaugePart& part = part_of(term.frame);
-      add(part, linearise_attitude(state_.frames[at(term.frame.value)], comparable(term.prior)).by_frame *
-                    move(part, term.frame));
-    }
+  void add_terms() {
+    for (const ObservationType* type : observation_types())
+      for (std::size_t row = 0; row < type->count(problem_); ++row) add_term(type->datum(problem_, state_, row));
   }
-
-  // Lines look at rotations alone, and a similarity turns both frames alike.
-  void add_lines() {
-    for (const auto& term : problem_.lines) {
-      GaugePart& part = part_of(term.frame);
-      const LineResidual line =
-          linearise_line(state_.frames[at(term.frame.value)], state_.frames[at(term.seen_by().value)], term);
-      add(part, (line.by_frame + line.by_other) * move(part, term.frame));
+  void add_term(const TermDatum& term) {
+    if (term.frame < 0) return;
+    const LocalFrame frame(term.frame);
+    GaugePart& part = part_of(frame);
+    if (term.base_to >= 0) {
+      const Eigen::Vector3d base = reference(LocalFrame(term.base_to)) - reference(frame);
+      part.normal(6, 6) += base.squaredNorm() / (term.base_sigma_m * term.base_sigma_m);
+      return;
     }
-  }
-
-  void add_verticals() {
-    for (const auto& term : problem_.verticals) {
-      const LocalFrame frame = problem_.images[at(term.image.value)].frame;
-      GaugePart& part = part_of(frame);
-      add(part, linearise_vertical(problem_, state_, term).by_frame * move(part, frame));
-    }
-  }
-
-  // Only the scale changes a relative pose; written out, as the other directions cancel by rounding alone.
-  void add_relatives() {
-    for (const auto& term : problem_.relatives) {
-      const Eigen::Vector3d base = reference(term.to) - reference(term.from);
-      part_of(term.from).normal(6, 6) += base.squaredNorm() / (term.position_sigma_m * term.position_sigma_m);
-    }
+    const Matrix67 moved = move(part, frame);
+    std::visit(
+        [&](const auto& by_frame) {
+          if constexpr (!std::is_same_v<std::decay_t<decltype(by_frame)>, std::monostate>) add(part, by_frame * moved);
+        },
+        term.by_frame);
+    if (term.holds_place) part.held += moved.bottomRows<3>().transpose() * moved.bottomRows<3>();
   }
 
   void add_point_priors() {

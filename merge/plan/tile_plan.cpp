@@ -7,6 +7,7 @@
 
 #include "adjust/problem/owner.h"
 #include "io/base/disjoint_sets.h"
+#include "merge/plan/unknowns.h"
 #include "partition/tiles/separators.h"
 #include "partition/tiles/tiles.h"
 
@@ -18,6 +19,18 @@ namespace {
 struct TouchedRows {
   std::vector<std::uint8_t> frames, cameras, mounts;
 };
+
+// Of all observations without a point: visit(TermRow, TermUnknowns).
+template <typename Visit>
+void visit_all_terms(const TileProblem& problem, Visit&& visit) {
+  const auto types = observation_types();
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    for (std::size_t row = 0; row < types[type]->count(problem); ++row) {
+      const TermUnknowns unknowns = types[type]->unknowns(problem, row);
+      if (unknowns.point < 0) visit(TermRow{static_cast<std::int32_t>(type), static_cast<std::int32_t>(row)}, unknowns);
+    }
+  }
+}
 
 TouchedRows touched_rows(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
   TouchedRows touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
@@ -33,20 +46,11 @@ TouchedRows touched_rows(const TileProblem& problem, const std::vector<Parameter
       touched.mounts[image.mount] = problem.mount_free[image.mount] != 0;
     }
   }
-  for (const auto& term : problem.positions) touched.frames[term.frame.value] = 1;
-  for (const auto& term : problem.attitudes) touched.frames[term.frame.value] = 1;
-  for (const auto& term : problem.lines) touched.frames[term.frame.value] = touched.frames[term.seen_by().value] = 1;
-  for (const auto& term : problem.verticals) {
-    const TileImage& image = problem.images[static_cast<std::size_t>(term.image.value)];
-    touched.frames[image.frame.value] = 1;
-    if (term.camera.size() > 0 && camera_free[image.camera.value]) touched.cameras[image.camera.value] = 1;
-    if (problem.mount_free[image.mount]) touched.mounts[image.mount] = 1;
-  }
-  for (const auto& term : problem.relatives) touched.frames[term.from.value] = touched.frames[term.to.value] = 1;
-  for (const auto& term : problem.intrinsic_priors)
-    if (camera_free[term.camera.value]) touched.cameras[term.camera.value] = 1;
-  for (const auto& term : problem.mount_priors)
-    if (problem.mount_free[term.mount]) touched.mounts[term.mount] = 1;
+  visit_all_terms(problem, [&](TermRow, const TermUnknowns& term) {
+    for (int f = 0; f < term.frame_count; ++f) touched.frames[at(term.frame[at(f)])] = 1;
+    if (term.camera >= 0 && camera_free[at(term.camera)]) touched.cameras[at(term.camera)] = 1;
+    if (term.mount >= 0 && problem.mount_free[at(term.mount)]) touched.mounts[at(term.mount)] = 1;
+  });
   return touched;
 }
 
@@ -80,7 +84,7 @@ void frames_of_point(const TileProblem& problem, std::int64_t point, std::vector
   std::sort(frames.begin(), frames.end());
 }
 
-// Edges between frames that share points, relative poses or lines: ascending, weighted by how many they share. Pairs
+// Edges between frames that share points or other observations: ascending, weighted by how many they share. Pairs
 // are sorted by their lower frame by counting, and of each of these counted by their upper one: there are millions.
 FrameGraph graph_of(const TileProblem& problem) {
   const std::size_t frame_count = problem.frames.size();
@@ -93,11 +97,10 @@ FrameGraph graph_of(const TileProblem& problem) {
       for (std::size_t a = 0; a < frames.size(); ++a)
         for (std::size_t b = a + 1; b < frames.size(); ++b) visit(frames[a], frames[b]);
     }
-    const auto visit_term = [&](LocalFrame a, LocalFrame b) {
-      if (a != b) visit(std::min(a, b).value, std::max(a, b).value);
-    };
-    for (const auto& term : problem.relatives) visit_term(term.from, term.to);
-    for (const auto& term : problem.lines) visit_term(term.frame, term.seen_by());
+    visit_all_terms(problem, [&](TermRow, const TermUnknowns& term) {
+      const auto [a, b] = term.frame;
+      if (term.frame_count == 2 && a != b) visit(std::min(a, b), std::max(a, b));
+    });
   };
   std::vector<std::size_t> end(frame_count + 1, 0);  // of each lower frame's pairs; first the end of those before
   visit_pairs([&](std::int32_t a, std::int32_t) { ++end[static_cast<std::size_t>(a) + 1]; });
@@ -142,9 +145,7 @@ class CellPlanner {
               const std::vector<std::int32_t>& depth_of_frame, std::size_t cells)
       : problem_(problem), plan_(plan), cell_of_frame_(cell_of_frame), depth_of_frame_(depth_of_frame) {
     plan.points.resize(cells);
-    for (auto* list : {&plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
-                       &plan.intrinsic_priors, &plan.mount_priors})
-      list->resize(cells);
+    plan.terms.resize(cells);
     touched_.assign(cells, std::vector<std::uint8_t>(plan.unknowns.size(), 0));
   }
 
@@ -194,53 +195,21 @@ class CellPlanner {
   }
 
   void share_terms() {
-    for (std::size_t i = 0; i < problem_.positions.size(); ++i) {
-      const LocalFrame frame = problem_.positions[i].frame;
-      plan_.positions[cell_of(frame)].push_back(static_cast<std::int64_t>(i));
-      touch(cell_of(frame), plan_.unknown_of_frame[frame.value]);
-    }
-    for (std::size_t i = 0; i < problem_.attitudes.size(); ++i) {
-      const LocalFrame frame = problem_.attitudes[i].frame;
-      plan_.attitudes[cell_of(frame)].push_back(static_cast<std::int64_t>(i));
-      touch(cell_of(frame), plan_.unknown_of_frame[frame.value]);
-    }
-    for (std::size_t i = 0; i < problem_.relatives.size(); ++i) {
-      const auto& term = problem_.relatives[i];
-      const std::size_t cell = owner_of({term.from.value, term.to.value});
-      plan_.relatives[cell].push_back(static_cast<std::int64_t>(i));
-      touch(cell, plan_.unknown_of_frame[term.from.value]);
-      touch(cell, plan_.unknown_of_frame[term.to.value]);
-    }
-    for (std::size_t i = 0; i < problem_.lines.size(); ++i) {
-      const auto& term = problem_.lines[i];
-      const std::size_t cell = owner_of({term.frame.value, term.seen_by().value});
-      plan_.lines[cell].push_back(static_cast<std::int64_t>(i));
-      touch(cell, plan_.unknown_of_frame[term.frame.value]);
-      touch(cell, plan_.unknown_of_frame[term.seen_by().value]);
-    }
-    for (std::size_t i = 0; i < problem_.verticals.size(); ++i) {
-      const auto& term = problem_.verticals[i];
-      const TileImage& image = problem_.images[static_cast<std::size_t>(term.image.value)];
-      const std::size_t cell = cell_of(image.frame);
-      plan_.verticals[cell].push_back(static_cast<std::int64_t>(i));
-      touch(cell, plan_.unknown_of_frame[image.frame.value]);
-      touch(cell, plan_.unknown_of_mount[image.mount]);
-      if (term.camera.size() > 0) touch(cell, plan_.unknown_of_camera[image.camera.value]);
-    }
     // Shared parameters' priors go where the first image of the camera or mount lies.
     std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);
     for (auto image = problem_.images.rbegin(); image != problem_.images.rend(); ++image)
       camera_cell[image->camera.value] = mount_cell[static_cast<std::size_t>(image->mount)] = cell_of(image->frame);
-    for (std::size_t i = 0; i < problem_.intrinsic_priors.size(); ++i) {
-      const auto camera = static_cast<std::size_t>(problem_.intrinsic_priors[i].camera.value);
-      plan_.intrinsic_priors[camera_cell[camera]].push_back(static_cast<std::int64_t>(i));
-      touch(camera_cell[camera], plan_.unknown_of_camera[camera]);
-    }
-    for (std::size_t i = 0; i < problem_.mount_priors.size(); ++i) {
-      const auto mount = static_cast<std::size_t>(problem_.mount_priors[i].mount);
-      plan_.mount_priors[mount_cell[mount]].push_back(static_cast<std::int64_t>(i));
-      touch(mount_cell[mount], plan_.unknown_of_mount[mount]);
-    }
+    std::vector<std::int32_t> frames;
+    visit_all_terms(problem_, [&](TermRow row, const TermUnknowns& term) {
+      frames.assign(term.frame.begin(), term.frame.begin() + term.frame_count);
+      const std::size_t cell = !frames.empty()    ? owner_of(frames)
+                               : term.camera >= 0 ? camera_cell[at(term.camera)]
+                                                  : mount_cell[at(term.mount)];
+      plan_.terms[cell].push_back(row);
+      for (const std::int32_t frame : frames) touch(cell, plan_.unknown_of_frame[at(frame)]);
+      if (term.mount >= 0) touch(cell, plan_.unknown_of_mount[at(term.mount)]);
+      if (term.camera >= 0) touch(cell, plan_.unknown_of_camera[at(term.camera)]);
+    });
   }
 
   const TileProblem& problem_;
@@ -311,8 +280,7 @@ void TilePlan::write(ByteWriter& out) const {
   for (const UnknownList* list : {&unknowns, &boundary, &owned}) out.values(*list);
   cells.write(out);
   for (const RowList& rows : points) rows.write(out);
-  for (const auto* lists : {&positions, &attitudes, &relatives, &lines, &verticals, &intrinsic_priors, &mount_priors})
-    for (const std::vector<std::int64_t>& rows : *lists) out.values(rows);
+  for (const std::vector<TermRow>& rows : terms) out.values(rows);
   for (const auto* rows : {&part_of_frame, &unknown_of_frame, &unknown_of_camera, &unknown_of_mount}) out.values(*rows);
   out.value(part_count);
   out.values(camera_free);
@@ -324,9 +292,7 @@ TilePlan TilePlan::read(ByteReader& in) {
   plan.cells = EliminationPlan::read(in);
   const std::size_t cell_count = plan.cells.node_of_leaf.size();
   for (std::size_t cell = 0; cell < cell_count; ++cell) plan.points.push_back(RowList::read(in));
-  for (auto* lists : {&plan.positions, &plan.attitudes, &plan.relatives, &plan.lines, &plan.verticals,
-                      &plan.intrinsic_priors, &plan.mount_priors})
-    for (std::size_t cell = 0; cell < cell_count; ++cell) lists->push_back(in.values<std::int64_t>());
+  for (std::size_t cell = 0; cell < cell_count; ++cell) plan.terms.push_back(in.values<TermRow>());
   for (auto* rows : {&plan.part_of_frame, &plan.unknown_of_frame, &plan.unknown_of_camera, &plan.unknown_of_mount})
     *rows = in.values<std::int64_t>();
   plan.part_count = in.value<std::int64_t>();

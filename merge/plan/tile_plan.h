@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "adjust/problem/tile_problem.h"
+#include "adjust/terms/terms.h"
 #include "merge/plan/plan.h"
 #include "merge/scratch/row_list.h"
 
@@ -18,15 +18,14 @@ UnknownList tile_unknowns(const TileProblem& problem, const std::vector<Paramete
 
 // Symbolic work of a tile, done once per verdict on observations.
 struct TilePlan {
-  UnknownList unknowns;         // touched, ascending
-  UnknownList boundary;         // passed to the merge tree, ascending
-  UnknownList owned;            // no tile with a lower number touches them
-  EliminationPlan cells;        // leaves = cells
-  std::vector<RowList> points;  // [cells] active points (rows), ascending
-  // Rows of the problem's tables of observations without a point, [cells].
-  std::vector<std::vector<std::int64_t>> positions, attitudes, relatives, lines, verticals, intrinsic_priors,
-      mount_priors;
-  // Part of every frame row that hangs together by points and relative poses, by lowest frame; -1: untouched. [frames]
+  UnknownList unknowns;                     // touched, ascending
+  UnknownList boundary;                     // passed to the merge tree, ascending
+  UnknownList owned;                        // no tile with a lower number touches them
+  EliminationPlan cells;                    // leaves = cells
+  std::vector<RowList> points;              // [cells] active points (rows), ascending
+  std::vector<std::vector<TermRow>> terms;  // [cells] observations without a point, ascending by type and row
+  // Part of every frame row that hangs together by points and observations between frames, by lowest frame; -1:
+  // untouched. [frames]
   std::vector<std::int64_t> part_of_frame;
   std::int64_t part_count = 0;
   // Position in `unknowns`, -1: held or untouched.

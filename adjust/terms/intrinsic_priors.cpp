@@ -1,0 +1,60 @@
+// Prior values of cameras: r = (k - k_0) / sigma for each parameter with a finite positive sigma, each by itself.
+//
+// Owned by the tile of the first oriented image of the camera.
+#include "adjust/terms/automatic_terms.h"
+#include "adjust/terms/linearise.h"
+#include "adjust/terms/terms.h"
+
+namespace megablock {
+
+namespace {
+
+// A prior has as many residuals as its camera has parameters.
+struct DynamicIntrinsicsKnown {
+  residual::IntrinsicsKnown known;
+  template <typename Scalar>
+  bool operator()(const Scalar* const* blocks, Scalar* result) const {
+    return known(blocks[0], result);
+  }
+};
+
+class IntrinsicPriors final : public ObservationType {
+ public:
+  std::size_t count(const TileProblem& problem) const override { return problem.intrinsic_priors.size(); }
+  TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
+    TermUnknowns unknowns;
+    unknowns.camera = static_cast<std::int32_t>(problem.intrinsic_priors[row].camera.value);
+    return unknowns;
+  }
+  void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
+                 const TermVisit& visit) const override {
+    const TileProblem::IntrinsicTerm& term = problem.intrinsic_priors[row];
+    const auto camera = static_cast<std::int32_t>(term.camera.value);
+    for (int k = 0; k < term.value.size(); ++k) {
+      const double weight = intrinsic_prior_weight(term, k);
+      if (weight == 0) continue;
+      const double r = intrinsic_prior_residual(state.cameras[static_cast<std::size_t>(camera)], term, k);
+      LinearTerm out;
+      out.set_residual(Eigen::Matrix<double, 1, 1>(r));
+      out.kinds.fill(ObservationKind::kIntrinsics);
+      Eigen::RowVectorXd by_camera = Eigen::RowVectorXd::Zero(term.value.size());
+      by_camera[k] = weight;
+      out.add_block(LinearTerm::By::kCamera, camera, by_camera);
+      visit(out);
+    }
+  }
+  ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
+    const TileProblem::IntrinsicTerm& term = problem.intrinsic_priors[row];
+    const int count = term.value.size();
+    return automatic_dynamic_term(DynamicIntrinsicsKnown{residual::IntrinsicsKnown{term}}, count, {count});
+  }
+};
+
+}  // namespace
+
+const ObservationType& intrinsic_priors() {
+  static const IntrinsicPriors type;
+  return type;
+}
+
+}  // namespace megablock

@@ -1,0 +1,45 @@
+// Given coordinates of control points: r = (X - X_0) / sigma, metres; an axis of infinite sigma is free.
+//
+// Owned by the tile of the point, and eliminated with it there (merge/tile/point_equations.h): normal equations and
+// datum take it from the point. Points that take no part leave their prior out.
+#include "adjust/terms/automatic_terms.h"
+#include "adjust/terms/linearise.h"
+#include "adjust/terms/terms.h"
+
+namespace megablock {
+
+namespace {
+
+class PointPriors final : public ObservationType {
+  using enum ObservationKind;
+
+ public:
+  std::size_t count(const TileProblem& problem) const override { return problem.point_priors.size(); }
+  TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
+    TermUnknowns unknowns;
+    unknowns.point = problem.point_priors[row].point.value;
+    return unknowns;
+  }
+  void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
+                 const TermVisit& visit) const override {
+    const TileProblem::PointTerm& term = problem.point_priors[row];
+    if (!problem.active(term.point.value)) return;
+    LinearTerm out;
+    out.set_residual(point_prior_residual(state.points[static_cast<std::size_t>(term.point.value)], term));
+    out.number = static_cast<int>(term.sigma.array().isFinite().count());
+    out.kinds = {kControlHorizontal, kControlHorizontal, kControlHeight};
+    visit(out);
+  }
+  ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
+    return automatic_term<3, 3>(residual::PointKnown{problem.point_priors[row]});
+  }
+};
+
+}  // namespace
+
+const ObservationType& point_priors() {
+  static const PointPriors type;
+  return type;
+}
+
+}  // namespace megablock

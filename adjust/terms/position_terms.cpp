@@ -1,0 +1,71 @@
+// Positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, l the lever arm in the rig's axes, metres.
+//
+//   C + R' l:   by w: [R' l]x (as Exp(-w) R' l),   by d: I
+//
+// Owned by the tile of the frame. A held position (io/block/held_priors.h) has no loss, which would let it go.
+#include "adjust/terms/automatic_terms.h"
+#include "adjust/terms/linearise.h"
+#include "adjust/terms/prior_loss.h"
+#include "adjust/terms/terms.h"
+
+namespace megablock {
+
+FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior) {
+  const Eigen::Vector3d arm = frame.rotation.conjugate() * prior.lever_arm;
+  const Eigen::Vector3d weight = prior.sigma.cwiseInverse();
+  FrameResidual3 result;
+  result.residual = weight.cwiseProduct(frame.centre - prior.position + arm);
+  result.by_frame << weight.asDiagonal() * skew<double>(arm), Eigen::Matrix3d(weight.asDiagonal());
+  return result;
+}
+
+namespace {
+
+class Positions final : public ObservationType {
+  using enum ObservationKind;
+
+ public:
+  std::size_t count(const TileProblem& problem) const override { return problem.positions.size(); }
+  TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
+    return {{problem.positions[row].frame.value}, 1};
+  }
+  void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
+                 const TermVisit& visit) const override {
+    const TileProblem::PositionTerm& term = problem.positions[row];
+    const FrameResidual3 r = linearise_position(state.frames[term.frame.value], term.prior);
+    LinearTerm out;
+    out.set_residual(r.residual);
+    out.kinds = {kPositionHorizontal, kPositionHorizontal, kPositionHeight};
+    out.add_block(LinearTerm::By::kFrame, term.frame.value, r.by_frame);
+    out.loss = loss_of(problem, term);
+    visit(out);
+  }
+  TermDatum datum(const TileProblem& problem, const TileState& state, std::size_t row) const override {
+    const TileProblem::PositionTerm& term = problem.positions[row];
+    TermDatum datum;
+    datum.frame = term.frame.value;
+    datum.by_frame = linearise_position(state.frames[term.frame.value], comparable(term.prior)).by_frame;
+    datum.holds_place = held(term.prior);
+    return datum;
+  }
+  RobustLoss loss(const TileProblem& problem, std::size_t row) const override {
+    return loss_of(problem, problem.positions[row]);
+  }
+  void scale_sigmas(TileProblem& problem, const SigmaScales& scales) const override {
+    const double horizontal = scales[kPositionHorizontal];
+    for (TileProblem::PositionTerm& term : problem.positions)
+      term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
+  }
+  ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
+    return automatic_term<3, kPoseBlock>(residual::PositionMeasured{problem.positions[row].prior});
+  }
+};
+
+}  // namespace
+
+const ObservationType& position_observations() {
+  static const Positions type;
+  return type;
+}
+
+}  // namespace megablock
