@@ -21,6 +21,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -139,6 +140,11 @@ struct TileProblem {
     Eigen::VectorXd camera;                              // parameters of the camera that `seen` goes with, or empty
     Eigen::Matrix2Xd by_camera;                          // weight * d seen / d parameter
   };
+  // A number between two frames, in the unit of its type (io/block/frame_measurements.h).
+  struct MeasuredTerm {
+    LocalFrame from, to;
+    double value, sigma;
+  };
   std::vector<PositionTerm> positions;
   std::vector<AttitudeTerm> attitudes;
   std::vector<RelativeTerm> relatives;
@@ -147,6 +153,7 @@ struct TileProblem {
   std::vector<MountTerm> mount_priors;
   std::vector<LineTerm> lines;
   std::vector<VerticalTerm> verticals;
+  std::map<std::string, std::vector<MeasuredTerm>> measured;  // by the key of their type
 
   RobustLoss image_loss, position_loss, attitude_loss, relative_loss, line_loss, vertical_loss;
 

@@ -52,6 +52,7 @@ class TileBuilder {
     for (std::int64_t row : control_points_) add_control_point(row);
     add_frame_priors();
     add_relative_poses();
+    add_measured();
     add_lines();
     add_verticals();
     add_camera_priors();
@@ -68,6 +69,9 @@ class TileBuilder {
   }
   MountId mount_of(ImageIndex image) const {
     return {block_.frames[block_.images[image].frame].rig, block_.images[image].mount};
+  }
+  const FrameMeasurement& measured(const std::string& key, std::size_t row) const {
+    return block_.frame_measurements.at(key)[row];
   }
   const Mount& mount(const MountId& id) const { return block_.rigs[id.rig].mounts[static_cast<std::size_t>(id.mount)]; }
 
@@ -103,6 +107,12 @@ class TileBuilder {
     for (std::size_t row : rows_.relative_poses) {
       frames.push_back(block_.relative_poses[row].from);
       frames.push_back(block_.relative_poses[row].to);
+    }
+    for (const auto& [key, rows] : rows_.measured) {
+      for (const std::size_t row : rows) {
+        frames.push_back(measured(key, row).from);
+        frames.push_back(measured(key, row).to);
+      }
     }
     for (const BlockLineTerm& line : lines_) {
       frames.push_back(line.frame);
@@ -188,6 +198,16 @@ class TileBuilder {
       problem_.relatives.push_back({LocalFrame(row_of(problem_.frames, relative.from)),
                                     LocalFrame(row_of(problem_.frames, relative.to)), relative.pose,
                                     relative.rotation_sigma_rad, relative.position_sigma_m});
+    }
+  }
+
+  void add_measured() {
+    for (const auto& [key, rows] : rows_.measured) {
+      for (const std::size_t row : rows) {
+        const FrameMeasurement& m = measured(key, row);
+        problem_.measured[key].push_back(
+            {LocalFrame(row_of(problem_.frames, m.from)), LocalFrame(row_of(problem_.frames, m.to)), m.value, m.sigma});
+      }
     }
   }
 
@@ -314,6 +334,15 @@ RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Til
     if (!state.oriented[relative.from] || !state.oriented[relative.to]) continue;
     const TileIndex tile = owner_tile(tiles, relative.from, relative.to);
     if (tile.valid()) rows[static_cast<std::size_t>(tile.value)].relative_poses.push_back(row);
+  }
+  for (const auto& [key, measurements] : block.frame_measurements) {
+    for (std::size_t row = 0; row < measurements.size(); ++row) {
+      const FrameMeasurement& m = measurements[row];
+      if (!state.oriented[m.from] || !state.oriented[m.to] || tiles.component[m.from] != tiles.component[m.to])
+        continue;
+      const TileIndex tile = owner_tile(tiles, m.from, m.to);
+      if (tile.valid()) rows[static_cast<std::size_t>(tile.value)].measured[key].push_back(row);
+    }
   }
   for (std::size_t row = 0; row < block.verticals.size(); ++row) {
     const FrameIndex frame = block.images[block.verticals[row].image].frame;

@@ -2,6 +2,8 @@
 // observation that the tile owns.
 #pragma once
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "adjust/problem/tile_problem.h"
@@ -21,9 +23,11 @@ TileProblem make_tile_problem(const Block& block, const BlockState& state, const
 struct RowsOfTile {
   std::vector<FrameIndex> frames;           // oriented and with a prior of any kind, ascending
   std::vector<std::size_t> relative_poses;  // that the tile owns, between oriented frames, ascending
-  std::vector<std::size_t> verticals;       // of oriented images, ascending
-  std::vector<CameraIndex> cameras;         // whose first oriented image lies in the tile, ascending
-  std::vector<MountId> mounts;              // the same
+  // By the key of their type; that the tile owns, between oriented frames of one part of the block, ascending.
+  std::map<std::string, std::vector<std::size_t>> measured;
+  std::vector<std::size_t> verticals;  // of oriented images, ascending
+  std::vector<CameraIndex> cameras;    // whose first oriented image lies in the tile, ascending
+  std::vector<MountId> mounts;         // the same
 };
 using RowsOfTiles = std::vector<RowsOfTile>;  // [tiles]
 RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles);

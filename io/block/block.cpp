@@ -151,6 +151,15 @@ void check(const Block& block) {
     require(relative.rotation_sigma_rad > 0 && relative.position_sigma_m > 0, what + " has no positive sigmas");
     check_unit(relative.pose, what);
   }
+  for (const auto& [key, measurements] : block.frame_measurements)
+    for (const FrameMeasurement& m : measurements) {
+      require(block.frames.contains(m.from) && block.frames.contains(m.to),
+              key + ": a row names no frame of the block");
+      const std::string what =
+          key + ": row of frames '" + block.frames[m.from].name + "' and '" + block.frames[m.to].name + "'";
+      require(m.from != m.to, what + " is of one frame");
+      require(std::isfinite(m.value) && std::isfinite(m.sigma) && m.sigma > 0, what + " has no finite positive sigma");
+    }
   for (const ControlPoint& point : block.control_points) {
     require(positive(point.sigma), "control point '" + point.name + "': sigmas must be positive (metres)");
     require(point.position.head<2>().allFinite() && !std::isinf(point.position.z()),

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -94,6 +95,12 @@ struct RelativePose {
   double rotation_sigma_rad = 0, position_sigma_m = 0;
 };
 
+// A number measured between two frames. Its type says which (frame_measurements.h).
+struct FrameMeasurement {
+  FrameIndex from, to;
+  double value = 0, sigma = 0;  // in the unit of the type
+};
+
 // The observation of a point in an image.
 struct ImageMeasurement {
   ImageIndex image;
@@ -148,7 +155,8 @@ struct Block {
   std::vector<RelativePose> relative_poses;
   std::vector<ControlPoint> control_points;
   std::vector<KnownLine> lines;
-  std::vector<SeenVertical> verticals;  // ascending by image
+  std::vector<SeenVertical> verticals;                                      // ascending by image
+  std::map<std::string, std::vector<FrameMeasurement>> frame_measurements;  // by the key of their type
 
   const Rig& rig_of(FrameIndex frame) const { return rigs[frames[frame].rig]; }
   const Mount& mount_of(ImageIndex image) const {

@@ -162,6 +162,13 @@ Block append_to(const Block& previous, Block moved, const std::function<void()>&
     relative.from = frames[relative.from];
     relative.to = frames[relative.to];
   }
+  merged.frame_measurements = moved.frame_measurements;
+  for (auto& [key, measurements] : merged.frame_measurements) {
+    for (FrameMeasurement& measurement : measurements) {
+      measurement.from = frames[measurement.from];
+      measurement.to = frames[measurement.to];
+    }
+  }
   merged.control_points = moved.control_points;
   for (ControlPoint& point : merged.control_points)
     for (ImageMeasurement& measurement : point.measurements) measurement.image = images[measurement.image];

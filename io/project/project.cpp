@@ -9,6 +9,7 @@
 #include "io/project/image_scan.h"
 #include "io/project/inputs/approximate_poses.h"
 #include "io/project/inputs/control_file.h"
+#include "io/project/inputs/frame_measurements_file.h"
 #include "io/project/inputs/lines.h"
 #include "io/project/inputs/verticals.h"
 #include "io/project/project_sections.h"
@@ -144,6 +145,9 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (control) add_control(*control, names_left_out(project), project.block, project.warnings);
   if (const auto lines = top.existing_file("lines"))
     read_lines(*lines, names_left_out(project), project.block, project.warnings);
+  for (const FrameMeasurementType& type : frame_measurement_types())
+    if (const auto file = top.existing_file(type.key))
+      read_frame_measurements(type, *file, names_left_out(project), project.block, project.warnings);
   if (const auto verticals = top.existing_file("verticals"))
     read_verticals(*verticals, names_left_out(project), project.block);
 }

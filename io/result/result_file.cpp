@@ -148,10 +148,17 @@ void get_figures(const Hdf5Reader& file, BlockResult& result) {
   result.digest = file.text_attribute("/", "digest");
 }
 
+// These have a row whether they are observed or not, as they have had in every result.
+constexpr std::size_t kKindsOfEveryResult = 14;
+
 void put_observation_table(Hdf5Writer& file, const ObservationTable& table) {
   std::vector<std::string> words;
-  for (std::size_t k = 0; k < kObservationKinds; ++k) words.push_back(word_of(static_cast<ObservationKind>(k)));
-  const auto& kinds = table.kinds;
+  std::vector<ObservationStatistics> kinds;
+  for (std::size_t k = 0; k < kObservationKinds; ++k) {
+    if (k >= kKindsOfEveryResult && table.kinds[k].count == 0) continue;
+    words.push_back(word_of(static_cast<ObservationKind>(k)));
+    kinds.push_back(table.kinds[k]);
+  }
   file.group("statistics", "of the observations, by kind");
   file.texts("statistics/kind", words);
   file.vector("statistics/count", column(kinds, [](const ObservationStatistics& s) { return s.count; }),

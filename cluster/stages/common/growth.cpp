@@ -23,6 +23,7 @@ Block first_images(const Block& block, std::int64_t n) {
     for (const Mount& mount : rig.mounts) cameras = std::max(cameras, mount.camera.value + 1);
   part.cameras.resize(static_cast<std::size_t>(cameras));
   part.relative_poses.clear();
+  part.frame_measurements.clear();
   part.control_points.clear();
   part.lines.clear();
   std::erase_if(part.verticals, [&](const SeenVertical& vertical) { return vertical.image.value >= n; });

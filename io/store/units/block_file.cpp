@@ -302,6 +302,7 @@ Block get_block_without_names(const Hdf5Reader& file) {
   block.control_points = get_control(file);
   block.lines = get_lines(file);
   block.verticals = get_verticals(file);
+  get_frame_measurements(file, block);
   return block;
 }
 
@@ -317,6 +318,7 @@ void put_block(Hdf5Writer& file, const Block& block) {
   put_control(file, block.control_points);
   put_lines(file, block.lines);
   put_verticals(file, block.verticals);
+  put_frame_measurements(file, block);
 }
 
 Block get_block(const Hdf5Reader& file) {

@@ -1,5 +1,6 @@
 #include "io/store/units/hdf5_block_observations.h"
 
+#include "io/block/frame_measurements.h"
 #include "io/store/hdf5/hdf5_tables.h"
 
 namespace megablock {
@@ -30,6 +31,39 @@ std::vector<RelativePose> get_relative_poses(const Hdf5Reader& file) {
   for (std::size_t i = 0; i < poses.size(); ++i)
     relatives.push_back({FrameIndex(from[i]), FrameIndex(to[i]), poses[i], rotation_sigma[i], position_sigma[i]});
   return relatives;
+}
+
+void put_frame_measurements(Hdf5Writer& file, const Block& block) {
+  if (block.frame_measurements.empty()) return;
+  file.group("frame_measurements", "numbers measured between two frames, by type");
+  for (const auto& [key, rows] : block.frame_measurements) {
+    const std::string group = "frame_measurements/" + key;
+    file.group(group, "one type");
+    file.vector(group + "/from", column(rows, [](const FrameMeasurement& m) { return m.from.value; }),
+                {"", "row in frames"});
+    file.vector(group + "/to", column(rows, [](const FrameMeasurement& m) { return m.to.value; }),
+                {"", "row in frames"});
+    file.vector(group + "/value", column(rows, [](const FrameMeasurement& m) { return m.value; }),
+                {"", "in the unit of the type"});
+    file.vector(group + "/sigma", column(rows, [](const FrameMeasurement& m) { return m.sigma; }),
+                {"", "in the unit of the type"});
+  }
+}
+
+void get_frame_measurements(const Hdf5Reader& file, Block& block) {
+  if (!file.has("frame_measurements")) return;
+  for (const FrameMeasurementType& type : frame_measurement_types()) {
+    const std::string group = std::string("frame_measurements/") + type.key;
+    if (!file.has(group)) continue;
+    const auto from = file.vector<std::int64_t>(group + "/from");
+    const auto count = static_cast<std::int64_t>(from.size());
+    const auto to = file.vector<std::int64_t>(group + "/to", count);
+    const auto value = file.vector<double>(group + "/value", count);
+    const auto sigma = file.vector<double>(group + "/sigma", count);
+    std::vector<FrameMeasurement>& rows = block.frame_measurements[type.key];
+    for (std::size_t i = 0; i < from.size(); ++i)
+      rows.push_back({FrameIndex(from[i]), FrameIndex(to[i]), value[i], sigma[i]});
+  }
 }
 
 void put_control(Hdf5Writer& file, const std::vector<ControlPoint>& points) {

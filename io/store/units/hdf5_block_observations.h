@@ -13,6 +13,9 @@ namespace megablock {
 void put_relative_poses(Hdf5Writer& file, const std::vector<RelativePose>& relatives);
 std::vector<RelativePose> get_relative_poses(const Hdf5Reader& file);
 
+// By type (io/block/frame_measurements.h); no group where there are none.
+void put_frame_measurements(Hdf5Writer& file, const Block& block);
+void get_frame_measurements(const Hdf5Reader& file, Block& block);
 void put_control(Hdf5Writer& file, const std::vector<ControlPoint>& points);
 std::vector<ControlPoint> get_control(const Hdf5Reader& file);
 

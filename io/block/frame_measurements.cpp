@@ -1,0 +1,12 @@
+#include "io/block/frame_measurements.h"
+
+#include <vector>
+
+namespace megablock {
+
+std::span<const FrameMeasurementType> frame_measurement_types() {
+  static const std::vector<FrameMeasurementType> types{};
+  return types;
+}
+
+}  // namespace megablock
