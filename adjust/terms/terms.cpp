@@ -14,6 +14,7 @@ const ObservationType& relative_pose_observations();
 const ObservationType& point_priors();
 const ObservationType& intrinsic_priors();
 const ObservationType& mount_priors();
+const ObservationType& distance_observations();
 
 namespace {
 
@@ -29,6 +30,7 @@ const Types& table() {
       &point_priors(),                // of control points
       &intrinsic_priors(),            // of cameras
       &mount_priors(),                // of mounts
+      &distance_observations(),       // of two frames
   };
   return types;
 }

@@ -30,6 +30,7 @@ enum class ObservationKind : std::uint8_t {
   kMount,       // prior values of mounts
   kLine,        // lines known to be vertical or horizontal
   kVertical,    // where images see down
+  kDistance,    // known distances of frames
 };
 
 // By ObservationKind.
@@ -53,6 +54,7 @@ inline constexpr ObservationKindRow kObservationKindTable[] = {
     {"mount, prior values", "mount"},
     {"lines of known direction", "line"},
     {"vertical in images", "vertical", true},
+    {"distance between frames", "distance"},
 };
 inline constexpr std::size_t kObservationKinds = std::size(kObservationKindTable);
 

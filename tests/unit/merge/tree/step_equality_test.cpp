@@ -22,6 +22,7 @@ struct StepCase {
   bool lines = false;
   bool verticals = false;
   bool camera_by_camera = false;  // the order of a track's observations
+  bool distances = false;
 };
 
 SimulationOptions aerial_steps() {
@@ -63,6 +64,7 @@ std::vector<StepCase> scenes() {
   relative.gps_share = 0.2;
   list.push_back({"StreetRelative", relative, cauchy});
   list.push_back({"StreetFreeMounts", street_steps(), {}, true});
+  list.push_back({"StreetDistances", street_steps(), cauchy, false, false, false, false, true});
   list.push_back({"StreetLines", street_steps(), cauchy, false, true});
   cauchy.vertical_loss = {RobustLoss::Kind::kCauchy, 2};
   list.push_back({"StreetVerticals", street_steps(), cauchy, true, false, true});
@@ -112,6 +114,12 @@ SimulatedBlock simulated(const StepCase& scene) {
     EXPECT_GT(sort_camera_by_camera(block), 100);
   }
   if (scene.lines) add_known_lines(block, 20, 1);
+  if (scene.distances)  // within tiles and across their borders, up to the root
+    for (std::int64_t f = 0; f + 30 < std::ssize(block.block.frames); f += 4) {
+      const FrameIndex from(f), to(f + 1 + f % 30);
+      const double truth = (block.truth.frames[to].centre - block.truth.frames[from].centre).norm();
+      block.block.frame_measurements["distances"].push_back({from, to, truth + 0.01, 0.02});
+    }
   if (scene.verticals)
     add_seen_verticals(block, {.noise_deg = 0.1, .wrong_share = 0.05, .by_radial = 0.02, .every = 2});
   if (scene.free_mounts)
