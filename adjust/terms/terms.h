@@ -7,7 +7,7 @@
 // adjust/lanes and merge/tile are made for them.
 //
 // To add a type (docs/developer/add-observation.md):
-//   1. write adjust/terms/NAME_terms.cpp: the mathematics at its head, a class derived from ObservationType, and a
+//   1. write a source file in adjust/terms: the mathematics at its head, a class derived from ObservationType, and a
 //      function that returns the one object of it;
 //   2. add one line to the table in terms.cpp;
 //   3. give it its kinds (name, word) in io/block/observation_statistics.h;

@@ -10,7 +10,7 @@
 #include "geometry/numbers/median.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
-#include "io/block/camera_priors.h"
+#include "io/project/inputs/camera_priors.h"
 
 namespace megablock {
 

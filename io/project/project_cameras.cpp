@@ -2,7 +2,7 @@
 #include <filesystem>
 
 #include "io/base/error.h"
-#include "io/block/camera_priors.h"
+#include "io/project/inputs/camera_priors.h"
 #include "io/project/project_sections.h"
 #include "io/text/settings_reader.h"
 

@@ -7,6 +7,7 @@
 #include "adjust/models/model_link.h"
 #include "adjust/orientation/steps/resection.h"
 #include "adjust/resection/rig_resection.h"
+#include "cluster/job/work_queue.h"
 #include "geometry/numbers/median.h"
 #include "tests/support/adjust/street_rig.h"
 

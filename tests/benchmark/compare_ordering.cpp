@@ -17,6 +17,7 @@
 #include "geometry/transform/rotation.h"
 #include "io/base/error.h"
 #include "io/project/project.h"
+#include "merge/tree/stopwatch.h"
 #include "partition/candidates/places.h"
 
 extern "C" void openblas_set_num_threads(int threads);

@@ -13,6 +13,7 @@
 #include <ctime>
 
 #include "cluster/process/process_memory.h"
+#include "io/block/registration.h"
 #include "partition/tiles/tiles.h"
 
 namespace {

@@ -15,6 +15,7 @@
 
 #include "cluster/process/process_memory.h"
 #include "io/base/hash.h"
+#include "match/tracks/match_order.h"
 #include "match/tracks/tracks.h"
 
 namespace {

@@ -8,7 +8,9 @@
 #include <numeric>
 
 #include "cluster/process/exit_codes.h"
+#include "cluster/stages/registration/registration.h"
 #include "io/base/error.h"
+#include "io/base/index.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/simulate/blocks/simulate.h"
 #include "tests/integration/block_folder.h"

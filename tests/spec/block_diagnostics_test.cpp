@@ -1,5 +1,5 @@
 // Acceptance of the block diagnostics (M57): AT-36.
-#include "partition/diagnostics/block_diagnostics.h"
+#include "io/block/block_diagnostics.h"
 
 #include <gtest/gtest.h>
 
@@ -9,6 +9,7 @@
 #include <set>
 
 #include "io/simulate/blocks/simulate.h"
+#include "partition/diagnostics/block_diagnostics.h"
 #include "partition/links/link_weights.h"
 #include "tests/spec/reached.h"
 

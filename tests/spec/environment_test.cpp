@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "cluster/job/messages.h"
 #include "geometry/camera/camera.h"
 #include "geometry/numbers/median.h"
 #include "io/base/error.h"

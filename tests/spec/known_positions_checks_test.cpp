@@ -8,6 +8,7 @@
 #include "adjust/checks/sanity_checks.h"
 #include "adjust/checks/subset_check.h"
 #include "io/base/error.h"
+#include "io/simulate/streets/street_scene.h"
 #include "known_positions_scene.h"
 #include "merge/tree/tile_solver.h"
 #include "reached.h"
@@ -108,7 +109,7 @@ std::unique_ptr<MergeInMemory> adjusted_alone(SingleTile& tile) {
   if (!solve_by_condensation(tile.problem, tile.state, {}).usable) return nullptr;
   auto runner =
       std::make_unique<MergeInMemory>(single_tile(tile.simulated.block).tree, std::vector<TileProblem>{tile.problem},
-                                     std::vector<TileState>{tile.state});
+                                      std::vector<TileState>{tile.state});
   adjust_exactly(*runner);
   runner->final_up();
   return runner;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "adjust/checks/common_motion.h"
+#include "cluster/stages/stages.h"
 #include "geometry/numbers/angles.h"
 #include "geometry/numbers/median.h"
 #include "known_positions_scene.h"

@@ -9,6 +9,7 @@
 #include "geometry/two_view/five_point.h"
 #include "geometry/two_view/relative_adjustment.h"
 #include "geometry/two_view/vertical_pair.h"
+#include "io/text/plausible.h"
 #include "reached.h"
 #include "tests/support/geometry/pair_scene.h"
 

@@ -15,6 +15,7 @@
 #include "geometry/two_view/pair_estimators.h"
 #include "geometry/vanishing/vanishing_circles.h"
 #include "geometry/vanishing/vanishing_points.h"
+#include "io/text/counted.h"
 #include "match/verification/two_view.h"
 #include "reached.h"
 #include "tests/support/geometry/linear_model.h"

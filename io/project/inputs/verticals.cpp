@@ -12,7 +12,7 @@
 #include "geometry/numbers/angles.h"
 #include "geometry/vanishing/vertical.h"
 #include "io/base/error.h"
-#include "io/block/camera_priors.h"
+#include "io/project/inputs/camera_priors.h"
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "io/base/name_table.h"
 #include "io/block/block.h"
 
 namespace megablock {

@@ -9,6 +9,7 @@
 #include "adjust/terms/linearise.h"
 #include "io/base/error.h"
 #include "merge/front/front.h"
+#include "merge/plan/unknowns.h"
 #include "merge/scratch/bytes.h"
 #include "merge/tile/cell_assembler.h"
 #include "merge/tile/condense.h"

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "adjust/calibration/block_sample.h"
 #include "adjust/calibration/camera_fit.h"
+#include "adjust/calibration/residual_structure.h"
 #include "io/base/error.h"
 #include "io/simulate/blocks/panorama.h"
 #include "io/simulate/blocks/simulate.h"

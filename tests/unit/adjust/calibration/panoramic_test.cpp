@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "adjust/calibration/panoramic_system.h"
 #include "io/base/error.h"
 #include "tests/support/adjust/panorama.h"
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <random>
 
+#include "adjust/models/shared_places.h"
 #include "adjust/models/similarity_equations.h"
 #include "io/base/error.h"
 #include "tests/support/adjust/model_grid.h"

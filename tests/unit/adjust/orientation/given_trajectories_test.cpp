@@ -9,6 +9,7 @@
 #include "adjust/tile/tile_adjustment.h"
 #include "geometry/numbers/angles.h"
 #include "geometry/transform/rotation.h"
+#include "io/simulate/streets/drive.h"
 
 namespace megablock {
 namespace {

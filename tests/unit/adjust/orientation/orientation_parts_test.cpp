@@ -5,6 +5,7 @@
 
 #include <set>
 
+#include "adjust/orientation/steps/orientation_options.h"
 #include "io/base/error.h"
 #include "tests/support/adjust/orientation_scene.h"
 #include "tests/support/adjust/seen_verticals.h"

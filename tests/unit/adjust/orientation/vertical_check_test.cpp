@@ -8,6 +8,7 @@
 #include <set>
 
 #include "geometry/numbers/angles.h"
+#include "io/block/set_aside_vertical.h"
 #include "tests/support/adjust/orientation_scene.h"
 #include "tests/support/adjust/seen_verticals.h"
 

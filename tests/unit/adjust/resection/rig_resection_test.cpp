@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "adjust/resection/rig_sights.h"
 #include "io/base/error.h"
 #include "tests/support/adjust/street_rig.h"
 

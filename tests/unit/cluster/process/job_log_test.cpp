@@ -7,6 +7,8 @@
 #include <regex>
 #include <thread>
 
+#include "cluster/commands/calibrate_command.h"
+#include "cluster/process/save_times.h"
 #include "io/base/error.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -6,6 +6,7 @@
 #include "adjust/terms/build_problem.h"
 #include "cluster/job/given_tracks.h"
 #include "cluster/stages/common/problem_hash.h"
+#include "cluster/stages/registration/frame_tracks.h"
 #include "io/simulate/blocks/simulate.h"
 #include "io/store/units/tracks_file.h"
 #include "tests/support/adjust/known_lines.h"

@@ -7,7 +7,10 @@
 #include <random>
 
 #include "adjust/orientation/vertical_check.h"
+#include "cluster/job/job.h"
 #include "cluster/stages/common/units.h"
+#include "cluster/stages/merge/merge_checkpoint.h"
+#include "cluster/terminal/option_checks.h"
 #include "io/store/units/features_file.h"
 #include "tests/support/adjust/seen_verticals.h"
 #include "tests/support/io/scratch_directory.h"

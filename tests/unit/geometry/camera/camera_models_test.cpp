@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "geometry/camera/intrinsics.h"
 #include "tests/support/geometry/camera_samples.h"
 
 namespace megablock {

@@ -11,6 +11,8 @@
 #include <random>
 #include <vector>
 
+#include "partition/views/views.h"
+
 namespace megablock {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/numbers/chi_square.h"
+#include "geometry/two_view/sampson.h"
 #include "tests/support/geometry/pair_scene.h"
 #include "tests/support/geometry/scene_pairs.h"
 

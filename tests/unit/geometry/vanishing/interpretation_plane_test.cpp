@@ -9,6 +9,7 @@
 
 #include "geometry/camera/camera.h"
 #include "geometry/numbers/angles.h"
+#include "geometry/vanishing/image_line.h"
 #include "tests/support/geometry/segment_scenes.h"
 
 namespace megablock {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/base/error.h"
+#include "io/block/residual_field.h"
 #include "io/evaluation/calibration_report.h"
 #include "io/project/project.h"
 #include "io/report/calibration_page.h"

@@ -9,6 +9,7 @@
 #include "geometry/numbers/angles.h"
 #include "io/base/error.h"
 #include "io/block/crs.h"
+#include "io/block/ground_change.h"
 #include "io/block/held_priors.h"
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/write.h"

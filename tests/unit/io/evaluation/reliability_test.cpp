@@ -10,6 +10,7 @@
 
 #include "geometry/numbers/student.h"
 #include "io/base/error.h"
+#include "io/report/sections/sections.h"
 
 namespace megablock {
 namespace {

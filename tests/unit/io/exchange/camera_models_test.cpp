@@ -1,6 +1,7 @@
 // Cameras of every model through files, project files, imports and exports.
 #include <gmock/gmock.h>
 
+#include "geometry/camera/projection.h"
 #include "io/base/error.h"
 #include "io/exchange/bal/bal_camera.h"
 #include "io/exchange/export.h"

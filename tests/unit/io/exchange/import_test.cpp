@@ -7,6 +7,7 @@
 #include "io/base/error.h"
 #include "io/exchange/export.h"
 #include "io/exchange/model/export_view.h"
+#include "io/exchange/model/imported_block.h"
 #include "io/project/project.h"
 #include "io/store/units/tracks_file.h"
 #include "tests/support/io/image_files.h"

@@ -13,6 +13,8 @@
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/write.h"
 #include "io/store/units/block_file.h"
+#include "io/text/csv_table.h"
+#include "io/text/yaml_reader.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/image_names.h"
 #include "tests/support/io/scratch_directory.h"

@@ -10,6 +10,8 @@
 
 #include "io/evaluation/figures.h"
 #include "io/report/drawing/html.h"
+#include "io/report/drawing/page.h"
+#include "io/text/number_reader.h"
 #include "tests/support/io/image_names.h"
 #include "tests/support/io/made_up_result.h"
 

@@ -10,6 +10,7 @@
 
 #include "io/base/error.h"
 #include "io/result/result.h"
+#include "io/store/hdf5/hdf5_tables.h"
 #include "io/store/units/block_file.h"
 #include "io/store/units/track_reader.h"
 #include "io/store/units/tracks_file.h"

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "io/base/error.h"
+#include "io/result/result_digest.h"
 #include "tests/support/io/example_block.h"
 #include "tests/support/io/same_bits.h"
 #include "tests/support/io/scratch_directory.h"

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "io/base/error.h"
+#include "io/text/stage_settings.h"
 
 namespace megablock {
 namespace {

@@ -18,6 +18,7 @@
 #include "io/base/error.h"
 #include "io/block/tracks.h"
 #include "io/images/picture_codec.h"
+#include "match/features/global_descriptor.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

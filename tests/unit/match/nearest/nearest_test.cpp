@@ -8,6 +8,7 @@
 #include <random>
 
 #include "io/base/error.h"
+#include "match/nearest/nearest_kernel.h"
 #include "match/pairs/pair_matching.h"
 
 namespace megablock {

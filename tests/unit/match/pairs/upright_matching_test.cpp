@@ -11,6 +11,7 @@
 #include "geometry/numbers/angles.h"
 #include "geometry/transform/rotation.h"
 #include "io/block/tracks.h"
+#include "match/tracks/matched_features.h"
 
 namespace megablock {
 namespace {

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "geometry/numbers/angles.h"
+#include "geometry/numbers/lane_vector.h"
 #include "geometry/transform/rotation.h"
 
 namespace megablock {

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "cluster/stages/merge/merge_tiles.h"
 #include "io/base/error.h"
 #include "merge/checks/monolithic.h"
 #include "tests/support/merge/tiled_block.h"

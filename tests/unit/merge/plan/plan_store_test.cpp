@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "merge/plan/tile_plan.h"
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/merge/damaged_scratch.h"
 #include "tests/support/merge/tiled_block.h"

@@ -8,6 +8,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "geometry/threads/workers.h"
+
 namespace megablock {
 namespace {
 

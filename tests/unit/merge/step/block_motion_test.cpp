@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "adjust/lanes/residual_squares.h"
 #include "adjust/lanes/tile_cost.h"
 #include "adjust/terms/linearise.h"
 #include "geometry/similarity/similarity.h"

@@ -3,7 +3,9 @@
 #include <ceres/covariance.h>
 #include <gtest/gtest.h>
 
+#include "adjust/lanes/lane_kernels.h"
 #include "adjust/tile/ceres_problem.h"
+#include "merge/tile/pair_blocks.h"
 #include "tests/support/merge/tiled_block.h"
 
 namespace megablock {

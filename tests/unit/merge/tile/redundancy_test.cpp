@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "geometry/numbers/decompositions.h"
+#include "io/block/observation_statistics.h"
 #include "merge/checks/monolithic.h"
 #include "tests/support/merge/tiled_block.h"
 

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 
+#include "merge/tree/pass_recorder.h"
+#include "merge/tree/tree_communicator.h"
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/merge/tiled_block.h"
 

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 
 #include "merge/tree/merge_in_memory.h"
+#include "merge/tree/node.h"
 #include "tests/support/merge/tiled_block.h"
 
 namespace megablock {

@@ -8,6 +8,7 @@
 
 #include "io/base/error.h"
 #include "merge/step/memory.h"
+#include "merge/tree/gather_by_tile.h"
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/merge/damaged_scratch.h"
 

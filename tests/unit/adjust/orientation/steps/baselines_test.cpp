@@ -5,6 +5,7 @@
 #include "adjust/orientation/steps/global_positioning.h"
 #include "adjust/orientation/steps/ground_alignment.h"
 #include "adjust/orientation/steps/resection.h"
+#include "adjust/orientation/steps/track_intersection.h"
 #include "tests/support/adjust/orientation_scene.h"
 
 namespace megablock {

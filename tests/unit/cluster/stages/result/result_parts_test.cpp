@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "cluster/stages/merge/merge_outcome.h"
+#include "cluster/stages/result/provenance.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {

@@ -5,6 +5,7 @@
 
 #include "io/report/drawing/drawing.h"
 #include "io/report/drawing/html.h"
+#include "io/report/drawing/plane.h"
 #include "io/report/report.h"
 #include "tests/support/io/made_up_result.h"
 

@@ -11,6 +11,7 @@
 #include "geometry/numbers/angles.h"
 #include "geometry/transform/rotation.h"
 #include "io/base/error.h"
+#include "io/simulate/pictures/texture.h"
 
 namespace megablock {
 namespace {

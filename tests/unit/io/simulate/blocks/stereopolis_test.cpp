@@ -13,7 +13,9 @@
 #include "io/project/project.h"
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/write_rendered.h"
+#include "io/simulate/scene/simulated_block.h"
 #include "io/simulate/scene/trajectory.h"
+#include "io/simulate/streets/bridge.h"
 #include "io/store/units/state_file.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -8,6 +8,7 @@
 #include "io/base/error.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/simulate/files/project_text.h"
 #include "io/simulate/files/write.h"
 #include "io/simulate/files/write_rendered.h"
 #include "io/store/units/block_file.h"

@@ -14,6 +14,9 @@
 #include "io/project/inputs/pose_csv.h"
 #include "io/project/project.h"
 #include "io/simulate/files/write_rendered.h"
+#include "io/simulate/pictures/city.h"
+#include "io/simulate/scene/scene.h"
+#include "io/simulate/scene/simulation_options.h"
 #include "io/store/units/state_file.h"
 #include "tests/support/io/scratch_directory.h"
 

@@ -9,6 +9,7 @@
 
 #include "cluster/stages/pipeline/features.h"
 #include "io/base/error.h"
+#include "io/block/features.h"
 #include "io/store/hdf5/hdf5_file.h"
 #include "io/store/units/adjustment_file.h"
 #include "io/store/units/features_file.h"

@@ -1,4 +1,4 @@
-#include "io/block/camera_priors.h"
+#include "io/project/inputs/camera_priors.h"
 
 namespace megablock {
 
