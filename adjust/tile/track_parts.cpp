@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::uint8_t kMostParts = 4;  // of a track, besides its own
 
-class PartFinder {
+class TrackPartFinder {
  public:
-  PartFinder(const TileProblem& problem, const TileState& state, double threshold, const AdjustOptions& options)
+  TrackPartFinder(const TileProblem& problem, const TileState& state, double threshold, const AdjustOptions& options)
       : problem_(problem),
         state_(state),
         threshold_(threshold),
@@ -94,7 +94,7 @@ TrackParts find_track_parts(const TileProblem& problem, const TileState& state, 
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
     if (problem.points[p].role == PointRole::kTie) rows = problem.begin[p + 1];
   TrackParts parts(static_cast<std::size_t>(rows), 0);
-  PartFinder finder(problem, state, threshold_sigmas, options);
+  TrackPartFinder finder(problem, state, threshold_sigmas, options);
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
     if (problem.points[p].role == PointRole::kTie && problem.active(p)) finder.find(p, parts);
   return parts;

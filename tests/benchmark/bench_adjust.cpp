@@ -6,7 +6,6 @@
 
 #include <limits>
 
-#include "adjust/lanes/lane_kernels_body.h"
 #include "adjust/terms/build_problem.h"
 #include "adjust/tile/tile_adjustment.h"
 #include "io/simulate/blocks/simulate.h"

@@ -42,7 +42,7 @@ TileAdjustment snapshot(const RankTile& tile) {
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
 // The layout that docs/reference/file-formats.md gives.
-static_assert(sizeof(MergePosition) == 224 && offsetof(MergePosition, tried_steps) == 4 &&
+static_assert(sizeof(MergePosition) == 232 && offsetof(MergePosition, tried_steps) == 4 &&
               offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
               offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88);
@@ -71,7 +71,8 @@ std::string MergeCheckpoint::folder(const MergePosition& position) const {
 
 std::uint64_t MergeCheckpoint::fingerprint(const std::string& folder) const {
   Hasher hasher;
-  hasher.add(inputs_).add(folder);
+  // With the size of the marker: a checkpoint of another layout does not count.
+  hasher.add(inputs_).add(folder).add(std::int64_t{sizeof(MergePosition)});
   return hasher.value();
 }
 

@@ -168,7 +168,7 @@ MergeCosts gather_costs(Job& job, const TileStore& tiles, const MergeTreeRunner&
   for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);
     const auto factors = reader.value<MemoryStatistics>();
-    const auto seconds = reader.value<PassSeconds>();
+    const auto seconds = reader.value<SweepSeconds>();
     all.peak_front_bytes = std::max(all.peak_front_bytes, reader.value<std::int64_t>());
     all.tiles += reader.value<std::int64_t>();
     all.tiles_in_scratch += reader.value<std::int64_t>();

@@ -11,7 +11,6 @@
 #include <random>
 
 #include "geometry/numbers/angles.h"
-#include "geometry/numbers/lane_vector.h"
 #include "geometry/transform/rotation.h"
 
 namespace megablock {

@@ -11,7 +11,6 @@
 #include "adjust/lanes/observation_lanes.h"
 #include "geometry/transform/rotation.h"
 #include "merge/tile/point_equations.h"
-#include "merge/tile/point_kernels_body.h"
 
 namespace megablock {
 namespace {
