@@ -97,6 +97,7 @@ CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& fea
           .store = store,
           .settings = {},
           .events = EventLog(store, 0),
+          .log = {},
           .block = block,
           .generations = {kImages},
           .records = {},

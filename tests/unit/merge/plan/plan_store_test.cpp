@@ -49,7 +49,11 @@ TEST_F(PlanStoreTest, EveryPlanComesBack) {
       EXPECT_EQ(store[t].points.size(), plans[t].cells.node_of_leaf.size());
       for (std::size_t cell = 0; cell < plans[t].points.size(); ++cell) {
         EXPECT_EQ(store[t].points[cell].rows(), plans[t].points[cell].rows());
-        EXPECT_EQ(store[t].positions[cell], plans[t].positions[cell]);
+        ASSERT_EQ(store[t].terms[cell].size(), plans[t].terms[cell].size());
+        for (std::size_t row = 0; row < plans[t].terms[cell].size(); ++row) {
+          EXPECT_EQ(store[t].terms[cell][row].type, plans[t].terms[cell][row].type);
+          EXPECT_EQ(store[t].terms[cell][row].row, plans[t].terms[cell][row].row);
+        }
       }
       EXPECT_EQ(store[t].unknowns, plans[t].unknowns);
       EXPECT_EQ(store[t].part_of_frame, plans[t].part_of_frame);
