@@ -1,6 +1,6 @@
-// Reads the result of a job: the poses of its images and how well they are known.
+// Reads the result of a job: the poses of its frames and how well they are known.
 //
-//   read_result JOB            poses of all oriented images with their standard deviations
+//   read_result JOB            poses of all oriented frames with their standard deviations
 //   read_result JOB --points   the tie points with their covariances instead
 //
 // Conventions. The ground frame is right-handed and in metres: east, north, up about the origin of the block. A pose
@@ -10,6 +10,7 @@
 #include <megablock/io/base/error.h>
 #include <megablock/io/result/result.h>
 
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <string>
@@ -20,22 +21,19 @@ using namespace megablock;
 
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 
-void print_images(const BlockResult& result) {
-  std::printf("image,x_m,y_m,z_m,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rotation_deg\n");
-  for (ImageIndex image(0); result.block.images.contains(image); ++image.value) {
-    const Image& entry = result.block.images[image];
-    if (!result.state.oriented[entry.frame]) continue;
-    // An image belongs to a frame, the pose of a whole rig; its mount is its camera's place in the rig.
-    const RigIndex rig = result.block.frames[entry.frame].rig;
-    const Pose& mount = result.state.mounts[rig][static_cast<std::size_t>(entry.mount)];
-    const Pose pose = camera_pose(result.state.frames[entry.frame], mount);
-    std::printf("%s,%.4f,%.4f,%.4f", result.block.name_of(image).c_str(), pose.centre.x(), pose.centre.y(),
+// A frame is one pose of a rig; the frame of a single camera is the pose of its image.
+void print_frames(const BlockResult& result) {
+  std::printf("frame,x_m,y_m,z_m,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rotation_deg\n");
+  for (FrameIndex frame(0); result.block.frames.contains(frame); ++frame.value) {
+    if (!result.state.oriented[frame]) continue;
+    const Pose& pose = result.state.frames[frame];
+    std::printf("%s,%.4f,%.4f,%.4f", result.block.frames[frame].name.c_str(), pose.centre.x(), pose.centre.y(),
                 pose.centre.z());
     if (result.frame_covariance.empty()) {
       std::printf(",,,,\n");  // the job was run without covariances
       continue;
     }
-    const BlockResult::Matrix6& covariance = result.frame_covariance[entry.frame];
+    const BlockResult::Matrix6& covariance = result.frame_covariance[frame];
     const Eigen::Matrix<double, 6, 1> sigma = covariance.diagonal().cwiseSqrt();
     std::printf(",%.4f,%.4f,%.4f,%.5f\n", sigma[3], sigma[4], sigma[5],
                 kDegrees * std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3));
@@ -64,7 +62,7 @@ int main(int argc, char** argv) {
   }
   try {
     const BlockResult result = read_result(std::string(argv[1]) + "/result/block.h5");
-    points ? print_points(result) : print_images(result);
+    points ? print_points(result) : print_frames(result);
   } catch (const Error& error) {
     std::fprintf(stderr, "read_result: %s\n", error.what());
     return 1;

@@ -28,10 +28,10 @@ def check(condition, what):
 
 
 def check_poses(rows, truth):
-    """Three coordinates of every image: their errors over their standard deviations."""
+    """Three coordinates of every frame: their errors over their standard deviations."""
     squares = []
     for row in rows:
-        expected = truth[row["image"]]
+        expected = truth[row["frame"]]
         for axis in "xyz":
             error = float(row[f"{axis}_m"]) - expected[axis]
             squares.append((error / float(row[f"sigma_{axis}_m"])) ** 2)
@@ -52,8 +52,9 @@ with tempfile.TemporaryDirectory() as name:
         cwd=tempfile.mkdtemp(dir=work))
     run("cmake", "--build", examples, "--parallel", "2")
     print(run(examples / "ransac_resection").strip())
+    print(run(examples / "merge_block").strip())
     rows = list(csv.DictReader(io.StringIO(run(examples / "read_result", work / "job"))))
-    check(len(rows) == 20, f"{len(rows)} images, not 20")
+    check(len(rows) == 20, f"{len(rows)} frames, not 20")
     with open(work / "block/truth.csv") as file:
         table = csv.DictReader(line for line in file if not line.startswith("#"))
         truth = {row["name"]: {axis: float(row[axis]) for axis in "xyz"} for row in table}
