@@ -1,7 +1,7 @@
 // Tail probabilities and quantiles of the chi-square distribution, for tests of variances and of squared residuals.
 //
 // With d degrees of freedom, P(X > s) = Q(d / 2, s / 2), where Q is the regularised upper incomplete gamma function
-// (Press et al., Numerical Recipes, section 6.2).
+// as Boost.Math computes it.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace megablock {
 // Returns the probability that a chi-square variable with `degrees` degrees of freedom (> 0) exceeds `statistic`.
 double chi_square_exceeds(double statistic, double degrees);
 
-// Returns the value that such a variable exceeds with this probability, 0 < probability < 1; relative error 1e-12.
+// Returns the value that such a variable exceeds with this probability, 0 < probability < 1.
 double chi_square_quantile(double probability, std::int64_t degrees);
 
 }  // namespace megablock

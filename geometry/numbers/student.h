@@ -2,8 +2,7 @@
 // single values.
 //
 // The normal tail is erfc(v / sqrt 2) / 2. With d degrees of freedom, Student's tail is I_x(d / 2, 1 / 2) / 2 at
-// x = d / (d + v^2), where I is the regularised incomplete beta function (Press et al., Numerical Recipes, section
-// 6.4).
+// x = d / (d + v^2), where I is the regularised incomplete beta function. Boost.Math computes both.
 #pragma once
 
 namespace megablock {
