@@ -41,6 +41,7 @@ void MergeInMemory::read_states() {
 
 DownReport MergeInMemory::down(const Pass& pass) {
   pass_ = pass;
+  steps_.clear();
   return runner_.down(pass);
 }
 
@@ -58,12 +59,11 @@ UpReport MergeInMemory::final_up() {
   return {posterior_.sums};
 }
 
-std::vector<TileStep> MergeInMemory::steps() const {
-  std::vector<TileStep> steps;
-  for (std::size_t t = 0; t < problems_.size(); ++t)
-    steps.push_back(solve_tile_down(problems_[t], tile_plans_[t], states_[t], pass_, TileFactor(),
-                                    unknown_steps_[t].restricted_to(tile_plans_[t].boundary), runner_.datum_of(t)));
-  return steps;
+const std::vector<TileStep>& MergeInMemory::steps() const {
+  for (std::size_t t = steps_.size(); t < problems_.size(); ++t)
+    steps_.push_back(solve_tile_down(problems_[t], tile_plans_[t], states_[t], pass_, TileFactor(),
+                                     unknown_steps_[t].restricted_to(tile_plans_[t].boundary), runner_.datum_of(t)));
+  return steps_;
 }
 
 }  // namespace megablock

@@ -37,7 +37,7 @@ class MergeInMemory : public TreeRunner {
   const BlockGauge& block_gauge() const { return runner_.gauge(); }  // of the last sweep up
   const MemoryStatistics& memory() const { return runner_.memory(); }
   // Of the last down(), points included, until accept().
-  std::vector<TileStep> steps() const;
+  const std::vector<TileStep>& steps() const;
 
  private:
   void read_states();
@@ -48,8 +48,9 @@ class MergeInMemory : public TreeRunner {
   std::vector<TileProblem> problems_;
   std::vector<TileState> states_;
   std::vector<TilePlan> tile_plans_;
-  Pass pass_ = 0;                    // of the last down()
-  std::vector<Step> unknown_steps_;  // [tiles] of the last down()
+  Pass pass_ = 0;                        // of the last down()
+  std::vector<Step> unknown_steps_;      // [tiles] of the last down()
+  mutable std::vector<TileStep> steps_;  // [tiles] with the points, once asked for
   MergeTreeRunner::Posterior posterior_;
   std::vector<TileCovariance> covariances_;
   GaugeReport gauge_;

@@ -37,6 +37,7 @@ SimulatedBlock block_with_all_types() {
       rig.mounts[m].rotation_sigma_rad = 0.01;
       rig.mounts[m].position_sigma_m = 0.05;
     }
+  for (Camera& camera : simulated.block.cameras) camera.prior_sigma[kFocal] = 5;
   for (const FrameMeasurementType& type : frame_measurement_types())
     for (std::int64_t f = 0; f + 7 < std::ssize(simulated.block.frames); f += 3)
       simulated.block.frame_measurements[type.key].push_back({FrameIndex(f), FrameIndex(f + 7), 20, 0.5});
