@@ -3,7 +3,7 @@
 //
 // Models of growing order are adjusted in turn to one set of observations with equal weights. Each trial adjusts poses,
 // points, free mounts and cameras in least squares without a robust loss. The observations are chosen before, with the
-// block's own models, so that no trial chooses its own data. All cameras of the block get the model of the trial, and
+// richest model, so that no trial chooses its own data. All cameras of the block get the model of the trial, and
 // the residuals of each camera are tested separately (residual_structure.h). Among the models without structure in the
 // residuals, the one with fewest parameters is recommended. The RMS cannot decide, because the largest model always has
 // the lowest.
