@@ -1,4 +1,4 @@
-// A connected part of a block, small enough to be adjusted many times.
+// Chooses a connected sample of a block that is small enough to be adjusted many times.
 #pragma once
 
 #include "io/block/block.h"
@@ -18,8 +18,8 @@ struct BlockSample {
   std::int64_t frames = 0, images = 0;
 };
 
-// Grown from the oriented frame with most observations, always by the frame that shares most tracks with those taken
-// (ties: the lower index). Throws InputError when no two oriented frames share tracks.
+// Grows the sample from the oriented frame with most observations, each time by the frame that shares most tracks with
+// the sample (of equal ones that with the lower index). Throws InputError when no two oriented frames share tracks.
 BlockSample sample_block(const Block& block, const BlockState& state, const TrackSet& tracks,
                          const BlockSampleOptions& options);
 

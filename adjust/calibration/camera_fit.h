@@ -1,6 +1,6 @@
-// A camera of one model as another model says it: the parameters of `model` under which the rays of a grid of pixels
-// of the given camera have these pixels, in least squares (Gauss-Newton, damped). Good start values when models are
-// compared, and the way to bring a calibration into a program that knows other models.
+// Converts a camera to another camera model. It fits the parameters of the new model, in least squares, so that it
+// projects the rays of a grid of pixels of the given camera to the same pixels (damped Gauss-Newton). The result gives
+// start values for the comparison of models and takes a calibration to a program that knows other models.
 #pragma once
 
 #include "geometry/camera/camera.h"
@@ -9,7 +9,7 @@ namespace megablock {
 
 struct CameraFit {
   Intrinsics camera;
-  double rms_px = 0;  // length of what is left, over the grid
+  double rms_px = 0;  // of the lengths of the residuals over the grid
 };
 
 // `free`: parameters that are fitted (those fixed by the model never are); others keep the values of start_intrinsics()

@@ -1,13 +1,13 @@
-// Prior sigmas that keep parameters from running away which the images do not determine, and that say nothing about
-// those that they do.
+// Gives prior sigmas of camera parameters. They are large enough not to affect parameters that the images determine,
+// and small enough to hold those that they do not.
 #pragma once
 
 #include "geometry/camera/intrinsics.h"
 
 namespace megablock {
 
-// Ten times weak_sigmas(); terms of radial corrections are loose at the corner of the image, however long the lens
-// (there a correction of 2 half diagonals). Focal length: none (0, as for fixed parameters).
+// Ten times weak_sigmas(). The sigma of a radial term is a correction of 2 half diagonals at the corner of the image,
+// whatever the focal length. The focal length has no prior (0, as for fixed parameters).
 IntrinsicSigmas loose_sigmas(const Intrinsics& start, int width, int height);
 
 }  // namespace megablock

@@ -92,7 +92,7 @@ class Comparer {
   }
 
  private:
-  // The block's own models, wrong measurements screened out.
+  // Adjusts a sample of the block with its own camera models and screens out outliers.
   void prepare(const BlockState& state, const TrackSet& tracks) {
     const BlockSample sample = sample_block(block_, state, tracks, options_.sample);
     WholeBlock whole = adjust_whole(block_, sample.state, sample.tracks, options_.adjustment);
@@ -107,8 +107,8 @@ class Comparer {
 
   const Camera& camera(std::size_t row) const { return block_.cameras[problem_.cameras[row]]; }
 
-  // The problem with every camera of the candidate's model, weakly held where nothing else determines it, and the state
-  // with these cameras as near to the given ones as they come.
+  // Returns the problem with all cameras of the candidate's model and weak priors for their parameters. `state` gets
+  // cameras of this model that are fitted to the given ones.
   TileProblem problem_of(const ModelCandidate& candidate, TileState& state) const {
     TileProblem problem = problem_;
     problem.intrinsic_priors.clear();
@@ -141,7 +141,7 @@ class Comparer {
     given_ = state.cameras;
   }
 
-  // Whether every measurement that takes part has a finite residual.
+  // Whether every kept observation has a finite residual.
   static bool projectable(const TileProblem& problem, const TileState& state) {
     for (std::int64_t p = 0; p < problem.point_count(); ++p) {
       if (!problem.active(p)) continue;

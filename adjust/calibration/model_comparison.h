@@ -1,12 +1,12 @@
-// Which camera model the images ask for (Cannelle 2013, 2.2: "the right one is the smallest whose residual field has no
-// structure").
+// Recommends a camera model for the images of a block (Cannelle 2013, 2.2: "the right one is the smallest whose
+// residual field has no structure").
 //
-// One block, one set of measurements, one weight for all of them; models of growing order in turn, each with poses,
-// points, free mounts and cameras adjusted in least squares without any robust loss. Which measurements take part is
-// settled before, with the richest model, so that no model chooses its own data. Every camera of the block gets the
-// model of the trial, and its residuals a test of their own (residual_structure.h). Of the models that leave a field
-// without structure the one with fewest parameters is recommended; the lowest RMS is always that of the largest model
-// and says nothing.
+// Models of growing order are adjusted in turn to one set of observations with equal weights. Each trial adjusts poses,
+// points, free mounts and cameras in least squares without a robust loss. The observations are chosen before, with the
+// richest model, so that no trial chooses its own data. All cameras of the block get the model of the trial, and
+// the residuals of each camera are tested separately (residual_structure.h). Among the models without structure in the
+// residuals, the one with fewest parameters is recommended. The RMS cannot decide, because the largest model always has
+// the lowest.
 #pragma once
 
 #include <string>

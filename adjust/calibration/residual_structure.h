@@ -1,5 +1,5 @@
-// Whether the residuals of a camera, seen over its sensor, have structure: what a lens does that the model does not
-// say.
+// Tests whether the residuals of a camera have structure over its sensor, that is, whether the lens distorts in a way
+// that the camera model does not describe.
 //
 // The sensor is cut into C cells. With n_c residuals in cell c, their mean r_c, and sigma^2 the scatter about the
 // cells' own means, pooled over all cells (2 (n - C) degrees of freedom; structure finer than a cell goes there),
@@ -35,7 +35,8 @@ struct ResidualStructure {
   double structure_px = 0;            // root mean square of the structure, length of the vectors; 0: none shows
 };
 
-// `parameters`: of the camera that were estimated from these residuals. width, height: of the sensor, px.
+// `parameters` is the number of camera parameters that were estimated from these residuals. width, height: of the
+// sensor, px.
 ResidualStructure residual_structure(const std::vector<ResidualAtPixel>& residuals, int width, int height,
                                      int parameters);
 

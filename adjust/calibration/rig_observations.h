@@ -1,5 +1,5 @@
-// Calibration of a rig (CN-05 to CN-08): which observations and unknowns of a block take part, and how well a rig with
-// given mounts and cameras fits.
+// Prepares the calibration of a rig (Cannelle 2013): it chooses the observations and unknowns of a block that take
+// part, and tells how well a rig with given mounts and cameras fits.
 //
 // A calibration is the adjustment of one block whose mounts are free: with surveyed targets (off-line), from tie points
 // alone (on-line, a free network), or with all that the project gives.

@@ -1,4 +1,4 @@
-// Degeneracy of frames whose positions are known: what of their attitudes comes from the attitude priors alone.
+// Finds the part of the attitudes that comes from the attitude priors alone, in blocks with known positions.
 //
 // Let the ground move by a similarity m = (phi, t, s) about a centre c (rotation, shift L t, scale 1 + s; L a length of
 // the block), and every frame answer as it fits best. The information on m is then, summed over the frames f,
@@ -27,7 +27,7 @@
 
 namespace megablock {
 
-// What similarities of the ground are about: the same for all tiles of a connected part of the block.
+// Centre and length unit of the similarities, the same for all tiles of a connected part of the block.
 struct MotionReference {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // mean of the positions, ground frame, m
   double length = 1;                                 // their rms distance from it, m
@@ -62,7 +62,7 @@ struct MotionVerdict {
 };
 MotionVerdict judge(const CommonMotion& motion, const MotionReference& reference);
 
-// What the report says, a line per case; empty when sound.
+// The lines of the report, one per case; empty when sound.
 std::vector<std::string> describe(const MotionVerdict& verdict);
 
 }  // namespace megablock

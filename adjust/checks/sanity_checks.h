@@ -1,5 +1,5 @@
-// What must hold of a solved block that nothing was told of (KP-17): the images of one overpass stand on a line at even
-// distances; a scene known to be flat lies on one level.
+// Checks a solved block against facts that the adjustment did not use (Barrier and Martin): the images of one overpass
+// lie on a line at even distances, and a scene known to be flat lies on one level.
 #pragma once
 
 #include <Eigen/Core>

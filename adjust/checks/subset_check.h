@@ -1,9 +1,10 @@
-// Reliability of an adjustment without ground truth: the same frames from disjoint subsets of the points (KP-14).
+// Tells the reliability of an adjustment without ground truth, by adjusting the same frames with disjoint subsets of
+// the points (Barrier and Martin).
 //
-// Every subset is adjusted by itself, with the priors and control points that all of them share; one reference point is
-// in all. What the subsets do not share, the noise of their measurements, shows in how far their results lie apart.
-// What they do share does not: where attitude priors alone tell of a common rotation, subsets agree to a tenth of their
-// error. So the sigma of that (common_motion.h) is given beside the spread.
+// Each subset is adjusted by itself, with the priors and control points that all subsets share. One reference point is
+// in all subsets. The spread of the results shows the noise of the observations, which the subsets do not share. It
+// does not show errors that they share: where only attitude priors determine a common rotation, subsets agree to a
+// tenth of their error. The sigma of this rotation (common_motion.h) is therefore given beside the spread.
 #pragma once
 
 #include "adjust/checks/common_motion.h"

@@ -1,5 +1,5 @@
-// Angles and image coordinates from the coplanarity of rays alone, positions known: the determinant method of Barrier
-// and Martin, "Bundle adjustment with known positions" (KP-03 to KP-10). No ground points among the unknowns.
+// Adjusts angles and image coordinates by the coplanarity of rays alone, with known positions and without ground
+// points: the determinant method of Barrier and Martin, "Bundle adjustment with known positions".
 //
 // For every point and every pair of the cameras that see it F = det(d_1 | d_2 | C_2 - C_1) = 0 (coplanarity.h). With
 // A = dF/d(angles), B = dF/d(image coordinates) a step solves, in least squares,
@@ -54,8 +54,9 @@ struct CoplanarityOptions {
   void check() const;  // throws InputError
 };
 
-// What the equations determine, at the rays brought together (so that noise makes no ranks), images and angles as far
-// as they are free. Points whose rays do not meet in front of their cameras are left out.
+// Rank and condition of the equations of the free angles and image coordinates. They are evaluated at rays that were
+// made to meet, because noise would raise the ranks. Points whose rays do not meet in front of their cameras are left
+// out.
 struct CoplanarityDiagnosis {
   std::int64_t rows = 0, columns = 0, rank = 0;  // of (A B)
   std::int64_t image_rank = 0;                   // of B

@@ -1,4 +1,5 @@
-// A block as the determinant method wants it (coplanarity_adjustment.h): single cameras of one focal length.
+// Converts a block to the network of the determinant method (coplanarity_adjustment.h): single cameras of one focal
+// length.
 //
 // Positions are those observed, else those the frames start with; they are held. Angles start at the observed
 // attitudes, else at those the frames start with. Measurements become x f / z, y f / z of their viewing rays, which

@@ -1,15 +1,15 @@
-// Projection and linearisation of observations in lanes (observation_lanes.h): the loops themselves, by raw pointers.
+// Declares the inner loops that project and linearise observations in lanes (observation_lanes.h), on raw pointers.
 #pragma once
 
 #include <cstdint>
 
 namespace megablock::lane_kernels {
 
-// Lanes are worked on in groups: counts are multiples of it.
+// The kernels work on groups of lanes; counts are multiples of this.
 constexpr std::int64_t kGroup = 8;
 constexpr std::int64_t padded(std::int64_t count) { return (count + kGroup - 1) / kGroup * kGroup; }
 
-// What a lane is made of.
+// Numbers of doubles that describe the image and the observation of a lane.
 constexpr int kViewSize = 24;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [8], unused
 constexpr int kRecordSize = 8;  // point [3], measured x and y [2], inverse sigma, unused [2]
 

@@ -1,7 +1,7 @@
-// Image observations side by side ("lanes"), projected or linearised several at once by the widest vectors that the
-// processor has; the bits are the same for all widths. Formulas: linearise.h.
+// Projects or linearises many image observations at once. The observations lie side by side in lanes, and the kernels
+// use the widest vectors of the processor. The bits are the same for all widths. The formulas are those of linearise.h.
 //
-// Cameras of Brown's model alone (LaneView::simple); what others see is for their owner to write over what stands in
+// The kernels know Brown's camera model only (LaneView::simple). For other cameras the caller overwrites the values of
 // the lane (linearise_in_camera).
 #pragma once
 
@@ -49,7 +49,7 @@ class AlignedValues {
 
 class ObservationLanes {
  public:
-  // As many as stay in the nearest cache, with what is made of them.
+  // Number of lanes that fit into the first-level cache together with their values.
   static constexpr std::int64_t kUsual = 64;
   // Takes `kernels` instead of the widest for tests.
   explicit ObservationLanes(const lane_kernels::Kernels& kernels = lane_kernels_of_processor()) : kernels_(&kernels) {}

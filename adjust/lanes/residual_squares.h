@@ -1,4 +1,5 @@
-// Squared residuals |r|^2 of image observations, divided by their variances, many at once (observation_lanes.h).
+// Gives the squared residuals |r|^2 of image observations, divided by their variances, many at once
+// (observation_lanes.h).
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The cost of a tile at a state: half the sum of the robust losses of all its residuals.
+// Gives the cost of a tile at a state: half the sum of the robust losses of all its residuals.
 //
 // Robust weighting as Ceres (corrector): residual and Jacobian are scaled by sqrt(rho'); the second-order term is
 // applied where rho'' > 0 and dropped where rho'' <= 0 (always, for the losses here).
@@ -11,7 +11,7 @@ namespace megablock {
 // Total cost F = 1/2 sum rho(|r|^2) over everything in the problem; infinity when a kept observation is behind a
 // camera (cannot be projected).
 double evaluate_cost(const TileProblem& problem, const TileState& state);
-// Of everything but the image observations.
+// The cost of everything but the image observations.
 double other_cost(const TileProblem& problem, const TileState& state);
 
 }  // namespace megablock

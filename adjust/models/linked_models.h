@@ -1,14 +1,14 @@
-// Models by their numbers, what they share and the links between them; from the links alone, a start for their joint
-// adjustment (M51).
+// Links independent models by the points and images that they share, and gives a start for their joint adjustment
+// (Kalantari 2009, chapter 9: sub-blocks joined by similarities).
 //
-// Links and trust: a robust similarity between every two models that share points or images (model_link.h), and its
-// agreeing points times the share of the link's triangles that close within their covariances. The spanning tree of
-// the most trusted links is the first start; this is chaining, and its errors add up. Averaging brings all links
-// together, in least squares with their covariances P^-1: of a link b -> a, and steps xi of its models,
+// Every two models that share points or images get a robust similarity (model_link.h). The trust in a link is its
+// number of inliers times the share of its triangles that close within their covariances. The spanning tree of the most
+// trusted links gives the first similarities; its errors add up along the tree. Averaging then uses all links together,
+// in least squares with their covariances P^-1. For a link b -> a and the steps xi of its models,
 //
 //     e = Log(S_ba^-1 S_a^-1 S_b),     e -> e + xi_b - T xi_a  (T: a's frame -> b's),     sum w(e) e' P e = min
 //
-// with weights w = (1 + e' P e / c)^-2 that forget what contradicts (Geman-McClure), their width c following the median
+// with the weights w = (1 + e' P e / c)^-2 of Geman and McClure against outliers. Their width c follows the median
 // misfit.
 #pragma once
 
@@ -32,23 +32,23 @@ struct LinkedModels {
 
   // One for each reference.
   std::vector<std::uint8_t> held() const;
-  // By the solution of these equations; the longest step of a model in the metric of its own equations. Throws
-  // ComputeError for steps that are not finite.
+  // Moves the models by the solution of these equations. Returns the longest step of a model in the metric of its own
+  // equations. Throws ComputeError for steps that are not finite.
   double move(const SimilarityEquations& equations);
-  // What hangs together by links that are kept becomes a part in the frame of its lowest model; places of several
-  // parts are split. The models of a part stay as they are to one another.
+  // Makes the models that kept links connect a part, in the frame of its lowest model, and splits shared points and
+  // images that lie in several parts. The models of a part keep their places relative to one another.
   void find_parts();
 };
 
-// Linked, and chained along the most trusted links; models that nothing links are parts of their own. Throws InputError
-// for numbers that are not finite, sigmas that are not positive, numbers given twice.
+// Links the models and chains them along the most trusted links. A model without links is a part of its own. Throws
+// InputError for values that are not finite, sigmas that are not positive, and numbers given twice.
 LinkedModels link_models(const std::vector<Model>& models, const LinkOptions& options);
 
 // Averages the similarities over all links from where they are, drops the links that contradict the result, and finds
 // the parts anew. Throws ComputeError where the links do not determine the similarities.
 void average_links(LinkedModels& linked, const LinkOptions& options);
 
-// How many times larger than their sigmas say squares of these degrees of freedom are, by their median; at least 1.
+// The factor by which squares of these degrees of freedom exceed their expectation, by their median; at least 1.
 double inflation(const std::vector<double>& squares, int degrees);
 
 }  // namespace megablock

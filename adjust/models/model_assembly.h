@@ -1,12 +1,12 @@
-// Block adjustment of independent models: pairs, sub-blocks or tiles, each in a frame of its own, joined by one
-// similarity each (M51, M52).
+// Joins independent models (pairs, sub-blocks or tiles, each in a frame of its own) to one block by one similarity
+// each: the block adjustment of independent models (Kalantari 2009, chapter 9).
 //
-// A start from the links between models: chained along the most trusted, then all together (linked_models.h). From it
-// all shared points and images together (place_adjustment.h).
+// The links between models give a start, first chained along the most trusted ones and then averaged (linked_models.h).
+// All shared points and images are then adjusted together (place_adjustment.h).
 //
-// The frame is that of the model with the lowest number in each part that hangs together; its similarity is the
-// identity. Models, points and images are taken in the order of their numbers: the result has the same bits in whatever
-// order they come.
+// The frame of each connected part is that of its model with the lowest number, whose similarity is the identity.
+// Models, points and images are taken in the order of their numbers, so that the result has the same bits in any order
+// of input.
 #pragma once
 
 #include "adjust/models/model_link.h"

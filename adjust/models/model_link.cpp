@@ -109,8 +109,8 @@ class LinkEstimator {
     return result;
   }
 
-  // By how much the variances of places and of attitudes are larger than their sigmas say, each by its own median over
-  // what agrees. Of its equations seven go into the similarity.
+  // Sets the factors by which the variances of positions and attitudes exceed the given ones, from the medians over the
+  // inliers. Seven of their equations determine the similarity, so the expected median is smaller by that share.
   void take_factors(const Similarity& s, const std::vector<std::uint8_t>& agrees) {
     const auto of_place = by_places_.squared_residuals(s);
     std::vector<double> places, turns;
@@ -124,7 +124,7 @@ class LinkEstimator {
     turn_factor_ = std::max(1.0, middle_of(std::move(turns)) / typical);
   }
 
-  // Least squares over what agrees.
+  // Least squares over the inliers.
   bool adjust(const std::vector<std::uint8_t>& agrees, int max_iterations, Similarity& s,
               SimilarityCovariance& information) const {
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -145,7 +145,7 @@ class LinkEstimator {
         information.topLeftCorner<3, 3>().diagonal().array() += trust;
         right.head<3>() += trust * rotation_log<double>(s.rotation.conjugate() * of_image->rotation);
       }
-      // Unit diagonal, so that what the points leave open shows.
+      // The diagonal is scaled to one, so that small pivots show which components the points leave open.
       const SimilarityStep size = information.diagonal().cwiseSqrt();
       if (!(size.minCoeff() > 0) || !size.allFinite()) return false;
       const SimilarityCovariance scaled =

@@ -1,4 +1,5 @@
-// Two models of one block and the similarity between them: what they share, and a robust fit of it (M50).
+// Gives the similarity between two models of one block by a robust fit to the points and images that they share
+// (Kalantari 2009, chapter 9: similarity from three points).
 //
 // A model is a set of points and images in a frame of its own, free in place, attitude and scale. Steps of a similarity
 // S (model -> common frame) are taken in the model's own frame and units, xi = (w, q, d):
@@ -10,9 +11,9 @@
 // point or projection centre S^-1 x_a - x_b, variance sigma_b^2 + sigma_a^2 / s^2; of an image's attitude
 // Log(R' Q_a' Q_b), variances added.
 //
-// The start is the best of samples of three points or centres (minimal_similarity.h) and of one image's attitude with
-// the distance of two places, by the sum of squares truncated at a threshold; it is improved by least squares over what
-// agrees until that does not change. Draws depend on the numbers of the two models alone.
+// The start is the best of samples, by the sum of squares truncated at a threshold. A sample is three points or centres
+// (minimal_similarity.h), or one image's attitude with the distance of two of them. Least squares over the inliers
+// improve it until the inliers no longer change. The draws depend on the numbers of the two models alone.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +41,7 @@ struct Model {
   std::vector<ModelImage> images;
 };
 
-// What two models have in common: rows of their points and of their images.
+// The points and images that two models share, by their rows in both.
 struct SharedRows {
   std::vector<std::pair<std::int32_t, std::int32_t>> points, images;
 };
@@ -58,26 +59,26 @@ struct LinkOptions {
   int min_redundancy = 8;               // equations that agree (3 a point, 6 an image) less 7; of three places at least
   double min_share = 0.25;              // agreeing of shared points and images
   int max_samples = 500;
-  // Sigmas of places and of attitudes are each known up to a factor, which each link takes from their median misfit
-  // over what agrees (at least 1): for models of which only the order of their errors is known. What agrees is then
-  // found a contrario (geometry/estimation/ransac.h), or, where that is too few, as the better of samples of which most
+  // Set this when only the order of magnitude of the models' errors is known. The sigmas of positions and of attitudes
+  // are then each scaled by a factor of at least 1 that each link takes from the median misfit of its inliers. The
+  // inliers are found a contrario (geometry/estimation/ransac.h) or, if these are too few, by the samples of which most
   // places agree.
   bool scale_sigmas = false;
   void check() const;  // throws InputError
 };
 
-// Empty where too little agrees, or leaves the similarity open. `shared` ascending, so that the result does not depend
-// on the order of what the models hold.
+// Fits the link b -> a. Empty where the inliers are too few or do not determine the similarity. `shared` is ascending,
+// so that the result does not depend on the order of the points and images in the models.
 std::optional<ModelLink> fit_model_link(const std::vector<Model>& models, std::int32_t a, std::int32_t b,
                                         const SharedRows& shared, const LinkOptions& options);
 
-// S E(xi).
+// Returns S E(xi).
 Similarity move_in_model(const Similarity& similarity, const SimilarityStep& xi);
 
-// The xi for which S is E(xi), for S near the identity.
+// Returns the xi with S = E(xi), for S near the identity.
 SimilarityStep step_of(const Similarity& near_identity);
 
-// d(S^-1 X)/dxi at z = S^-1 X.
+// Returns d(S^-1 X)/dxi at z = S^-1 X.
 Eigen::Matrix<double, 3, 7> by_model_step(const Eigen::Vector3d& z);
 
 }  // namespace megablock

@@ -77,7 +77,7 @@ class PlaceEquations {
     return rotation_log<double>(e.rotation.conjugate() * rotation * linked_.similarity[nth(e.model)].rotation);
   }
 
-  // Squares of the misfit of an entry over their expectation were the similarities known.
+  // The squared misfits of an entry, relative to their expectation if the similarities were known.
   struct Misfit {
     double place = 0, turn = 0;
   };
@@ -108,7 +108,7 @@ class PlaceEquations {
     return {good * inflation(all_places, 3), good * inflation(turns, 3)};
   }
 
-  // Tests every entry anew; how many changed.
+  // Tests every entry anew and returns how many changed.
   std::int64_t screen() {
     const Misfit limit = limits();
     std::int64_t changed = 0;
@@ -138,7 +138,7 @@ class PlaceEquations {
     return std::any_of(place.entries.begin(), place.entries.end(), [](const auto& e) { return e.kept; });
   }
 
-  // Where they leave similarities open, of fewer models.
+  // Factorises the equations. Where they leave similarities open, models are taken apart until they do not.
   void factorise(SimilarityEquations& equations) {
     linearise(equations);
     for (std::int32_t open; (open = equations.factorise()) >= 0;) {
@@ -148,7 +148,8 @@ class PlaceEquations {
     }
   }
 
-  // By the equations that two models still have in common; where that joins them all, the open model goes alone.
+  // Breaks the links between models that fewer than seven common equations per pair connect. If there are none, the
+  // open model loses all its links.
   void take_apart(std::int32_t open) {
     std::map<std::pair<std::int32_t, std::int32_t>, int> common;
     for (const SharedPlace& place : linked_.places)
@@ -170,7 +171,7 @@ class PlaceEquations {
     linked_.find_parts();
   }
 
-  // Of each part as it was linked the largest piece is the part, all others are lost to it.
+  // The largest piece of a part stands for the part; the models of the other pieces are lost.
   void find_lost(const std::vector<std::int32_t>& as_linked) {
     std::map<std::int32_t, std::map<std::int32_t, int>> pieces;
     for (std::size_t m = 0; m < as_linked.size(); ++m) ++pieces[as_linked[m]][linked_.reference[m]];

@@ -1,14 +1,17 @@
-// Joint adjustment of linked models by the places, points and images, that they share (M52).
+// Adjusts the similarities of linked models together, by the points and images that they share (Kalantari 2009, chapter
+// 9: block adjustment of independent models).
 //
-// With S_m (model -> common frame), x_mi point i in model m, X_i its place and A_j, Q_mj attitudes of image j,
+// With S_m (model -> common frame), x_mi the point or projection centre i in model m, X_i its position in the common
+// frame, and A_j, Q_mj the attitudes of image j in the common frame and in model m, it minimises
 //
 //     sum |S_m^-1 X_i - x_mi|^2 / sigma_mi^2  +  sum |Log(Q_mj' A_j R_m)|^2 / rho_mj^2
 //
-// in units of each model, so that no scale shrinks. X and A are eliminated: with errors alike on all axes their normal
-// matrices are multiples of the unit matrix, and X_i is the mean of S_m x_mi with weights 1/(s_m sigma_mi)^2. What is
-// left, seven unknowns a model, is solved by sparse Cholesky factorisation. Points and images are tested in every round
-// of the first half, both ways, and the worst of a place is left out first. What is then no longer held together is
-// taken apart, and the rest goes on without it.
+// The residuals are in units of each model, because residuals in the common frame would shrink with the scales. X and A
+// are eliminated. Their errors are equal on all axes, so their normal matrices are multiples of the unit matrix, and
+// X_i is the mean of S_m x_mi with weights 1/(s_m sigma_mi)^2. The seven unknowns of each model remain and are solved
+// by sparse Cholesky factorisation. Points and images are tested in the first half of the iterations, and may come
+// back; the worst entry of a point or image is left out first. Models that are then no longer held together are taken
+// apart.
 #pragma once
 
 #include "adjust/models/linked_models.h"
@@ -30,8 +33,8 @@ struct PlaceAdjustment {
   bool converged = true;  // false: ended by max_iterations
 };
 
-// Moves the similarities; what is left out is marked at the entries of the places, and at the links of what was taken
-// apart. Throws ComputeError when it diverges.
+// Moves the similarities of `linked`. It marks outliers at the entries of the places, and the broken links of models
+// that were taken apart. Throws ComputeError when it diverges.
 PlaceAdjustment adjust_places(LinkedModels& linked, const PlaceAdjustmentOptions& options);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// What models share: points and images that two of them or more hold.
+// Lists the points and images that two or more models hold, and checks the models.
 #pragma once
 
 #include <fmt/core.h>
@@ -14,7 +14,7 @@
 
 namespace megablock {
 
-// A point or an image and where it is in the models that hold it.
+// A point or an image, with its position in each of the models that hold it.
 struct SharedPlace {
   struct Entry {
     std::int32_t model, row;  // row of the model's points or images

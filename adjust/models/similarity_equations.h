@@ -1,5 +1,5 @@
-// Normal equations of an adjustment of similarities, one of seven unknowns (SimilarityStep) for each model, solved by
-// sparse Cholesky factorisation.
+// Holds and solves the normal equations of an adjustment of similarities. Each model has seven unknowns
+// (SimilarityStep). The factorisation is a sparse Cholesky factorisation and also gives the covariance of each model.
 #pragma once
 
 #include <Eigen/SparseCholesky>
@@ -18,7 +18,7 @@ using Block7 = SimilarityCovariance;
 
 inline std::size_t nth(std::int32_t i) { return static_cast<std::size_t>(i); }
 
-// Normal equations of seven unknowns a model; those of held models are left out.
+// The equations hold no unknowns for held models.
 class SimilarityEquations {
  public:
   explicit SimilarityEquations(const std::vector<std::uint8_t>& held) { hold(held); }
@@ -42,7 +42,7 @@ class SimilarityEquations {
   }
   void add(std::int32_t m, const SimilarityStep& right) { right_[nth(m)] += right; }
 
-  // The model at which it ends where the similarities are not determined, -1 where they are.
+  // Returns -1, or the model at which the factorisation meets a similarity that is not determined.
   std::int32_t factorise() {
     if (rows_ == 0) return -1;
     std::vector<Eigen::Triplet<double>> entries;
@@ -81,8 +81,8 @@ class SimilarityEquations {
     const auto found = blocks_.find({row_[nth(m)], row_[nth(m)]});
     return found == blocks_.end() ? 0 : std::sqrt(std::max(0.0, step.dot(found->second * step)));
   }
-  // Of all models, zero for held ones: the blocks of the inverse on its diagonal, from those entries alone that the
-  // factor has (K. Takahashi, J. Fagan, M.-S. Chin, "Formation of a sparse bus impedance matrix", 1973). After
+  // The diagonal blocks of the inverse, zero for held models. They need only the entries of the inverse where the
+  // factor has entries (K. Takahashi, J. Fagan, M.-S. Chin, "Formation of a sparse bus impedance matrix", 1973). After
   // factorise().
   std::vector<Block7> covariances() const {
     std::vector<Block7> result(row_.size(), Block7::Zero());

@@ -53,7 +53,7 @@ IndexedVector<FrameIndex, Neighbours> neighbours_of(const Block& block, const Bl
   return neighbours;
 }
 
-// From this frame on, away from the side that has no neighbour, or once around.
+// The trajectory from its end `first` to the other end, or once around a ring that contains `first`.
 Trajectory follow(const Block& block, const IndexedVector<FrameIndex, Neighbours>& neighbours, FrameIndex first) {
   Trajectory trajectory;
   trajectory.frames.push_back(first);
@@ -89,7 +89,7 @@ class TrajectoryAdjuster {
   bool observed() const {
     return std::ranges::any_of(trajectory_.frames, [&](FrameIndex f) { return position(f) || attitude(f); });
   }
-  // The worst of the kinds.
+  // The mean square of the kind of observation that agrees worst.
   double mean_square() const {
     Agreement of_position, of_attitude, of_tie;
     for (std::size_t k = 0; k < poses_.size(); ++k) {
@@ -103,7 +103,8 @@ class TrajectoryAdjuster {
     return std::max({of_position.mean(), of_attitude.mean(), of_tie.mean()});
   }
 
-  // Steps with the squares alone until they no longer help, then with the loss.
+  // Iterates with least squares until the cost no longer falls, then with the loss. The loss alone would treat the
+  // drift of the given poses as outliers.
   void run() {
     constexpr int kMostSteps = 8;  // of each
     for (const RobustLoss& loss : {RobustLoss(), kForgetting}) {
@@ -120,12 +121,12 @@ class TrajectoryAdjuster {
   }
 
  private:
-  // What the frames before one say of it.
+  // Normal equations that the eliminated frames leave on the next one.
   struct Carried {
     Matrix6 normal = Matrix6::Zero();
     Vector6 right = Vector6::Zero();
   };
-  // A frame eliminated: its step is solved - by_next * (step of the next one).
+  // An eliminated frame. Its step is solved - by_next * (step of the next frame).
   struct Eliminated {
     Vector6 solved;
     Matrix6 by_next;
@@ -172,9 +173,10 @@ class TrajectoryAdjuster {
     sum.right.noalias() -= weight * r.by_frame.transpose() * r.residual;
   }
 
-  // Eliminates frame k; `carried` becomes what is carried to the next one.
+  // Eliminates frame k with the equations `carried` from the frames before it, and replaces these by the equations for
+  // frame k + 1.
   Eliminated eliminate(std::size_t k, const RobustLoss& loss, Carried& carried) const {
-    constexpr double kDamping = 1e-8;  // for what nothing observes
+    constexpr double kDamping = 1e-8;  // keeps the matrix regular where nothing observes a component
     const FrameIndex frame = trajectory_.frames[k];
     if (const auto* prior = position(frame)) add_prior(linearise_position(poses_[k], *prior), loss, carried);
     if (const auto* prior = attitude(frame)) add_prior(linearise_attitude(poses_[k], *prior), loss, carried);
@@ -198,7 +200,7 @@ class TrajectoryAdjuster {
     return result;
   }
 
-  // A step for all frames, into trial_.
+  // Computes one step of all frames and stores the moved poses in trial_.
   void solve(const RobustLoss& loss) {
     std::vector<Carried> beginning;  // of each piece
     Carried carried;
@@ -240,7 +242,7 @@ void adjust_trajectory(const Block& block, const ObservationOptions& use, const 
     Pose& pose = state.frames[trajectory.frames[k]];
     const double moved = (adjuster.poses()[k].centre - pose.centre).norm();
     change.largest_m = std::max(change.largest_m, moved);
-    change.rms_m += moved * moved;  // the sum of squares until all are there
+    change.rms_m += moved * moved;  // a sum of squares until adjust_trajectories() takes the root
     pose = adjuster.poses()[k];
     ++change.frames;
   }
@@ -258,7 +260,7 @@ GivenTrajectoryChange adjust_trajectories(const Block& block, const ObservationO
     for (const FrameIndex frame : trajectory.frames) done[frame] = 1;
     adjust_trajectory(block, use, trajectory, options.max_mean_square, state, change);
   };
-  for (const bool rings : {false, true})  // what has ends first
+  for (const bool rings : {false, true})  // chains with ends first, then rings
     for (FrameIndex f(0); neighbours.contains(f); ++f.value) {
       const Neighbours& own = neighbours[f];
       if (!done[f] && own.row[0] != kNone && own.full() == rings) adjust_from(f);

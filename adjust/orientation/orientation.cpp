@@ -22,7 +22,7 @@ namespace megablock {
 
 namespace {
 
-// The steps of one component; each leaves `values_` better than it found it.
+// Runs the steps for one component. Each step improves `values_`.
 class Orientation {
  public:
   Orientation(const Block& block, const BlockState& start, const OrientationOptions& options, OrientationGraph graph)
@@ -83,7 +83,7 @@ class Orientation {
   }
 
  private:
-  // Of frames.
+  // The relative rotations of the pairs of images as rotations between their frames.
   std::vector<RelativeRotation> relative_rotations() const {
     std::vector<RelativeRotation> relative;
     for (const auto& edge : graph_.edges) {
@@ -114,7 +114,8 @@ class Orientation {
       if (rotations_[f]) reasons_[f] = "no baseline to other images could be measured";
   }
 
-  // In the axes of the frames, with all their errors: the cameras are not estimated here.
+  // The verticals in the axes of the frames. Their sigmas include the errors of the cameras, because rotation averaging
+  // does not estimate these.
   std::vector<KnownVertical> known_verticals() const {
     const GroundVertical ground(block_.ground);
     std::vector<KnownVertical> verticals;
@@ -130,8 +131,8 @@ class Orientation {
     return verticals;
   }
 
-  // Sets aside verticals that are wrong by what the rotations without them, the positions and the attitudes say;
-  // whether any are left.
+  // Sets aside the verticals that contradict the rotations averaged without them, the positions or the attitudes.
+  // Returns whether any are left.
   bool check_verticals() {
     std::vector<SeenDown> seen;
     std::vector<std::size_t> images;
@@ -159,12 +160,12 @@ class Orientation {
     return aside_.size() < seen.size();
   }
 
-  // In the axes of the averaged rotations, as far as attitudes or positions tell.
+  // The direction of down in the axes of the averaged rotations, if attitudes or positions determine it.
   std::optional<AxisDirection> known_down() const {
     const GroundVertical ground(block_.ground);
     const Eigen::Vector3d down = ground.down(Eigen::Vector3d::Zero());
     if (known_angles_ != GroundAngles::kAll) return down_by_positions(graph_, values_, down);
-    constexpr double kMounting = 2 * kDegree;  // sensors against cameras
+    constexpr double kMounting = 2 * kDegree;  // of the attitude sensors relative to the cameras
     double variance = 0, count = 0;
     for (const auto& frame : graph_.frames) {
       if (!frame.given && !frame.attitude) continue;
@@ -184,10 +185,11 @@ class Orientation {
     centres_from_baselines(1, {}, {});
   }
 
-  // Frames' centres from the baselines times `scale`, with mounts where the scale is metric (`priors` given).
+  // Projection centres of the frames from the baselines times `scale`. Mounts count only where the scale is metric,
+  // that is, where `known` holds priors.
   void centres_from_baselines(double scale, const std::vector<std::optional<CentrePrior>>& known,
                               const std::vector<std::optional<Eigen::Vector3d>>& start) {
-    constexpr double kRelativeSigma = 0.1;  // of what the matches do not say
+    constexpr double kRelativeSigma = 0.1;  // of a baseline, besides the noise of its matches
     std::vector<CentreDifference> differences;
     for (const Baseline& baseline : baselines_) {
       const auto &a = graph_.images[row(baseline.a)], &b = graph_.images[row(baseline.b)];
@@ -208,7 +210,7 @@ class Orientation {
     }
   }
 
-  // Brings rotations and centres onto the known positions and solves the centres once more with these.
+  // Transforms rotations and centres to the observed positions and solves the centres once more with these as priors.
   void to_ground() {
     if (!any_position_) return;
     intersect(3 * kDegree, 1 * kDegree);
@@ -271,8 +273,8 @@ class Orientation {
     if (oriented() < 2) throw ComputeError("fewer than two images could be oriented");
   }
 
-  // Intersects with the limit in pixels; with given poses, which may be approximate and do not move, at least four
-  // times the median error. Returns the limit in radians.
+  // Intersects the tracks with a limit in pixels and returns the limit in radians. Given poses may be approximate and
+  // do not move; with them the limit is at least four times the median error.
   double intersect_within(double limit_px) {
     double limit = limit_px / smallest_focal();
     if (any_given_) {
@@ -285,7 +287,7 @@ class Orientation {
     return limit;
   }
 
-  // Left-over frames by their observations of points, as long as new ones come in.
+  // Resects the frames that have no pose yet from the intersected points, and repeats while new frames come in.
   void resect(double limit) {
     while (true) {
       std::int64_t found = 0;
@@ -300,7 +302,8 @@ class Orientation {
     }
   }
 
-  // Frames with too few points lose their pose; the number of them.
+  // Takes the pose from frames with too few points and returns their number. A dropped frame may leave others with too
+  // few, so the test repeats.
   std::int64_t drop_weak_frames() {
     std::int64_t dropped = 0;
     while (true) {
@@ -336,7 +339,7 @@ class Orientation {
   std::vector<ParameterMask> free_intrinsics(int terms, bool unknown_focal_only) const {
     constexpr std::size_t kFewestFrames = 4;
     std::vector<ParameterMask> result(graph_.cameras.size(), 0);
-    if (oriented() < kFewestFrames || any_given_) return result;  // given poses go with the given cameras
+    if (oriented() < kFewestFrames || any_given_) return result;  // given poses belong to the given cameras
     for (std::size_t c = 0; c < result.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];
       if (unknown_focal_only && camera.focal_known) continue;
@@ -347,7 +350,8 @@ class Orientation {
     return result;
   }
 
-  // A focal length that ran away goes back to its start value.
+  // Resets a camera whose focal length left the range of 0.2 to 10 times the longer side of its image. Fisheyes and
+  // panoramas are exempt.
   void check_focals() {
     for (std::size_t c = 0; c < values_.cameras.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];

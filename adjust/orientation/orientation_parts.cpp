@@ -21,7 +21,8 @@ namespace {
 
 using PartLinks = std::vector<std::vector<std::int32_t>>;  // [frames by name] ascending
 
-// Frames of `set` by their distance from `first`, then by name; what cannot be reached comes after it in the same way.
+// The frames of `set` in the order of their distance in links from `first`, then of their names. Frames that cannot be
+// reached follow, sorted in the same way.
 std::vector<std::int32_t> by_distance(const PartLinks& links, const std::vector<std::int32_t>& set,
                                       std::int32_t first) {
   std::set<std::int32_t> left(set.begin(), set.end());
@@ -103,14 +104,14 @@ std::vector<OrientationPart> orientation_parts(const Block& block, const std::ve
 
 namespace {
 
-// What is kept of a part once it is oriented, in a frame of its own.
+// The result of one part, in a coordinate frame of its own.
 struct OrientedPart {
   OrientationPart part;
   std::vector<std::optional<Pose>> poses;  // [part.frames]
   IndexedVector<CameraIndex, Intrinsics> cameras;
   std::vector<std::pair<FrameIndex, std::string>> failed;
   std::vector<SetAsideVertical> verticals_aside;
-  GroundAngles known = GroundAngles::kNone;  // of its frame
+  GroundAngles known = GroundAngles::kNone;  // angles of its coordinate frame that are known
 };
 
 void leave_out(const std::vector<SetAsideVertical>& aside, OrientationGraph& graph) {
@@ -133,7 +134,7 @@ class PartwiseOrientation {
     if (parts_.empty()) return whole();
     assemble();
     OrientationResult in_parts = result();
-    // Parts that do not fit together, or fail, cost more frames than one orientation would.
+    // Parts that fail or do not fit together lose frames that one orientation of the whole would keep.
     if (10 * in_parts.failed.size() <= frames_.size()) return in_parts;
     try {
       OrientationResult at_once = whole();
@@ -169,11 +170,11 @@ class PartwiseOrientation {
       leave_out(oriented.verticals_aside, graph);
       oriented.known = known_angles(graph);
       parts_.push_back(std::move(oriented));
-    } catch (const ComputeError&) {  // too little holds it together; its frames may be in others
+    } catch (const ComputeError&) {  // the part is too weak; other parts may hold its frames
     }
   }
 
-  // Of the pairs, ascending, in one pass over them.
+  // The pairs of each part, ascending, found in one pass over all pairs.
   std::vector<std::vector<std::size_t>> rows_of_parts(const std::vector<OrientationPart>& parts) const {
     std::map<FrameIndex, std::vector<std::size_t>> parts_of;  // ascending
     for (std::size_t p = 0; p < parts.size(); ++p)
@@ -213,7 +214,7 @@ class PartwiseOrientation {
   }
   bool joined(std::size_t p) const { return assembled_.part[p] == largest_; }
 
-  // A frame's pose comes from the part in whose core it is, else from the first that has it.
+  // A frame takes its pose from the part whose core holds it, else from the first part that has a pose of it.
   void collect(BlockState& state) const {
     for (const bool core : {true, false})
       for (std::size_t p = 0; p < parts_.size(); ++p) {
@@ -228,7 +229,7 @@ class PartwiseOrientation {
       }
   }
 
-  // Mean of the parts, by their frames.
+  // The cameras are the mean over the parts that use them, weighted by the frames of their cores.
   void average_cameras(BlockState& state) const {
     for (CameraIndex c(0); state.cameras.contains(c); ++c.value) {
       double weights = 0;
@@ -283,7 +284,7 @@ class PartwiseOrientation {
     return result;
   }
 
-  // By the part in whose core the image's frame is.
+  // A vertical counts as the part judged it whose core holds the image's frame.
   std::vector<SetAsideVertical> verticals_aside() const {
     std::map<ImageIndex, SetAsideVertical> aside;
     for (const OrientedPart& part : parts_) {
@@ -297,7 +298,8 @@ class PartwiseOrientation {
     return result;
   }
 
-  // What all parts know of the ground, each as much as its frames: the assembled frame is that of the first alone.
+  // The vertical or the attitude as the mean over the parts that know it, weighted by the frames of their cores. The
+  // assembled coordinate frame alone is that of the first part.
   struct Ground {
     GroundAngles known = GroundAngles::kNone;
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  // to it

@@ -12,7 +12,7 @@ namespace {
 
 std::size_t row_of(FrameIndex frame) { return static_cast<std::size_t>(frame.value); }
 
-// What `to` must be for the relative pose to hold, and the other way round.
+// The pose of `to` that fulfils the relative pose with the given pose of `from`, and the reverse.
 Pose predicted_to(const RelativePose& relative, const Pose& from) {
   return {relative.pose.rotation * from.rotation, from.centre + from.rotation.conjugate() * relative.pose.centre};
 }
@@ -88,7 +88,7 @@ class StretchTurner {
       if (both_oriented(relative) && !contradicted(relative)) join(row_of(relative.from), row_of(relative.to));
   }
 
-  // Median angle to the initial orientation of a group, moved or not.
+  // Median angle between a group, moved or not, and its initial orientation.
   template <typename Move>
   double distance(const std::vector<FrameIndex>& frames, Move&& move) const {
     std::vector<double> angles;
@@ -99,8 +99,8 @@ class StretchTurner {
     return *middle;
   }
 
-  // Whether a group has observed positions and is not further from them than they allow, or half as far again as
-  // before.
+  // Whether a group has observed positions and stays at them: its median distance is within their sigmas, or grows by
+  // no more than half.
   bool keeps_positions(const std::vector<FrameIndex>& frames, const Movement& movement) const {
     constexpr double kAllowed = 3;  // sigmas, median
     std::vector<double> before, after;
@@ -123,7 +123,9 @@ class StretchTurner {
     return median(after) <= std::max(kAllowed, 1.5 * median(before));
   }
 
-  // Frames moved; 0: the relative pose holds, or it is not the smaller group that is wrong.
+  // Moves the smaller group so that the relative pose is fulfilled, and returns the number of frames moved. It is 0 if
+  // the relative pose is fulfilled already, if the move would not halve the angle to the initial orientation, or if it
+  // would take the group away from its positions.
   std::int64_t try_to_move(const RelativePose& relative) {
     if (!both_oriented(relative) || find(row_of(relative.from)) == find(row_of(relative.to)) || !contradicted(relative))
       return 0;

@@ -1,15 +1,16 @@
-// Stretches of a pass that contradict the relative poses by which they hang on the rest of the block.
+// Turns back the stretches of a pass that the adjustments of the tiles left turned against their relative poses.
 //
-// A tile's own adjustment holds a stretch that reaches in from a neighbouring tile by tie points alone: the relative
-// poses at its ends belong to the neighbour. Where its ties to other passes were lost among poor start values, it may
-// end turned about the line of its positions, by tens of degrees, in agreement with itself and with its GNSS positions;
-// no step of the global adjustment finds back from there. The relative poses at its ends say so: by many of their
-// sigmas and by more than what linearisation bears.
+// A stretch that reaches into a tile from its neighbour is held there by tie points alone, because the relative poses
+// at its ends belong to the neighbour. If poor start values cost it its ties to other passes, it may end turned by tens
+// of degrees about the line of its positions. It then still agrees with itself and with its GNSS positions, and no
+// iteration of the global adjustment can bring it back. The relative poses at its ends show the error: it is many of
+// their sigmas and too large for a linearisation.
 //
-// Frames are joined by the relative poses that their orientations fulfil. A group that only contradicted ones tie to a
-// larger one is moved as a whole so that it fulfils one of these, if that brings it nearer to the rotations of the
-// initial orientation and keeps it at its observed positions; a group without any stays. So a wrong relative pose moves
-// nothing, unless the initial orientation was made from it and it is wrong about the line of the positions only.
+// Relative poses that the present poses fulfil join frames to groups. If a group is tied to a larger one by
+// contradicted relative poses only, it is moved as a whole so that one of them is fulfilled. This happens only if the
+// group has observed positions, stays at them, and at least halves its median angle to the initial orientation. So a
+// wrong relative pose moves nothing, unless the initial orientation was made from it and it is wrong about the line of
+// the positions only.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +20,12 @@
 namespace megablock {
 
 struct StretchOptions {
-  double max_rotation_rad = 0.0175;  // 1 degree: contradiction of a relative pose that is looked at
-  double max_sigmas = 20;            // and this many of its sigmas
+  double max_rotation_rad = 0.0175;  // a relative pose is contradicted from 1 degree on
+  double max_sigmas = 20;            // and from this many of its sigmas on
 };
 
-// Moves the stretches of `state` (frames that are oriented); how many frames were moved. `initial`: the orientation
-// before any adjustment.
+// Moves the turned stretches of the oriented frames of `state` and returns the number of frames moved. `initial` is the
+// orientation before any adjustment.
 std::int64_t turn_back_stretches(const Block& block, const BlockState& initial, BlockState& state,
                                  const StretchOptions& options = {});
 

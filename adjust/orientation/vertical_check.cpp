@@ -19,11 +19,11 @@ namespace megablock {
 
 namespace {
 
-constexpr double kLevel = 1e-3;            // share of right pairs that the test takes for contradictory
-constexpr double kLeaning = 1 * kDegree;   // of what is upright, and of rotations that bend together
-constexpr double kFarthest = 3 * kDegree;  // sigma of the relative rotation, beyond which nothing is compared
-constexpr double kShareOfAll = 1. / 3, kShareOfAgreeing = 0.8;  // of a group that is believed
-constexpr std::size_t kFewest = 2;                              // that make a group
+constexpr double kLevel = 1e-3;            // share of correct pairs that the test rejects
+constexpr double kLeaning = 1 * kDegree;   // of walls that lean, and of a common drift of rotations
+constexpr double kFarthest = 3 * kDegree;  // largest sigma of a relative rotation for a comparison
+constexpr double kShareOfAll = 1. / 3, kShareOfAgreeing = 0.8;  // of an accepted group
+constexpr std::size_t kFewest = 2;                              // verticals of a group
 
 Eigen::Vector3d rotation_vector(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d cross = from.cross(to);
@@ -32,7 +32,7 @@ Eigen::Vector3d rotation_vector(const Eigen::Vector3d& from, const Eigen::Vector
   return from.dot(to) > 0 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(std::numbers::pi * from.unitOrthogonal());
 }
 
-// Whether two directions are one; `covariance`: of their difference.
+// Whether two directions are equal within the covariance of their difference.
 bool same_direction(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Eigen::Matrix3d& covariance) {
   static const double limit = chi_square_quantile(kLevel, 2);
   const Eigen::Vector3d e = rotation_vector(from, to);
@@ -50,7 +50,7 @@ struct Shown {
   Eigen::Matrix3Xd by_camera;
 };
 
-// What the cameras may be wrong by, as it shows in the difference of two directions.
+// Effect of the errors of the cameras on the difference of two directions.
 Eigen::Matrix3d of_cameras(const Shown& a, const Shown& b) {
   if (a.camera == b.camera && a.by_camera.cols() == b.by_camera.cols()) {
     const Eigen::Matrix3Xd difference = a.by_camera - b.by_camera;
@@ -65,8 +65,8 @@ bool agree(const Shown& a, const Shown& b, double variance) {
       a.covariance + b.covariance + of_cameras(a, b) + (variance + kLeaning * kLeaning) * Eigen::Matrix3d::Identity());
 }
 
-// Which nodes that see a vertical are compared with a node: the nearest, and ever fewer of those farther away, so that
-// what hangs together closely is compared with the rest too.
+// Chooses the nodes with verticals that are compared with a node: the nearest ones, and fewer and fewer of those
+// farther away. The far ones make sure that a closely connected piece of the graph is compared with the rest too.
 class Vicinity {
  public:
   Vicinity(std::size_t nodes, const std::vector<RelativeRotation>& edges, const std::vector<std::uint8_t>& kept,
@@ -154,7 +154,7 @@ class VerticalJudge {
     partners_[j].emplace_back(i, one);
   }
 
-  // Of verticals that were compared with one another.
+  // A set of verticals that were compared with one another, directly or through others.
   void judge(const std::vector<std::size_t>& members, const std::optional<AxisDirection>& down,
              std::vector<VerticalVerdict>& verdicts) {
     std::map<std::int64_t, std::vector<std::size_t>> groups;
@@ -184,7 +184,7 @@ class VerticalJudge {
     }
   }
 
-  // Whether at least half of its partners in the group agree with it: one alone may do so by accident.
+  // Whether at least half of its partners in the group agree with it. A single partner may agree by accident.
   bool belongs(std::size_t i, std::int64_t group) {
     if (groups_.find(static_cast<std::int64_t>(i)) != group) return false;
     std::size_t partners = 0, agreeing = 0;
@@ -198,7 +198,8 @@ class VerticalJudge {
 
   bool is_down(const std::vector<std::size_t>& group, const AxisDirection& down) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // the mean: errors of one camera are those of all its images
+    Eigen::Matrix3d covariance =
+        Eigen::Matrix3d::Zero();  // the mean, because the images of one camera share its errors
     for (const std::size_t i : group) {
       sum += shown_[i].direction;
       covariance += (shown_[i].covariance + shown_[i].by_camera * shown_[i].by_camera.transpose()) /
@@ -210,7 +211,7 @@ class VerticalJudge {
   }
 
   std::vector<Shown> shown_;
-  DisjointSets regions_, groups_;                                    // of rows: compared with one another, agreeing
+  DisjointSets regions_, groups_;  // of `shown_`: those compared with one another; those that agree
   std::vector<std::vector<std::pair<std::size_t, bool>>> partners_;  // [shown] row, whether they agree
 };
 
@@ -256,7 +257,7 @@ struct JudgedByPose {
   Eigen::Matrix3d covariance;  // of both
 };
 
-// The most that show one direction, which is that of one of at most fifty of them.
+// The largest number of verticals that show one direction other than down. At most fifty directions are tried.
 std::size_t most_alike(const std::vector<JudgedByPose>& judged) {
   constexpr std::size_t kTried = 50;
   std::size_t most = 0;

@@ -1,4 +1,4 @@
-// Resection of every frame that sees enough control points (CN-21, CN-23).
+// Resects every frame that sees enough control points (Cannelle 2013: resections of a rig along its path).
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
-// Joint adjustment of a trajectory (CN-22, 23, 28, 29, 30): poses of all frames from
+// Adjusts the poses of all frames of a trajectory together (Cannelle 2013: chain, registrations, resections and
+// control), from
 //
 //   chain          successive frames of a pass: in the axes of the first, as a 2x2 registration, or, as published, in
 //                  ground axes: S_i - S_{i-1} = dS, R_i R_{i-1}' = dR
@@ -10,12 +11,12 @@
 //
 // as one sparse least squares problem (Ceres, SPARSE_NORMAL_CHOLESKY, one thread: the same bits every time).
 //
-// Weights. A registration is right or altogether wrong, a position is good to centimetres or off by metres with all of
-// its neighbours. Both get the weight of Geman and McClure, w = (1 + q / c^2)^-2, of their mean squared normalised
-// residual q, in rounds of reweighting in which the scale falls from what the start is good for to the noise (graduated
-// non-convexity: Yang, Antonante, Tzoumas and Carlone, RA-L 2020). q of a position is the mean over its neighbours in
-// the pass, and its weight is divided by their number: errors of a trajectory change over tens of frames, so that this
-// many positions count as one.
+// Weights. A registration is either correct or altogether wrong. A position is good to centimetres, or off by metres
+// together with its neighbours. Both get the weight of Geman and McClure, w = (1 + q / c^2)^-2, with q the mean squared
+// normalised residual. The adjustment is reweighted several times, while the scale c falls from the accuracy of the
+// start to the noise (graduated non-convexity: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, RA-L 2020). For a
+// position q is the mean over its neighbours in the pass, and the weight is divided by their number. The errors of a
+// trajectory change over tens of frames, so that this many positions count as one.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// 2x2 registration (CN-25): relative pose of two passes from two successive frames of each, A and B of one, C and D of
-// the other, and the points that all four see.
+// Gives the relative pose of two passes from two successive frames of each, A and B of one, C and D of the other, and
+// the points that all four see: the 2x2 registration of Cannelle 2013.
 //
 // Everything is expressed in the axes of A. Unknowns are the poses of B, C and D and the points; A is held, the pairs
 // are tied by the trusted relative poses of the trajectory
@@ -60,8 +60,9 @@ struct PairRegistrationOptions {
 PairRegistration register_pair(const std::array<Pose, 4>& frames, const std::vector<FourFrameTrack>& tracks,
                                const PairRegistrationOptions& options, std::uint64_t seed);
 
-// Baseline (CN-24): rigid transformation between the points as A and B intersect them and as C and D do. Relative pose
-// A -> C; empty with fewer than three points. Not usable where points are far against the base.
+// The registration of points on points of Cannelle 2013, for comparison: the rigid transformation between the points as
+// A and B intersect them and as C and D do. Returns the relative pose A -> C, or nothing with fewer than three points.
+// It is not usable where the points are far away compared with the base.
 std::optional<Pose> register_3d_3d(const std::array<Pose, 4>& frames, const std::vector<FourFrameTrack>& tracks,
                                    std::uint64_t seed);
 

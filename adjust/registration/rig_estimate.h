@@ -1,6 +1,7 @@
-// Cameras and mounts of a rig from its tie points and its trusted relative poses: what registration needs of an on-line
-// calibration (CN-07). Mounts that are half a degree wrong shift rays by a dozen pixels, the same way in A as in B and
-// in C as in D, but passes that see a place with different cameras then disagree by decimetres.
+// Estimates the cameras and mounts of a rig from its tie points and its trusted relative poses, as far as registration
+// needs an on-line calibration (Cannelle 2013). Mounts that are half a degree wrong shift rays by a dozen pixels, the
+// same way in A as in B and in C as in D, but passes that see a place with different cameras then disagree by
+// decimetres.
 //
 // A bundle adjustment of a few windows of successive frames: unknowns are cameras, mounts (both with their priors),
 // frames and points; observations are the tracks within one window (passes do not meet) and the chain's relative poses.

@@ -1,5 +1,5 @@
-// The trajectory of a block as input of the joint adjustment: start poses, passes, the chain of successive frames,
-// control measured along the path.
+// Gives the trajectory of a block as input of the joint adjustment: start poses, passes, the chain of successive
+// frames, and the control points observed along the path.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ struct TrajectoryOptions {
   // Of links made of the trajectory's own differences, where the block has no relative pose.
   double difference_position_sigma_m = 0.02, difference_rotation_sigma_deg = 0.02;
   double max_gap_m = 50, max_gap_s = 60;  // successive frames farther apart are not linked by such differences
-  enum class CheckPoints { kIgnore, kTie } check_points = CheckPoints::kTie;  // CN-30, variants 1 and 2
+  enum class CheckPoints { kIgnore, kTie } check_points = CheckPoints::kTie;  // both variants of Cannelle 2013
   bool use_control = true;
   std::string check_prefix;  // control points whose names begin so are check points too
   void check() const;        // throws InputError

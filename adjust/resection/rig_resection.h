@@ -1,10 +1,10 @@
-// Pose of a rig from known points seen by any of its cameras ("relevement", CN-21).
+// Gives the pose of a rig from known points observed by any of its cameras ("relevement", Cannelle 2013).
 //
-// Generalised P3P (geometry/resection/gp3p.h) on samples of three points, each solution judged by all sights
-// (geometry/estimation/ransac.h), then Levenberg-Marquardt over the agreeing ones, with residuals whitened by
-// measurement and point (rig_sights.h), so that sigmas of the points enter the choice, the weights and the covariance
-// of the pose. A pose known beforehand (the trajectory's: metres in position, hundredths of a degree in attitude) takes
-// part as an observation with its sigmas: it decides between the solutions of three points and steadies configurations
+// Samples of three points give poses by generalised P3P (geometry/resection/gp3p.h), and all observations judge each
+// pose (geometry/estimation/ransac.h). Levenberg-Marquardt iterations over the inliers follow. The residuals are
+// whitened by the covariances of observation and point (rig_sights.h), so that the sigmas of the points enter the
+// choice, the weights and the covariance of the pose. An approximate pose, such as that of the trajectory, takes part
+// as an observation with its sigmas. It decides between the solutions of three points and stabilises configurations
 // near a critical surface.
 #pragma once
 

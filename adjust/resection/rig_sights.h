@@ -1,4 +1,5 @@
-// Points seen by a rig: whitened residuals, and the estimator of geometry/estimation/ransac.h for the rig's pose.
+// Gives the whitened residuals of points observed by a rig, and the estimator of its pose for
+// geometry/estimation/ransac.h.
 //
 // Residuals are in pixels (geometry/resection/rig_ray.h), each whitened by
 //
@@ -60,8 +61,9 @@ class RigSightEstimator {
   std::span<const RigSight> sights_;
 };
 
-// The pose that most of the sights agree on, of a frame or a part of a tile that is lost: up to 500 samples, residuals
-// up to the threshold in sigmas. Empty where none is found; whether enough agree is the caller's to judge.
+// Finds the pose with most inliers for a lost frame or a lost part of a tile, with up to 500 samples. Residuals up to
+// the threshold, in sigmas, are inliers. Empty where no pose is found; the caller judges whether the inliers are
+// enough.
 std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// Robust losses of positions and attitudes: none for those that are held, which a loss would let go.
+// Gives the robust losses of observed positions and attitudes. Held ones have none, because a loss would release them.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"

@@ -1,5 +1,5 @@
-// Where images see down, as observations of two angles of their attitude, of their mount and of their camera (Kalantari
-// 2009, M58).
+// Gives the residual of a vertical that an image shows: an observation of two angles of its attitude, of its mount and
+// of its camera (Kalantari 2009, chapter 10: verticals as observations).
 //
 // With g down at the frame (unit, ground axes), v = R_m R_f g is where the image sees it; d is where it was seen. The
 // difference of two directions, across d, that grows with the angle a between them to the opposite side is Lambert's

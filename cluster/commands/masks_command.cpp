@@ -37,7 +37,7 @@ struct MasksOptions {
   StaticRegionOptions regions;
 };
 
-// What was found for a camera.
+// The mask proposed for a camera.
 struct Proposal {
   std::string camera, file;  // file: empty when nothing is masked, or the camera could not be judged
   int images = 0;            // looked at

@@ -43,7 +43,7 @@ void check(const MeasurementsOptions& options) {
     if (!std::isfinite(coordinate)) throw InputError("measurements: --near takes finite numbers, in metres");
 }
 
-// That nothing lies about a place, and where it would.
+// Warns that no point lies near the asked position, and says where points lie.
 void tell_of_nothing(const MeasurementStore& store, const MeasurementsOptions& options) {
   const Eigen::AlignedBox3d extent = store.extent();
   std::string where = "no point has a position";

@@ -112,7 +112,7 @@ std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
                                                  std::sqrt(whole(1, 1)) * kDegreesPerRadian);
 }
 
-// Of all that the row of an image follows from.
+// A hash of everything that determines the result of an image.
 std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prior, std::uint64_t mask,
                      const SegmentOptions& segments) {
   const Camera& camera = block.cameras[block.camera_of(i)];

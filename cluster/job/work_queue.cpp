@@ -28,7 +28,7 @@ std::vector<std::size_t> claim_order(const std::vector<Unit>& units) {
   return order;
 }
 
-// What one rank did, exchanged at the end of the stage.
+// The failures and counts of one rank, exchanged at the end of the stage.
 struct RankRecord {
   std::vector<std::pair<std::size_t, std::string>> failures;  // unit number, reason
   std::int64_t computed = 0;

@@ -85,7 +85,7 @@ Json failures(const BlockResult& result) {
   return list;
 }
 
-// Of this very result; empty: there are none.
+// The figures that were written for the present result, or an empty text if there are none.
 std::string written_figures(const JobStore& store) {
   std::ifstream file(store.path(kResultFigures));
   const std::string text{std::istreambuf_iterator<char>(file), {}};

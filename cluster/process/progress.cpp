@@ -65,7 +65,7 @@ Progress::~Progress() {
   if (terminal_) print(done_(), true);
 }
 
-// Of the last half minute: what was there already, which a resumed run passes at once, does not count for long.
+// The rate over the last half minute. A resumed run passes its finished units at once; they drop out of the rate soon.
 double Progress::rate_per_second(std::int64_t done) {
   constexpr double kWindow_s = 30;
   const double now_s = monotonic_seconds();

@@ -78,7 +78,7 @@ void refuse_another_block(const JobStore& store, const Block& previous, const Pr
                    " images; name another folder with -j, or delete this one to begin anew");
 }
 
-// Of the job's last run; empty: there is none, or it is damaged.
+// The block of the job's last run, or nothing if there is none or it is damaged.
 std::optional<Block> previous_block(const JobStore& store, const JobLog& log) {
   if (!std::filesystem::exists(store.path("block.h5"))) return std::nullopt;
   const std::string damage = store.problem("block.h5");

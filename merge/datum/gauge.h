@@ -1,5 +1,5 @@
-// The datum of the block: what its observations leave free, fixed by minimal constraints, expressed by inner ones,
-// never silently.
+// Finds the directions of the datum that the observations of the block leave free, and fixes them by minimal
+// constraints. Covariances are expressed under inner constraints. Every free direction is reported.
 //
 // A similarity of the ground (rotation phi about the component's centroid c, shift L t, scale 1 + s; L its extent)
 // moves

@@ -1,4 +1,4 @@
-// Covariances of a free block by the S-transformation (Baarda 1973)
+// Gives the covariances of a free block under inner constraints, by the S-transformation (Baarda 1973)
 //
 //     C' = S C S',   S = I - N M^-1 N'W,   M = N'WN over the component's frames,  W = (1, 1, 1, 1/L^2, ...)
 //

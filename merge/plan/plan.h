@@ -1,4 +1,4 @@
-// Symbolic plan of an elimination along a tree: which unknowns complete at which node.
+// Plans an elimination along a tree: it says which unknowns are eliminated at which node.
 //
 // An unknown is eliminated at the lowest node that holds all leaves touching it; below that node it is passed up. The
 // same plan serves the merge tree (leaves = tiles) and the cells inside a tile (leaves = cells).
@@ -29,7 +29,7 @@ struct EliminationPlan {
   static EliminationPlan read(ByteReader& in);
 };
 
-// What the inner nodes cost; the leaves' share is in their own plans.
+// The cost of the inner nodes. The cost of the leaves is in their own plans.
 struct FrontCosts {
   std::int64_t root = 0, widest = 0;  // unknowns of the root's front, of the largest one
   double operations = 0;              // floating-point additions and multiplications of eliminating all of them once

@@ -1,6 +1,6 @@
-// The plans of one rank's tiles: in memory, or in the rank's scratch directory beside the measurements of a tile that
-// is there (tile_store.h), read when they are asked for. What has no room there stays in memory; the choice never
-// changes bits.
+// Stores the plans of one rank's tiles. The plan of a tile whose observations are in the rank's scratch directory
+// (tile_store.h) is stored there too and read when it is needed. Plans without room there stay in memory. The choice
+// never changes the bits of a result.
 #pragma once
 
 #include <cstdint>

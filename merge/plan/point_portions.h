@@ -1,4 +1,5 @@
-// The points of a tile in portions of some hundred, cell by cell, so that threads share a tile of few cells evenly.
+// Divides the points of a tile into portions of some hundred, cell by cell, so that threads share even a tile of few
+// cells evenly.
 #pragma once
 
 #include <algorithm>

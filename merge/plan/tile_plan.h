@@ -1,5 +1,5 @@
-// The symbolic work of a tile: its unknowns, its cells, and the points and observations that each cell owns. It is done
-// once for every verdict on the observations and used by every pass over the tile.
+// Plans the work on a tile: its unknowns, its cells, and the points and observations that each cell owns. The plan is
+// made again only when the kept observations change, and serves every sweep over the tile.
 #pragma once
 
 #include <cstdint>

@@ -139,7 +139,7 @@ void read_steps(std::istream& file, std::size_t count, Take&& take) {
     });
 }
 
-// What counts is bits: -0 is not 0.
+// Compares bits, so that -0 differs from 0.
 template <typename T>
 bool same_bits(T a, T b) {
   if constexpr (std::is_same_v<T, double>)
@@ -181,7 +181,7 @@ void read_runs(std::istream& file, std::size_t count, Take&& take) {
 
 enum class Form : std::uint8_t { kRuns, kEach };
 
-// In 4 bytes, if so many units are what the value is.
+// Whether the value is a whole number of pixel units that 4 bytes can hold.
 bool is_pixels(double value) {
   const double units = value / kPixelUnit;
   return std::abs(units) < 0x1p31 && same_bits(static_cast<std::int32_t>(units) * kPixelUnit, value);
@@ -208,7 +208,7 @@ void read_bytes(std::istream& file, std::size_t count, Take&& take) {
 
 void write_count(std::ostream& file, std::size_t count) { write(file, static_cast<std::uint64_t>(count)); }
 
-// Makes room; how many.
+// Reads the number of values and makes room for them.
 template <typename T>
 std::size_t read_count(std::istream& file, std::vector<T>& values) {
   std::uint64_t count = 0;

@@ -26,7 +26,7 @@ bool tells(const AlignmentTile& tile, std::size_t row) {
   return tile.observations[row] >= kFewestAlignmentObservations && finite(tile.poses[row]);
 }
 
-// Frames that several tiles tell of, ascending.
+// The frames that two or more tiles hold with enough observations, ascending.
 std::vector<FrameIndex> shared_frames(const std::vector<AlignmentTile>& tiles) {
   std::vector<FrameIndex> all, shared;
   for (const AlignmentTile& tile : tiles)
@@ -38,7 +38,8 @@ std::vector<FrameIndex> shared_frames(const std::vector<AlignmentTile>& tiles) {
   return shared;
 }
 
-// How good a frame is in its tile goes by its observations; how good all of them are each link finds by itself.
+// The sigma of a frame falls with the root of its observations. The size of all sigmas is open, because each link
+// scales them by its misfits.
 Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<FrameIndex>& shared) {
   constexpr double kOrder = 1e-6;  // of the extent, and rad: smaller than any misfit, as links only enlarge sigmas
   Model model;
@@ -53,7 +54,7 @@ Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<
   return model;
 }
 
-// The tiles of a part as assembled, back to where they were in the mean.
+// Moves the assembled tiles of a part back to their mean place before the assembly.
 class WayBack {
  public:
   void add(const AlignmentTile& tile, const Similarity& assembled) {

@@ -38,7 +38,8 @@ BlockMotion motion_of(const MotionSums::Row& sums) {
   return motion;
 }
 
-// Held positions are not carried along: what would move them is left to the step, and the rest turns about them.
+// Removes the components of the motion that would move held positions, and turns the rest about the pivot. The
+// iteration itself makes the removed part of the motion.
 BlockMotion allowed(const BlockComponent& component, const BlockMotion& motion) {
   if (component.movable == Matrix77::Identity()) return motion;
   Eigen::Matrix<double, 7, 1> parameters;

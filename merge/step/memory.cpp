@@ -42,7 +42,7 @@ void FactorStore::put(std::int64_t node, NodeFactors factors, Loss loss) {
   statistics_.peak_bytes = std::max(statistics_.peak_bytes, bytes_);
 }
 
-// The oldest leave first; the newest stays.
+// Moves factors to scratch, the oldest first, until the rest is within the budget. The newest always stays in memory.
 void FactorStore::make_room() {
   for (auto oldest = node_by_time_.begin();
        bytes_ + others_ > options_.factor_bytes && std::next(oldest) != node_by_time_.end();) {
@@ -62,13 +62,13 @@ void FactorStore::make_room() {
 bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
   if (spilled_.contains(node)) return true;
   const std::string name = factor_file(node);
-  // Asked first: what has no room costs no copy.
+  // The room is reserved before the factors are written, so that factors without room cost no copy.
   if (scratch_full_ || !options_.scratch->reserve(name, factors.byte_count())) return false;
   const bool whole = options_.scratch->write(name, [&](std::ostream& file) {
     ByteWriter writer(file);
     factors.write(writer);
   });
-  if (!whole) {  // the disk is full: what is there stays, the rest is computed again
+  if (!whole) {  // the disk is full: later factors are computed again
     scratch_full_ = true;
     return false;
   }
@@ -81,7 +81,7 @@ bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
 const NodeFactors* FactorStore::get(std::int64_t node) {
   if (const auto entry = kept_.find(node); entry != kept_.end()) return &entry->second;
   if (!spilled_.contains(node)) return nullptr;
-  loaded_ = NodeFactors();  // makes room first
+  loaded_ = NodeFactors();  // frees the memory of the last ones before more is read
   options_.scratch->read(factor_file(node), [&](std::istream& file, std::size_t size) {
     ByteReader reader(file, size);
     loaded_ = NodeFactors::read(reader);

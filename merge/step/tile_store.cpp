@@ -9,7 +9,7 @@ namespace megablock {
 
 namespace {
 
-// The tables of a tile that wait in scratch, but for the points' positions.
+// Visits the tables of a tile that are stored in scratch, except the positions of the points.
 template <typename Visit, typename... Problems>
 void visit_tables(Visit&& visit, Problems&... problems) {
   visit(problems.images...);
@@ -30,14 +30,14 @@ std::int64_t byte_count(const std::vector<T>& values) {
   return static_cast<std::int64_t>(values.size() * sizeof(T));
 }
 
-// Of a tile as it takes part in a step: points twice.
+// The memory of a tile in an iteration, which holds the points twice: present and trial.
 std::int64_t byte_count(const RankTile& tile) {
   std::int64_t bytes = 2 * byte_count(tile.state.points);
   visit_tables([&](const auto& table) { bytes += byte_count(table); }, tile.problem);
   return bytes;
 }
 
-// The names of a tile's files; of two of points the present ones are in one, those of a trial in the other.
+// The names of a tile's files. There are two files of points, one for the present ones and one for those of a trial.
 std::string file_of(std::int64_t tile, const std::string& what) {
   return "tile-" + std::to_string(tile) + "-" + what + ".bin";
 }

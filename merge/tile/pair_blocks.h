@@ -1,5 +1,6 @@
-// What points add between the frames of a cell, in blocks of their own. In the front the six columns of a block lie far
-// apart and across cache lines; here each is a line, and blocks that are used together are few.
+// Sums the contributions of points to the blocks between two frames of a cell, apart from the front. In the front the
+// six columns of a block lie far apart and across cache lines. Here a block is contiguous, and few blocks are used
+// together.
 #pragma once
 
 #include <algorithm>

@@ -1,10 +1,11 @@
-// Points whose observations lie beyond the corner of the loss, brought to their own optimum at held poses.
+// Moves points whose observations lie in the tail of the loss to their own optimum at held poses.
 //
-// A point with few observations, most of them in the tail, has hardly any curvature along some direction: neither the
-// reweighted nor the true normal equations of the block bring it there in few steps, and a handful of such points holds
-// up all others. For a single point the problem is small: a damped Newton iteration in three unknowns, with the loss's
-// own curvature (tile_linearisation.h, no lower bound but zero). Done for the trial state of every step, so that it
-// only lowers the cost that the step is judged by (inner iterations; the optimum is the same).
+// A point with few observations, most of them in the tail, has hardly any curvature along some direction. Neither the
+// reweighted nor the true normal equations of the block then bring it to its optimum in few iterations, and a handful
+// of such points delays all others. For a single point the problem is small: damped Newton iterations in three
+// unknowns, with the curvature of the loss (tile_linearisation.h, bounded by zero only). It is solved for the trial
+// state of every iteration. So it only lowers the cost by which the step is judged, and the optimum stays the same
+// (inner iterations).
 #pragma once
 
 #include <span>

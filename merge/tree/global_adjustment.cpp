@@ -41,13 +41,14 @@ void reject(GlobalState& state) {
   state.next = GlobalAction::kReject;
 }
 
-// Whether a change of the cost is too small to go on for its sake; where damping holds the steps down it says nothing.
+// Whether a change of the cost is too small to continue. With strong damping a small change says nothing, because the
+// damping keeps the steps small.
 bool negligible(const GlobalState& state, const GlobalOptions& options, double change) {
   return options.function_tolerance > 0 && state.pass_lambda <= kHardlyDamped &&
          std::abs(change) <= options.function_tolerance * state.cost;
 }
 
-// After a step was accepted or rejected: the next pass, unless the budget of steps is spent.
+// Starts the next iteration after an accepted or rejected step, or stops.
 void start_pass(GlobalState& state, const GlobalOptions& options) {
   state.pass_lambda = state.lambda;
   state.pass_curvature = state.curvature;
@@ -87,7 +88,7 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
   } else if (small && !options.confirm && state.pass_lambda <= kHardlyDamped) {
     return stop(state, GlobalOutcome::kConverged);
   } else if ((small || at_floor) && state.confirm != 0) {
-    state.pass_lambda = 0;  // this pass decides
+    state.pass_lambda = 0;  // this undamped iteration decides on convergence
     state.pass_curvature = 0;
     return;
   }
@@ -104,7 +105,7 @@ void report_down(GlobalState& state, const GlobalOptions&, const DownReport& rep
     state.floor_decrement = -1;
     return decrease > 0 ? accept(state, decrease / state.predicted) : reject(state);
   }
-  // The cost cannot tell a good step from rounding, only a plainly wrong one.
+  // Here the expected decrease is below rounding, so the cost can only expose a plainly wrong step.
   if (-decrease > kUnresolvable * kUnresolvable + 1e6 * kEpsilon * state.cost) return reject(state);
   state.floor_decrement = std::sqrt(state.decrement_squared);
   accept(state, 1);

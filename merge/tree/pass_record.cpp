@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t kFormat = 1;
 
-// What Linux draws anew each time the machine starts; empty elsewhere.
+// An identifier that Linux draws anew at each start of the machine; empty on other systems.
 std::string start_of_machine() {
   std::string id;
   std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), id);
@@ -25,7 +25,7 @@ constexpr const char* kRecord = "pass.bin";
 
 std::string update_file(std::int64_t node) { return "update-" + std::to_string(node) + ".bin"; }
 
-// The record names them.
+// The files that the record names.
 std::vector<std::string> files_of(const PassRecord& record) {
   std::vector<std::string> files;
   for (const std::int64_t node : record.subtrees) files.push_back(update_file(node));

@@ -63,8 +63,9 @@ UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass
   return eliminate_inner(node, std::move(left), std::move(right), pass, false);
 }
 
-// The eliminated columns, and the rest once whole and once as a triangle; of the covariances as much. A seam's check
-// works on a copy of the rest. What a tile eliminates never stands in one front: its cells' fronts are small.
+// The memory of a front: the eliminated columns, and the update once as a full matrix and once as a triangle. The
+// covariances need as much. The check of a seam works on a copy of the update. A tile has no front of all its unknowns,
+// because the fronts of its cells are small.
 std::int64_t MergeTreeRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
@@ -89,7 +90,7 @@ const NodeFactors& MergeTreeRunner::factors_of(std::int64_t node, const Pass& pa
 UpReport MergeTreeRunner::up(const Pass& pass) {
   const Stopwatch watch(seconds_.all);
   ++seconds_.sweeps_up;
-  // Of the state at hand, not of the first one: a resumed run gets the same bits.
+  // The datum is taken at the present state, not at the first one, so that a resumed run gets the same bits.
   gauge_ = gather_gauge();
   last_pass_.reset();
   check_seams_ = posterior_expected_ && pass.lambda == 0 && !pass.curvature && !gauge_.free();

@@ -49,12 +49,12 @@ std::vector<CommonTrack> common_tracks(const std::vector<TrackRay>& a, const std
   return result;
 }
 
-// Angle of each ray pair from the common plane, radians (first order).
+// The angle by which each pair of rays misses the plane through the baseline, in radians to first order.
 double epipolar_angle(const CommonTrack& c, const Eigen::Vector3d& t) {
   return std::abs(t.dot(c.a.cross(c.b))) / std::max(t.cross(c.a).norm(), 0.02);
 }
 
-// Direction of the baseline, unit, sign by the majority of points in front; empty when the rays do not say.
+// The unit direction of the baseline. Its sign puts most points in front. Empty when the rays do not determine it.
 std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>& common,
                                                   const Eigen::Vector3d& start) {
   constexpr double kSmallest = 0.02 * kDegree;
@@ -265,7 +265,7 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
 
 namespace {
 
-// The reweighted least squares of step 3 over the nodes that a prior, or the largest part, reaches.
+// Solves step 3 for the nodes that are connected to a prior, or to the largest part.
 class CentreNetwork {
  public:
   CentreNetwork(std::int32_t nodes, const std::vector<CentreDifference>& differences,
@@ -299,7 +299,8 @@ class CentreNetwork {
       if (values[i]) centre_[i] = *values[i];
   }
 
-  // One solution with weights from the present residuals (none in the first without a start); the largest change.
+  // Solves once, with weights from the present residuals, and returns the largest change. The first solution has
+  // weights only if there is a start.
   std::optional<double> iterate() {
     std::vector<double> of_difference, of_prior(priors_.size(), 0.0);
     for (const auto& d : differences_)

@@ -1,4 +1,5 @@
-// Coarse bundle adjustment of initial orientation: the tile's residuals over the graph's tracks, solved by Ceres.
+// Adjusts the oriented frames, points and cameras of the initial orientation together. It takes the residuals of a tile
+// (tile_problem.h) over the tracks of the graph and solves them with Ceres to a loose tolerance.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"
@@ -7,15 +8,15 @@
 namespace megablock {
 
 struct CoarseOptions {
-  ObservationOptions observations;         // sigma and priors; the loss below replaces theirs
+  ObservationOptions observations;         // sigmas and priors; the loss below replaces theirs
   double loss_scale_px = 4;                // Cauchy scale of image residuals
   std::vector<ParameterMask> camera_free;  // [graph.cameras] refined intrinsics
   int max_iterations = 20;
   double function_tolerance = 1e-4;
 };
 
-// Adjusts oriented frames, points and the free intrinsics over the kept observations; given frames stay. Throws
-// ComputeError when Ceres finds no usable solution.
+// Adjusts the oriented frames, the points and the free camera parameters to the kept observations. Given frames keep
+// their poses. Throws ComputeError when Ceres finds no usable solution.
 void adjust_coarsely(const Block& block, const OrientationGraph& graph, const CoarseOptions& options,
                      OrientationValues& values);
 

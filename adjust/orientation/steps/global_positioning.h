@@ -1,13 +1,13 @@
-// Projection centres and points together, from rays of known rotation and position priors.
+// Improves projection centres and points together, with rotations held, from the viewing rays and the position priors.
 //
-// With v the unit ray of an observation in ground axes, minimises
+// With v the unit ray of an observation in ground axes it minimises
 //
 //     sum rho(|v - d (X - C)|^2 / sigma^2) + position priors,   d = 1 / |X - C|,
 //
-// over all centres C and points X: residuals are chords between unit vectors, so that near and far points weigh alike
-// and a point behind its camera still has a gradient. After Pan, Barath, Pollefeys and Schoenberger, "Global
-// structure-from-motion revisited", ECCV 2024, who leave d free to start at random; here the start is measured
-// (baselines.h), and d is eliminated.
+// over all centres C and points X. The residuals are chords between unit vectors. So near and far points have the same
+// weight, and a point behind its camera still has a gradient. The method is that of L. Pan, D. Barath, M. Pollefeys and
+// J. Schoenberger, "Global structure-from-motion revisited", ECCV 2024. They keep d as an unknown to start at random;
+// here baselines.h gives the start, and d is eliminated.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"
@@ -20,7 +20,7 @@ struct PositioningOptions {
   int max_iterations = 15;
 };
 
-// Improves the centres of the oriented frames and the points; rotations stay. Given frames stay.
+// Moves the centres of the oriented frames and the points of `values`. Rotations and given frames stay.
 void position_globally(const OrientationGraph& graph, const std::vector<Eigen::Vector3d>& rays,
                        const PositioningOptions& options, OrientationValues& values);
 

@@ -78,7 +78,7 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
   }
   if (known.to.empty()) return known;
   known.stated_sigma /= static_cast<double>(known.to.size());
-  // First centres bend over the block: allow for a twentieth of its (robust) extent.
+  // First centres are bent over the block; the sigmas allow for a twentieth of its (robust) extent.
   Eigen::Vector3d middle;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> coordinates;
@@ -97,7 +97,7 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
 GroundAngles known_angles(const OrientationGraph& graph) {
   for (const auto& frame : graph.frames)
     if (frame.given || frame.attitude) return GroundAngles::kAll;
-  // One or two could be wrong, and nothing would show it.
+  // One or two verticals could be wrong without any contradiction.
   constexpr std::ptrdiff_t kVerticals = 3;
   const auto seen = std::count_if(graph.images.begin(), graph.images.end(),
                                   [](const auto& image) { return image.vertical != nullptr; });

@@ -1,5 +1,5 @@
-// From the arbitrary frame of averaged rotations and first centres to the ground frame, or to the frame of a free
-// block.
+// Transforms the first rotations and centres from their arbitrary coordinate frame to the ground frame, or to the frame
+// of a free block.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"
@@ -8,31 +8,31 @@
 
 namespace megablock {
 
-// What of the averaged rotations refers to the ground already.
+// Says how far the averaged rotations refer to the ground already: not at all, by the vertical, or by all three angles.
 enum class GroundAngles { kNone, kLevel, kAll };
-// By attitude priors and given poses, or by the verticals of three images or more.
+// kAll with attitude priors or given poses, kLevel with the verticals of three images or more, else kNone.
 GroundAngles known_angles(const OrientationGraph& graph);
 
-// Where the known positions say that `down` of the ground is, in the axes of `values`, of which only the frames'
-// centres count. First centres bend, and one bend moves many of them: the covariance is that of a single position for
-// each of the unknowns, with the residuals among its errors. Empty where they say nothing (on a line, fewer than
-// three).
+// The direction `down` of the ground in the axes of `values`, from the known positions and the centres of the frames.
+// First centres are bent, and one bend moves many of them. The covariance therefore counts one position for each
+// unknown only, with the residuals among its errors. Empty where the positions do not determine the direction (on a
+// line, or too few).
 std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, const OrientationValues& values,
                                                const Eigen::Vector3d& down);
 
-// Similarity that brings the oriented frames onto the known positions (priors and given poses), robustly; empty with
-// fewer than two of them. Positions on one line leave the rotation about the line open; it follows from
-//  * the rotations as they are, when these refer to the ground already (kAll: attitude priors or given poses), else
-//  * their level (kLevel: verticals; more positions than a line turn the heading alone then, too), else
-//  * gravity: images that look across the line over more than 25 m distance look down (nadir), all others have the
-//    camera's y axis pointing down (street).
+// Fits a robust similarity from the oriented frames to the known positions (priors and given poses). Empty with fewer
+// than two of them. Positions on one line leave the rotation about the line open. It then follows from
+//  * the rotations, if they refer to the ground already (kAll), else
+//  * their vertical (kLevel; positions off one line then turn the heading only), else
+//  * gravity: images that look across the line at points more than 25 m away are taken to look down (nadir); in all
+//    others the y axis of the camera is taken to point down (street).
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
                                                double median_distance, GroundAngles known);
 
-// Similarity to the frame of a free block: centroid of the frames at the origin, mean baseline of the linked frames one
-// unit (`keep_scale`: as it is), first principal plane of the centres horizontal with the images' mean viewing and y
-// directions downwards, the frame farthest from the centroid on the positive x axis. Of what is known of the rotations
-// it keeps all, or the level.
+// The similarity to the frame of a free block. Its origin is the centroid of the frames, and the mean baseline of
+// linked frames is one unit (unless `keep_scale`). The principal plane of the centres is horizontal, with the mean
+// viewing and y directions of the images downwards, and the frame farthest from the centroid lies on the positive x
+// axis. Angles that are known already are kept: all of them, or the vertical.
 Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, GroundAngles known,
                                     bool keep_scale);
 

@@ -1,6 +1,6 @@
-// What initial orientation works on: frames, images, relative orientations and tracks of one component in local numbers
-// whose order does not depend on the order of the block's images (frames and images by name, tracks by length, then by
-// their first observations).
+// Gives initial orientation its input: the frames, images, relative orientations and tracks of one component, in local
+// numbers. Frames and images are ordered by name, tracks by length and then by their first observations, so that the
+// numbers do not depend on the order of the images in the block.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,14 +15,14 @@
 
 namespace megablock {
 
-// Local numbers are signed; the standard library wants them unsigned.
+// A local number as an index of the standard library, which is unsigned.
 inline std::size_t row(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 struct OrientationGraph {
   struct FrameNode {
     FrameIndex index;
-    std::optional<Pose> given;              // oriented beforehand: stays where it is
-    std::optional<PositionPrior> position;  // of given frames their own position
+    std::optional<Pose> given;              // oriented beforehand; this pose stays
+    std::optional<PositionPrior> position;  // for given frames, their own position
     std::optional<AttitudePrior> attitude;
   };
   struct ImageNode {
@@ -37,13 +37,13 @@ struct OrientationGraph {
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // camera a -> camera b
     // Unit direction from a to b in the axes of camera a; zero: rotation only.
     Eigen::Vector3d baseline = Eigen::Vector3d::Zero();
-    double rotation_sigma = 0, baseline_sigma = 0;  // of the matches' errors, of each axis, rad; 0: not known
+    double rotation_sigma = 0, baseline_sigma = 0;  // by the noise of the matches, per axis, rad; 0: not known
   };
   struct PairEdge : Relative {
     std::int32_t a = -1, b = -1;  // rows of `images`, a < b
     double inliers = 0;
     bool has_twin = false;
-    Relative twin;  // explains the matches of a plane nearly as well
+    Relative twin;  // the second orientation that fits the matches of a plane
   };
   // Observations of a track: rows [begin[t], begin[t + 1]); images ascending.
   struct Observation {

@@ -1,4 +1,4 @@
-// The options of initial orientation.
+// Holds the options of initial orientation (orientation.h).
 #pragma once
 
 #include <cstdint>

@@ -34,8 +34,8 @@ struct SeenNormals {
 };
 
 constexpr int kRounds = 10;
-// A twin is chosen that agrees better by this factor than what is chosen now, and by as many witnesses as agree wholly:
-// a single one may do so by chance, where hills leave few pairs a twin.
+// A twin is chosen if it agrees better by this factor than the present choice, and by this number of fully agreeing
+// witnesses. Where hills leave few pairs a twin, a single witness may agree by chance.
 constexpr double kClearly = 1.5, kWitnesses = 0.75;
 
 // From 0 to 1.
@@ -61,7 +61,7 @@ void choose_twins_by_planes(OrientationGraph& graph, std::size_t witnesses) {
     return std::tuple(-p.inliers, p.a, p.b) < std::tuple(-q.inliers, q.a, q.b);
   };
   for (std::vector<SeenNormals>& of_image : seen) std::sort(of_image.begin(), of_image.end(), stronger);
-  // First each pair is held against whichever normals of the others fit, then against those chosen.
+  // In the first iteration the better fitting normal of each witness counts, later the chosen one.
   std::vector<std::uint8_t> by_twin(graph.edges.size(), 0);
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::array<double, 2>> votes(graph.edges.size(), {0, 0});

@@ -58,17 +58,17 @@ double variance_of(const RelativeRotation& edge) {
 
 namespace {
 
-// The number of inliers from which alone the rotation would be as good.
+// The number of inliers at which the variance would be the same without the noise of the matches.
 double effective_inliers(const RelativeRotation& edge) { return std::max(0.0, kVariance / variance_of(edge) - 1); }
 
-// Edges and verticals, without those that the others make unlikely.
+// The edges and verticals that agree with the others.
 struct Likely {
   Edges edges;
   Verticals verticals;
 };
 
-// A vertical with which less than a quarter of its node's edges agree, by inliers, is left out; an edge that the
-// verticals at its ends then contradict counts a tenth.
+// Leaves out a vertical if less than a quarter of the edges of its node, weighted by inliers, agree with it. An edge
+// that the remaining verticals at its ends contradict counts a tenth.
 Likely likely_ones(std::int32_t nodes, const Edges& edges, const Verticals& verticals) {
   constexpr double kAgree = 5 * kDegree, kFewest = 0.25, kDiscount = 0.1;
   std::vector<std::int32_t> vertical(row(nodes), -1);  // of several the last

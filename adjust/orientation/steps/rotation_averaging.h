@@ -1,18 +1,19 @@
-// Robust averaging of relative rotations over a graph.
+// Gives the rotations of all nodes of a graph from relative rotations, priors and verticals, robustly.
 //
-// Unknown R_i (world -> i), measured R_ij ~ R_j R_i'. With the increments w of rotation.h (about the world axes) and
-// the world-axes residual e = Log(R_j' R_ij R_i), one iteration solves  w_j - w_i = e  in weighted least squares, a
-// graph Laplacian times the 3x3 identity, by sparse Cholesky factorisation. Start: the spanning tree of the most
-// trusted edges (inliers times the share of triangles that close). Weights: first 1/|e| (L1), then Geman-McClure, after
-// Chatterjee and Govindu, "Efficient and robust large-scale rotation averaging", ICCV 2013; over the variance of what
-// the matches say and of what they do not (calibration, wrong matches), which falls with their number. The loss turns
-// at 2 degrees and three sigmas of the edge, added in squares.
+// The unknowns are R_i (world -> i), the observations R_ij ~ R_j R_i'. With the increments w of rotation.h (about the
+// world axes) and the residual e = Log(R_j' R_ij R_i) in world axes, one iteration solves  w_j - w_i = e  in weighted
+// least squares. The matrix is a graph Laplacian times the 3x3 identity, factorised by sparse Cholesky. The start is
+// the spanning tree of the most trusted edges (inliers times the share of triangles that close). The weights are first
+// 1/|e| (L1), then those of Geman and McClure (A. Chatterjee and V. Govindu, "Efficient and robust large-scale rotation
+// averaging", ICCV 2013). They are divided by the variance of the edge: that of the noise of its matches, plus a part
+// for calibration and wrong matches that falls with their number. The width of the loss is 2 degrees and three sigmas
+// of the edge, added in squares.
 //
-// The average is free by a rotation of the world, and its errors add up along chains. A node that sees the vertical
-// fixes two angles of three: with d where it sees down and g down in the world (the axis -z, to a degree) it measures
-// w = g x R_i'd about the axes x and y. Where edge and verticals at its ends
-// disagree by more than 5 degrees, a vertical that most edges of its node contradict is left out, and an edge that
-// others contradict counts a tenth. The heading, about z, stays free.
+// Relative rotations leave a common rotation of the world free, and their errors add up along chains. A node with a
+// vertical fixes two of its three angles. With d the direction of down in the node and g that in the world (the axis
+// -z, to a degree) it observes w = g x R_i'd about the axes x and y; the heading about z stays free. An edge and the
+// verticals at its ends disagree from 5 degrees on. A vertical that most edges of its node contradict is then left out,
+// and an edge that the remaining verticals contradict counts a tenth.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -27,19 +28,19 @@ namespace megablock {
 struct RelativeRotation {
   std::int32_t a = -1, b = -1;
   Eigen::Quaterniond rotation;  // R_b R_a'
-  double inliers = 0;           // trust; a rotation from 100 inliers counts as 0.5 deg
-  double sigma_rad = 0;         // of its matches' errors, per angle: it counts by both; 0: not known
+  double inliers = 0;           // a rotation from 100 inliers has a sigma of 0.5 deg
+  double sigma_rad = 0;         // by the noise of its matches, per angle, added to the above; 0: not known
 };
-// Of such a rotation, per angle, radians^2.
+// The variance of a relative rotation, per angle, in rad^2.
 double variance_of(const RelativeRotation& edge);
 
-// What is known of a rotation from elsewhere.
+// A rotation known from attitude priors or given poses.
 struct RotationPrior {
   Eigen::Quaterniond rotation;
   double sigma_rad = 0;  // 0: held
 };
 
-// Where a node sees down (Kalantari 2009, M45).
+// The direction of down in a node (Kalantari 2009, chapter 8: verticals of images).
 struct KnownVertical {
   std::int32_t node = -1;
   Eigen::Vector3d seen = Eigen::Vector3d::UnitY();     // unit, the node's axes
@@ -52,9 +53,9 @@ struct AveragedRotations {
   std::vector<std::uint8_t> kept;                           // [edges] 0: farther from the average than allowed
 };
 
-// `priors` [nodes]. With held rotations the nodes connected to them are averaged, else the largest connected part
-// (ties: the lowest node); without any prior its lowest node gets the identity. With `verticals` alone the world's z is
-// up, and the heading any.
+// `priors` [nodes]. With held rotations the nodes connected to them are averaged, else those of the largest connected
+// part (of equal ones that with the lowest node). Without any prior its lowest node gets the identity. With `verticals`
+// alone the z axis of the world is up and the heading arbitrary.
 AveragedRotations average_rotations(std::int32_t nodes, const std::vector<RelativeRotation>& edges,
                                     const std::vector<std::optional<RotationPrior>>& priors, double max_error_rad,
                                     const std::vector<KnownVertical>& verticals = {});

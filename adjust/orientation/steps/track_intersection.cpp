@@ -57,7 +57,7 @@ std::optional<Hypothesis> best_pair(const std::vector<Ray>& rays, double limit) 
   const std::size_t count = rays.size();
   std::optional<Hypothesis> best;
   int tried = 0;
-  // Rays far apart in the track first: they intersect best.
+  // Rays far apart in the track come first, because they intersect best.
   for (std::size_t gap = count - 1; gap > 0 && tried < kMaxHypotheses; --gap)
     for (std::size_t i = 0; i + gap < count && tried < kMaxHypotheses; ++i) {
       const auto point = midpoint(rays[i], rays[i + gap]);
@@ -69,7 +69,7 @@ std::optional<Hypothesis> best_pair(const std::vector<Ray>& rays, double limit) 
   return best;
 }
 
-// Least squares of angles: rays weighted by the inverse squared distance.
+// Least squares of the angles, which weights each ray by its inverse squared distance.
 std::optional<Eigen::Vector3d> refine(Eigen::Vector3d point, const std::vector<Ray>& rays, double limit) {
   for (int iteration = 0; iteration < 2; ++iteration) {
     std::vector<Ray> agreeing;

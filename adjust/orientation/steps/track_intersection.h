@@ -1,5 +1,6 @@
-// Robust intersection of tracks that may hold wrong observations, for given poses: every pair of rays (up to a limit)
-// is a hypothesis, the one with most agreeing rays wins. Errors are angles between rays, so nothing is projected.
+// Intersects tracks at given poses, and finds their outliers. Up to 30 pairs of rays give a
+// point each, and the point with the smallest truncated sum of squares wins. Errors are angles between rays, so points
+// need not be projected.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,11 +23,11 @@ struct OrientationValues {
 };
 
 struct IntersectionLimits {
-  double max_error_rad = 0.01;      // of a ray that agrees
-  double min_intersection_rad = 0;  // between the two most different agreeing rays
+  double max_error_rad = 0.01;      // of an inlier
+  double min_intersection_rad = 0;  // largest angle between two inliers, at least
 };
 
-// Intersects all tracks; fills points and kept.
+// Intersects all tracks and fills `points` and `kept` of the values.
 void intersect_tracks(const OrientationGraph& graph, const std::vector<Eigen::Vector3d>& rays,
                       const IntersectionLimits& limits, OrientationValues& values);
 

@@ -184,7 +184,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   return adjusted;
 }
 
-// Of what the ranks say.
+// The largest of the figures of all ranks. Collective.
 double largest(Job& job, double figure) {
   for (const std::string& text : job.ranks.gather_all(std::to_string(figure)))
     figure = std::max(figure, std::stod(text));

@@ -49,7 +49,7 @@ Bytes read_file(const std::string& path) {
   return bytes;
 }
 
-// Of the frames, cameras and mounts of a tile, zero where it does not touch one.
+// Writes the covariances of the frames, cameras and mounts of a tile, zero where the tile does not touch one.
 void write_covariances(const std::string& path, const TileProblem& problem, const TileCovariance& covariance) {
   ByteWriter writer;
   writer.values(problem.frames);

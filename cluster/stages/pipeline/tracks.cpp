@@ -39,7 +39,7 @@ constexpr std::int64_t kFeatureBits = 24;  // SIFT features of one image stay fa
 
 std::int64_t track_key(ImageIndex image, std::int32_t feature) { return (image.value << kFeatureBits) | feature; }
 
-// Where the tracks of the tiles come from: calls its argument with the tracks of tile 0, 1, ... in turn.
+// A source of tracks: it calls its argument with the tracks of tile 0, 1, ... in turn.
 using TracksByTile = std::function<void(const std::function<void(const TrackSet&)>&)>;
 
 std::uint64_t content_fingerprint(const TrackSet& tracks) {

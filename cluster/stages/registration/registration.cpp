@@ -140,7 +140,7 @@ std::string run_rig(Job& job, LazyTracks& tracks, const RegistrationSettings& se
   return file.summary;
 }
 
-// Of the block with its rig.
+// The fingerprint of the block and its rig.
 std::uint64_t block_fingerprint(const Job& job) {
   Hasher hasher;
   hasher.add(job.store.seal("block.h5")->content_hash);

@@ -37,7 +37,7 @@ Eigen::Vector2d residual(const RankTile& tile, std::int64_t point, std::int64_t 
                       {tile.problem.x[static_cast<std::size_t>(o)], tile.problem.y[static_cast<std::size_t>(o)]});
 }
 
-// What holds of a tile's observations: those of points that take no part are not kept.
+// Marks the kept observations of a tile. Those of points that take no part do not count as kept.
 std::vector<std::uint8_t> verdicts(const TileProblem& problem) {
   std::vector<std::uint8_t> kept = problem.kept;
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
