@@ -9,13 +9,13 @@ namespace megablock {
 
 void RansacOptions::check() const {
   if (!(threshold >= 0) || (threshold == 0 && !(max_threshold > 0)))
-    throw std::invalid_argument("ransac: a positive threshold is needed, or the largest one to choose from");
-  if (!(confidence > 0 && confidence < 1)) throw std::invalid_argument("ransac: confidence must lie between 0 and 1");
-  if (!(inlier_share >= 0 && inlier_share <= 1))
-    throw std::invalid_argument("ransac: the share of inliers must lie between 0 and 1");
-  if (max_draws < 1) throw std::invalid_argument("ransac: at least one draw is needed");
+    throw std::invalid_argument("ransac: threshold must be positive, or 0 together with a positive max_threshold");
+  if (!(confidence > 0 && confidence < 1))
+    throw std::invalid_argument("ransac: confidence must be above 0 and below 1");
+  if (!(inlier_share >= 0 && inlier_share <= 1)) throw std::invalid_argument("ransac: inlier_share must be in [0, 1]");
+  if (max_draws < 1) throw std::invalid_argument("ransac: max_draws must be at least 1");
   if (min_draws > max_draws) throw std::invalid_argument("ransac: min_draws must not exceed max_draws");
-  if (keep < 1) throw std::invalid_argument("ransac: at least one model must be kept");
+  if (keep < 1) throw std::invalid_argument("ransac: keep must be at least 1");
 }
 
 double number_of_samples(std::size_t observations, std::size_t sample_size) {

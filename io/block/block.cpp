@@ -71,11 +71,11 @@ bool positive(const Eigen::Vector3d& sigma) { return (sigma.array() > 0).all(); 
 void check_verticals(const Block& block) {
   ImageIndex before;
   for (const SeenVertical& vertical : block.verticals) {
-    require(block.images.contains(vertical.image), "a vertical names no image of the block");
+    require(block.images.contains(vertical.image), "a vertical refers to an image that the block does not have");
     const std::string what = "vertical of image '" + block.name_of(vertical.image) + "'";
     require(before < vertical.image, what + ": appears twice, or out of the order of images");
     before = vertical.image;
-    require(std::abs(vertical.down.norm() - 1) < 1e-6, what + ": is no unit vector");
+    require(std::abs(vertical.down.norm() - 1) < 1e-6, what + ": is not a unit vector");
     // A unit vector has no error along itself, so only the covariance across it must be positive.
     const Eigen::Matrix<double, 3, 2> plane = tangent_plane(vertical.down);
     const Eigen::Matrix2d covariance = plane.transpose() * vertical.covariance * plane;
@@ -83,10 +83,10 @@ void check_verticals(const Block& block) {
             what + ": its covariance is not positive; sigmas must be greater than 0");
     require(vertical.camera.size() == vertical.by_camera.cols() && vertical.camera.allFinite() &&
                 vertical.by_camera.allFinite(),
-            what + ": its derivatives by the camera's parameters are not as many as these, or not finite");
+            what + ": it must have a finite derivative for each parameter of its camera");
     require(vertical.camera.size() == 0 ||
                 vertical.camera.size() == block.cameras[block.camera_of(vertical.image)].intrinsics.size(),
-            what + ": was found with another model of its camera; find it again");
+            what + ": was found with another camera model; determine it again");
   }
 }
 
@@ -119,14 +119,15 @@ void check(const Block& block) {
     require(!rig.mounts.empty(), "rig '" + rig.name + "': has no camera");
     require(rig.mounts.front().held(), "rig '" + rig.name + "': its first mount is the reference and must be held");
     for (const Mount& mount : rig.mounts) {
-      require(block.cameras.contains(mount.camera), "rig '" + rig.name + "': a mount names no camera of the block");
+      require(block.cameras.contains(mount.camera),
+              "rig '" + rig.name + "': a mount refers to a camera that the block does not have");
       check_unit(mount.pose, "rig '" + rig.name + "'");
       require(mount.held() || (mount.rotation_sigma_rad > 0 && mount.position_sigma_m > 0),
               "rig '" + rig.name + "': the sigmas of a mount must be both positive, or both 0 to hold it");
     }
   }
   for (const Frame& frame : block.frames) {
-    require(block.rigs.contains(frame.rig), "frame '" + frame.name + "': names no rig of the block");
+    require(block.rigs.contains(frame.rig), "frame '" + frame.name + "': refers to a rig that the block does not have");
     if (frame.position_prior)
       require(frame.position_prior->position.allFinite() && frame.position_prior->lever_arm.allFinite() &&
                   positive(frame.position_prior->sigma),
@@ -139,13 +140,14 @@ void check(const Block& block) {
   }
   for (ImageIndex i(0); block.images.contains(i); ++i.value) {
     const Image& image = block.images[i];
-    require(block.frames.contains(image.frame), "image '" + block.name_of(i) + "': names no frame of the block");
+    require(block.frames.contains(image.frame),
+            "image '" + block.name_of(i) + "': refers to a frame that the block does not have");
     require(image.mount >= 0 && image.mount < static_cast<int>(block.rig_of(image.frame).mounts.size()),
             "image '" + block.name_of(i) + "': its rig has no such mount");
   }
   for (const RelativePose& relative : block.relative_poses) {
     require(block.frames.contains(relative.from) && block.frames.contains(relative.to),
-            "a relative pose names no frame of the block");
+            "a relative pose refers to a frame that the block does not have");
     const std::string what = "relative pose of frames '" + block.frames[relative.from].name + "' and '" +
                              block.frames[relative.to].name + "'";
     require(relative.rotation_sigma_rad > 0 && relative.position_sigma_m > 0, what + " has no positive sigmas");
@@ -165,15 +167,19 @@ void check(const Block& block) {
     require(point.position.head<2>().allFinite() && !std::isinf(point.position.z()),
             "control point '" + point.name + "': position must be finite (metres; height may be unknown)");
     for (const ImageMeasurement& m : point.measurements) {
-      require(block.images.contains(m.image), "control point '" + point.name + "': names no image of the block");
-      require(m.pixel.allFinite() && m.sigma_px > 0, "control point '" + point.name + "': bad image measurement");
+      require(block.images.contains(m.image),
+              "control point '" + point.name + "': an observation refers to an image that the block does not have");
+      require(m.pixel.allFinite() && m.sigma_px > 0,
+              "control point '" + point.name + "': an image measurement is not finite, or its sigma is not positive");
     }
   }
   for (const KnownLine& line : block.lines)
     for (const KnownLine::Measurement& m : line.measurements) {
-      require(block.images.contains(m.image), "line '" + line.name + "': names no image of the block");
+      require(block.images.contains(m.image),
+              "line '" + line.name + "': an observation refers to an image that the block does not have");
       require(m.first.allFinite() && m.second.allFinite() && m.first != m.second && m.sigma_px > 0,
-              "line '" + line.name + "': bad image measurement");
+              "line '" + line.name +
+                  "': an image measurement is not finite, has no extent, or has a sigma that is not positive");
     }
   check_verticals(block);
 }

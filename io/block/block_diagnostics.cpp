@@ -131,9 +131,10 @@ class JsonWriter {
 
 void DiagnosticsOptions::check() const {
   if (!(min_base_to_height >= 0 && min_base_to_height < max_base_to_height))
-    throw InputError("min_base_to_height must not be negative and be below max_base_to_height");
+    throw InputError("min_base_to_height must be at least 0 and less than max_base_to_height");
   require_within(max_base_to_height, {0, 1e3}, "max_base_to_height");
-  if (!(min_overlap >= 0 && min_overlap < 1)) throw InputError("min_overlap is a share: from 0 to below 1");
+  if (!(min_overlap >= 0 && min_overlap < 1))
+    throw InputError("min_overlap must be a share of at least 0 and less than 1");
   if (min_images < 1 || min_images > 255) throw InputError("min_images must be from 1 to 255");
   if (min_link_points < 1) throw InputError("min_link_points must be at least 1");
   if (!(gap_factor > 1)) throw InputError("gap_factor must be above 1");

@@ -114,7 +114,9 @@ Georeference& Georeference::operator=(Georeference&&) noexcept = default;
 
 Eigen::Vector3d Georeference::to_local(const Geodetic& position) const {
   Eigen::Vector3d xyz(position.longitude_deg, position.latitude_deg, position.height_m);
-  if (!in_range(xyz) || !transform_->apply(PJ_FWD, xyz)) throw InputError("a WGS84 position is out of range");
+  if (!in_range(xyz) || !transform_->apply(PJ_FWD, xyz))
+    throw InputError(
+        "a WGS84 position is out of range; latitudes must lie in [-90, 90], longitudes in [-360, 360] degrees");
   return xyz;
 }
 

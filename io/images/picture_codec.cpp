@@ -18,7 +18,7 @@ PictureCodecs load_codecs() {
   void* library = dlopen(kLibrary, RTLD_NOW | RTLD_LOCAL);  // stays loaded until the process ends
   void* symbol = library == nullptr ? nullptr : dlsym(library, "megablock_picture_codecs");
   if (symbol == nullptr)
-    throw InputError(std::string("pictures cannot be read or written: ") + dlerror() +
+    throw InputError(std::string("image files cannot be read or written: ") + dlerror() +
                      "; it belongs beside the program, or where 'cmake --install' puts it");
   return reinterpret_cast<decltype(&megablock_picture_codecs)>(symbol)();
 }
@@ -43,7 +43,7 @@ cv::Mat read_picture(const std::string& path, int flags) {
 std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
                                           const std::vector<int>& parameters) {
   std::vector<unsigned char> bytes = codecs().encode(extension, picture, parameters);
-  if (bytes.empty()) throw ComputeError("OpenCV cannot encode a picture as " + extension);
+  if (bytes.empty()) throw ComputeError("OpenCV cannot encode an image as " + extension);
   return bytes;
 }
 

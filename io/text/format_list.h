@@ -23,7 +23,7 @@ const Format& format_named(const std::vector<Format>& formats, const std::string
     if (format.name == name) return format;
     list += (list.empty() ? "" : ", ") + format.name;
   }
-  throw InputError("'" + name + "' is no " + kind + " format; they are " + list);
+  throw InputError("'" + name + "' is not an " + kind + " format; the formats are " + list);
 }
 
 }  // namespace megablock

@@ -137,8 +137,8 @@ std::vector<LabelledMatch> labelled_matches(const Block& block, const TrackSet& 
                                             const std::vector<std::uint8_t>& wrong, const TrustOptions& trust,
                                             std::uint64_t seed) {
   if (wrong.size() != tracks.image.size())
-    throw InputError("labels: " + std::to_string(wrong.size()) + " for " + std::to_string(tracks.image.size()) +
-                     " observations; one per observation is needed");
+    throw InputError("match filter: " + std::to_string(wrong.size()) + " labels for " +
+                     std::to_string(tracks.image.size()) + " observations; give one label per observation");
   const TrustedPairs trajectory(block, trust);
   std::mt19937_64 generator(seed);
   std::vector<LabelledMatch> matches;

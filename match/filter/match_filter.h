@@ -5,10 +5,10 @@
 //
 // The features, each normalised to mean 0 and standard deviation 1 over the training samples, are
 //
-//     ln(1 + r_im / sigma)    sigma: what the trust in the orientation lets expect (TrustedPair::epipolar_sigma_px)
+//     ln(1 + r_im / sigma)    sigma: as expected from the trusted orientation (TrustedPair::epipolar_sigma_px)
 //     asinh(d / 1 m)          d the smaller of d_1 and d_2, negative behind a camera
 //     ln(1 + alpha / 1 deg)
-//     ln(1 + r_M / 1 cm)      only for comparison: it makes the filter no better
+//     ln(1 + r_M / 1 cm)      only for comparison, as it does not improve the filter
 #pragma once
 
 #include <cstdint>

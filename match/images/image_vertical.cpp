@@ -121,7 +121,7 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
       if (!seen.vertical && seen.segments > 0) break;
     }
   } catch (const cv::Exception& e) {
-    result.failure = "no segments: " + e.err;
+    result.failure = "line segments could not be found: " + e.err;
     return result;
   }
   result.segments = seen.segments;

@@ -50,7 +50,7 @@ Adjacency adjacency(const FrameGraph& graph) {
   result.begin.assign(static_cast<std::size_t>(graph.frame_count) + 1, 0);
   for (const FrameEdge& edge : graph.edges) {
     if (edge.a.value < 0 || edge.b.value >= graph.frame_count || edge.a >= edge.b)
-      throw ComputeError("frame graph: a link is out of range or not ordered");
+      throw ComputeError("frame graph: a link must join two frames of the graph, the lower index first");
     total += 2 * edge.weight;
     ++result.begin[static_cast<std::size_t>(edge.a.value) + 1];
     ++result.begin[static_cast<std::size_t>(edge.b.value) + 1];

@@ -249,7 +249,8 @@ TEST_F(BlockInput, SigmasThatAreNone) {
                 HasSubstr("control point '" + s.block.control_points[1].name + "': sigmas must be positive"));
     s = good;
     s.block.control_points[2].measurements[0].sigma_px = wrong;
-    EXPECT_THAT(refusal(s), HasSubstr("control point '" + s.block.control_points[2].name + "': bad image measurement"));
+    EXPECT_THAT(refusal(s), HasSubstr("control point '" + s.block.control_points[2].name +
+                                      "': an image measurement is not finite"));
     s = good;
     s.block.relative_poses.push_back({FrameIndex(0), FrameIndex(1), Pose(), 1e-3, wrong});
     EXPECT_THAT(refusal(s), HasSubstr("relative pose of frames '"));
@@ -324,8 +325,8 @@ TEST_F(BlockInput, ObservationsThatAreNoNumbers) {
   options.control_points = 4;
   SimulatedBlock control = simulate_block(options);
   control.block.control_points[1].measurements[2].pixel.x() = kNaN;
-  EXPECT_THAT(refusal(control),
-              HasSubstr("control point '" + control.block.control_points[1].name + "': bad image measurement"));
+  EXPECT_THAT(refusal(control), HasSubstr("control point '" + control.block.control_points[1].name +
+                                          "': an image measurement is not finite"));
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ std::vector<CameraModel> get_models(const Hdf5Reader& file, std::int64_t rows) {
   std::vector<CameraModel> models;
   for (const std::string& name : file.texts("cameras/model", rows)) {
     const auto model = find_model(name);
-    if (!model) file.fail("cameras/model", "names a camera model that is not known, '" + name + "'");
+    if (!model) file.fail("cameras/model", "names an unknown camera model, '" + name + "'");
     models.push_back(*model);
   }
   return models;

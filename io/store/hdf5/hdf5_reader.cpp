@@ -73,7 +73,7 @@ Hdf5Reader::Hdf5Reader(const std::string& path) : path_(path) {
   if (file_.id() < 0)
     throw StoreError(path + ": cannot be opened as HDF5 (" + last_hdf5_failure() + "); delete it and run again");
   if (!has_attribute("/", "kind") || !has_attribute("/", "format_version"))
-    throw StoreError(path + ": is no file of megablock (no attribute 'kind')");
+    throw StoreError(path + ": is not a file of megablock (it lacks the attribute 'kind' or 'format_version')");
   const auto version = attribute<std::uint32_t>("/", "format_version");
   if (version != kFormatVersion)
     throw StoreError(path + ": has format version " + std::to_string(version) + ", this program reads version " +
@@ -111,7 +111,7 @@ std::size_t Hdf5Reader::size_of_rows(const std::string& name, const std::vector<
   const std::vector<std::int64_t> found = shape(name);
   for (const RowRange& range : ranges)
     if (range.first < 0 || range.count < 0 || found.empty() || range.first + range.count > found[0])
-      fail(name, "has " + shape_text(found) + " rows, more were asked for");
+      fail(name, "has shape " + shape_text(found) + ", but rows beyond its end were requested");
   std::int64_t size = count_of(ranges);
   for (std::size_t d = 1; d < found.size(); ++d) size *= found[d];
   return static_cast<std::size_t>(size);
@@ -121,8 +121,7 @@ void Hdf5Reader::check_class(std::int64_t set, const std::string& name, ElementT
   const bool wants_integers = type != ElementType::kFloat && type != ElementType::kDouble;
   const Hdf5Handle found(checked(H5Dget_type(set), name), &H5Tclose);
   const H5T_class_t kind = H5Tget_class(found.id());
-  if (wants_integers && kind == H5T_FLOAT)
-    fail(name, "holds floating-point numbers, not integers: HDF5 would make something of NaN, too");
+  if (wants_integers && kind == H5T_FLOAT) fail(name, "holds floating-point numbers where integers are expected");
 }
 
 void Hdf5Reader::read_rows(const std::string& name, ElementType type, const std::vector<RowRange>& ranges,

@@ -320,7 +320,7 @@ void Hdf5Writer::scalar_attribute(const std::string& object, const std::string& 
 std::int64_t Hdf5Writer::checked(std::int64_t result, const std::string& name) const {
   if (result >= 0) return result;
   throw StoreError(path_ + ": " + (name.empty() ? "" : name + ": ") + "cannot be made (" + last_hdf5_failure() +
-                   "); is there memory enough for the file?");
+                   "); is there enough memory for the file?");
 }
 
 }  // namespace megablock

@@ -76,7 +76,8 @@ void read_file(const std::string& path, std::vector<UnitEvent>& events) {
     } catch (const Json::exception&) {
       // After a power failure, the file system may have zero bytes at the end of the file instead of a line.
       if (file.peek() == std::ifstream::traits_type::eof()) return;
-      throw StoreError(path + ":" + std::to_string(number) + ": is no event; delete the file, nothing depends on it");
+      throw StoreError(path + ":" + std::to_string(number) +
+                       ": is not an event; delete the file, nothing depends on it");
     }
   }
 }

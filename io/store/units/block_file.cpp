@@ -247,7 +247,7 @@ void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images
 
 // The folder before the image names in their paths. It is the same for all images, so only the first path is read.
 std::string get_image_folder(const Hdf5Reader& file) {
-  if (file.shape("images/path") != file.shape("images/name")) file.fail("images/path", "has not a row per image");
+  if (file.shape("images/path") != file.shape("images/name")) file.fail("images/path", "must have one row per image");
   if (file.shape("images/name") == std::vector<std::int64_t>{0}) return "";
   const std::string path = file.text_rows("images/path", {{0, 1}}).front();
   const std::string name = file.text_rows("images/name", {{0, 1}}).front();
@@ -257,7 +257,7 @@ std::string get_image_folder(const Hdf5Reader& file) {
 std::int64_t image_count(const Hdf5Reader& file) {
   const std::vector<std::int64_t> shape = file.shape("images/name");
   for (const char* name : {"images/frame", "images/mount", "images/file_hash"})
-    if (shape.size() != 1 || file.shape(name) != shape) file.fail(name, "has not a row per image");
+    if (shape.size() != 1 || file.shape(name) != shape) file.fail(name, "must have one row per image");
   return shape[0];
 }
 

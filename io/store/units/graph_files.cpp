@@ -33,7 +33,7 @@ CandidateGraph read_candidates(const std::string& path) {
   graph.cell_pairs = cumulate(file.vector<std::int64_t>("cells/pair_difference"));
   for (const std::int64_t row : graph.cell_pairs)
     if (row < 0 || row >= static_cast<std::int64_t>(graph.pairs.size()))
-      file.fail("cells/pair_difference", "names a pair that is not there");
+      file.fail("cells/pair_difference", "refers to a pair that does not exist");
   graph.cell_begin = begin_of(file, "cells/pairs", file.vector<std::int64_t>("cells/pairs"),
                               static_cast<std::int64_t>(graph.cell_pairs.size()));
   return graph;
@@ -95,7 +95,8 @@ void get_twins(const Hdf5Reader& file, std::vector<VerifiedPair>& pairs) {
   const auto row = cumulate(file.vector<std::int64_t>("twins/pair_difference"));
   const auto twins = get_orientations(file, "twins", std::ssize(row));
   for (std::size_t i = 0; i < row.size(); ++i) {
-    if (row[i] < 0 || row[i] >= std::ssize(pairs)) file.fail("twins/pair_difference", "names a pair that is not there");
+    if (row[i] < 0 || row[i] >= std::ssize(pairs))
+      file.fail("twins/pair_difference", "refers to a pair that does not exist");
     pairs[static_cast<std::size_t>(row[i])].twin = twins[i];
   }
 }
@@ -160,7 +161,8 @@ std::vector<VerifiedPair> read_matches(const std::string& path) {
   std::vector<VerifiedPair> pairs(a.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     VerifiedPair& pair = pairs[i];
-    if (model[i] > static_cast<std::uint8_t>(PairModel::kRotationOnly)) file.fail("pairs/model", "is unknown");
+    if (model[i] > static_cast<std::uint8_t>(PairModel::kRotationOnly))
+      file.fail("pairs/model", "holds an unknown model");
     pair.a = ImageIndex(a[i]);
     pair.b = ImageIndex(b[i]);
     pair.model = static_cast<PairModel>(model[i]);
@@ -210,7 +212,8 @@ Tiles get_tiles(const Hdf5Reader& file) {
   tiles.tile_of_frame =
       IndexedVector<FrameIndex, TileIndex>(indices<TileIndex>(file.vector<std::int64_t>("tiles/tile_of_frame")));
   for (const TileIndex tile : tiles.tile_of_frame)
-    if (tile.value < -1 || tile.value >= tiles.tile_count) file.fail("tiles/tile_of_frame", "names no tile");
+    if (tile.value < -1 || tile.value >= tiles.tile_count)
+      file.fail("tiles/tile_of_frame", "refers to a tile that does not exist");
   tiles.component = IndexedVector<FrameIndex, std::int32_t>(
       file.vector<std::int32_t>("tiles/component_of_frame", static_cast<std::int64_t>(tiles.tile_of_frame.size())));
   if (file.has("tiles/separator_depth"))  // earlier versions of the program did not write it

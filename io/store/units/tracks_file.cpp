@@ -123,7 +123,8 @@ std::vector<std::int32_t> narrow(const std::vector<std::int64_t>& values) {
   std::vector<std::int32_t> narrowed;
   narrowed.reserve(values.size());
   for (const std::int64_t value : values) {
-    if (value != static_cast<std::int32_t>(value)) throw StoreError("tracks: more than 2^31 images cannot be streamed");
+    if (value != static_cast<std::int32_t>(value))
+      throw StoreError("tracks: a block may have at most 2^31 images; divide it into several blocks");
     narrowed.push_back(static_cast<std::int32_t>(value));
   }
   return narrowed;

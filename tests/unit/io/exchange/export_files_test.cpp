@@ -35,7 +35,7 @@ TEST(ExportFiles, RefusesUnknownFormatsAndPlacesItCannotWrite) {
   ScratchDirectory folder;
   const BlockResult result = small_result();
   EXPECT_THAT(message_of<InputError>([&] { export_result(result, "kml", folder.path("x")); }),
-              HasSubstr("'kml' is no export format; they are colmap-text, "));
+              HasSubstr("'kml' is not an export format; the formats are colmap-text, "));
   for (const std::string& format : export_formats())  // a place that is mistyped
     EXPECT_THAT(
         message_of<InputError>([&] { export_result(result, format, folder.path("nowhere/out/")); }),

@@ -212,7 +212,7 @@ TEST(Import, BadFilesAreRefusedByLine) {
   EXPECT_THAT(refusal("bundler", "# Bundle file v0.3\n1 0\n-5 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n"),
               HasSubstr("f:3: focal length of camera 0 is negative"));
   EXPECT_THAT(refusal("bundler", "Bundle\n1 0\n"), HasSubstr("f:1: is no Bundler file"));
-  EXPECT_THAT(refusal("nvm", ""), HasSubstr("'nvm' is no import format"));
+  EXPECT_THAT(refusal("nvm", ""), HasSubstr("'nvm' is not an import format"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("bal", folder.path("none")); }), HasSubstr("cannot be read"));
   EXPECT_THAT(message_of<InputError>([&] { import_block("colmap-text", folder.path()); }), HasSubstr("cannot be read"));
 }

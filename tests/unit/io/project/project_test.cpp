@@ -334,7 +334,7 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_EQ(refusal(folder, "\nimages: pictures\n"), "block.yaml:2: images: folder 'pictures' does not exist");
   EXPECT_THAT(refusal(folder, "images: nothing\n"), HasSubstr("block.yaml:1: images: no readable image"));
   EXPECT_THAT(refusal(folder, images + "gps:\n  sigma_horizontal_m: 3 m\n"),
-              HasSubstr("block.yaml:3: gps.sigma_horizontal_m: '3 m' has something behind the number"));
+              HasSubstr("block.yaml:3: gps.sigma_horizontal_m: '3 m' has text after the number"));
   EXPECT_THAT(refusal(folder, images + "gps: {sigma_vertical_m: -1}\n"),
               HasSubstr("block.yaml:2: sigma_vertical_m must lie in [1e-08, 1e+06], or be 0 for what is held, not -1"));
   for (const char* absurd : {"1e300", "1e-300"}) {

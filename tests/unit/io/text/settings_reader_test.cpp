@@ -71,7 +71,7 @@ TEST(SettingsReader, RefusesUnitsAndWrongKinds) {
     const StageSettings settings = settings_with("d", value);
     return input_message_of([&] { SettingsReader(settings, "adjustment").number("d", number); });
   };
-  EXPECT_THAT(number_message("3 px"), HasSubstr("block.yaml:7: adjustment.d: '3 px' has something behind the number"));
+  EXPECT_THAT(number_message("3 px"), HasSubstr("block.yaml:7: adjustment.d: '3 px' has text after the number"));
   EXPECT_THAT(number_message("three"), HasSubstr("'three' is not a number"));
   EXPECT_THAT(number_message(""), HasSubstr("not a number"));
   EXPECT_THAT(number_message("nan"), HasSubstr("not a finite number"));
