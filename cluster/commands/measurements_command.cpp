@@ -9,8 +9,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "cluster/status/status.h"
 #include "cluster/process/exit_codes.h"
+#include "cluster/status/status.h"
 #include "cluster/terminal/option_checks.h"
 #include "cluster/terminal/output_check.h"
 #include "io/base/error.h"

@@ -81,7 +81,8 @@ InitialOrientation read_orientation(const std::string& path) {
   const auto images = file.vector<std::int64_t>("verticals_aside/image");
   const auto verdicts = file.vector<std::uint8_t>("verticals_aside/verdict", static_cast<std::int64_t>(images.size()));
   for (std::size_t v = 0; v < images.size(); ++v) {
-    if (verdicts[v] < 1 || verdicts[v] > 3) throw StoreError(path + ": verticals_aside/verdict must be 1 to 3");
+    if (verdicts[v] < 1 || verdicts[v] > static_cast<std::uint8_t>(VerticalVerdict::kAgainstPoses))
+      throw StoreError(path + ": verticals_aside/verdict must be 1 to 4");
     orientation.verticals_aside.push_back({ImageIndex(images[v]), static_cast<VerticalVerdict>(verdicts[v])});
   }
   return orientation;

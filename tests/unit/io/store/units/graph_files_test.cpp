@@ -274,12 +274,16 @@ TEST(OrientationFile, KeepsWhyFramesGotNoPose) {
   orientation.state.frames.resize(2);
   orientation.state.oriented.resize(2);
   orientation.failed = {{FrameIndex(1), "only 3 of its points could be intersected"}};
-  orientation.verticals_aside = {{ImageIndex(0), VerticalVerdict::kAgainstGround}};
+  orientation.verticals_aside = {{ImageIndex(0), VerticalVerdict::kAgainstGround},
+                                 {ImageIndex(1), VerticalVerdict::kContradicted},
+                                 {ImageIndex(2), VerticalVerdict::kNoConsensus},
+                                 {ImageIndex(3), VerticalVerdict::kAgainstPoses}};
   write_orientation(path, orientation);
   const InitialOrientation read = read_orientation(path);
   EXPECT_EQ(read.state.frames.size(), 2u);
   EXPECT_EQ(read.failed, orientation.failed);
-  ASSERT_EQ(read.verticals_aside.size(), 1u);
+  ASSERT_EQ(read.verticals_aside.size(), 4u);
+  EXPECT_EQ(read.verticals_aside[3].verdict, VerticalVerdict::kAgainstPoses);
   EXPECT_EQ(read.verticals_aside[0].image, ImageIndex(0));
   EXPECT_EQ(read.verticals_aside[0].verdict, VerticalVerdict::kAgainstGround);
 }
