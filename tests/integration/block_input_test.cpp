@@ -318,7 +318,8 @@ TEST_F(BlockInput, ObservationsThatAreNoNumbers) {
     folder_.run();
     ADD_FAILURE() << "taken";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("tie_points.h5: observations/x: holds floating-point numbers, not integers"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("tie_points.h5: observations/x: holds floating-point numbers where integers are expected"));
   }
 
   SimulationOptions options = aerial(12);

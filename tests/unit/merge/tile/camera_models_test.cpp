@@ -85,7 +85,8 @@ TEST_P(CameraModels, AdjustAsOneCeresProblem) {
   ASSERT_EQ(block.whole.cameras[0], CameraIndex(0));
   EXPECT_EQ(found.model(), truth.model());
   const Camera& camera = block.simulated.block.cameras[CameraIndex(0)];
-  const std::vector<TileCovariance> covariances = runner.covariances();
+  runner.final_up();
+  const std::vector<TileCovariance>& covariances = runner.covariances();
   for (std::size_t t = 0; t < runner.problems().size(); ++t) {
     if (runner.problems()[t].cameras.front() != CameraIndex(0)) continue;
     const Eigen::MatrixXd& covariance = covariances[t].cameras.front();

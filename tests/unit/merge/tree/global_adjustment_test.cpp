@@ -175,7 +175,9 @@ class MemoryTest : public testing::Test {
     return runner;
   }
   void expect_same(MergeInMemory& a, MergeInMemory& b) {
-    const std::vector<TileCovariance> ca = a.covariances(), cb = b.covariances();
+    a.final_up();
+    b.final_up();
+    const std::vector<TileCovariance>&ca = a.covariances(), &cb = b.covariances();
     for (std::size_t t = 0; t < a.states().size(); ++t) {
       EXPECT_TRUE(same_bits(a.states()[t], b.states()[t])) << "tile " << t;
       for (std::size_t f = 0; f < ca[t].frames.size(); ++f) EXPECT_EQ(ca[t].frames[f], cb[t].frames[f]);
