@@ -191,7 +191,7 @@ void run_stages(Job& job, const std::string& tie_points) {
   for (const Stage& stage : all_stages()) {
     if (!stage.runs(!tie_points.empty())) continue;
     stage.run(job, results);
-    if (stage.ends(job.options.last_stage, !tie_points.empty()) && stage.name != all_stages().back().name) return;
+    if (stage.ends(job.options.last_stage, !tie_points.empty()) && &stage != &all_stages().back()) return;
   }
   remove_surplus(job, results.tracks);
 }

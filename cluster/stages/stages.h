@@ -1,9 +1,9 @@
 // The table of the stages of a job.
 //
-// To add a stage, write one file pair in cluster/stages/ that brings the stage's units up to date (run_stage() in
+// To add a stage, write one file in cluster/stages/pipeline/ that brings the stage's units up to date (run_stage() in
 // cluster/job/work_queue.h runs them over all ranks, skips those that are there, and records what failed), and add one
-// line to the table in stages.cpp. The pipeline, the commands that run as far as a stage, `status`, the report and the
-// cleaning of a job all ask the table. docs/developer/add-stage.md has the steps.
+// line to the table in stages.cpp. The pipeline, the commands that run as far as a stage, `status` and the cleaning of a
+// job ask the table. docs/developer/add-stage.md has the steps, and the places that do not ask it yet.
 #pragma once
 
 #include <span>
@@ -43,7 +43,7 @@ struct Stage {
   bool runs(bool given_tie_points) const { return !given_tie_points || command_given != nullptr; }
   // Whether `last` is the command that ends with this stage.
   bool ends(const std::string& last, bool given_tie_points) const {
-    return !last.empty() && last == (given_tie_points ? command_given : command);
+    return !last.empty() && runs(given_tie_points) && last == (given_tie_points ? command_given : command);
   }
 };
 
