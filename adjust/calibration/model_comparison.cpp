@@ -16,18 +16,14 @@ namespace megablock {
 
 namespace {
 
-using Kind = CameraModelKind;
-
 constexpr int kAllTerms = -1;
 
 ModelCandidate candidate_of(const CameraModel& model, int terms) {
-  ModelCandidate candidate{model, 0, model_name(model)};
-  for (int p = 0; p < parameter_count(model); ++p)
-    if (!is_fixed(model, p)) candidate.free |= mask_of(p);
+  ModelCandidate candidate{model, free_parameters(model), model_name(model)};
   if (terms == kAllTerms) return candidate;
   candidate.name += "/" + std::to_string(terms);
   candidate.free &= ~radial_terms(model, kMaxIntrinsics) | radial_terms(model, terms);
-  if (model.kind == Kind::kBrown) candidate.free &= ~(mask_of(kDecentring1) | mask_of(kDecentring2));
+  candidate.free &= ~parameters_with(model, ParameterRole::kTangential);
   return candidate;
 }
 
@@ -42,7 +38,7 @@ ModelCandidate find_candidate(const std::string& name) {
   const std::size_t slash = name.find('/');
   const auto model = find_model(name.substr(0, slash));
   if (!model) throw InputError("'" + name + "' is no camera model; they are " + model_list());
-  if (model->kind == Kind::kEquirectangular)
+  if (is_panorama(*model))
     throw InputError("'" + name + "' is no model of a lens: stitched panoramas have none to compare");
   if (slash == std::string::npos) return candidate_of(*model, kAllTerms);
   int terms = 0;
@@ -56,10 +52,10 @@ ModelCandidate find_candidate(const std::string& name) {
 }
 
 std::vector<ModelCandidate> default_candidates(const CameraModel& given) {
-  if (given.kind == Kind::kEquirectangular)
+  if (is_panorama(given))
     throw InputError("the camera is a stitched panorama (equirectangular), which has no lens to model");
   std::vector<std::string> names = {"opencv-fisheye/1", "opencv-fisheye/2", "opencv-fisheye/3", "opencv-fisheye"};
-  if (given.kind != Kind::kFisheye)
+  if (!sees_sideways(given))
     names = {"pinhole",      "brown/1",    "brown/2",      "brown/3",       "brown",         "ign-radial/1",
              "ign-radial/2", "ign-radial", "odd-radial-4", "even-radial-2", "even-radial-4", "polynomial-3",
              "polynomial-5", "legendre-3", "legendre-5",   "fourier-1",     "fourier-2",     "opencv-fisheye"};

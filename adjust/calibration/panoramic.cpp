@@ -205,12 +205,7 @@ class Calibration {
 };
 
 ParameterMask estimated(const Intrinsics& start, ParameterMask held) {
-  ParameterMask free = 0;
-  for (int p = 0; p < start.size(); ++p)
-    if (!is_fixed(start.model(), p) && !contains(held, p)) free |= mask_of(p);
-  // A turn about the vertical axis, which the rotations have.
-  if (start.model().kind == CameraModelKind::kEquirectangular) free &= ~mask_of(kPrincipalX);
-  return free;
+  return free_parameters(start.model()) & ~held & ~parameters_like_rotation(start.model());
 }
 
 ParameterMask leading(const CameraModel& model, ParameterMask free) {
@@ -286,7 +281,7 @@ void check_determined(const PanoramicPrior& prior, PanoramicResult& result) {
         p == kFocal ? kWeakFocal * result.camera[kFocal] : kWeakPrior * prior.sigma[static_cast<std::size_t>(p)];
     if (std::isfinite(sigma) && sigma < most) continue;
     const std::string name = parameter_name(model, p);
-    if (is_radial(model) && (p == kSymmetryX || p == kSymmetryY))
+    if (contains(parameters_with(model, ParameterRole::kSymmetry), p))
       result.warnings.push_back(
           fmt::format("the centre of symmetry is not determined ({} has sigma {:.0f} px): the lens distorts too little",
                       name, sigma));

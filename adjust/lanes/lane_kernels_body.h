@@ -1,5 +1,5 @@
 // Internal to adjust/lanes/: lane_kernels_*.cpp include it and set the width of vectors. Formulas: linearise.h,
-// geometry/camera/projection.h.
+// geometry/camera/models/brown.h.
 #pragma once
 
 #include "adjust/lanes/lane_kernels.h"

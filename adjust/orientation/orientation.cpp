@@ -356,8 +356,7 @@ class Orientation {
     for (std::size_t c = 0; c < values_.cameras.size(); ++c) {
       const Camera& camera = block_.cameras[graph_.cameras[c]];
       const double ratio = values_.cameras[c][kFocal] / std::max(camera.width, camera.height);
-      const CameraModelKind kind = camera.intrinsics.model().kind;
-      if (kind == CameraModelKind::kFisheye || kind == CameraModelKind::kEquirectangular) continue;
+      if (sees_sideways(camera.intrinsics.model())) continue;
       if (!(ratio > 0.2 && ratio < 10)) values_.cameras[c] = camera.intrinsics;
     }
   }

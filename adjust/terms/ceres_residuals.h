@@ -57,20 +57,19 @@ double value_of(const ceres::Jet<T, kSize>& x) {
 
 // The pixel m with m + d(m) = `straight`: from its value, Newton steps with the derivative of d by automatic
 // differentiation; the first gives m its derivatives, the second shows that the value was one.
-template <typename Scalar>
-Eigen::Matrix<Scalar, 2, 1> corrected_pixel(const CameraModel& model, const Scalar* camera,
+template <typename Model, typename Scalar>
+Eigen::Matrix<Scalar, 2, 1> corrected_pixel(int order, const Intrinsics& plain, const Scalar* camera,
                                             const Eigen::Vector2d& value, const Eigen::Matrix<Scalar, 2, 1>& straight) {
   using Jet = ceres::Jet<double, 2>;
-  Intrinsics plain(model);
-  for (int p = 0; p < plain.size(); ++p) plain[p] = value_of(camera[p]);
   Eigen::Matrix<Scalar, 2, 1> pixel(Scalar(value.x()), Scalar(value.y()));
   for (int step = 0; step < 2; ++step) {
     const Eigen::Matrix<Jet, 2, 1> at(Jet(value_of(pixel.x()), 0), Jet(value_of(pixel.y()), 1));
-    const Eigen::Matrix<Jet, 2, 1> d = correction<Jet, double>(model, plain.data(), at);
+    const Eigen::Matrix<Jet, 2, 1> d = Model::template correction<Jet>(order, plain.data(), at);
     Eigen::Matrix2d jacobian;
     jacobian << 1 + d.x().v[0], d.x().v[1], d.y().v[0], 1 + d.y().v[1];
     const Eigen::Matrix2d inverse = jacobian.inverse();
-    const Eigen::Matrix<Scalar, 2, 1> open = straight - pixel - correction<Scalar, Scalar>(model, camera, pixel);
+    const Eigen::Matrix<Scalar, 2, 1> open =
+        straight - pixel - Model::template correction<Scalar>(order, camera, pixel);
     for (int i = 0; i < 2; ++i) pixel[i] += inverse(i, 0) * open[0] + inverse(i, 1) * open[1];
   }
   return pixel;
@@ -99,7 +98,7 @@ struct ImageMeasured {
   bool project_point(const Scalar* camera, const Vector3<Scalar>& point, Eigen::Matrix<Scalar, 2, 1>& pixel) const {
     if (model == CameraModel()) {
       if (!(point.z() > Scalar(0))) return false;
-      pixel = project_directly(model.kind, camera, point);
+      pixel = BrownModel::project<Scalar>(0, camera, point);
       return true;
     }
     Intrinsics plain(model);
@@ -107,9 +106,13 @@ struct ImageMeasured {
     const Eigen::Vector2d value =
         project(plain, Eigen::Vector3d(value_of(point.x()), value_of(point.y()), value_of(point.z())));
     if (!value.allFinite()) return false;
-    pixel = corrects_pixels(model) ? corrected_pixel<Scalar>(model, camera, value,
-                                                             project_directly(CameraModelKind::kPinhole, camera, point))
-                                   : project_directly(model.kind, camera, point);
+    pixel = with_model(model.kind, [&]<typename Model>(std::type_identity<Model>) {
+      if constexpr (Model::kCorrectsPixels)
+        return corrected_pixel<Model>(model.order, plain, camera, value,
+                                      PinholeModel::project<Scalar>(0, camera, point));
+      else
+        return Model::template project<Scalar>(model.order, camera, point);
+    });
     return true;
   }
 };

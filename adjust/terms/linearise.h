@@ -10,7 +10,7 @@
 #pragma once
 
 #include "adjust/problem/tile_problem.h"
-#include "geometry/camera/brown.h"
+#include "geometry/camera/camera.h"
 
 namespace megablock {
 
@@ -55,7 +55,7 @@ inline bool linearise_in_camera(const ImageView& view, const Eigen::Vector3d& po
   };
   if (k.model().kind == CameraModelKind::kBrown) {
     ProjectionJacobian projection;
-    if (!project_brown(k, result.in_camera, with_intrinsics, projection)) return false;
+    if (!BrownModel::linearise(k.data(), result.in_camera, with_intrinsics, projection)) return false;
     take(projection);
   } else {
     const ProjectionJacobian projection = project_with_jacobian(k, result.in_camera);

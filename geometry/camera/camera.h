@@ -1,9 +1,5 @@
 // Projection of a point into an image, its inverse, and its derivatives, for every camera model. The formulas are in
-// projection.h and correction.h.
-//
-// Each model decides which points are in front of the camera. Pinhole, Brown and all correction models see points with
-// Z > 0 (correction models only as far as they do not fold the image). The fisheye sees every direction up to the angle
-// where its polynomial stops growing, also beyond 90 degrees. The panorama sees everything except its poles.
+// models/, one file a model. Each model decides which points it sees; FieldOfView in models/model.h gives the rule.
 //
 // Points are in camera axes (x right, y down, z along the view) in any unit. Pixels have their centres at +0.5.
 #pragma once
@@ -11,8 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "geometry/camera/correction.h"
-#include "geometry/camera/projection.h"
+#include "geometry/camera/intrinsics.h"
 
 namespace megablock {
 
@@ -21,7 +16,7 @@ Eigen::Vector2d project_other(const Intrinsics& k, const Eigen::Vector3d& point)
 inline Eigen::Vector2d no_pixel() { return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()); }
 inline Eigen::Vector2d project(const Intrinsics& k, const Eigen::Vector3d& point) {
   if (k.model().kind != CameraModelKind::kBrown) return project_other(k, point);
-  return point.z() > 0 ? projection::brown(k.data(), point) : no_pixel();
+  return point.z() > 0 ? BrownModel::project<double>(0, k.data(), point) : no_pixel();
 }
 
 // Adjusted minus measured pixel. In a panorama both edges of the image are the same place, so its difference is taken
@@ -32,7 +27,7 @@ Eigen::Matrix<Scalar, 2, 1> pixel_difference(const CameraModel& model, const Sca
                                              const Eigen::Vector2d& measured) {
   using std::floor;
   Eigen::Matrix<Scalar, 2, 1> difference(adjusted.x() - measured.x(), adjusted.y() - measured.y());
-  if (model.kind == CameraModelKind::kEquirectangular) {
+  if (is_panorama(model)) {
     const Scalar turn = (2 * 3.14159265358979323846) * k[kFocal];
     difference.x() -= turn * floor(difference.x() / turn + 0.5);
   }
@@ -49,16 +44,6 @@ inline Eigen::Vector2d reprojection(const Intrinsics& k, const Eigen::Vector3d& 
   return pixel_difference(k, project(k, point), measured);
 }
 
-// Derivatives of a pixel by the model's parameters, one column each. Held in place, without heap memory.
-using IntrinsicJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxIntrinsics>;
-
-// A projection with its derivatives by the camera coordinates and by the parameters (zero for fixed ones).
-struct ProjectionJacobian {
-  bool valid = false;  // otherwise the rest is undefined: the model has no pixel for the point
-  Eigen::Vector2d pixel;
-  Eigen::Matrix<double, 2, 3> by_point;
-  IntrinsicJacobian by_intrinsics;
-};
 ProjectionJacobian project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point);
 
 // The unit viewing direction of a pixel in camera axes. Empty where the model cannot be inverted: beyond the radius
@@ -78,6 +63,11 @@ RayJacobian ray_with_jacobian(const Intrinsics& k, const Eigen::Vector2d& pixel)
 
 // Two unit vectors (columns) that form an orthonormal basis with the unit vector `direction`.
 Eigen::Matrix<double, 3, 2> tangent_plane(const Eigen::Vector3d& direction);
+
+// For models that correct the measured pixel (corrects_pixels()): the correction d(m) with its derivative by the pixel,
+// and the pixel m with m + d(m) = `corrected`, NaN where the model folds the image. See models/pixel_correction.h.
+Correction correction_at(const Intrinsics& k, const Eigen::Vector2d& pixel);
+Eigen::Vector2d solve_correction(const Intrinsics& k, const Eigen::Vector2d& corrected);
 
 // The normalised image point (x, y) = (X/Z, Y/Z) of a pixel. Empty where viewing_ray() is, and for rays with Z <= 0.
 std::optional<Eigen::Vector2d> unproject(const Intrinsics& k, const Eigen::Vector2d& pixel);

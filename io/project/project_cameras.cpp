@@ -90,12 +90,7 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
     for (const double coordinate : *point)
       check_within(coordinate, {-kFocalPx.most, kFocalPx.most}, "principal_point_px",
                    reader.where("principal_point_px"));
-    camera.intrinsics[kPrincipalX] = (*point)[0];
-    camera.intrinsics[kPrincipalY] = (*point)[1];
-    if (is_radial(camera.intrinsics.model())) {
-      camera.intrinsics[kSymmetryX] = (*point)[0];
-      camera.intrinsics[kSymmetryY] = (*point)[1];
-    }
+    set_principal_point((*point)[0], (*point)[1], camera.intrinsics);
   }
   read_distortion(reader, camera);
 }

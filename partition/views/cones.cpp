@@ -27,8 +27,7 @@ std::optional<Pose> known_pose(const Frame& frame) {
 ViewingCones::ViewingCones(const Block& block, double range_m) : range_m_(range_m) {
   for (const Camera& camera : block.cameras) {
     Shape shape;
-    const CameraModelKind kind = camera.intrinsics.model().kind;
-    shape.wide = kind == CameraModelKind::kFisheye || kind == CameraModelKind::kEquirectangular;
+    shape.wide = sees_sideways(camera.intrinsics.model());
     shape.cosine = std::cos(half_opening(camera));
     const double f = camera.intrinsics[kFocal];
     const Eigen::Vector2d principal(camera.intrinsics[kPrincipalX], camera.intrinsics[kPrincipalY]);

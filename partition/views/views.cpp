@@ -206,8 +206,8 @@ void place_between(const std::vector<ImageIndex>& pass, Views& views) {
 
 double half_opening(const Camera& camera) {
   const Intrinsics& k = camera.intrinsics;
-  if (k.model().kind == CameraModelKind::kEquirectangular) return std::numbers::pi;
-  if (k.model().kind == CameraModelKind::kFisheye) {
+  if (is_panorama(k.model())) return std::numbers::pi;
+  if (sees_sideways(k.model())) {
     const double radius = 0.5 * std::max(camera.width, camera.height);
     const auto ray = viewing_ray(k, {k[kPrincipalX] + radius, k[kPrincipalY]});
     return ray ? std::acos(ray->z()) : std::numbers::pi;

@@ -12,7 +12,7 @@ import sys
 
 # A folder may include itself and every folder of its room that stands before it, and whole rooms as ROOMS says.
 FOLDERS = """
-geometry/numbers geometry/threads geometry/estimation geometry/transform geometry/camera geometry/similarity
+geometry/numbers geometry/threads geometry/estimation geometry/transform geometry/camera/models geometry/camera geometry/similarity
 geometry/vanishing geometry/two_view geometry/resection geometry/intersection
 io/base io/text io/block io/images io/images/module io/store/hdf5 io/store/job io/store/units io/project/inputs io/project io/result io/evaluation
 io/exchange/model io/exchange/bal io/exchange/colmap io/exchange/tables io/exchange

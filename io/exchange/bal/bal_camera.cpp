@@ -13,7 +13,7 @@ bool is_brown(const Intrinsics& k) { return k.model().kind == CameraModelKind::k
 }  // namespace
 
 void check_bal_model(const std::string& camera, const CameraModel& model) {
-  if (model.kind != CameraModelKind::kFisheye && model.kind != CameraModelKind::kEquirectangular) return;
+  if (!sees_sideways(model)) return;
   throw InputError("camera '" + camera + "' has the model " + model_name(model) +
                    ", whose images BAL and Bundler files cannot hold");
 }

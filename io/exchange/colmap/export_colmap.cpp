@@ -3,7 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "io/base/error.h"
+#include "io/exchange/colmap/colmap_camera.h"
 #include "io/exchange/model/export_view.h"
 #include "io/text/text_writer.h"
 
@@ -13,37 +13,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kPinhole = 1, kOpenCv = 4, kOpenCvFisheye = 5, kFullOpenCv = 6;  // COLMAP's numbers of the models
 constexpr int kGrey = 128;
-
-struct ColmapCamera {
-  int model;
-  const char* name;
-  std::vector<double> parameters;
-};
-
-ColmapCamera colmap_camera(const Camera& given, const Intrinsics& k) {
-  const CameraModelKind kind = k.model().kind;
-  if (kind == CameraModelKind::kPinhole)
-    return {kPinhole, "PINHOLE", {k[kFocal], k[kFocal], k[kPrincipalX], k[kPrincipalY]}};
-  if (kind == CameraModelKind::kFisheye) {
-    ColmapCamera fisheye{kOpenCvFisheye, "OPENCV_FISHEYE", {k[kFocal], k[kFocal], k[kPrincipalX], k[kPrincipalY]}};
-    fisheye.parameters.insert(fisheye.parameters.end(), k.begin() + kRadial1, k.end());
-    return fisheye;
-  }
-  if (kind != CameraModelKind::kBrown)
-    throw InputError("camera '" + given.name + "' has the model " + model_name(k.model()) +
-                     ", which COLMAP does not have; pinhole, brown and opencv-fisheye can be exported");
-  ColmapCamera camera{kOpenCv,
-                      "OPENCV",
-                      {k[kFocal], k[kFocal], k[kPrincipalX], k[kPrincipalY], k[kRadial1], k[kRadial2], k[kDecentring1],
-                       k[kDecentring2]}};
-  if (k[kRadial3] == 0) return camera;
-  camera.model = kFullOpenCv;
-  camera.name = "FULL_OPENCV";
-  camera.parameters.insert(camera.parameters.end(), {k[kRadial3], 0, 0, 0});
-  return camera;
-}
 
 // Mean residual length of a point, px. Recomputed, so that it belongs to what the files hold.
 double point_error(const ExportView& view, std::int64_t t) {
@@ -75,7 +45,7 @@ void write_model(const BlockResult& result, Writer& writer) {
   for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
     const CameraIndex index(static_cast<std::int64_t>(c));
     writer.camera(index.value + 1, result.block.cameras[index],
-                  colmap_camera(result.block.cameras[index], result.state.cameras[index]));
+                  to_colmap(result.block.cameras[index].name, result.state.cameras[index]));
   }
   writer.begin_images(view.image_count(), view.observations.size());
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
@@ -115,7 +85,7 @@ class ColmapText {
     cameras_.print("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n# Number of cameras: {}\n", count);
   }
   void camera(std::int64_t id, const Camera& camera, const ColmapCamera& model) {
-    cameras_.print("{} {} {} {}", id, model.name, camera.width, camera.height);
+    cameras_.print("{} {} {} {}", id, model.form->name, camera.width, camera.height);
     for (const double p : model.parameters) cameras_.print(" {}", p);
     cameras_.print("\n");
   }
@@ -164,7 +134,7 @@ class ColmapBinary {
   void begin_cameras(std::size_t count) { cameras_.bytes(static_cast<std::uint64_t>(count)); }
   void camera(std::int64_t id, const Camera& camera, const ColmapCamera& model) {
     cameras_.bytes(static_cast<std::uint32_t>(id));
-    cameras_.bytes(static_cast<std::int32_t>(model.model));
+    cameras_.bytes(static_cast<std::int32_t>(model.form->number));
     cameras_.bytes(static_cast<std::uint64_t>(camera.width));
     cameras_.bytes(static_cast<std::uint64_t>(camera.height));
     for (const double p : model.parameters) cameras_.bytes(p);

@@ -1,32 +1,18 @@
 #include "io/exchange/colmap/import_colmap.h"
 
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 namespace megablock {
 
-const std::vector<ColmapModel>& colmap_models() {
-  static const std::vector<ColmapModel> all = {
-      {0, "SIMPLE_PINHOLE", CameraModelKind::kPinhole, {"f", "cx", "cy"}},
-      {1, "PINHOLE", CameraModelKind::kPinhole, {"fx", "fy", "cx", "cy"}},
-      {2, "SIMPLE_RADIAL", CameraModelKind::kBrown, {"f", "cx", "cy", "k1"}},
-      {3, "RADIAL", CameraModelKind::kBrown, {"f", "cx", "cy", "k1", "k2"}},
-      {4, "OPENCV", CameraModelKind::kBrown, {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"}},
-      {5, "OPENCV_FISHEYE", CameraModelKind::kFisheye, {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"}},
-      {6,
-       "FULL_OPENCV",
-       CameraModelKind::kBrown,
-       {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}}};
-  return all;
-}
-
-const ColmapModel& colmap_model(const std::string& name, const std::function<void(const std::string&)>& fail) {
-  const auto& all = colmap_models();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const ColmapModel& model) { return model.name == name; });
+const ColmapCameraForm& colmap_camera_form(const std::string& name,
+                                           const std::function<void(const std::string&)>& fail) {
+  const auto& all = colmap_camera_forms();
+  const auto found =
+      std::find_if(all.begin(), all.end(), [&](const ColmapCameraForm& form) { return form.name == name; });
   if (found == all.end()) {
     std::string list;
-    for (const ColmapModel& model : all) list += (list.empty() ? "" : ", ") + model.name;
+    for (const ColmapCameraForm& form : all) list += (list.empty() ? "" : ", ") + form.name;
     fail("camera model '" + name + "' is not supported; the models are " + list);
   }
   return *found;
@@ -36,7 +22,7 @@ void ColmapBuilder::add_point(std::int64_t id, const Eigen::Vector3d& position) 
   if (!points_.emplace(id, position).second) fail("point " + std::to_string(id) + " appears twice");
 }
 
-void ColmapBuilder::add_camera(std::int64_t id, const ColmapModel& model, std::int64_t width, std::int64_t height,
+void ColmapBuilder::add_camera(std::int64_t id, const ColmapCameraForm& form, std::int64_t width, std::int64_t height,
                                const std::vector<double>& parameters) {
   const std::string which = "camera " + std::to_string(id);
   constexpr std::int64_t kLargest = 1 << 20;
@@ -46,21 +32,9 @@ void ColmapBuilder::add_camera(std::int64_t id, const ColmapModel& model, std::i
   camera.name = which;
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
-  camera.intrinsics = Intrinsics(CameraModel{model.kind});
-  double fx = 0;
-  for (std::size_t i = 0; i < model.parameters.size(); ++i) {
-    const std::string& name = model.parameters[i];
-    const double value = parameters[i];
-    if (name == "fx") fx = value;
-    if (name == "fy" && std::abs(value - fx) > 1e-9 * std::abs(fx))
-      fail(which + " has fx " + std::to_string(fx) + " and fy " + std::to_string(value) +
-           "; only square pixels (fx = fy) are supported");
-    const auto ours = find_parameter(camera.intrinsics.model(), name == "fx" || name == "fy" ? "f" : name);
-    if (ours)
-      camera.intrinsics[*ours] = value;
-    else if (value != 0)
-      fail(which + " uses " + name + ", which is not supported");
-  }
+  const CameraFromColmap converted = from_colmap(form, parameters);
+  if (!converted.refusal.empty()) fail(which + " " + converted.refusal);
+  camera.intrinsics = converted.intrinsics;
   if (!(camera.intrinsics[kFocal] > 0)) fail("the focal length of " + which + " is not positive");
   camera.prior_sigma = weak_sigmas(camera.intrinsics, 0.05 * camera.intrinsics[kFocal], camera.width);
   camera.focal_known = true;

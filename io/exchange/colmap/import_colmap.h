@@ -6,21 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "io/exchange/colmap/colmap_camera.h"
 #include "io/exchange/model/imported_block.h"
 
 namespace megablock {
 
-// A camera model of COLMAP: its number in binary files, its name in text files, ours of the same projection, its
-// parameters. "fx" and "fy" must agree.
-struct ColmapModel {
-  int number;
-  std::string name;
-  CameraModelKind kind;
-  std::vector<std::string> parameters;
-};
-const std::vector<ColmapModel>& colmap_models();
-// Ends with `fail` when it is none of them.
-const ColmapModel& colmap_model(const std::string& name, const std::function<void(const std::string&)>& fail);
+// The camera model with this name in COLMAP. Ends with `fail` when it is none of colmap_camera_forms().
+const ColmapCameraForm& colmap_camera_form(const std::string& name,
+                                           const std::function<void(const std::string&)>& fail);
 
 // Puts the parts of a model together: points, then cameras, then images with their observations.
 class ColmapBuilder {
@@ -29,7 +22,7 @@ class ColmapBuilder {
   std::function<void(const std::string&)> fail;
 
   void add_point(std::int64_t id, const Eigen::Vector3d& position);
-  void add_camera(std::int64_t id, const ColmapModel& model, std::int64_t width, std::int64_t height,
+  void add_camera(std::int64_t id, const ColmapCameraForm& form, std::int64_t width, std::int64_t height,
                   const std::vector<double>& parameters);
   // q = (w, x, y, z) and t of X_cam = R X + t.
   void add_image(std::int64_t id, const std::array<double, 4>& q, const Eigen::Vector3d& translation,

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "io/exchange/colmap/import_colmap.h"
 #include "io/text/number_reader.h"
@@ -97,16 +98,17 @@ class BinaryReader {
   void read_camera(Bytes& bytes) {
     const auto id = bytes.value<std::uint32_t>("a camera's id");
     const auto number = bytes.value<std::int32_t>("a camera's model");
-    const auto& all = colmap_models();
-    const auto model = std::find_if(all.begin(), all.end(), [&](const ColmapModel& m) { return m.number == number; });
-    const std::string name = model == all.end() ? "number " + std::to_string(number) : model->name;
-    const ColmapModel& known = colmap_model(name, builder_.fail);
+    const auto& all = colmap_camera_forms();
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const ColmapCameraForm& f) { return f.number == number; });
+    const std::string name = found == all.end() ? "number " + std::to_string(number) : found->name;
+    const ColmapCameraForm& form = colmap_camera_form(name, builder_.fail);
     const auto width = bytes.value<std::uint64_t>("a camera's width");
     const auto height = bytes.value<std::uint64_t>("a camera's height");
     std::vector<double> parameters;
-    for (std::size_t i = 0; i < known.parameters.size(); ++i)
+    for (std::size_t i = 0; i < form.parameters.size(); ++i)
       parameters.push_back(bytes.number("a camera's parameters"));
-    builder_.add_camera(id, known, static_cast<std::int64_t>(width), static_cast<std::int64_t>(height), parameters);
+    builder_.add_camera(id, form, static_cast<std::int64_t>(width), static_cast<std::int64_t>(height), parameters);
   }
 
   void read_image(Bytes& bytes) {

@@ -51,13 +51,13 @@ class TextReader {
 
   void read_camera(NumberReader& reader, const std::string& first) {
     const std::int64_t id = parse_id(reader, first, "a camera's id");
-    const ColmapModel& model = colmap_model(std::string(reader.word("a camera's model")), builder_.fail);
+    const ColmapCameraForm& form = colmap_camera_form(std::string(reader.word("a camera's model")), builder_.fail);
     const std::int64_t width = reader.integer("a camera's width", 1, kMany);
     const std::int64_t height = reader.integer("a camera's height", 1, kMany);
     std::vector<double> parameters;
-    for (std::size_t i = 0; i < model.parameters.size(); ++i)
+    for (std::size_t i = 0; i < form.parameters.size(); ++i)
       parameters.push_back(reader.number("a camera's parameters"));
-    builder_.add_camera(id, model, width, height, parameters);
+    builder_.add_camera(id, form, width, height, parameters);
     reader.rest_of_line();
   }
 

@@ -21,21 +21,17 @@ double neutral(const Camera& camera, int parameter) {
   return parameter == kFocal ? 0 : start[static_cast<std::size_t>(parameter)];
 }
 
-bool in_pixels(const CameraModel& model, int parameter) {
-  return parameter <= kPrincipalY || is_additive(model) || (is_radial(model) && parameter < kRadialTerms);
-}
-
-// Radial coefficients in pixels are too small for decimals.
-std::string with_digits(const CameraModel& model, int parameter, double value) {
-  if (in_pixels(model, parameter)) return fixed(value, 2);
-  return model.kind == CameraModelKind::kIgnRadial ? significant(value, 4) : fixed(value, 6);
+// A value of a parameter. Coefficients in powers of 1 / px are too small for decimals.
+std::string with_digits(ParameterUnit unit, double value, std::string (*decimals)(double, int)) {
+  if (unit == ParameterUnit::kInversePixels) return significant(value, 4);
+  return decimals(value, unit == ParameterUnit::kPixels ? 2 : 6);
 }
 
 // Angle between the rays through the middles of opposite borders, degrees.
 double opening(const Camera& camera, const Intrinsics& k, const Eigen::Vector2d& half) {
   const Eigen::Vector2d centre(0.5 * camera.width, 0.5 * camera.height);
-  if (k.model().kind == CameraModelKind::kEquirectangular) return 2 * half.norm() / k[kFocal] * kDegreesPerRadian;
-  if (k.model().kind != CameraModelKind::kFisheye) return 2 * std::atan(half.norm() / k[kFocal]) * kDegreesPerRadian;
+  if (is_panorama(k.model())) return 2 * half.norm() / k[kFocal] * kDegreesPerRadian;
+  if (!sees_sideways(k.model())) return 2 * std::atan(half.norm() / k[kFocal]) * kDegreesPerRadian;
   double angle = 0;
   for (const double side : {-1.0, 1.0}) {
     const auto ray = viewing_ray(k, centre + side * half);
@@ -78,7 +74,7 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
   const CameraModel& model = camera.intrinsics.model();
   for (int k = 0; k < parameter_count(model); ++k) {
     const auto at = static_cast<std::size_t>(k);
-    const bool pixels = in_pixels(model, k);
+    const ParameterUnit unit = camera_parameters(model)[at].unit;
     const double start = camera.intrinsics[at], now = adjusted ? result.state.cameras[index][at] : kUnknown;
     const double sigma = sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[index](k, k))) : kUnknown;
     const double prior = camera.prior_sigma[at];
@@ -86,9 +82,8 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
     const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
     const bool tested = k != kFocal && std::isfinite(ratio);
     table.add(
-        {parameter_name(model, k) + (pixels ? " [px]" : ""), with_digits(model, k, start), with_digits(model, k, now),
-         pixels || model.kind != CameraModelKind::kIgnRadial ? with_sign(now - start, pixels ? 2 : 6)
-                                                             : significant(now - start, 4),
+        {parameter_name(model, k) + (unit == ParameterUnit::kPixels ? " [px]" : ""), with_digits(unit, start, fixed),
+         with_digits(unit, now, fixed), with_digits(unit, now - start, with_sign),
          held ? "held" : significant(sigma, 2), tested ? fixed(ratio, 1) : "",
          prior == 0             ? "held"
          : std::isfinite(prior) ? "σ " + significant(prior, 2)

@@ -25,8 +25,7 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
                                       {u * camera.width, v * camera.height});
         if (corner) radius_sq = std::max(radius_sq, corner->squaredNorm());
       }
-    const CameraModelKind kind = camera.intrinsics.model().kind;
-    all_around_.push_back(kind == CameraModelKind::kFisheye || kind == CameraModelKind::kEquirectangular);
+    all_around_.push_back(sees_sideways(camera.intrinsics.model()));
     max_radius_sq_.push_back(1.05 * radius_sq);
   }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "adjust/calibration/panoramic.h"
-#include "geometry/camera/correction.h"
+#include "geometry/camera/camera.h"
 #include "io/simulate/blocks/panorama.h"
 #include "io/simulate/scene/random.h"
 

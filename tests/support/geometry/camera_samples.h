@@ -15,7 +15,7 @@ inline constexpr int kSampleWidth = 1920, kSampleHeight = 1080;
 inline std::vector<CameraModel> every_model() {
   std::vector<CameraModel> models;
   for (const CameraModelForm& form : camera_model_forms())
-    for (std::int32_t order = form.lowest_order; order <= form.highest_order; ++order)
+    for (std::int32_t order = form.orders.lowest; order <= form.orders.highest; ++order)
       models.push_back({form.kind, order});
   return models;
 }
@@ -47,12 +47,13 @@ inline Intrinsics sample_camera(const CameraModel& model, double focal, int widt
       for (int p = kRadialTerms; p < k.size(); ++p) k[p] = 0.1 * unit(random);
       break;
     default:
-      for (int p = kCorrectionTerms; is_additive(model) && p < k.size(); ++p) k[p] = 15 * unit(random) / model.order;
+      for (int p = 0; p < k.size(); ++p)
+        if (contains(parameters_with(model, ParameterRole::kAdditive), p)) k[p] = 15 * unit(random) / model.order;
   }
   return k;
 }
 inline Intrinsics sample_camera(const CameraModel& model) {
-  return sample_camera(model, model.kind == CameraModelKind::kFisheye ? 560 : 1400, kSampleWidth, kSampleHeight);
+  return sample_camera(model, field_of_view(model) == FieldOfView::kWide ? 560 : 1400, kSampleWidth, kSampleHeight);
 }
 
 }  // namespace megablock

@@ -1,7 +1,7 @@
 // Cameras of every model through files, project files, imports and exports.
 #include <gmock/gmock.h>
 
-#include "geometry/camera/projection.h"
+#include "geometry/camera/camera.h"
 #include "io/base/error.h"
 #include "io/exchange/bal/bal_camera.h"
 #include "io/exchange/export.h"
@@ -139,6 +139,19 @@ TEST(CameraModelExchange, ColmapKeepsPinholeAndFisheye) {
   ScratchDirectory folder;
   export_result(result_with("opencv-fisheye"), "colmap-text", folder.path("model"));
   EXPECT_THAT(read_file(folder.path("model/cameras.txt")), HasSubstr(" OPENCV_FISHEYE "));
+}
+
+// COLMAP's fisheyes with fewer terms are ours with the others zero.
+TEST(CameraModelExchange, TakesColmapsRadialFisheyes) {
+  ScratchDirectory folder;
+  write_file(folder.path("cameras.txt"),
+             "1 SIMPLE_RADIAL_FISHEYE 100 80 90 50 40 -0.1\n2 RADIAL_FISHEYE 100 80 91 50 40 -0.1 0.02\n");
+  write_file(folder.path("images.txt"), "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 2 b.jpg\n\n");
+  write_file(folder.path("points3D.txt"), "");
+  const Block block = import_block("colmap-text", folder.path()).block;
+  const CameraModel fisheye = *find_model("opencv-fisheye");
+  EXPECT_EQ(block.cameras[CameraIndex(0)].intrinsics, Intrinsics(fisheye, {90, 50, 40, -0.1, 0, 0, 0}));
+  EXPECT_EQ(block.cameras[CameraIndex(1)].intrinsics, Intrinsics(fisheye, {91, 50, 40, -0.1, 0.02, 0, 0}));
 }
 
 TEST(CameraModelExchange, RefusesByCamera) {
