@@ -106,21 +106,24 @@ constexpr std::int64_t kFewestObservations = 6;
 
 // Poses from the tile that holds most of a frame's observations.
 void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<TileIndex>& numbers, MergeStart& start) {
+  struct Observations {
+    std::int64_t richest = 0, total = 0;  // in the tile that has most of them, in all tiles
+  };
   BlockState& state = start.state;
-  IndexedVector<FrameIndex, std::int64_t> richest(state.frames.size(), 0), total(state.frames.size(), 0);
+  IndexedVector<FrameIndex, Observations> observations(state.frames.size());
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     for (std::size_t i = 0; i < tiles[t].frames.size(); ++i) {
       const FrameIndex frame = tiles[t].frames[i];
-      total[frame] += tiles[t].observations[i];
-      if (tiles[t].observations[i] <= richest[frame]) continue;
-      richest[frame] = tiles[t].observations[i];
+      Observations& seen = observations[frame];
+      seen.total += tiles[t].observations[i];
+      if (tiles[t].observations[i] <= seen.richest) continue;
+      seen.richest = tiles[t].observations[i];
       state.frames[frame] = tiles[t].poses[i];
       start.tile_of_frame[frame] = numbers[t];
     }
   }
-  for (std::size_t f = 0; f < total.size(); ++f)
-    if (total[FrameIndex(static_cast<std::int64_t>(f))] < kFewestObservations)
-      state.oriented[FrameIndex(static_cast<std::int64_t>(f))] = 0;
+  for (FrameIndex f(0); observations.contains(f); ++f.value)
+    if (observations[f].total < kFewestObservations) state.oriented[f] = 0;
 }
 
 // Points with a frame that has not gone with the tile, and those that the tile has not found. [points]
