@@ -15,7 +15,8 @@ find_dependency(nlohmann_json)
 find_dependency(PROJ)
 find_dependency(exiv2)
 
-# Packages without a CMake configuration of their own.
+# Packages without a CMake configuration of their own. Targets whose names another package could also choose are in the
+# namespace megablock.
 function(megablock_library target library header)
   if(TARGET ${target})
     return()
@@ -27,10 +28,10 @@ function(megablock_library target library header)
   set_target_properties(${target} PROPERTIES IMPORTED_LOCATION ${${variable}}
                         INTERFACE_INCLUDE_DIRECTORIES ${${variable}_include})
 endfunction()
-megablock_library(metis metis metis.h)
+megablock_library(megablock::metis metis metis.h)
 megablock_library(xxHash::xxHash xxhash xxhash.h)
 megablock_library(SuiteSparse::CHOLMOD cholmod cholmod.h suitesparse)
-megablock_library(openblas openblas cblas.h x86_64-linux-gnu/openblas-pthread openblas-pthread)
+megablock_library(megablock::openblas openblas cblas.h x86_64-linux-gnu/openblas-pthread openblas-pthread)
 # CGAL is headers; its exact arithmetic is GMP and MPFR.
-megablock_library(gmp gmp gmp.h)
-megablock_library(mpfr mpfr mpfr.h)
+megablock_library(megablock::gmp gmp gmp.h)
+megablock_library(megablock::mpfr mpfr mpfr.h)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The installed library from another tree: the examples are configured, built and run against an install prefix.
 
-The poses that the example prints are held against the simulator's truth by their own standard deviations.
+The poses that the example prints are held against the simulator's truth by their own standard deviations. Every
+installed header is compiled, in two orders, so that none needs a header that is not installed or not included.
 usage: library.py MEGABLOCK BUILD_FOLDER SOURCE_FOLDER
 """
 import csv
@@ -25,6 +26,22 @@ def run(*command, **options):
 def check(condition, what):
     if not condition:
         sys.exit(f"library.py: {what}")
+
+
+def check_headers(prefix, folder):
+    """Compiles one file that includes all installed headers, and one that includes them in the opposite order."""
+    headers = sorted(str(path.relative_to(prefix / "include")) for path in (prefix / "include").rglob("*.h"))
+    folder.mkdir()
+    for name, order in (("forward", headers), ("backward", headers[::-1])):
+        (folder / f"{name}.cpp").write_text("".join(f"#include <{header}>\n" for header in order))
+    (folder / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(headers LANGUAGES C CXX)\n"
+        "find_package(megablock 0.1 REQUIRED)\nadd_library(headers OBJECT forward.cpp backward.cpp)\n"
+        "target_compile_options(headers PRIVATE -fsyntax-only)\n"
+        "target_link_libraries(headers PRIVATE megablock::megablock)\n")
+    run("cmake", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
+    run("cmake", "--build", folder / "build", "--parallel", "2")
+    print(f"{len(headers)} installed headers compile")
 
 
 def check_poses(rows, truth):
@@ -51,6 +68,7 @@ with tempfile.TemporaryDirectory() as name:
     run("cmake", "-S", source / "examples", "-B", examples, "-DCMAKE_BUILD_TYPE=Debug", f"-DCMAKE_PREFIX_PATH={prefix}",
         cwd=tempfile.mkdtemp(dir=work))
     run("cmake", "--build", examples, "--parallel", "2")
+    check_headers(prefix, work / "headers")
     print(run(examples / "ransac_resection").strip())
     print(run(examples / "merge_block").strip())
     rows = list(csv.DictReader(io.StringIO(run(examples / "read_result", work / "job"))))
