@@ -14,6 +14,7 @@
 #include "geometry/camera/models/fisheye.h"
 #include "geometry/camera/models/pinhole.h"
 #include "geometry/camera/models/radial_correction.h"
+#include "geometry/camera/models/thin_prism_fisheye.h"
 
 namespace megablock {
 
@@ -28,13 +29,15 @@ enum class CameraModelKind : std::int32_t {
   kEvenRadial,
   kPolynomial,
   kLegendre,
-  kFourier
+  kFourier,
+  kThinPrismFisheye
 };
 
 template <typename... Models>
 struct CameraModelList {};
-using AllCameraModels = CameraModelList<BrownModel, PinholeModel, FisheyeModel, EquirectangularModel, IgnRadialModel,
-                                        OddRadialModel, EvenRadialModel, PolynomialModel, LegendreModel, FourierModel>;
+using AllCameraModels =
+    CameraModelList<BrownModel, PinholeModel, FisheyeModel, EquirectangularModel, IgnRadialModel, OddRadialModel,
+                    EvenRadialModel, PolynomialModel, LegendreModel, FourierModel, ThinPrismFisheyeModel>;
 
 // A model consists of a kind and an order, which determine the number and the names of its parameters.
 struct CameraModel {

@@ -34,6 +34,9 @@ inline Intrinsics sample_camera(const CameraModel& model, double focal, int widt
     case CameraModelKind::kFisheye:
       for (int p = 3; const double value : {-0.03, 0.012, -0.008, 0.001}) k[p++] = value;
       break;
+    case CameraModelKind::kThinPrismFisheye:
+      for (int p = 3; const double value : {-0.03, 0.012, -0.008, 0.001, 2e-3, -1e-3, 1.5e-3, -2e-3}) k[p++] = value;
+      break;
     case CameraModelKind::kIgnRadial:
       k[kSymmetryX] -= 9;
       k[kSymmetryY] += 22;

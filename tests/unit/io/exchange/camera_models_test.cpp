@@ -141,6 +141,20 @@ TEST(CameraModelExchange, ColmapKeepsPinholeAndFisheye) {
   EXPECT_THAT(read_file(folder.path("model/cameras.txt")), HasSubstr(" OPENCV_FISHEYE "));
 }
 
+// The parameters stand in COLMAP's order, which is not ours, and come back.
+TEST(CameraModelExchange, ColmapKeepsThinPrisms) {
+  ScratchDirectory folder;
+  BlockResult result = result_with("thin-prism-fisheye");
+  const Intrinsics k(*find_model("thin-prism-fisheye"), {500, 320, 240, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8});
+  for (Intrinsics& camera : result.state.cameras) camera = k;
+  for (const char* format : {"colmap-text", "colmap-bin"}) {
+    export_result(result, format, folder.path(format));
+    EXPECT_EQ(import_block(format, folder.path(format)).block.cameras[CameraIndex(0)].intrinsics, k) << format;
+  }
+  EXPECT_THAT(read_file(folder.path("colmap-text/cameras.txt")),
+              HasSubstr(" 500 500 320 240 0.1 0.2 0.5 0.6 0.3 0.4 0.7 0.8\n"));
+}
+
 // COLMAP's fisheyes with fewer terms are ours with the others zero.
 TEST(CameraModelExchange, TakesColmapsRadialFisheyes) {
   ScratchDirectory folder;

@@ -218,6 +218,47 @@ TEST(Fisheye, EndsWhereItsPolynomialTurnsBack) {
   EXPECT_FALSE(viewing_ray(k, {201, 0}));
 }
 
+// The distortion as COLMAP's documentation of THIN_PRISM_FISHEYE gives it: additions du, dv to equidistant coordinates.
+TEST(ThinPrismFisheye, AddsTheTermsOfColmap) {
+  const double f = 420, cx = 512, cy = 384, k1 = -0.02, k2 = 0.011, k3 = -0.004, k4 = 0.0007, p1 = 0.003, p2 = -0.002,
+               sx1 = 0.0015, sy1 = -0.0025;
+  const Intrinsics k(*find_model("thin-prism-fisheye"), {f, cx, cy, k1, k2, k3, k4, p1, p2, sx1, sy1});
+  for (const Eigen::Vector3d& point : {Eigen::Vector3d(1, 2, 3), Eigen::Vector3d(-4, 0.5, 1),
+                                       Eigen::Vector3d(0.3, -7, -2), Eigen::Vector3d(0, 0, 9)}) {
+    const double theta = std::acos(point.normalized().z()), across = std::hypot(point.x(), point.y());
+    const double u = across == 0 ? 0 : theta * point.x() / across, v = across == 0 ? 0 : theta * point.y() / across;
+    const double r2 = theta * theta;
+    const double radial = k1 * r2 + k2 * std::pow(r2, 2) + k3 * std::pow(r2, 3) + k4 * std::pow(r2, 4);
+    const double du = u * radial + 2 * p1 * u * v + p2 * (r2 + 2 * u * u) + sx1 * r2;
+    const double dv = v * radial + 2 * p2 * u * v + p1 * (r2 + 2 * v * v) + sy1 * r2;
+    EXPECT_LT((project(k, point) - Eigen::Vector2d(cx + f * (u + du), cy + f * (v + dv))).norm(), 1e-10);
+  }
+  EXPECT_FALSE(project(k, {0, 0, -1}).allFinite());
+}
+
+TEST(ThinPrismFisheye, IsTheFisheyeWithoutPrisms) {
+  const Intrinsics fisheye(*find_model("opencv-fisheye"), {300, 500, 400, -0.1, 0.02, -0.003, 0.0004});
+  Intrinsics prism(*find_model("thin-prism-fisheye"));
+  std::copy(fisheye.begin(), fisheye.end(), prism.begin());
+  for (double degrees = 1; degrees < 120; degrees += 7) {
+    const double angle = degrees * std::numbers::pi / 180;
+    const Eigen::Vector3d ray(0.6 * std::sin(angle), -0.8 * std::sin(angle), std::cos(angle));
+    EXPECT_LT((project(prism, ray) - project(fisheye, ray)).norm(), 1e-10) << degrees;
+    EXPECT_LT((*viewing_ray(prism, project(fisheye, ray)) - ray).norm(), 1e-12) << degrees;
+  }
+}
+
+TEST(ThinPrismFisheye, EndsWhereItFolds) {
+  // Along x the radius t (1 - t^2 / 3) has its maximum at t = 1, as in Fisheye.EndsWhereItsPolynomialTurnsBack.
+  const Intrinsics k(*find_model("thin-prism-fisheye"), {300, 0, 0, -1.0 / 3, 0, 0, 0, 0, 0, 0, 0});
+  const auto at = [](double angle) { return Eigen::Vector3d(std::sin(angle), 0, std::cos(angle)); };
+  EXPECT_TRUE(project(k, at(0.99)).allFinite());
+  EXPECT_FALSE(project(k, at(1.01)).allFinite());
+  EXPECT_FALSE(project_with_jacobian(k, at(1.01)).valid);
+  EXPECT_TRUE(viewing_ray(k, {199, 0}));
+  EXPECT_FALSE(viewing_ray(k, {201, 0}));
+}
+
 TEST(Equirectangular, SeesTheWholeSphere) {
   const Intrinsics k = start_intrinsics(*find_model("equirectangular"), 0, 3600, 1800);
   const auto expect_pixel = [&](const Eigen::Vector3d& point, double x, double y) {
