@@ -27,7 +27,8 @@ Eigen::SparseMatrix<double> to_eigen(ceres::CRSMatrix& m) {
                                     m.cols.data(), m.values.data());
 }
 
-// Rows that hold the frames of the constraints along their directions, as heavy as what observes them.
+// The rows that hold the constrained frames along their directions. Their weight is that of the observations of a
+// frame.
 DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem, const BlockGauge& gauge) {
   const Eigen::VectorXd root = system.diagonal().unaryExpr([](double d) { return d > 0 ? std::sqrt(d) : 1; });
   std::vector<Eigen::Triplet<double>> entries;
@@ -45,7 +46,7 @@ DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem,
   return datum;
 }
 
-// S = I - N T of inner constraints over the frames, T = (N'WN)^-1 N'W.
+// The S-transformation to inner constraints over the frames: S = I - N T, T = (N'WN)^-1 N'W.
 struct InnerTransformation {
   Eigen::MatrixXd n, t;  // [reduced x defect], [defect x reduced]
 
@@ -72,7 +73,7 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
     place(column, c, c.move_frame(state.frames[f].centre, reference_place(problem, state, f)));
     weighted.middleRows<6>(column) = c.weights().asDiagonal() * s.n.middleRows<6>(column);
   }
-  for (const TileImage& image : problem.images) {  // free mounts follow the scale
+  for (const TileImage& image : problem.images) {  // free mounts move with the scale
     const std::int64_t column = system.mount_column[static_cast<std::size_t>(image.mount)];
     const BlockComponent* c = components[static_cast<std::size_t>(image.frame.value)];
     if (column < 0 || c == nullptr) continue;
@@ -82,8 +83,8 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
   return s;
 }
 
-// The normal equations of everything but points, sparse: W = N - C' P^-1 C of the points' 3 x 3 blocks P, and its right
-// side.
+// The normal equations without the points, sparse: W = N - C' P^-1 C, where P holds the 3 x 3 blocks of the points. And
+// their right side.
 struct ReducedEquations {
   Eigen::SparseMatrix<double> normal;
   Eigen::VectorXd right;
@@ -114,7 +115,7 @@ ReducedEquations reduced_equations(const MonolithicSystem& system, const DatumRo
   return reduced;
 }
 
-// The undamped Newton step of everything but points.
+// The undamped Newton step of all unknowns except the points.
 Eigen::VectorXd reduced_step(const MonolithicSystem& system, const DatumRows& datum) {
   const ReducedEquations reduced = reduced_equations(system, datum);
   const Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> solver(reduced.normal);
@@ -124,7 +125,7 @@ Eigen::VectorXd reduced_step(const MonolithicSystem& system, const DatumRows& da
   return x;
 }
 
-// Of the frames that are in the system; zero for the others.
+// The sigmas of the frames that are in the system; zero for the others.
 FrameSigmas sigmas_of(const MonolithicSystem& system, const Eigen::MatrixXd& covariance) {
   FrameSigmas sigmas = FrameSigmas::Zero(6, std::ssize(system.frame_column));
   for (std::size_t f = 0; f < system.frame_column.size(); ++f)
@@ -133,7 +134,8 @@ FrameSigmas sigmas_of(const MonolithicSystem& system, const Eigen::MatrixXd& cov
   return sigmas;
 }
 
-// ComputeError where a step is no number or a sigma not positive: their ratio would look like agreement.
+// The largest ratio of step and sigma. Throws ComputeError when a step is not a number or a sigma is not positive,
+// because their ratio would look like agreement.
 double largest_over_sigma(const MonolithicSystem& system, const Eigen::VectorXd& step, const FrameSigmas& sigmas) {
   double largest = 0;
   for (std::size_t f = 0; f < system.frame_column.size(); ++f) {

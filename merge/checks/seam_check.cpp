@@ -24,15 +24,16 @@ namespace megablock {
 
 namespace {
 
-constexpr double kRankTolerance = 1e-10;  // pivot, of a matrix scaled to a unit diagonal
-// Of what is known of a direction, the share that is known on the other side: below, nothing is left to test, and the
-// share is lost in the rounding of the whole.
+constexpr double kRankTolerance = 1e-10;  // smallest pivot of a matrix that is scaled to a unit diagonal
+// The share of the information about a direction that the other side has. Below this share nothing is left to test, and
+// the share is lost in the rounding of the whole.
 constexpr double kShared = 1e-6;
-// Information about a frame's turn, of the most there is of any in the tile: below, its turn is not asked for.
+// A frame whose rotation has less than this share of the largest information in the tile is not tested for a turn.
 constexpr double kVisibleTurn = 0.25;
-// Variance factor of residuals without noise, of which a ratio means nothing.
+// The least variance factor that is compared with. Residuals without noise have a smaller one, and its ratio has no
+// meaning.
 constexpr double kNoNoise = 0.01;
-constexpr std::size_t kLines = 3;  // of one kind; the rest is counted
+constexpr std::size_t kLines = 3;  // lines of one kind; the rest is only counted
 
 struct Quadratic {
   Eigen::MatrixXd s;  // full symmetric
@@ -48,7 +49,7 @@ Quadratic unpacked(const UpdateMatrix& update) {
   return q;
 }
 
-// The lower triangle of D S D.
+// The lower triangle of D S D, with D the diagonal matrix of `scale`.
 Eigen::MatrixXd scaled(const UpdateMatrix& update, const Eigen::VectorXd& scale) {
   const Eigen::Index n = scale.size();
   Eigen::MatrixXd matrix(n, n);
@@ -72,7 +73,7 @@ struct SemidefiniteFactor {
     if (!pivots.empty()) m = Eigen::MatrixXd(m(Eigen::all, order()));
     return m;
   }
-  // b'A^+ b of a b in the range, so that the leading rows alone give it: |L_11^-1 b_1|^2.
+  // b'A^+ b for a b in the range of A. The leading rows alone then give it: |L_11^-1 b_1|^2.
   double least_squares(const Eigen::VectorXd& b) const {
     Eigen::VectorXd leading = rows_permuted(b).topRows(rank);
     lower.topLeftCorner(rank, rank).triangularView<Eigen::Lower>().solveInPlace(leading);
@@ -87,8 +88,9 @@ struct SemidefiniteFactor {
   }
 };
 
-// Of the lower triangle that `matrix()` returns, with a diagonal of at most about one; its rank is that of the pivots
-// above `tolerance`. Without pivoting, which is several times as fast, where no pivot comes near to vanishing.
+// Factorises the lower triangle that `matrix()` returns, whose diagonal is at most about one. The rank is the number of
+// pivots above `tolerance`. The factorisation without pivoting is several times as fast; it is kept where every pivot
+// is clearly above zero.
 template <typename Make>
 SemidefiniteFactor semidefinite_factor(const Make& matrix, double tolerance = kRankTolerance) {
   const double plainly_there = std::max(1e-7, tolerance);
@@ -111,8 +113,8 @@ Eigen::Matrix<double, Matrix::RowsAtCompileTime, 1> scale_of(const Matrix& s) {
   return s.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
 }
 
-// F of a covariance matrix C = FF': scaled to a unit diagonal and factorised, F = D P L; what is held, or no more known
-// than rounding lets one see, leaves columns of L zero.
+// A root F of a covariance matrix, C = FF'. The matrix is scaled to a unit diagonal and factorised, F = D P L. Columns
+// of L are zero for held unknowns, and where the rest of the covariance is below rounding.
 class CovarianceRoot {
  public:
   explicit CovarianceRoot(const CovarianceMatrix& c) {
@@ -149,7 +151,7 @@ class CovarianceRoot {
 
 double normal_exceeds(double deviate) { return 0.5 * std::erfc(deviate / std::sqrt(2.0)); }
 
-// Quantiles of one alarm probability.
+// The quantiles of one alarm probability, computed once for each number of degrees.
 class Limits {
  public:
   explicit Limits(double probability) : probability_(probability) {}
@@ -164,12 +166,12 @@ class Limits {
   std::map<std::int64_t, double> known_;
 };
 
-// The score of some scalar unknowns; `own`: what the tile knows of them, `left`: A.
+// Tests the score of some scalar unknowns. `own` is the tile's information about them, `left` is A.
 template <int Size>
 UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eigen::Matrix<double, Size, Size>& own,
                          const Eigen::Matrix<double, Size, Size>& left, double variance_factor, Limits& limits) {
   UnknownCheck check;
-  // In units of what the tile knows.
+  // In units in which the tile's information has a unit diagonal.
   const Eigen::Matrix<double, Size, 1> scale = scale_of(own);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * left * scale.asDiagonal());
   const Eigen::Matrix<double, Size, 1> along = eigen.vectors.transpose() * scale.cwiseProduct(score);
@@ -182,7 +184,7 @@ UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eige
   return check;
 }
 
-// All checks of a tile. seen: F'S with C = FF', so that seen'seen = S C S.
+// Makes all checks of a tile. `seen` is F'S with C = FF', so that seen'seen = S C S.
 std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::MatrixXd& seen,
                                          const UnknownList& unknowns, double probability, double variance_factor) {
   constexpr int kKinds = 3, kTurn = 3;  // a frame's first three scalar unknowns are its rotation
@@ -259,7 +261,7 @@ std::vector<std::string> describe_noise(const std::vector<TileCheck>& tiles) {
   return lines;
 }
 
-// The worst by excess that have no unknown in common.
+// The worst checks by excess of which no two have an unknown in common.
 std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
   std::stable_sort(checks.begin(), checks.end(),
                    [](const UnknownCheck& a, const UnknownCheck& b) { return a.excess() > b.excess(); });
@@ -275,7 +277,7 @@ std::array<UnknownCheck, 4> worst_of(std::vector<UnknownCheck> checks) {
 
 }  // namespace
 
-// The scale leaves rank and minimum as they are.
+// The matrix is scaled to a unit diagonal, which leaves rank and minimum unchanged.
 LeastSquares least_squares(const UpdateMatrix& condensed) {
   const Eigen::Index n = total_dimension(condensed.unknowns);
   Eigen::VectorXd scale(n);
@@ -294,7 +296,7 @@ SeamReport check_seam(std::int64_t node, const LeastSquares& left, const LeastSq
                       const Front::Result& together, double probability, double variance_factor) {
   const FrontFactor& factor = together.factor;
   const std::int64_t eliminated = total_dimension(factor.eliminated);
-  double squares = 0;  // of z, which has further columns in free blocks
+  double squares = 0;  // |z|^2; in free blocks z has further columns
   for (std::int64_t i = 0; i < eliminated; ++i)
     squares += factor.z[static_cast<std::size_t>(i)] * factor.z[static_cast<std::size_t>(i)];
   const LeastSquares& rest = together.update.alone;
@@ -323,8 +325,8 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   {
     const CovarianceRoot root(boundary.restricted_to(condensed.unknowns));
     seen = root.transposed_times(own.s);
-    // The rest's normal equations on the boundary are C^-1 - S. With C = FF' and W = I - F'SF, which has their nullity,
-    // s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
+    // The normal equations of the rest of the block on the separator unknowns are C^-1 - S. With C = FF', the matrix W
+    // = I - F'SF has the same nullity, and s'(C^-1 - S)^+ s = (F's)'W^+ (F's).
     const auto w = [&] {
       Eigen::MatrixXd matrix = root.times(seen);
       matrix = -matrix;
@@ -348,7 +350,7 @@ bool UnknownCheck::shares_unknown(const UnknownCheck& check) const {
 
 std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
   std::vector<const TileCheck*> left;
-  double squares = 0, degrees = 0;  // of those
+  double squares = 0, degrees = 0;  // sums over `left`
   for (const TileCheck& tile : tiles) {
     if (tile.own_degrees <= 0) continue;
     left.push_back(&tile);
@@ -359,7 +361,7 @@ std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
     const auto own = static_cast<double>(tile->own_degrees);
     return tile->own_chi2 / own / std::max(kNoNoise, (squares - tile->own_chi2) / (degrees - own));
   };
-  // Normal deviate of F (Paulson 1942): its third root is nearly normal.
+  // The normal deviate of F (Paulson 1942), whose cube root is nearly normally distributed.
   const auto deviate = [&](const TileCheck* tile) {
     const auto own = static_cast<double>(tile->own_degrees);
     const double root = std::cbrt(ratio(tile) / kUsualVarianceRatio);
@@ -380,7 +382,7 @@ std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
 }
 
 std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& tiles, const UnknownName& name) {
-  std::vector<std::pair<std::int64_t, UnknownCheck>> all;  // tile, what it disagrees about
+  std::vector<std::pair<std::int64_t, UnknownCheck>> all;  // a tile, and an unknown about which it disagrees
   for (const TileCheck& tile : tiles)
     for (const UnknownCheck& check : tile.worst)
       if (check.degrees > 0) all.emplace_back(tile.tile, check);
@@ -422,7 +424,7 @@ std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& ti
 
 namespace {
 
-// Which tile explains the alarm of which node of the tree; -1: no alarm.
+// For each node of the tree, the tile that explains its alarm; -1: no alarm.
 std::vector<std::int64_t> explain(const MergeTree& tree, const std::vector<SeamReport>& seams,
                                   const std::vector<TileCheck>& tiles) {
   std::vector<std::int64_t> explained(tree.nodes.size(), -1), leaf(tiles.size(), -1);

@@ -14,10 +14,10 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 
-constexpr double kNullDirection = 1e-11;  // of the largest eigenvalue; the matrix itself carries errors of 1e-15
-constexpr double kHeldDirection = 1e-6;   // of the largest singular value: what a frame can hold
-constexpr double kOnePlace = 1e-9;        // of the coordinates: extent of frames that are all at one place
-constexpr double kDetermined = 1;         // information of a rotation (1 / rad^2) or of a scale that is known
+constexpr double kNullDirection = 1e-11;  // share of the largest eigenvalue; the matrix itself has errors of 1e-15
+constexpr double kHeldDirection = 1e-6;   // share of the largest singular value: a frame holds the directions above it
+constexpr double kOnePlace = 1e-9;  // share of the coordinates: frames within a smaller extent are all at one place
+constexpr double kDetermined = 1;   // information of a rotation (1 / rad^2) or of a scale, below which it is free
 
 // All parts of one component.
 struct PartGroup {
@@ -25,7 +25,7 @@ struct PartGroup {
   std::int64_t lowest_frame = -1;
 };
 
-// Similarity parameters about (to.centre, to.extent) in terms of those about the part's own centre and extent.
+// Expresses similarity parameters about the part's own centre and extent by those about (to.centre, to.extent).
 Matrix77 change_of_reference(const GaugePart& from, const BlockComponent& to) {
   const Eigen::Vector3d shift = from.centre - to.centre;
   Matrix77 change = Matrix77::Identity();
@@ -35,17 +35,17 @@ Matrix77 change_of_reference(const GaugePart& from, const BlockComponent& to) {
   return change;
 }
 
-// What the normal matrix of a component says of (phi, t, s).
+// The information of a component's normal matrix about (phi, t, s).
 struct Freedom {
-  Eigen::MatrixXd directions;  // [7 x free], orthonormal: free ones that leave the scale as it is
-  Vector7 scaling;             // a scale of one, rotation and shift estimated along with it
+  Eigen::MatrixXd directions;  // [7 x free], orthonormal: the free directions that leave the scale unchanged
+  Vector7 scaling;             // a scale of one, with the rotation and shift that follow from it
   double scale_information = 0;
   double limit = 0;  // below, the information of a direction is rounding
   bool has_scale = false;
 };
 
-// Shifts are free in the null space, rotations where their information, shifts estimated along with them, is less than
-// 1 / rad^2.
+// Shifts are free in the null space. Rotations are free where their information is less than 1 / rad^2, with the shifts
+// estimated along with them.
 Freedom freedom_of(const Matrix77& normal) {
   Freedom freedom;
   freedom.limit = kNullDirection * symmetric_eigen(normal).values(6);
@@ -66,7 +66,7 @@ Freedom freedom_of(const Matrix77& normal) {
 
   const SymmetricEigen turn = symmetric_eigen(0.5 * (turning + turning.transpose()));
   std::int64_t free_turns = 0;
-  Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // by a scale of one
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // the rotation that follows from a scale of one
   for (int i = 0; i < 3; ++i) {
     if (turn.values(i) <= std::max(freedom.limit, kDetermined))
       ++free_turns;
@@ -83,7 +83,7 @@ Freedom freedom_of(const Matrix77& normal) {
   return freedom;
 }
 
-// Projection on the directions of (phi, t, s) along which held positions stay where they are.
+// The projection on the directions of (phi, t, s) that leave held positions where they are.
 Matrix77 movable_directions(const Matrix77& held) {
   Matrix77 movable = Matrix77::Identity();
   const SymmetricEigen movement = symmetric_eigen(held);
@@ -93,7 +93,7 @@ Matrix77 movable_directions(const Matrix77& held) {
   return movable;
 }
 
-// `freedom`: of the component alone.
+// Sets up a component, and finds the free directions of it alone.
 BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   BlockComponent c;
   c.lowest_frame = group.lowest_frame;
@@ -117,11 +117,13 @@ BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   c.pivot = c.centre;
   if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
   freedom = freedom_of(normal);
-  freedom.has_scale = !one_place;  // a frame alone, say, known by its position only: a scale moves no frame
+  // a single frame that is known by its position only, for example: a scale moves no frame
+  freedom.has_scale = !one_place;
   return c;
 }
 
-// Components by the lowest one that has its scale in common with them: by free mounts that both see.
+// For each component, the lowest component that has its scale in common with it. Components have a common scale when
+// they see the same free mount.
 std::vector<std::size_t> scale_groups(const std::vector<PartGroup>& components) {
   std::vector<std::pair<UnknownId, std::size_t>> seen;
   for (std::size_t c = 0; c < components.size(); ++c)
@@ -137,8 +139,8 @@ std::vector<std::size_t> scale_groups(const std::vector<PartGroup>& components) 
   return group;
 }
 
-// Numbers the free directions. A common scale belongs to the first component that has frames which it moves; the
-// others follow it.
+// Numbers the free directions. A common scale is numbered in the first component with frames that it moves; the others
+// take over its number.
 void number_columns(const std::vector<std::size_t>& scale_group, const std::vector<Freedom>& freedoms,
                     std::vector<BlockComponent>& components) {
   struct Scale {
@@ -146,7 +148,7 @@ void number_columns(const std::vector<std::size_t>& scale_group, const std::vect
     std::int64_t component = -1, column = -1;
     bool free() const { return component >= 0 && information <= limit; }
   };
-  std::vector<Scale> scales(components.size());  // by group
+  std::vector<Scale> scales(components.size());  // by the number of the group
   for (std::size_t c = 0; c < components.size(); ++c) {
     Scale& scale = scales[scale_group[c]];
     scale.information += freedoms[c].scale_information;
@@ -175,8 +177,8 @@ void number_columns(const std::vector<std::size_t>& scale_group, const std::vect
   }
 }
 
-// Holds the lowest frame along all directions it can hold, and the farthest one along the rest. The reference place is
-// taken for that of the frame: what it leaves open of the direction is as well held by what is near to it.
+// Holds the lowest frame along all directions that it can hold, and the farthest frame along the rest. The position of
+// a frame stands for its reference place: a direction near the free one holds the free one as well.
 void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<GaugeConstraint>& constraints) {
   const Vector6 unit = c.weights().cwiseSqrt();
   const auto hold = [&](std::int64_t frame, const Eigen::Vector3d& centre, const Eigen::MatrixXd& free) {
@@ -264,7 +266,7 @@ std::int64_t BlockGauge::defect() const {
 }
 
 BlockGauge make_gauge(const std::vector<TileGauge>& tiles) {
-  // Parts of different tiles belong together where they share a frame.
+  // Parts of different tiles belong to one component where they share a frame.
   std::vector<std::pair<std::size_t, std::size_t>> all;  // (tile, part)
   for (std::size_t t = 0; t < tiles.size(); ++t)
     for (std::size_t p = 0; p < tiles[t].parts.size(); ++p) all.emplace_back(t, p);
@@ -278,7 +280,7 @@ BlockGauge make_gauge(const std::vector<TileGauge>& tiles) {
     if (shared[s].first == shared[s - 1].first)
       rows.unite(static_cast<std::int32_t>(shared[s].second), static_cast<std::int32_t>(shared[s - 1].second));
 
-  std::vector<PartGroup> groups(all.size());  // by first part; others stay empty
+  std::vector<PartGroup> groups(all.size());  // at the first part of each component; the others stay empty
   for (std::size_t i = 0; i < all.size(); ++i) {
     PartGroup& group = groups[at(rows.find(static_cast<std::int32_t>(i)))];
     group.parts.push_back(&part_at(i));

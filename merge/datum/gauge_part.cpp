@@ -1,4 +1,4 @@
-// What one tile says of the datum: the information of its priors on the similarities of each part.
+// Computes the information of one tile about the datum: how far its priors determine the similarities of each part.
 #include <algorithm>
 #include <type_traits>
 
@@ -11,8 +11,8 @@ namespace megablock {
 
 namespace {
 
-constexpr double kScaleGiven = 1e6;    // weight of the scale where held mounts give it
-constexpr double kAtReference = 1e-9;  // metres from its rig's reference, so that a scale does not move a mount
+constexpr double kScaleGiven = 1e6;    // weight of the scale in a part where held mounts fix it
+constexpr double kAtReference = 1e-9;  // metres: a mount nearer to its rig's reference is not moved by a scale
 
 // Fills the parts of a tile.
 class PartBuilder {

@@ -35,7 +35,7 @@ InnerSums InnerSums::from_bytes(const Bytes& bytes) {
 
 namespace {
 
-// Columns 1.. of an unknown's rows: [6 x defect].
+// Columns 1 and up of an unknown's rows: [6 x defect].
 Eigen::MatrixXd columns_of(const Step& unknowns, const UnknownId& id, std::int64_t defect) {
   Eigen::MatrixXd z(6, defect);
   for (std::int64_t k = 0; k < defect; ++k)
@@ -43,7 +43,7 @@ Eigen::MatrixXd columns_of(const Step& unknowns, const UnknownId& id, std::int64
   return z;
 }
 
-// The columns of M^-1 that belong to a component, and the block of M^-1 K M^-1.
+// The columns of M^-1 that belong to a component, and its block of M^-1 K M^-1.
 struct ComponentSums {
   Eigen::MatrixXd inverse, k;
 };
@@ -102,7 +102,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
       transform(covariance.points[at(p)], covariance.point_columns[at(p)], c->move_point(state.points[at(p)]),
                 sums_of(c));
     }
-  // Free mounts change with the scale of the components that see them.
+  // Free mounts move with the scale of the components that see them.
   std::vector<const BlockComponent*> of_mount(problem.mounts.size(), nullptr);
   for (const TileImage& image : problem.images)
     if (components[at(image.frame.value)] != nullptr) of_mount[at(image.mount)] = components[at(image.frame.value)];

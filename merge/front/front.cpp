@@ -40,8 +40,8 @@ SubtreeSums read_sums(ByteReader& in) {
   return sums;
 }
 
-// Partial Cholesky of the first e rows and columns of a symmetric n x n matrix: `factor` [n x e], the rest `update`
-// [p x p] (lower triangles, column-major).
+// The partial Cholesky factorisation of the first e rows and columns of a symmetric n x n matrix. `factor` holds the
+// columns of these [n x e], `update` the rest [p x p] (lower triangles, column-major).
 class PartialCholesky {
  public:
   PartialCholesky(double* factor, double* update, std::int64_t n, std::int64_t e, double* rhs,
@@ -81,7 +81,7 @@ class PartialCholesky {
     }
   }
 
-  // Column by column with the pivot test; a held row and column become those of the identity.
+  // Factorises column by column with the test of the pivots. A held row and column become those of the identity.
   void factorise_diagonal_block(std::int64_t first, std::int64_t end) {
     for (std::int64_t k = first; k < end; ++k) {
       const double pivot = at(k, k);
@@ -248,7 +248,7 @@ std::vector<double> FrontMemory::take(std::size_t size) {
     buffer = std::move(*enough);
     free_.erase(enough);
   } else if (!free_.empty()) {
-    free_.pop_back();  // grows instead of being kept beside a larger one
+    free_.pop_back();  // the vector grows; keeping both would take more memory
   }
   buffer.clear();
   buffer.reserve(size);
@@ -291,9 +291,9 @@ std::int64_t Front::row_of(const UnknownId& id) const {
 }
 
 void Front::add(const UpdateMatrix& child) {
-  // Stretches of the child's rows that lie one behind the other here too.
+  // A run of the child's rows that follow each other in this front too.
   struct Run {
-    std::int64_t row, first, count;  // here, in the child
+    std::int64_t row, first, count;  // row in this front, first row in the child, number of rows
   };
   std::vector<Run> runs;
   std::int64_t n = 0;
@@ -313,7 +313,7 @@ void Front::add(const UpdateMatrix& child) {
       for (auto down = across; down != runs.end(); ++down) {
         const std::int64_t skipped = down == across ? k : 0, count = down->count - skipped;
         const std::int64_t row = down->row + skipped;
-        const bool below = row >= column;  // else transposed
+        const bool below = row >= column;  // otherwise the block is added transposed
         const Place target = below ? place(row, column) : place(column, row);
         const std::int64_t step = below ? 1 : target.stride;
         if (step == 1)

@@ -1,19 +1,20 @@
-// Dense fronts: one step of the elimination, for the cells of a tile and for the nodes of the merge tree alike.
+// Dense fronts: one step of the elimination, the same for the cells of a tile and for the nodes of the merge tree.
 //
 // A front holds the normal equations K x = b of the unknowns E, which are eliminated here, and of the separator P,
-// which is passed to the parent. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update matrix
-// is
+// whose equations go to the parent. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update
+// matrix is
 //
-//     S = K_PP - Y Y',   s = b_P - Y z,
+//     S = K_PP - Y Y',   s = b_P - Y z.
 //
-// the Newton decrement grows by |z|^2, and on the way down x_E = L^-T (z - Y' x_P).
+// The square of the Newton decrement grows by |z|^2, and on the way down x_E = L^-T (z - Y' x_P).
 //
-// A pivot below 1e-12 of the un-eliminated diagonal of J'J (of the damped one when lambda > 0) marks a direction that
-// the observations do not determine: the scalar unknown is held (x = 0: a minimal constraint) and reported.
+// A pivot below 1e-12 of the diagonal of J'J before the elimination (of the damped diagonal when lambda > 0) marks a
+// direction that the observations do not determine. Its scalar unknown is held (x = 0, a minimal constraint) and
+// reported.
 //
-// Sign: b = -J'r, so x is the step. Right-hand side 0 is b; a free block adds further ones for its inner constraints.
-// Every function depends on its inputs alone, and children are added in their order, so that the bits are always the
-// same.
+// Sign: b = -J'r, so that x is the step. Right-hand side 0 is b; a free block adds further ones for its inner
+// constraints. The result of every function depends on its inputs alone, and children are added in their order, so that
+// the bits are always the same.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +31,7 @@ inline constexpr double kPivotTolerance = 1e-12;
 struct HeldUnknown {
   UnknownId id;
   std::int64_t component = 0;  // row inside the unknown
-  double ratio = 0;            // pivot / un-eliminated diagonal; 0 / 0 counts as 0
+  double ratio = 0;            // pivot / diagonal before the elimination; 0 / 0 counts as 0
 };
 
 // Sums over a subtree besides the matrices.
@@ -41,7 +42,7 @@ struct SubtreeSums {
   std::int64_t residuals = 0;     // scalar residuals
   std::int64_t observations = 0;  // image observations among them
   std::int64_t points = 0;
-  std::int64_t unknowns = 0;     // scalar unknowns eliminated, points included, held ones included
+  std::int64_t unknowns = 0;     // scalar unknowns eliminated; points and held unknowns count too
   std::int64_t held_points = 0;  // scalar unknowns of points held for a vanishing pivot
   std::vector<HeldUnknown> held;
   void add(const SubtreeSums& other);  // in the order of the calls
@@ -53,15 +54,16 @@ struct LeastSquares {
   std::int64_t rank = 0;
 };
 
-// The update of a child: its normal equations condensed on the unknowns that it passes to its parent.
+// The update of a child: its normal equations, condensed on its separator unknowns.
 struct UpdateMatrix {
-  UnknownList unknowns;  // passed, ascending
+  UnknownList unknowns;  // separator unknowns, ascending
   std::int64_t right_hand_sides = 1;
-  std::vector<double> matrix;    // lower triangle column by column, packed: n (n + 1) / 2
-  std::vector<double> rhs;       // [n x right_hand_sides], column-major
-  std::vector<double> diagonal;  // [n] of the un-eliminated J'J below here: what lambda multiplies
+  std::vector<double> matrix;  // lower triangle column by column, packed: n (n + 1) / 2
+  std::vector<double> rhs;     // [n x right_hand_sides], column-major
+  // [n] diagonal of J'J before the elimination, of the whole subtree; lambda multiplies it
+  std::vector<double> diagonal;
   SubtreeSums sums;
-  LeastSquares alone;  // of these equations by themselves; filled in where seams are checked (seam_check.h)
+  LeastSquares alone;  // of these equations alone; filled in where seams are checked (seam_check.h)
 
   std::int64_t byte_count() const;  // of its values
   void write(ByteWriter& out) const;
@@ -76,7 +78,7 @@ struct FrontFactor {
   std::int64_t right_hand_sides = 1;
   std::vector<double> factor;      // [(e + p) x e] column-major: L (lower triangle) above Y
   std::vector<double> z;           // [e x right_hand_sides]
-  std::vector<std::int64_t> held;  // rows of E that are held
+  std::vector<std::int64_t> held;  // rows of held unknowns in E
 
   std::int64_t byte_count() const;
   void write(ByteWriter& out) const;
@@ -96,19 +98,19 @@ struct Step {
   static Step from_bytes(const Bytes& bytes);
 };
 
-// Dense symmetric matrix over a list of unknowns (covariances).
+// A dense symmetric matrix over a list of unknowns (covariances).
 struct CovarianceMatrix {
   UnknownList unknowns;        // ascending
   std::vector<double> matrix;  // [n x n], column-major, full
 
   CovarianceMatrix restricted_to(const UnknownList& wanted) const;
-  // Block (row unknown, column unknown) copied into out (column-major, rows = its dimension).
+  // Copies the block (row unknown, column unknown) to `out` (column-major, with as many rows as the row unknown).
   bool block(const UnknownId& row, const UnknownId& column, double* out) const;
   Bytes to_bytes() const;
   static CovarianceMatrix from_bytes(const Bytes& bytes);
 };
 
-// Keeps the memory of small fronts for the next ones. To fetch it anew from the system would cost as much as their
+// Keeps the memory of small fronts for the next ones. To get it anew from the system would cost as much time as their
 // arithmetic.
 class FrontMemory {
  public:
@@ -120,17 +122,18 @@ class FrontMemory {
   std::vector<std::vector<double>> free_;  // ascending by capacity
 };
 
-// A front that is being filled. The rows of the eliminated unknowns come first, those of the passed ones behind them.
+// A front that is being filled. The rows of the eliminated unknowns come first, those of the separator unknowns follow.
 // The columns of the two are stored apart, so that the first become the factor without a copy. Only the lower triangle
 // is used.
 class Front {
  public:
-  // `memory` may be null; else it outlives the front.
+  // `memory` may be null; otherwise it outlives the front.
   Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1, FrontMemory* memory = nullptr);
 
   std::int64_t dimension() const { return dimension_; }
   std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
-  // A block of the lower triangle whose columns belong to one unknown: its first element, and the distance of columns.
+  // A block of the lower triangle whose columns belong to one unknown: its first element, and the distance between
+  // columns.
   struct Place {
     double* values;
     std::int64_t stride;
@@ -140,18 +143,18 @@ class Front {
     if (column < e) return {factor_.data() + row + column * dimension_, dimension_};
     return {update_.data() + (row - e) + (column - e) * p, p};
   }
-  double* factor() { return factor_.data(); }  // columns of E [n x e], n between them
-  double* update() { return update_.data(); }  // of P, rows of P alone [p x p]
+  double* factor() { return factor_.data(); }  // columns of E [n x e], stored n values apart
+  double* update() { return update_.data(); }  // columns of P, with the rows of P alone [p x p]
   std::int64_t eliminated_dimension() const { return eliminated_dimension_; }
   double* rhs() { return rhs_.data(); }            // [n x right_hand_sides]
-  double* diagonal() { return diagonal_.data(); }  // [n] of J'J
+  double* diagonal() { return diagonal_.data(); }  // [n] diagonal of J'J
   SubtreeSums& sums() { return sums_; }
 
-  void add(const UpdateMatrix& child);  // extend-add; further right-hand sides than this front has are left out
+  void add(const UpdateMatrix& child);  // extend-add; leaves out right-hand sides that this front does not have
 
   struct Result;
-  // Adds lambda * diagonal to the eliminated rows and factorises them. Returns the update and the factors; the front is
-  // used up.
+  // Adds lambda * diagonal to the eliminated rows and factorises them. Returns the update and the factors. The front
+  // cannot be used afterwards.
   Result eliminate(double lambda) &&;
 
  private:
@@ -170,10 +173,11 @@ struct Front::Result {
   FrontFactor factor;
 };
 
-// The values of E and P, ascending, from those of at least P.
+// The values of E and P, ascending, from values that include those of P.
 Step back_substitute(const FrontFactor& factor, const Step& passed);
 
-// Covariance of the unknowns E and P of a front, in three blocks. That of a large front is never formed as a whole.
+// The covariance of the unknowns E and P of a front, in three blocks. The whole matrix of a large front is never
+// formed.
 struct FrontCovariance {
   UnknownList eliminated, passed;  // each ascending
   std::vector<double> inner;       // C_EE [e x e] column-major, lower triangle
@@ -181,12 +185,12 @@ struct FrontCovariance {
   std::vector<double> outer;       // C_PP [p x p]
 
   CovarianceMatrix restricted_to(const UnknownList& wanted) const;  // throws ComputeError when one is missing
-  Bytes bytes_of(const UnknownList& wanted) const;                  // of restricted_to(), which is not formed
+  Bytes bytes_of(const UnknownList& wanted) const;                  // bytes of restricted_to(), without forming it
   CovarianceMatrix whole() const;                                   // of E and P, ascending
 };
 
-// From the covariance of P, of all its unknowns and no others:
-// C_EE = K_EE^-1 + K_EE^-1 K_EP C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
+// The covariance of a front from that of P, which has all unknowns of P and no others: C_EE = K_EE^-1 + K_EE^-1 K_EP
+// C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
 FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix passed);
 
 }  // namespace megablock

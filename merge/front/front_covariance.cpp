@@ -1,4 +1,4 @@
-// Covariances of a front, by its parts (front.h).
+// Computes the covariance of a front, block by block (front.h).
 #include <cblas.h>
 
 #include <algorithm>
@@ -31,7 +31,8 @@ bool CovarianceMatrix::block(const UnknownId& row, const UnknownId& column, doub
 
 namespace {
 
-// Unknowns, then the lower triangle column by column, as it comes: `fill(j, out)` puts rows j to n of column j there.
+// Writes the unknowns, then the lower triangle column by column. `fill(j, out)` writes rows j to n of column j to
+// `out`.
 template <typename Fill>
 Bytes bytes_of_triangle(const UnknownList& unknowns, Fill&& fill) {
   const std::int64_t n = total_dimension(unknowns);
@@ -104,7 +105,7 @@ FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix give
 
 namespace {
 
-// Elements of a front's covariance in the order of a list of its unknowns.
+// The elements of a front's covariance, in the order of a list of its unknowns.
 class RestrictedCovariance {
  public:
   // Throws ComputeError when one is missing.
@@ -130,7 +131,7 @@ class RestrictedCovariance {
 
  private:
   struct Row {
-    bool inside;         // of E
+    bool inside;         // whether it belongs to E
     std::int64_t index;  // in E or P
   };
   const FrontCovariance& front_;

@@ -12,7 +12,7 @@ namespace megablock {
 
 inline int blas(std::int64_t n) { return static_cast<int>(n); }
 
-// First row of every unknown of `wanted` in `list` laid out as row_offsets(list).
+// The first row of every unknown of `wanted` in `list`, whose rows are laid out as by row_offsets(list).
 inline std::vector<std::int64_t> rows_in(const UnknownList& list, const UnknownList& wanted, const char* what) {
   const std::vector<std::int64_t> offsets = row_offsets(list);
   std::vector<std::int64_t> rows;
@@ -25,7 +25,7 @@ inline std::vector<std::int64_t> rows_in(const UnknownList& list, const UnknownL
   return rows;
 }
 
-// Scalar rows in the larger table of every scalar row of `wanted`.
+// The scalar rows in the larger table, for every scalar row of `wanted`.
 inline std::vector<std::int64_t> scalar_rows(const UnknownList& wanted, const std::vector<std::int64_t>& first_rows) {
   std::vector<std::int64_t> rows;
   for (std::size_t i = 0; i < wanted.size(); ++i)

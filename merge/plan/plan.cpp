@@ -8,7 +8,7 @@ namespace megablock {
 
 namespace {
 
-// An unknown of the table and how many leaves below a node touch it.
+// An unknown of the table, and the number of leaves below a node that touch it.
 struct Touched {
   std::size_t unknown;
   std::int64_t leaves;
@@ -50,7 +50,8 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
       if (leaves_of[row]++ == 0) owned[leaf].push_back(u);
     }
   }
-  for (const Unknown& u : kept) leaves_of[static_cast<std::size_t>(find_unknown(table, u.id))] = -1;  // never complete
+  // never eliminated
+  for (const Unknown& u : kept) leaves_of[static_cast<std::size_t>(find_unknown(table, u.id))] = -1;
 
   EliminationPlan plan;
   plan.nodes.resize(tree.nodes.size());
@@ -116,7 +117,7 @@ FrontCosts front_costs(const EliminationPlan& plan) {
     if (node.leaf >= 0) continue;
     const std::int64_t width = node.front_dimension();
     costs.widest = std::max(costs.widest, width);
-    // Cholesky of e columns, their rows below, the update of the rest.
+    // The Cholesky factorisation of e columns, the rows below them, and the update.
     const auto e = static_cast<double>(total_dimension(node.eliminated)), p = static_cast<double>(width) - e;
     costs.operations += e * e * e / 3 + p * e * e + p * p * e;
   }

@@ -1,7 +1,8 @@
-// Plans an elimination along a tree: it says which unknowns are eliminated at which node.
+// Plans an elimination along a tree: says which unknowns are eliminated at which node.
 //
-// An unknown is eliminated at the lowest node that holds all leaves touching it; below that node it is passed up. The
-// same plan serves the merge tree (leaves = tiles) and the cells inside a tile (leaves = cells).
+// An unknown is eliminated at the lowest node whose subtree holds all leaves that touch it. Every node below that one
+// sends it to its parent. The same plan serves the merge tree (leaves = tiles) and the inside of a tile (leaves =
+// cells).
 #pragma once
 
 #include <vector>
@@ -15,8 +16,8 @@ namespace megablock {
 struct PlanNode {
   std::int64_t left = -1, right = -1, parent = -1;  // as in the tree; -1: none
   std::int64_t leaf = -1;                           // leaf number (tile or cell), -1 for inner nodes
-  UnknownList eliminated;                           // completed here, ascending
-  UnknownList passed;                               // of the update matrix, ascending
+  UnknownList eliminated;                           // eliminated here, ascending
+  UnknownList passed;                               // separator unknowns, those of the update matrix, ascending
   UnknownList owned;                                // leaves: touched here and by no leaf with a lower number
   std::int64_t front_dimension() const { return total_dimension(eliminated) + total_dimension(passed); }
 };
@@ -31,13 +32,13 @@ struct EliminationPlan {
 
 // The cost of the inner nodes. The cost of the leaves is in their own plans.
 struct FrontCosts {
-  std::int64_t root = 0, widest = 0;  // unknowns of the root's front, of the largest one
+  std::int64_t root = 0, widest = 0;  // number of unknowns of the root's front, of the largest front
   double operations = 0;              // floating-point additions and multiplications of eliminating all of them once
 };
 FrontCosts front_costs(const EliminationPlan& plan);
 
-// leaf_unknowns: ascending list per leaf (of the unknowns its residuals touch). `kept`: ascending; these are never
-// eliminated but passed up beyond the root (a tile's boundary unknowns).
+// `leaf_unknowns` has an ascending list for each leaf: the unknowns in its residuals. `kept` is ascending; these
+// unknowns are never eliminated, and the root sends them on (the separator unknowns of a tile).
 EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>& leaf_unknowns,
                           const UnknownList& kept = {});
 

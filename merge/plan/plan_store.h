@@ -1,6 +1,6 @@
-// Stores the plans of one rank's tiles. The plan of a tile whose observations are in the rank's scratch directory
-// (tile_store.h) is stored there too and read when it is needed. Plans without room there stay in memory. The choice
-// never changes the bits of a result.
+// Stores the plans of one rank's tiles. Where the observations of a tile are in the rank's scratch directory
+// (tile_store.h), its plan is stored there too and read when it is needed. A plan without room there stays in memory.
+// The choice never changes the bits of a result.
 #pragma once
 
 #include <cstdint>
@@ -20,22 +20,23 @@ class PlanStore {
   PlanStore(const PlanStore&) = delete;
   PlanStore& operator=(const PlanStore&) = delete;
 
-  // In the order of the tiles, `row` below counts them; `tile` is its number in the block.
+  // Plans are added in the order of the tiles, and `row` below counts them. `tile` is the number of the tile in the
+  // block.
   void add(std::int64_t tile, TilePlan plan, bool to_scratch);
   bool in_scratch(std::size_t row) const { return slots_[row].in_scratch; }
-  // The reference holds until another row is asked for that is in scratch.
+  // The reference is valid until another row is read from scratch.
   const TilePlan& operator[](std::size_t row) const;
 
  private:
   struct Slot {
     std::int64_t tile = -1;
     bool in_scratch = false;
-    TilePlan plan;  // of a tile in memory
+    TilePlan plan;  // empty when it is in scratch
   };
 
   std::shared_ptr<ScratchSpace> scratch_;
   std::vector<Slot> slots_;
-  // What was read last.
+  // The plan that was read last.
   mutable TilePlan loaded_;
   mutable std::int64_t loaded_row_ = -1;
 };

@@ -1,4 +1,4 @@
-// Divides the points of a tile into portions of some hundred, cell by cell, so that threads share even a tile of few
+// Divides the points of a tile into portions of a few hundred, cell by cell, so that threads share even a tile of few
 // cells evenly.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Symbolic work of a tile: its unknowns, its cells and what each cell owns.
+// Makes the plan of a tile: finds its unknowns, divides it into cells, and gives points and observations to the cells.
 #include "merge/plan/tile_plan.h"
 
 #include <algorithm>
@@ -15,12 +15,12 @@ namespace megablock {
 
 namespace {
 
-// Which rows of the problem's tables a kept residual touches.
+// The rows of the problem's tables that occur in a kept residual.
 struct TouchedRows {
   std::vector<std::uint8_t> frames, cameras, mounts;
 };
 
-// Of all observations without a point: visit(TermRow, TermUnknowns).
+// Calls visit(TermRow, TermUnknowns) for all observations without a point.
 template <typename Visit>
 void visit_all_terms(const TileProblem& problem, Visit&& visit) {
   const auto types = observation_types();
@@ -76,7 +76,7 @@ UnknownList listed(const TileProblem& problem, const TouchedRows& touched,
   return unknowns;
 }
 
-// Distinct frame rows of an active point's kept observations, ascending.
+// The frame rows of an active point's kept observations, ascending; a frame may occur several times.
 void frames_of_point(const TileProblem& problem, std::int64_t point, std::vector<std::int32_t>& frames) {
   frames.clear();
   for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
@@ -84,8 +84,9 @@ void frames_of_point(const TileProblem& problem, std::int64_t point, std::vector
   std::sort(frames.begin(), frames.end());
 }
 
-// Edges between frames that share points or other observations: ascending, weighted by how many they share. Pairs
-// are sorted by their lower frame by counting, and of each of these counted by their upper one: there are millions.
+// The edges between frames that share points or other observations, ascending. Their weight is the number of shared
+// ones. There are millions of pairs of frames: they are sorted by their lower frame by counting, and the pairs of each
+// lower frame are counted by their upper one.
 FrameGraph graph_of(const TileProblem& problem) {
   const std::size_t frame_count = problem.frames.size();
   std::vector<std::int32_t> frames;
@@ -102,7 +103,8 @@ FrameGraph graph_of(const TileProblem& problem) {
       if (term.frame_count == 2 && a != b) visit(std::min(a, b), std::max(a, b));
     });
   };
-  std::vector<std::size_t> end(frame_count + 1, 0);  // of each lower frame's pairs; first the end of those before
+  // of the pairs of each lower frame; at first the beginning of these pairs
+  std::vector<std::size_t> end(frame_count + 1, 0);
   visit_pairs([&](std::int32_t a, std::int32_t) { ++end[static_cast<std::size_t>(a) + 1]; });
   std::partial_sum(end.begin(), end.end(), end.begin());
   std::vector<std::int32_t> upper(end.back());
@@ -138,7 +140,7 @@ void number_parts(const FrameGraph& graph, TilePlan& plan) {
   }
 }
 
-// Shares out points and the observations without a point, and notes which unknowns each cell touches.
+// Gives points, and observations without a point, to cells, and notes the unknowns that each cell touches.
 class CellPlanner {
  public:
   CellPlanner(const TileProblem& problem, TilePlan& plan, const std::vector<std::int32_t>& cell_of_frame,
@@ -166,7 +168,7 @@ class CellPlanner {
   std::size_t cell_of(LocalFrame frame) const {
     return static_cast<std::size_t>(cell_of_frame_[static_cast<std::size_t>(frame.value)]);
   }
-  // Of frame rows, which may come several times.
+  // The cell that owns an observation of these frame rows, which may occur several times.
   std::size_t owner_of(const std::vector<std::int32_t>& frames) {
     candidates_.clear();
     for (const std::int32_t frame : frames) {
@@ -195,7 +197,7 @@ class CellPlanner {
   }
 
   void share_terms() {
-    // Shared parameters' priors go where the first image of the camera or mount lies.
+    // The prior of a camera or mount goes to the cell of its first image.
     std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);
     for (auto image = problem_.images.rbegin(); image != problem_.images.rend(); ++image)
       camera_cell[image->camera.value] = mount_cell[static_cast<std::size_t>(image->mount)] = cell_of(image->frame);
@@ -261,7 +263,7 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
   }
   std::size_t cell_count = 0;
   for (const MergeTree::Node& n : cells.tree.nodes) cell_count += n.left < 0 && n.right < 0;
-  // What the tile passes on is cut off already, above the root of its cells.
+  // The frames of the tile's separator count as removed, because they lie above the root of the cells.
   std::vector<std::uint8_t> passed(problem.frames.size(), 0);
   for (std::size_t row = 0; row < passed.size(); ++row)
     passed[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
@@ -270,7 +272,7 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
     if (passed[row] || depth[row] >= 0) ++depth[row];
   const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();
   plan.cells = make_plan(cells.tree, lists, plan.boundary);
-  for (PlanNode& cell : plan.cells.nodes) cell.owned = {};  // of tiles alone somebody asks for it
+  for (PlanNode& cell : plan.cells.nodes) cell.owned = {};  // only the `owned` lists of tiles are used
   return plan;
 }
 

@@ -11,34 +11,34 @@
 
 namespace megablock {
 
-// Every unknown that a kept residual of the tile touches, ascending. What make_plan needs of each tile.
+// Every unknown in the kept residuals of a tile, ascending. make_plan() needs this list of each tile.
 UnknownList tile_unknowns(const TileProblem& problem);
-// With other intrinsics estimated than those of the problem, one mask per camera.
+// The same when other intrinsics are estimated than those of the problem, one mask for each camera.
 UnknownList tile_unknowns(const TileProblem& problem, const std::vector<ParameterMask>& camera_free);
 
-// Symbolic work of a tile, done once per verdict on observations.
+// The symbolic work on a tile. It is done once for each set of kept observations.
 struct TilePlan {
   UnknownList unknowns;                     // touched, ascending
-  UnknownList boundary;                     // passed to the merge tree, ascending
-  UnknownList owned;                        // no tile with a lower number touches them
+  UnknownList boundary;                     // separator unknowns, ascending
+  UnknownList owned;                        // unknowns that no tile with a lower number touches
   EliminationPlan cells;                    // leaves = cells
   std::vector<RowList> points;              // [cells] active points (rows), ascending
   std::vector<std::vector<TermRow>> terms;  // [cells] observations without a point, ascending by type and row
-  // Part of every frame row that hangs together by points and observations between frames, by lowest frame; -1:
-  // untouched. [frames]
+  // For each frame row, the part of the tile to which it belongs; -1: untouched. A part holds together by points and by
+  // observations between frames. Parts are numbered by their lowest frame.
   std::vector<std::int64_t> part_of_frame;
   std::int64_t part_count = 0;
-  // Position in `unknowns`, -1: held or untouched.
+  // Position in `unknowns`; -1: held or untouched.
   std::vector<std::int64_t> unknown_of_frame, unknown_of_camera, unknown_of_mount;
   std::vector<ParameterMask> camera_free;  // [cameras] estimated intrinsics
   void write(ByteWriter& out) const;
   static TilePlan read(ByteReader& in);
 };
-// Frame row of an active point's first kept observation.
+// The frame row of an active point's first kept observation.
 std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);
 // `node` is the tile's leaf in the plan of the merge tree.
 TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 16);
-// Of a tile that is a block of its own: nothing is passed on.
+// For a tile that is a block of its own: it has no separator unknowns.
 TilePlan make_lone_tile_plan(const TileProblem& problem, const std::vector<ParameterMask>& camera_free);
 
 }  // namespace megablock

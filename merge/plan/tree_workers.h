@@ -1,4 +1,5 @@
-// The threads of the process (geometry/threads/workers.h) at work on the cells of a tile, by their tree.
+// Visits the cells of a tile along their tree, on all threads of the process (geometry/threads/workers.h). A node is
+// visited after its children (elimination), or after its parent (covariances).
 #pragma once
 
 #include <omp.h>
@@ -14,11 +15,11 @@
 
 namespace megablock {
 
-// All nodes of a tree, children first, from its leaves: whoever has visited a leaf goes on upwards as long as what is
-// beside its way is done.
+// Visits all nodes of a tree, children first. The thread that has visited a leaf goes on to the parent when the sibling
+// is done too, and so on upwards.
 class ChildrenFirst {
  public:
-  explicit ChildrenFirst(const std::vector<PlanNode>& nodes)  // outlives it
+  explicit ChildrenFirst(const std::vector<PlanNode>& nodes)  // `nodes` outlives the object
       : nodes_(nodes), errors_(nodes.size()), open_children_(nodes.size()) {
     for (std::size_t n = 0; n < nodes.size(); ++n) {
       if (nodes[n].leaf >= 0) leaves_.push_back(static_cast<std::int64_t>(n));
@@ -26,7 +27,8 @@ class ChildrenFirst {
     }
   }
   std::int64_t leaves() const { return std::ssize(leaves_); }
-  // Calls visit(n) for leaf number `leaf` and the nodes above that it completes. Once for each leaf, by any thread.
+  // Calls visit(n) for leaf number `leaf` and for the nodes above it that this completes. Call it once for each leaf,
+  // on any thread.
   template <typename Visit>
   void ascend(std::int64_t leaf, const Visit& visit) {
     for (std::int64_t n = leaves_[static_cast<std::size_t>(leaf)];;) {
@@ -35,7 +37,8 @@ class ChildrenFirst {
       if (n < 0 || open_children_[static_cast<std::size_t>(n)].fetch_sub(1, std::memory_order_acq_rel) > 1) return;
     }
   }
-  // Once all is visited: the error of the lowest left-most node that has one; those above it are left out.
+  // Rethrows an error after all leaves are visited. Of two children with errors the left one's counts; nodes above a
+  // failed one are not visited.
   void rethrow() const {
     if (errors_.back()) std::rethrow_exception(errors_.back());
   }
@@ -61,8 +64,8 @@ class ChildrenFirst {
   std::vector<std::int64_t> leaves_;
 };
 
-// Calls visit(n) for all nodes of a tree, children first, on all threads. Exceptions as visit_in_parallel; nodes above
-// one that threw are left out.
+// Calls visit(n) for all nodes of a tree, children first, on all threads. Exceptions are handled as by
+// visit_in_parallel; nodes above a failed one are not visited.
 template <typename Visit>
 void visit_children_first(const std::vector<PlanNode>& nodes, Visit&& visit) {
   ChildrenFirst tree(nodes);
@@ -70,9 +73,9 @@ void visit_children_first(const std::vector<PlanNode>& nodes, Visit&& visit) {
   tree.rethrow();
 }
 
-// Calls visit(n, parent) for all nodes of a tree, parents first, subtrees on different threads. What it returns is
-// given to the children, as `parent`, and forgotten behind them; the root's is nullptr. As above; nodes below one that
-// threw are left out.
+// Calls visit(n, parent) for all nodes of a tree, parents first, with subtrees on different threads. `parent` points to
+// the value that visit() returned for the parent, and is nullptr at the root. A value is freed when the subtree of its
+// node is done. Exceptions are handled as above; nodes below a failed one are not visited.
 template <typename Value, typename Visit>
 void visit_parents_first(const std::vector<PlanNode>& nodes, Visit&& visit) {
   std::vector<std::exception_ptr> errors(nodes.size());

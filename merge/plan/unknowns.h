@@ -1,5 +1,5 @@
-// The unknowns of the reduced normal equations: frames, free cameras, free mounts. Points never appear here, they are
-// eliminated one by one inside their tile.
+// The unknowns of the reduced normal equations: frames, free cameras, free mounts. Points never appear here, because
+// they are eliminated one by one inside their tile.
 #pragma once
 
 #include <compare>
@@ -10,12 +10,12 @@
 
 namespace megablock {
 
-// Rows and offsets are signed; the standard library wants them unsigned.
+// Rows and offsets are signed numbers; the containers of the standard library take unsigned ones.
 inline std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 enum class UnknownKind : std::int32_t { kFrame = 0, kCamera = 1, kMount = 2 };
 
-// Identity in the block: FrameIndex, CameraIndex, or (RigIndex, mount).
+// Identifies an unknown in the block: a FrameIndex, a CameraIndex, or (RigIndex, mount).
 struct UnknownId {
   UnknownKind kind = UnknownKind::kFrame;
   std::int32_t part = 0;  // mount in its rig, else 0
@@ -40,11 +40,11 @@ struct Unknown {
 using UnknownList = std::vector<Unknown>;
 
 std::int64_t total_dimension(const UnknownList& unknowns);
-// First scalar row of every unknown and the total behind them: [unknowns + 1].
+// The first scalar row of every unknown, and the total as the last entry: [unknowns + 1].
 std::vector<std::int64_t> row_offsets(const UnknownList& unknowns);
-// Position of an id in an ascending list, -1 when it is not there.
+// The position of an id in an ascending list; -1 when it is not there.
 std::int64_t find_unknown(const UnknownList& ascending, const UnknownId& id);
-// Ascending union of ascending lists. Throws ComputeError when an unknown has two dimensions.
+// The ascending union of ascending lists. Throws ComputeError when an unknown has two dimensions.
 UnknownList unite(const std::vector<const UnknownList*>& lists);
 // "frame 12", "camera 3", "mount 2 of rig 0".
 std::string describe(const UnknownId& id);

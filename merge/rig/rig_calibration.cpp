@@ -18,7 +18,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kMinLineRatio = 0.02;  // of control points; below they lie on one line
+constexpr double kMinLineRatio = 0.02;  // spread across the line / along it; control points below it lie on one line
 constexpr std::size_t kFewControl = 3;
 
 BlockState state_of(const Block& block, const BlockState& start, const WholeBlock& whole) {
@@ -29,7 +29,7 @@ BlockState state_of(const Block& block, const BlockState& start, const WholeBloc
   return state;
 }
 
-// Adjusted check points against their given positions.
+// Compares the adjusted check points with their given positions.
 std::optional<PointFit> check_points(const Block& block, const WholeBlock& whole,
                                      const std::vector<Eigen::Matrix3d>* covariances) {
   PointFit fit;
@@ -84,7 +84,7 @@ class RigCalibrator {
  private:
   void check_input() {
     if (options_.mode == CalibrationMode::kOnLine && tracks_->track_count() == 0)
-      throw InputError("there are no tie points: on-line calibration needs them; give 'tie_points' or pictures");
+      throw InputError("there are no tie points: on-line calibration needs them; give 'tie_points' or images");
     std::vector<Eigen::Vector3d> control;
     for (const ControlPoint& point : block_.control_points)
       if (point.role == PointRole::kControl && point.position.allFinite() && !point.measurements.empty())
@@ -106,7 +106,7 @@ class RigCalibrator {
                       control.size()));
   }
 
-  // From one standpoint nothing can be intersected.
+  // Throws InputError when no point can be intersected, as with a rig that did not move.
   void need_points() const {
     WholeBlock whole = whole_block(block_, start_, *tracks_, options_.adjustment.observations);
     triangulate_points(whole.problem, whole.state, options_.adjustment);
@@ -118,7 +118,7 @@ class RigCalibrator {
                     options_.adjustment.min_intersection_deg));
   }
 
-  // Tracks left out in turn decide whether the result is better than the start.
+  // Holds out tracks, adjusts the others, and compares result and start on the tracks that were held out.
   void compare_held_out() {
     const std::int64_t every =
         options_.held_out_share > 0 ? std::llround(std::max(2.0, 1 / options_.held_out_share)) : 0;
@@ -126,7 +126,7 @@ class RigCalibrator {
     Block training = block_, left_out = block_;
     left_out.control_points.clear();
     training.control_points.clear();
-    // Targets are held out as well, where there are many.
+    // Control points are held out as well where there are many.
     const bool many = std::ssize(block_.control_points) >= 4 * every;
     for (std::size_t p = 0; p < block_.control_points.size(); ++p) {
       const bool out = many && static_cast<std::int64_t>(p) % every == every / 2;
@@ -145,7 +145,7 @@ class RigCalibrator {
     warm_start_.oriented = start_.oriented;
   }
 
-  // Of all measurements, to the optimum.
+  // Adjusts all observations to the optimum.
   WholeBlock adjust() {
     WholeBlock whole = adjust_whole(block_, result_.held_out > 0 ? warm_start_ : start_, *tracks_, options_.adjustment);
     MergeInMemory runner(single_tile(block_).tree, {whole.problem}, {whole.state});
@@ -272,7 +272,7 @@ class RigCalibrator {
       warn(mount.name + ": no measurement takes part; its mount stays at the start");
     else if (!empty.empty())
       warn(mount.name + ": hardly any measurements in the sensor's quadrant " + empty +
-           "; drive so that the camera sees points all over its picture");
+           "; drive so that the camera sees points all over its image");
     if (mount.held || mount.field.observations == 0) return;
     if (!mount.position_determined || !mount.rotation_determined) {
       warn(
@@ -313,7 +313,7 @@ class RigCalibrator {
     }
   }
 
-  // Frames and points of the other site adjusted with the rig held at the values of one and the other.
+  // Adjusts frames and points of the other site twice: with the rig held at the start, and held at the result.
   void verify(const VerificationSite& site) {
     RigCalibration earlier = result_;
     for (MountCalibration& mount : earlier.mounts) mount.pose = mount.start;

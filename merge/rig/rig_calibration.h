@@ -1,4 +1,5 @@
-// Calibrates the rigs of a block (Cannelle 2013): adjustment, posterior sigmas, comparison with the start.
+// Calibrates the rigs of a block (Cannelle 2013): it adjusts cameras and mounts, gives their posterior sigmas, and
+// compares the result with the start.
 #pragma once
 
 #include "adjust/calibration/rig_observations.h"
@@ -16,10 +17,10 @@ struct CalibratedRig {
   BlockState state;
 };
 
-// `start`: frames with their approximate poses, cameras and mounts as the block gives them. The result is compared with
-// the start on tracks that were left out at first, or on the other site. It is refused (RigCalibration::refused) when
-// it fits no better. Throws InputError for blocks without anything to calibrate or measure, ComputeError when the
-// adjustment fails. Deterministic.
+// `start` has the frames with their approximate poses, and cameras and mounts as the block gives them. Result and start
+// are compared on tracks that were held out, or on the other site. A result that fits no better than the start is
+// refused (RigCalibration::refused). Throws InputError when the block has nothing to calibrate or no observations, and
+// ComputeError when the adjustment fails. Deterministic.
 CalibratedRig calibrate_rig(const Block& block, const BlockState& start, const TrackSet& tracks,
                             const RigCalibrationOptions& options,
                             const std::optional<VerificationSite>& verification = {});

@@ -21,7 +21,7 @@ std::int32_t mount_row(const TileProblem& problem, const UnknownId& id) {
                                    problem.mounts.begin());
 }
 
-// Condensed on the free mounts, priors included.
+// The normal equations condensed on the free mounts, with the priors.
 UpdateMatrix condense_on_mounts(const TileProblem& problem, const TileState& state) {
   PlanNode node;
   node.leaf = 0;
@@ -43,7 +43,7 @@ Eigen::MatrixXd full(const UpdateMatrix& update) {
   return matrix;
 }
 
-// Information of the mounts' priors, in the order of the update matrix.
+// The information of the priors of the mounts, in the order of the update matrix.
 Eigen::MatrixXd prior_information(const TileProblem& problem, const TileState& state, const UnknownList& mounts) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(6 * std::ssize(mounts), 6 * std::ssize(mounts));
   for (std::size_t u = 0; u < mounts.size(); ++u) {
@@ -58,7 +58,7 @@ Eigen::MatrixXd prior_information(const TileProblem& problem, const TileState& s
   return information;
 }
 
-// Increments in units of what counts as not known.
+// The increments of the mounts at which a direction counts as undetermined, one for each scalar unknown.
 Eigen::VectorXd units(std::size_t mounts) {
   constexpr double kOpenRotation = 5 * std::numbers::pi / 180, kOpenPosition = 0.1;  // rad, m
   Eigen::VectorXd unit(6 * static_cast<Eigen::Index>(mounts));
@@ -66,7 +66,7 @@ Eigen::VectorXd units(std::size_t mounts) {
   return unit;
 }
 
-// Unit directions, of increments in these units, in which the rigs grow about their references.
+// The unit directions in which the rigs grow about their references; increments are in the units above.
 Eigen::MatrixXd scale_directions(const TileProblem& problem, const TileState& state, const UnknownList& mounts,
                                  const Eigen::VectorXd& unit) {
   Eigen::MatrixXd directions(unit.size(), 0);

@@ -1,10 +1,10 @@
-// The information of the observations of a block on the mounts of its rigs: the normal equations condensed on the free
-// mounts, with frames, cameras and points eliminated.
+// Computes how well the observations of a block determine the mounts of its rigs. From the normal equations it
+// eliminates frames, cameras and points; the free mounts remain.
 //
-// S is the condensed matrix without the priors of the mounts. Directions with a standard deviation above 0.1 m or 5
-// degrees in S are not determined by the observations. The movement of all free mounts of a rig away from its reference
-// is the scale of the rig, which tie points alone never determine. With P the information of the priors, the covariance
-// is (S + P)^-1. For mounts whose priors only keep the system regular it is the covariance at the present scale.
+// S is this condensed matrix without the priors of the mounts. The observations do not determine a direction whose
+// standard deviation in S is above 0.1 m or 5 degrees. The scale of a rig is the movement of all its free mounts away
+// from its reference; tie points alone never determine it. With P the information of the priors, the covariance is (S +
+// P)^-1. Where the priors only keep the system regular, it is the covariance at the present scale of the rig.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,8 +24,8 @@ struct RigPosterior {
   bool scale_determined = true;        // of every rig
 };
 
-// `problem` holds the whole block at its solution; every free mount has a prior. `without_scale`: covariances at the
-// present scale of the rig where the observations do not determine it.
+// `problem` holds the whole block at its solution, and every free mount has a prior. With `without_scale` the
+// covariances are those at the present scale of a rig whose scale the observations do not determine.
 RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool without_scale);
 
 }  // namespace megablock

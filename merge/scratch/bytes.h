@@ -1,6 +1,6 @@
-// Writes plain values and vectors as a flat string of bytes, and reads them back: messages between ranks and files in
-// the scratch directory. The byte order is that of the host, because the ranks of a job and its scratch are on machines
-// of one kind.
+// Writes plain values and vectors as a flat string of bytes, and reads them back. Messages between ranks and files in
+// the scratch directory have this form. The byte order is that of the host, because the ranks of a job and its scratch
+// are on machines of one kind.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace megablock {
 
 using Bytes = std::string;
 
-// Writes into memory, or straight into a file. The state of the file then says whether everything was written.
+// Writes into memory, or straight into a file. The state of the file says whether everything was written.
 class ByteWriter {
  public:
   ByteWriter() = default;
@@ -40,7 +40,7 @@ class ByteWriter {
     value<std::uint64_t>(b.size());
     append(b.data(), b.size());
   }
-  void reserve(std::size_t size) { bytes_.reserve(size); }  // only of a writer into memory
+  void reserve(std::size_t size) { bytes_.reserve(size); }  // only for a writer into memory
   Bytes take() { return std::move(bytes_); }                // the bytes written so far
 
  private:

@@ -33,15 +33,15 @@ bool read(std::istream& file, T& value) {
   return read(file, &value, 1);
 }
 
-// Calls visit(first, size) for each chunk of `count` values, until it returns false.
+// Calls visit(first, size) for each chunk of `count` values, until visit returns false.
 template <typename Visit>
 void visit_chunks(std::size_t count, Visit&& visit) {
   for (std::size_t first = 0; first < count; first += kChunk)
     if (!visit(first, std::min(kChunk, count - first))) return;
 }
 
-// Chunks of values of another type on their way: narrow(number) of each to the file, take(number, value) of each from
-// it.
+// Writes and reads values as another type, chunk by chunk. narrow(number) gives each stored value, take(number, value)
+// receives it.
 template <typename Stored, typename Narrow>
 void write_as(std::ostream& file, std::size_t count, Narrow&& narrow) {
   std::array<Stored, kChunk> chunk;
@@ -61,7 +61,8 @@ void read_as(std::istream& file, std::size_t count, Take&& take) {
   });
 }
 
-// Unsigned differences to the least value wrap around, and back.
+// The range of a column of integers. Differences from the least value are unsigned; they wrap around, and back when
+// they are added again.
 struct Integers {
   std::uint64_t least = 0;
   std::uint8_t width = 0;  // bytes
@@ -80,7 +81,8 @@ struct Integers {
   Integers() = default;
 };
 
-// Calls visit(zero of the unsigned type of this width); false: there is none, nor no width at all.
+// Calls visit with a zero of the unsigned type of this width (0: without a call). Returns false when there is no type
+// of this width.
 template <typename Visit>
 bool with_width(std::uint8_t width, Visit&& visit) {
   if (width == 1) visit(std::uint8_t{0});
@@ -115,7 +117,7 @@ void read_integers(std::istream& file, std::size_t count, Take&& take) {
   if (!known) file.setstate(std::ios::failbit);
 }
 
-// Wraps around where it is too large, as the sum does that undoes it.
+// A difference that is too large wraps around, and so does the sum that undoes it.
 std::int64_t difference(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
 }

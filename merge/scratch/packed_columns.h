@@ -1,6 +1,6 @@
-// Packs the columns of a tile for its file in scratch, and unpacks them without the loss of a bit. An iteration reads a
-// tile twice, and for a large block these reads are most of the traffic through memory, so that narrow columns save
-// time. The form of a column depends on its type:
+// Packs the columns of a tile for its file in scratch, and unpacks them without losing a bit. An iteration reads a tile
+// twice, and for a large block these reads are most of the memory traffic, so that narrow columns save time. The form
+// of a column depends on its type:
 //
 //   integers   the difference from the smallest one, in 0, 1, 2, 4 or 8 bytes each
 //   steps      the first integer, then the differences of neighbours as integers (for ascending ranges and indices)

@@ -1,7 +1,7 @@
 // An ascending list of rows of a table, stored as the distances between neighbours, one byte each. A distance of 255
-// and more takes further bytes; it is rare where the rows of a table are shared out among some dozen lists. The plans
-// of all tiles stay in memory while their observations are in scratch. For a million images their lists of points would
-// take 80 MiB as 32-bit numbers.
+// and more takes further bytes; this is rare where some dozen lists share the rows of a table. The lists save memory:
+// the plans of all tiles stay in memory while their observations are in scratch, and for a million images their lists
+// of points would take 80 MiB as 32-bit numbers.
 #pragma once
 
 #include <cassert>

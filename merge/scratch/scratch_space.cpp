@@ -12,7 +12,7 @@ namespace megablock {
 
 namespace {
 
-// The buffer of a file that may grow to `granted` bytes. Beyond, it asks before each write.
+// The buffer of a file that may grow to `granted` bytes. For more it asks before each write.
 class BoundedBuffer : public std::filebuf {
  public:
   BoundedBuffer(std::int64_t granted, std::function<bool(std::int64_t)> ask)
@@ -73,7 +73,7 @@ bool ScratchSpace::reserve(const std::string& name, std::int64_t bytes) {
 bool ScratchSpace::write(const std::string& name, const Write& write) {
   if (directory_.empty() || !reserve(name, 0)) return false;
   BoundedBuffer buffer(bytes_of(name), [&](std::int64_t bytes) { return reserve(name, bytes); });
-  // An existing file is overwritten, not truncated, and cut to its new length at the end.
+  // An existing file is overwritten, not truncated. At the end it is cut to its new length.
   if (!buffer.open(path(name), std::ios::binary | std::ios::in | std::ios::out))
     buffer.open(path(name), std::ios::binary | std::ios::out);
   std::ostream file(&buffer);
@@ -97,7 +97,7 @@ void ScratchSpace::read(const std::string& name, const Read& read) {
   try {
     if (file) read(file, static_cast<std::size_t>(size));
     if (file && file.tellg() == size) return;
-  } catch (const StoreError&) {  // it does not name the file; the error below does
+  } catch (const StoreError&) {  // its message does not name the file; the error below does
   }
   remove(name);
   throw StoreError("cannot read " + path(name) + " of the scratch directory; run again to resume");

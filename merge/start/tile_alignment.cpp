@@ -17,9 +17,9 @@ namespace megablock {
 namespace {
 
 constexpr int kRounds = 3;
-constexpr double kLeast = 1e-9;  // m and rad: differences of tiles that agree to rounding
+constexpr double kLeast = 1e-9;  // m and rad: smaller differences count as agreement to rounding
 
-// rotation phi, shift, relative scale, about the tile's centroid.
+// The similarity of a tile about its centroid: rotation phi, shift, relative scale.
 using Parameters = std::array<double, 7>;
 
 template <typename Scalar>
@@ -31,7 +31,7 @@ Eigen::Quaternion<Scalar> turn_of(const Scalar* p) {
 }
 
 struct Placed {
-  Eigen::Vector3d arm, centroid;  // of the frame from the tile's centroid
+  Eigen::Vector3d arm, centroid;  // arm: from the tile's centroid to the frame
   Eigen::Quaterniond rotation;
 
   template <typename Scalar>
@@ -89,7 +89,7 @@ struct StayResidual {
   }
 };
 
-struct SharedFrame {  // of all tiles
+struct SharedFrame {  // by all tiles that hold it
   FrameIndex frame;
   std::int64_t observations;
   std::size_t tile, row;
@@ -198,7 +198,7 @@ class Aligner {
   }
 
   const std::vector<AlignmentTile>& tiles_;
-  std::vector<Parameters> parameters_;  // one allocation: Ceres orders blocks by their addresses
+  std::vector<Parameters> parameters_;  // one allocation, because Ceres orders parameter blocks by their addresses
   std::vector<Eigen::Vector3d> centroids_;
   std::vector<double> extents_;
   std::vector<Common> common_;

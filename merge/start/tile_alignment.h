@@ -1,10 +1,10 @@
-// Brings tiles that were adjusted on their own into one ground frame before the merge. Each tile gets a similarity; all
-// are adjusted jointly on the frames that tiles have in common.
+// Brings tiles that were adjusted on their own into one ground frame before the merge. Each tile gets a similarity, and
+// all similarities are adjusted jointly on the frames that tiles have in common.
 //
 // Each tile has the datum of its own priors or start values. Where these are weak (positions good to metres),
 // neighbours differ by many times the precision of their observations, and a block assembled from them is far from any
-// optimum. With S_t near the identity, for every frame and every tile t that holds it besides the one with most
-// observations, h:
+// optimum. The adjustment minimises, with S_t near the identity, over every frame and every tile t that holds it; h is
+// the tile with most observations of the frame, and t is another one:
 //
 //     sum rho(|S_t C_t - S_h C_h|^2 / p^2) + rho(angle(S_t R_t, S_h R_h)^2 / r^2)  +  sum over tiles |S_t - 1|^2 / a^2
 //

@@ -38,10 +38,10 @@ std::vector<FrameIndex> shared_frames(const std::vector<AlignmentTile>& tiles) {
   return shared;
 }
 
-// The sigma of a frame falls with the root of its observations. The size of all sigmas is open, because each link
-// scales them by its misfits.
+// The sigma of a frame falls with the square root of its observations. Only the ratios of the sigmas matter, because
+// each link scales them by its misfits.
 Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<FrameIndex>& shared) {
-  constexpr double kOrder = 1e-6;  // of the extent, and rad: smaller than any misfit, as links only enlarge sigmas
+  constexpr double kOrder = 1e-6;  // share of the extent, and rad: below any misfit, because links only enlarge sigmas
   Model model;
   model.number = static_cast<std::int64_t>(number);
   const double extent = extent_of(tile);
@@ -54,7 +54,7 @@ Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<
   return model;
 }
 
-// Moves the assembled tiles of a part back to their mean place before the assembly.
+// Finds the similarity that moves the assembled tiles of a part back to their mean place before the assembly.
 class WayBack {
  public:
   void add(const AlignmentTile& tile, const Similarity& assembled) {
@@ -91,7 +91,7 @@ class WayBack {
     return sum;
   }
 
-  Eigen::Matrix4d turns_ = Eigen::Matrix4d::Zero();  // sum of q q' of unit quaternions
+  Eigen::Matrix4d turns_ = Eigen::Matrix4d::Zero();  // sum of q q' over the unit quaternions
   Places from_, to_;
 };
 
@@ -107,7 +107,7 @@ std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles) 
   AssembledModels assembled;
   try {
     assembled = assemble_models(models, options);
-  } catch (const ComputeError&) {  // all stay; they are aligned in any case
+  } catch (const ComputeError&) {  // no tile moves; they are aligned afterwards in any case
     return std::vector<Similarity>(tiles.size());
   }
   std::map<std::int64_t, WayBack> parts;  // by the number of the part

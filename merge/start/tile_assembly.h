@@ -2,13 +2,14 @@
 // 2009).
 //
 // Each tile was adjusted with the datum of its start values alone. Neighbours therefore differ in place, attitude and
-// scale by the errors of these. The frames that tiles share give the similarities between them, which join them
-// (adjust/models/model_assembly.h). Each connected part is then moved back to the mean place of its tiles: its attitude
-// by the rotations that the assembly made,
+// scale by the errors of these values. The frames that tiles share give the similarities between the tiles
+// (adjust/models/model_assembly.h). Each connected part is then moved back to the mean place of its tiles. Its attitude
+// follows from the rotations R_t of the assembly,
 //
 //     R = mean R_t',     weighted by the frames of tile t,
 //
-// because projection centres on a line would leave it undetermined, its size and place by the projection centres.
+// because projection centres on a line would leave it undetermined. Its size and place follow from the projection
+// centres.
 #pragma once
 
 #include <vector>
@@ -17,8 +18,8 @@
 
 namespace megablock {
 
-// Returns one similarity for each tile, applied as S(pose). It is the identity for a tile that nothing joins or that
-// does not fit its neighbours, and for all tiles when the assembly fails.
+// Returns one similarity for each tile, applied as S(pose). It is the identity for a tile that shares no frames or does
+// not fit its neighbours, and for all tiles when the assembly fails.
 std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles);
 
 }  // namespace megablock

@@ -18,7 +18,8 @@ MotionSums::Row row_of(const Eigen::Vector3d& c, const PoseIncrement& x) {
   return row;
 }
 
-// The nearest similarity; the moments are brought to the centroid, where the shift separates.
+// Finds the nearest similarity. The moments are first moved to the centroid, where the shift is independent of the
+// rest.
 BlockMotion motion_of(const MotionSums::Row& sums) {
   BlockMotion motion;
   const double frames = sums[0];
@@ -39,7 +40,7 @@ BlockMotion motion_of(const MotionSums::Row& sums) {
 }
 
 // Removes the components of the motion that would move held positions, and turns the rest about the pivot. The
-// iteration itself makes the removed part of the motion.
+// iterations themselves make the removed part of the motion.
 BlockMotion allowed(const BlockComponent& component, const BlockMotion& motion) {
   if (component.movable == Matrix77::Identity()) return motion;
   Eigen::Matrix<double, 7, 1> parameters;

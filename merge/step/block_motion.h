@@ -1,11 +1,11 @@
 // Applies a step of the adjustment. The part of the step that moves a whole component of the block is applied as a
 // similarity, the rest along straight lines.
 //
-// Priors of metres fix the datum of a small block to fractions of a degree. A step that turns it by phi moves frames
-// and points along tangents, C + phi x (C - c): across the axis everything grows by 1 + phi^2 / 2, along it nothing.
-// The images show that as soon as phi^2 / 2 of their width exceeds the noise (phi = 0.3 degrees: 0.02 px). Damping then
-// holds every step down to this size, and the adjustment needs many iterations. The similarity (phi, t, s) nearest to a
-// component's step,
+// Where priors of metres alone fix the datum of a small block, they fix its attitude to fractions of a degree. A step
+// that turns the block by phi moves frames and points along tangents, C + phi x (C - c): across the axis everything
+// grows by 1 + phi^2 / 2, along it nothing grows. The images show this when phi^2 / 2 of their width exceeds the noise
+// (phi = 0.3 degrees: 0.02 px). Damping then holds every step down to this size, and the adjustment needs many
+// iterations. The similarity (phi, t, s) nearest to the step of a component,
 //
 //     min  sum over frames  |w + phi|^2 + |d - t - phi x (C - c) - s (C - c)|^2 / L^2,
 //
@@ -13,7 +13,7 @@
 // c), where X' has been moved by the rest of the step. To first order this is the step itself, so that the normal
 // equations are unchanged.
 //
-// Sums are formed per tile over the frames that it owns, and added in tile order.
+// The sums over the frames that a tile owns are formed for each tile, and added in tile order.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,9 +23,9 @@
 
 namespace megablock {
 
-// Sums of a tile over the step of its own frames, one row per component of the block that it touches.
+// The sums of a tile over the steps of its own frames, one row for each component of the block that it touches.
 struct MotionSums {
-  // Frames, sums of C, C C' (row by row), d, w, C x d, C . d, about the ground origin.
+  // The number of frames, and the sums of C, C C' (row by row), d, w, C x d and C . d, about the ground origin.
   static constexpr int kSize = 1 + 3 + 9 + 3 + 3 + 3 + 1;
   using Row = Eigen::Matrix<double, kSize, 1>;
   std::vector<std::int64_t> components;  // ascending

@@ -62,7 +62,7 @@ void FactorStore::make_room() {
 bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
   if (spilled_.contains(node)) return true;
   const std::string name = factor_file(node);
-  // The room is reserved before the factors are written, so that factors without room cost no copy.
+  // The room is reserved before the factors are written, so that no time is lost on factors that find no room.
   if (scratch_full_ || !options_.scratch->reserve(name, factors.byte_count())) return false;
   const bool whole = options_.scratch->write(name, [&](std::ostream& file) {
     ByteWriter writer(file);

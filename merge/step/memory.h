@@ -1,9 +1,9 @@
 // The memory budgets of a rank, and its store of factors between the sweep up and the sweep down. tile_store.h holds
 // the tiles.
 //
-// Factors stay in memory within a budget of bytes. Beyond it they go to the scratch directory of the rank while that
-// has room (scratch_space.h); beyond that they are dropped and computed again in the sweep down. The choice never
-// changes tiles or bits.
+// Factors stay in memory within a budget of bytes. Beyond it they go to the scratch directory of the rank, as long as
+// that has room (scratch_space.h). Without room there they are dropped and computed again in the sweep down. The choice
+// never changes tiles or bits.
 //
 // The sweep down visits the nodes in the reverse order of the sweep up. The oldest factor is needed last, so it leaves
 // memory first.
@@ -23,12 +23,12 @@ namespace megablock {
 
 struct MemoryOptions {
   std::int64_t factor_bytes = std::int64_t{4} << 30;  // budget of factors in memory; the newest stays in any case
-  // Directory of this process alone. Without one all tiles stay in memory, and factors beyond the budget are
-  // recomputed.
+  // The directory of this process alone. Without one all tiles stay in memory, and factors beyond the budget are
+  // computed again.
   std::shared_ptr<ScratchSpace> scratch = std::make_shared<ScratchSpace>();
   std::int64_t tile_bytes = std::int64_t{4} << 30;  // budget of the observations and points of tiles (tile_store.h)
 };
-// Name of the file that holds the factors of a node.
+// The name of the file that holds the factors of a node.
 std::string factor_file(std::int64_t node);
 
 struct MemoryStatistics {
@@ -37,8 +37,8 @@ struct MemoryStatistics {
   std::int64_t peak_bytes = 0;        // of factors in memory
 };
 
-// Factors of one node of the merge tree: those of the cells of a tile, or of the front of an inner node. While seams
-// are checked, also the condensed normal equations of a tile.
+// The factors of one node of the merge tree: those of the cells of a tile, or of the front of an inner node. While
+// seams are checked, the condensed normal equations of a tile are kept as well.
 struct NodeFactors {
   TileFactor tile;
   FrontFactor front;
@@ -55,20 +55,22 @@ class FactorStore {
   FactorStore(const FactorStore&) = delete;
   FactorStore& operator=(const FactorStore&) = delete;
 
-  // The fate of factors that fit neither in memory nor in scratch.
+  // Factors that fit neither in memory nor in scratch are dropped (kRecompute) or kept in memory all the same (kNever).
   enum class Loss { kRecompute, kNever };
   void put(std::int64_t node, NodeFactors factors, Loss loss = Loss::kRecompute);
-  // nullptr: the factors were dropped and must be computed again. The pointer is valid until the next put or get.
+  // Returns nullptr when the factors were dropped and must be computed again. The pointer is valid until the next put
+  // or get.
   const NodeFactors* get(std::int64_t node);
   void discard(std::int64_t node);  // the factors are not needed any more
-  // Reduces the budget by the memory that others use from now on: fronts at work and updates that wait for a parent or
-  // a child, bytes.
+  // Reduces the budget by so many bytes from now on. They are the memory of the fronts at work, and of the updates and
+  // values that wait for a parent or a child.
   void leave_room(std::int64_t bytes);
   void clear();
 
-  // For records of a sweep (pass_record.h): the bytes in memory that have no copy in scratch; copies them there, false
-  // when there is no room; the nodes whose factors are in scratch; after clear(), takes over the factors of these nodes
-  // that an earlier run left there.
+  // For records of a sweep (pass_record.h). bytes_without_copy(): bytes in memory that have no copy in scratch.
+  // copy_to_scratch() copies them there, and returns false when there is no room. nodes_in_scratch(): nodes whose
+  // factors are in scratch. adopt(), after clear(), takes over the factors of these nodes that an earlier run left
+  // there.
   std::int64_t bytes_without_copy() const;
   bool copy_to_scratch();
   std::vector<std::int64_t> nodes_in_scratch() const;
@@ -84,13 +86,13 @@ class FactorStore {
   MemoryOptions options_;
   MemoryStatistics statistics_;
   std::int64_t bytes_ = 0, others_ = 0, clock_ = 0;
-  bool scratch_full_ = false;                          // its disk
-  std::map<std::int64_t, NodeFactors> kept_;           // by node
-  std::map<std::int64_t, std::int64_t> node_by_time_;  // of kept ones
+  bool scratch_full_ = false;                          // no space on its disk
+  std::map<std::int64_t, NodeFactors> kept_;           // by node, the factors in memory
+  std::map<std::int64_t, std::int64_t> node_by_time_;  // the nodes of kept_
   std::map<std::int64_t, std::int64_t> time_of_node_;
   std::set<std::int64_t> never_lost_;
   std::set<std::int64_t> spilled_;  // nodes whose factors are in scratch
-  std::set<std::int64_t> written_;  // and the spare files of earlier sweeps, which are written over
+  std::set<std::int64_t> written_;  // these and the nodes of spare files, which later factors overwrite
   NodeFactors loaded_;              // the factors that were read last
 };
 

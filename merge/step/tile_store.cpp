@@ -30,7 +30,7 @@ std::int64_t byte_count(const std::vector<T>& values) {
   return static_cast<std::int64_t>(values.size() * sizeof(T));
 }
 
-// The memory of a tile in an iteration, which holds the points twice: present and trial.
+// The memory of a tile in an iteration, which holds the points twice: the present ones and those of the trial.
 std::int64_t byte_count(const RankTile& tile) {
   std::int64_t bytes = 2 * byte_count(tile.state.points);
   visit_tables([&](const auto& table) { bytes += byte_count(table); }, tile.problem);
@@ -99,7 +99,7 @@ void TileStore::forget(Slot& slot) {
 RankTile& TileStore::load(std::size_t row) {
   Slot& slot = slots_[row];
   if (!slot.in_scratch || loaded_ == static_cast<std::int64_t>(row)) return slot.tile;
-  if (loaded_ >= 0) {  // its memory goes on to the next one
+  if (loaded_ >= 0) {  // frees its memory for the next one
     Slot& before = slots_[static_cast<std::size_t>(std::exchange(loaded_, -1))];
     visit_tables([](auto& from, auto& to) { to.swap(from); }, before.tile.problem, slot.tile.problem);
     if (!before.points_here && !slot.points_here) slot.tile.state.points.swap(before.tile.state.points);

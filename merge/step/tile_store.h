@@ -1,15 +1,15 @@
-// The tiles of one rank, out of core. Tiles stay in memory as a whole within a budget of bytes. Of the other tiles the
-// observations and points are in the scratch directory of the rank; they are read when the tile's turn comes, one tile
-// at a time.
+// Stores the tiles of one rank, partly out of core. Whole tiles stay in memory within a budget of bytes. The
+// observations and points of the other tiles are in the scratch directory of the rank. They are read when the tile is
+// visited, one tile at a time.
 //
-// A tile in scratch is packed (packed_columns.h): about 15 bytes an observation of a street instead of 39. The store
-// asks once whether the tile has room there (scratch_space.h), with its unpacked size and the points of a trial beside
-// the present ones. Later screening may lengthen the runs of its flags; when these do not fit, the tile moves to
+// A tile in scratch is packed (packed_columns.h): about 15 bytes for an observation of a street, instead of 39. The
+// store asks once whether the tile has room there (scratch_space.h), with its unpacked size and the points of a trial
+// beside the present ones. Later screening may lengthen the runs of its flags; when these do not fit, the tile moves to
 // memory.
 //
-// Which tiles stay in memory is decided once, in the order in which they are added. Sweeps go over all tiles again and
-// again, up and down, and with a fixed choice each sweep reads every other tile exactly once. When the scratch disk is
-// full, a tile stays in memory. The choice never changes bits.
+// The choice of the tiles that stay in memory is made once, in the order in which they are added. Sweeps visit all
+// tiles again and again, up and down; with a fixed choice each sweep reads every other tile exactly once. When the
+// scratch disk is full, a tile stays in memory. The choice never changes bits.
 //
 // Frames, cameras, mounts and their values (the "outline" of a tile) are small and always in memory, as are lines,
 // verticals and the priors of points, cameras and mounts. Images, image observations and the other observations of a
@@ -58,8 +58,7 @@ class TileStore {
     save(row);
   }
 
-  // Stores the state after a step beside the present one, until accept() or reject() decides on the states of all
-  // tiles.
+  // Stores the state after a step beside the present one. accept() or reject() then decides on the states of all tiles.
   void put_trial(std::size_t row, TileState trial);
   void accept();
   void reject();
@@ -72,7 +71,8 @@ class TileStore {
     RankTile tile;
     TileState trial;
     bool in_scratch = false;
-    bool points_here = false, trial_here = false;  // the points of a tile in scratch that did not fit there
+    // the points of a tile in scratch are in memory, because they did not fit there
+    bool points_here = false, trial_here = false;
     int points_file = 0;  // number of the file with the present points; the other of the two files holds the trial's
   };
 

@@ -41,7 +41,7 @@ class TileTrialMaker::Work {
   const bool robust_;
   const TileMotion motion_;
   TileTrial trial_;
-  const SeenImages seen_;  // from the new state
+  const SeenImages seen_;  // views of the new state
   const UnknownMotions unknowns_;
   const PointTables tables_;
   PerThread<PointEquations> equations_;

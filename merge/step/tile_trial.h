@@ -1,9 +1,9 @@
-// The trial state of a tile after a step, and its cost.
+// Makes the trial state of a tile after a step, and computes its cost.
 //
-// The result is that of solve_tile_down (condense.h), apply_step (block_motion.h) and refine_points
-// (point_refinement.h) one after the other, bit for bit. Done together they read the observations of a point once
-// instead of twice and evaluate the new state while the observations are still in the lanes; they store no steps of
-// points, and the threads synchronise once.
+// The result has the same bits as solve_tile_down (condense.h), apply_step (block_motion.h) and refine_points
+// (point_refinement.h), one after the other. Together they read the observations of a point once instead of twice,
+// evaluate the new state while the observations are still in the lanes, and store no steps of points. The threads
+// synchronise only once.
 #pragma once
 
 #include <memory>
@@ -16,9 +16,9 @@ namespace megablock {
 struct TileTrial {
   TileState state;
   double cost = 0;
-  double damping_norm = 0;  // as TileStep
+  double damping_norm = 0;  // as in TileStep
 };
-// `step`: of the unknowns alone, from solve_tile_unknowns.
+// `step` holds the step of the unknowns alone, from solve_tile_unknowns.
 TileTrial try_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                    const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                    const TileStep& step, double settled = kPointSettled);

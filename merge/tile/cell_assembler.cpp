@@ -8,7 +8,8 @@ namespace megablock {
 
 namespace {
 
-// Lower triangle of C += J'J, and J'r behind it, of two residuals; C has the width of J.
+// Adds J'J to the lower triangle of C, and J'r to the column behind it, for two residuals. C has as many rows as J has
+// columns.
 void add_squares(double* c, std::int64_t width, const double* jacobian, const double* residual) {
   const double *first = jacobian, *second = jacobian + width;
   for (std::int64_t j = 0; j <= width; ++j) {

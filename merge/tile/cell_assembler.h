@@ -1,10 +1,12 @@
-// Fills the front of a cell with its points, which are eliminated on the way, and its other observations.
+// Fills the front of a cell with the contributions of its points, which are eliminated on the way, and of its other
+// observations.
 //
-// Per point (point_equations.h) K_ij -= Y_i Y_j' of shared unknowns goes to the front at once, that of two frames to a
-// block apart (pair_blocks.h). Added to the front once per cell are these blocks and what only concerns one frame or
-// the shared unknowns of one camera in one mount, J'J and -J'r: of a frame G'(V_f - T T')G and G'(b_f - T z) of its
-// sights, T = V_f C^-T. By its blocks, with R = V_f - T T', the first is [u]x R [u]x', -[u]x R and R. Further the
-// diagonal of J'J (point_kernels::FrameValue).
+// For each point (point_equations.h), K_ij -= Y_i Y_j' goes to the front at once where i or j is a shared unknown.
+// Between two frames it goes to a block outside the front (pair_blocks.h). Once per cell these blocks are added to the
+// front, and so are the sums that concern one frame, or the shared unknowns of one camera in one mount. The latter are
+// J'J and -J'r. The sums of a frame run over its points, with T = V_f C^-T: G'(V_f - T T')G, G'(b_f - T z), and the
+// diagonal of J'J (point_kernels::FrameValue). With R = V_f - T T', the first of them has the blocks [u]x R [u]x',
+// -[u]x R and R.
 #pragma once
 
 #include <vector>
@@ -15,17 +17,18 @@
 
 namespace megablock {
 
-// Adds the block of two unknowns at (row, column) of the front, transposed when it would lie above the diagonal; of a
-// diagonal block (row = column) the lower triangle alone counts.
+// Adds the block of two unknowns at (row, column) of the front. A block above the diagonal is added transposed; of a
+// diagonal block (row = column) only the lower triangle is read.
 void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen::Ref<const Eigen::MatrixXd>& block);
 
 class CellAssembler {
  public:
-  // `pair_blocks`: room for what points add between frames.
+  // `pair_blocks` gives the memory for the blocks between two frames.
   CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pair_blocks);
   void add_points(PointEquations& equations);  // after linearise()
   void add_term(const TermResidual& term);
-  // Adds what was summed apart; the front is complete then. `diagonal`: of J'J over plan.unknowns, grows by the cell's.
+  // Adds the blocks and sums outside the front; the front is then complete. `diagonal` is that of J'J over
+  // plan.unknowns, and the diagonal of the cell is added to it.
   void finish(std::vector<double>& diagonal);
 
  private:
@@ -42,22 +45,22 @@ class CellAssembler {
     int rows = 0, stride = 0;
     const double* values = nullptr;
   };
-  // A B' from the front
+  // Subtracts A B' from the front.
   void subtract_outer(const point_kernels::Kernels& kernels, const Factor& a, const Factor& b);
   void add_pairs();
-  // An unknown's own J'J (lower triangle), with its diagonal.
+  // Adds an unknown's own J'J (lower triangle) and its diagonal.
   void add_normal(std::int64_t unknown, const Eigen::Ref<const Eigen::MatrixXd>& normal);
 
   const TilePlan& plan_;
   Front& front_;
-  std::vector<std::int64_t> rows_;             // of TilePlan::unknowns in the front (first row of each, -1: not in it)
+  std::vector<std::int64_t> rows_;             // first row of each of TilePlan::unknowns in the front, -1: not in it
   std::vector<FrameSum> frames_;               // [plan.unknowns]
   std::vector<SharedSum> shared_;              // by ImageUnknowns::calibration
-  std::vector<PointEquations::Block> blocks_;  // of the point at hand
-  std::vector<std::int64_t> frame_rows_;       // of the cell's frames in the front, ascending
-  std::vector<std::int64_t> numbers_;          // [plan.unknowns] of frames among them
+  std::vector<PointEquations::Block> blocks_;  // of the present point
+  std::vector<std::int64_t> frame_rows_;       // rows of the cell's frames in the front, ascending
+  std::vector<std::int64_t> numbers_;          // [plan.unknowns] number of each frame among frame_rows_
   PairBlocks& pair_blocks_;                    // by these numbers
-  std::vector<std::int64_t> sight_frames_;     // [sights] of the points at hand, by these numbers
+  std::vector<std::int64_t> sight_frames_;     // [groups] numbers of the frames of the present points
 };
 
 }  // namespace megablock

@@ -27,7 +27,8 @@ void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState
   assembler.finish(diagonal);
 }
 
-// The datum enters where its unknown completes, or at the tile's top, where the diagonal is that of the whole tile.
+// Adds the datum of a tile to a front. It is added where its unknown is eliminated or, for separator unknowns, at the
+// top of the tile, where the diagonal is that of the whole tile.
 void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front) {
   for (const Unknown& u : unknowns) {
     const std::int64_t row = front.row_of(u.id);
@@ -38,7 +39,7 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
     }
     for (const TileDatum::Hold& hold : datum.holds) {
       if (hold.frame != u.id) continue;
-      // Any weight holds what nothing observes.
+      // Where nothing observes the unknown, any weight holds it.
       const Eigen::Matrix<double, 6, 1> root =
           Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).unaryExpr([](double d) {
             return d > 0 ? std::sqrt(d) : 1;
@@ -97,7 +98,7 @@ class TileCondenser::Work {
   TileCondensation take();
 
  private:
-  // What a thread works with.
+  // The working memory of a thread.
   struct OfThread {
     PointEquations equations;
     PairBlocks pair_blocks;
@@ -149,7 +150,7 @@ TileCondensation TileCondenser::Work::take() {
   for (const std::vector<double>& diagonal : diagonals_)
     for (std::size_t k = 0; k < diagonal.size(); ++k) result.factor.diagonal[k] += diagonal[k];
   result.update = std::move(updates_.back());
-  result.update.matrix.shrink_to_fit();  // waits for its sibling
+  result.update.matrix.shrink_to_fit();  // frees memory, because the update waits for that of the sibling
   return result;
 }
 
@@ -180,7 +181,7 @@ TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, con
   result.unknowns.columns = columns;
   result.unknowns.values.assign(at(rows_in_all * columns), 0);
 
-  // Fronts from the top; each front's step is complete when its cell is reached.
+  // Fronts are solved from the top down, so that the step of the parent is known.
   const std::vector<PlanNode>& nodes = plan.cells.nodes;
   std::vector<Step> steps(nodes.size());
   for (std::size_t i = nodes.size(); i-- > 0;) {

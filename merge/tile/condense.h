@@ -1,15 +1,16 @@
-// A tile: its condensed normal equations on the boundary unknowns, and the way back down.
+// Condenses a tile: eliminates its points and its inner unknowns, so that the normal equations of its separator
+// unknowns remain. On the way down it gives the step and the covariances of everything in the tile.
 //
-// Inside the tile the bisection goes on to cells of about 16 frames (32 of a lone tile). A point belongs to one of them
-// (adjust/problem/owner.h) and is eliminated there: with V = sum J_p'J_p + lambda D_p = C C', W_i = J_i'J_p and Y_i =
-// W_i C^-T,
+// Inside the tile the bisection goes on to cells of about 16 frames (32 in a tile that is a block of its own). A point
+// belongs to one cell (adjust/problem/owner.h) and is eliminated there. With V = sum J_p'J_p + lambda D_p = C C', W_i =
+// J_i'J_p and Y_i = W_i C^-T,
 //
 //     K_ij -= Y_i Y_j',   b_i -= Y_i C^-1 b_p,   x_p = C^-T (C^-1 b_p - sum Y_i' x_i).
 //
-// The cells' fronts are then eliminated depth-first like the nodes of the merge tree. The boundary block is never
-// factorised: in a tile without a datum it is singular.
-// Robust weights as Ceres (sqrt(rho'), no second-order term) unless the pass asks for the losses' curvature
-// (tile_linearisation.h); D = diagonal of J'J.
+// The fronts of the cells are then eliminated depth-first, as the nodes of the merge tree are. The block of the
+// separator unknowns is never factorised, because it is singular in a tile without a datum. Robust weights are those of
+// Ceres (sqrt(rho') without the second-order term), unless the sweep asks for the curvature of the losses
+// (tile_linearisation.h). D is the diagonal of J'J.
 #pragma once
 
 #include <memory>
@@ -21,10 +22,10 @@
 
 namespace megablock {
 
-// Factors of a tile's cells, by node of TilePlan::cells. Empty: recompute.
+// The factors of the cells of a tile, by node of TilePlan::cells. When it is empty, they are computed again.
 struct TileFactor {
   std::vector<FrontFactor> nodes;
-  std::vector<double> diagonal;  // of J'J over the scalar unknowns of the plan: the tile's own residuals
+  std::vector<double> diagonal;  // diagonal of J'J over the scalar unknowns of the plan, from the tile's own residuals
   bool empty() const { return nodes.empty(); }
   std::int64_t byte_count() const;
   void write(ByteWriter& out) const;
@@ -36,7 +37,8 @@ struct TileCondensation {
   TileFactor factor;
 };
 
-// What the datum of a free block adds to a tile (gauge.h); empty when priors fix it.
+// The constraints and right-hand sides that the datum of a free block adds to a tile (gauge.h). Empty when priors fix
+// the datum.
 struct TileDatum {
   struct Hold {
     UnknownId frame;
@@ -46,64 +48,65 @@ struct TileDatum {
   Step columns{{}, 0, {}};  // further right-hand sides
 };
 
-// How a pass linearises and damps.
+// The linearisation and the damping of a sweep.
 struct Pass {
   double lambda = 0;
   bool curvature = false;  // with the second-order term of the robust losses
   Pass(double damping, bool with_curvature = false) : lambda(damping), curvature(with_curvature) {}
 };
 
-// Linearises at `state`, eliminates the tile's points and interior unknowns.
-// Throws ComputeError when a kept observation is behind its camera.
+// Linearises at `state`, and eliminates the points and inner unknowns of the tile. Throws ComputeError when a kept
+// observation is behind its camera.
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                                const Pass& pass, const TileDatum& datum = {});
 
-// The same in parts, by threads that may be at work on other tiles, too (geometry/threads/rounds.h).
+// The same in portions, for threads that may work on other tiles as well (geometry/threads/rounds.h).
 class TileCondenser {
  public:
-  // Problem, plan and state outlive it.
+  // Problem, plan and state outlive the object.
   TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                 TileDatum datum = {});
   ~TileCondenser();
   std::int64_t cells() const;
-  // A cell, and the fronts above it that it completes; every cell once.
+  // Condenses a cell and the fronts above it that this completes. Call it once for every cell.
   void condense(std::int64_t cell);
-  TileCondensation take();  // once all are done
+  TileCondensation take();  // after the last cell
 
  private:
   class Work;
   std::unique_ptr<Work> work_;
 };
 
-// Step of everything in the tile.
+// The step of everything in the tile.
 struct TileStep {
-  Step unknowns;                        // of plan.unknowns, with the columns of the boundary's step
+  Step unknowns;                        // step of plan.unknowns, with as many columns as that of the separator
   std::vector<Eigen::Vector3d> points;  // [points], zero for points that take no part
   double damping_norm = 0;              // sum of D x^2 over the tile's own residuals; the predicted decrease of the
                                         // block is 1/2 (decrement^2 + lambda * sum of these)
 };
-// From the boundary's step, the unknowns alone, which the factor gives (tile_trial.h goes on).
+// The step of the unknowns from that of the separator unknowns, by the factors of the tile (tile_trial.h goes on).
 TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, const Step& boundary);
-// And the points, which are linearised again. `factor` empty: condensed again (same bits).
+// The step of unknowns and points; the points are linearised again. Without `factor` the tile is condensed again, with
+// the same bits.
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum = {});
 
-// Posterior covariances of a tile, from factors of a pass with lambda = 0.
+// The posterior covariances of a tile, from the factors of a sweep with lambda = 0.
 struct TileCovariance {
   CovarianceMatrix boundary;                        // as given
   std::vector<Eigen::Matrix<double, 6, 6>> frames;  // [frames]; zero where untouched
-  std::vector<Eigen::MatrixXd> cameras;             // [cameras] of the model's parameters; held ones zero
+  std::vector<Eigen::MatrixXd> cameras;  // [cameras] covariance of the model's parameters; zero for held ones
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
   std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part
-  ObservationTable observations;                    // of everything the tile observes
-  // Redundancy numbers of the image observations, along the image's x and y (no unit, 0 to 1;
-  // io/evaluation/reliability.h), of the residual as its loss weights it: 1 - diag(J C J') / sigma^2. NaN for
+  ObservationTable observations;                    // statistics of all observations of the tile
+  // Redundancy numbers of the image observations along the image's x and y (no unit, 0 to 1;
+  // io/evaluation/reliability.h), for residuals as the loss weights them: 1 - diag(J C J') / sigma^2. NaN for
   // observations that take no part. [observations]
   std::vector<float> redundancy_x, redundancy_y;
-  // [points] of the further columns (3 x columns), where they were asked for.
+  // [points] The further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };
-// `columns`: of plan.unknowns, column 0 is not used; empty for blocks with a datum.
+// `columns`: step of plan.unknowns whose columns 1 and up are used; empty for blocks whose datum is fixed.
 TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
                                const TileFactor& factor, CovarianceMatrix boundary, const TileDatum& datum = {},
                                const Step& columns = {});

@@ -1,5 +1,6 @@
-// Covariances of a tile: down through the cells' fronts, then per point; with them the redundancy numbers of all
-// observations (io/block/observation_statistics.h), which are the same whatever holds a free datum.
+// Computes the covariances of a tile: from the top down through the fronts of its cells, then point by point. It also
+// computes the redundancy numbers of all observations (io/block/observation_statistics.h), which do not depend on how a
+// free datum is held.
 #include <limits>
 
 #include "merge/plan/tree_workers.h"
@@ -17,10 +18,10 @@ ObservationKind image_kind(PointRole role) {
                                      : ObservationKind::kTieImage;
 }
 
-// What the cells add that a thread works on: each writes where no other does.
+// The contributions of the cells that one thread works on. Each thread writes to places of its own.
 class CellCovariances {
  public:
-  // `offsets`: of plan.unknowns in columns.
+  // `offsets`: first row of each of plan.unknowns in `columns`.
   CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const PointTables& tables,
                   const Step& columns, const std::vector<std::int64_t>& offsets, TileCovariance& result)
       : problem_(problem),
@@ -33,7 +34,7 @@ class CellCovariances {
         frame_sums_(plan.unknowns.size()),
         row_of_unknown_(plan.unknowns.size(), -1) {}
 
-  // Points and observations of a cell, from the covariance of its unknowns.
+  // Adds the points and observations of a cell, from the covariance of its unknowns.
   void add(std::size_t cell, const CovarianceMatrix& covariance, ObservationTable& observations) {
     observations_ = &observations;
     cell_ = covariance.matrix.data();
@@ -56,14 +57,14 @@ class CellCovariances {
 
  private:
   using CovarianceBlock = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-  // Of two unknowns of the cell.
+  // The covariance of two unknowns of the cell.
   CovarianceBlock covariance_of(std::int64_t a, std::int64_t rows, std::int64_t b, std::int64_t columns) const {
     const double* first = cell_ + row_of_unknown_[at(a)] + row_of_unknown_[at(b)] * cell_rows_;
     return {first, rows, columns, Eigen::OuterStride<>(cell_rows_)};
   }
 
-  // With Y_a = W_a C^-T of the unknowns a that see the point:
-  // C_ap = -sum_b C_ab Y_b C^-1,  C_pp = C^-T (I + sum_a Y_a' sum_b C_ab Y_b) C^-1.
+  // With Y_a = W_a C^-T of the unknowns a in the residuals of the point,
+  //   C_ap = -sum_b C_ab Y_b C^-1,  C_pp = C^-T (I + sum_a Y_a' sum_b C_ab Y_b) C^-1.
   void add_point(std::size_t i) {
     const Eigen::Matrix3d inverse = equations_.inverse_factor(i);
     Eigen::Matrix3d inner = Eigen::Matrix3d::Identity();
@@ -109,7 +110,7 @@ class CellCovariances {
     }
   }
 
-  // Of an unknown that sees the point at hand in blocks_.
+  // The place in blocks_ of an unknown in the residuals of the present point.
   std::size_t place(std::int64_t unknown) const {
     std::size_t i = 0;
     while (blocks_[i].unknown != unknown) ++i;
@@ -144,7 +145,7 @@ class CellCovariances {
       (*observations_)[term.kinds[at(k)]].add(term.residual[k] * term.residual[k], 1 - variance[k]);
   }
 
-  // Their own right-hand side is zero: x_p = -C^-T sum Y_i' x_i.
+  // The further columns of a point. Their right-hand side at the point is zero: x_p = -C^-T sum Y_i' x_i.
   void add_point_columns(std::size_t i) {
     const std::int64_t n = offsets_.back();
     Eigen::Matrix<double, 3, Eigen::Dynamic> sum = Eigen::MatrixXd::Zero(3, columns_.columns - 1);
@@ -164,12 +165,12 @@ class CellCovariances {
   const std::vector<std::int64_t>& offsets_;
   TileCovariance& result_;
   PointEquations equations_;
-  std::vector<FrameSum> frame_sums_;           // reduce() makes them with Y
-  std::vector<PointEquations::Block> blocks_;  // of the point at hand
-  // Of the cell at hand.
+  std::vector<FrameSum> frame_sums_;           // reduce() fills them together with Y; they are not used
+  std::vector<PointEquations::Block> blocks_;  // of the present point
+  // These belong to the present cell.
   ObservationTable* observations_ = nullptr;
-  std::vector<std::int64_t> row_of_unknown_;  // in the covariance of its unknowns
-  const double* cell_ = nullptr;              // this
+  std::vector<std::int64_t> row_of_unknown_;  // row of each unknown in the covariance of the cell
+  const double* cell_ = nullptr;              // the covariance of the cell's unknowns
   std::int64_t cell_rows_ = 0;
   std::vector<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMaxIntrinsics, 3>> with_point_;  // C_ap
   std::array<JacobianBlock<IntrinsicJacobian>, 3> jacobians_;  // of one observation
@@ -203,7 +204,7 @@ class TileCovarianceBuilder {
   TileCovariance build(CovarianceMatrix boundary) {
     result_.boundary = std::move(boundary);
     take(result_.boundary, plan_.boundary);
-    std::vector<ObservationTable> tables(plan_.points.size());  // of the cells
+    std::vector<ObservationTable> tables(plan_.points.size());  // [cells]
     visit_parents_first<CovarianceMatrix>(plan_.cells.nodes, [&](std::int64_t n, const CovarianceMatrix* parent) {
       const PlanNode& node = plan_.cells.nodes[at(n)];
       const FrontFactor& factor = factor_.nodes[at(n)];

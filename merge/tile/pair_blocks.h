@@ -12,8 +12,8 @@
 
 namespace megablock {
 
-// Of pairs (i, j), i > j, of numbered frames: [6 x 6] column by column, point_kernels::kPairStride apart. All zero
-// when nothing has been added since the last call of take().
+// The blocks of pairs (i, j), i > j, of numbered frames: [6 x 6] column by column, with columns
+// point_kernels::kPairStride apart. All are zero when nothing has been added since the last call of take().
 class PairBlocks {
  public:
   void reserve(std::int64_t frames) {
@@ -23,7 +23,7 @@ class PairBlocks {
     used_.resize(static_cast<std::size_t>(count));
   }
   point_kernels::Pairs pairs() { return {values_.data(), used_.data()}; }
-  // Calls add(i, j, block) for the blocks of the first `frames` that something was added to, and clears them.
+  // Calls add(i, j, block) for the blocks of the first `frames` frames to which something was added, and clears them.
   template <typename Add>
   void take(std::int64_t frames, Add add) {
     for (std::int64_t i = 0, number = 0; i < frames; ++i) {

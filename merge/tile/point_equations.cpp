@@ -143,7 +143,8 @@ double* PointEquations::take(int count) {
   return first;
 }
 
-// Points of a cell lie apart from each other, where the processor does not look ahead by itself.
+// Fetches the observations of a point ahead of their use. The points of a cell lie apart from each other in memory, and
+// the processor does not foresee which one is next.
 void PointEquations::fetch_ahead(std::int64_t point) const {
   const std::size_t row = at(problem_.begin[at(point)]);
   if (row >= problem_.image.size()) return;
@@ -169,7 +170,7 @@ void PointEquations::add_observations(std::int64_t point) {
     count += kept[row];
   }
   if (!add_lanes(added.first, count, state_.points[at(point)])) {
-    // Once more in the order of frames, so that the images of one follow each other.
+    // Add them once more in the order of frames, so that the observations of one frame follow each other.
     const auto frame_of_row = [&](std::int64_t row) { return frames_[at(problem_.image[at(row)].value)]; };
     std::sort(rows, rows + count, [&](std::int64_t a, std::int64_t b) {
       return std::pair(frame_of_row(a), a) < std::pair(frame_of_row(b), b);
@@ -182,8 +183,9 @@ void PointEquations::add_observations(std::int64_t point) {
   added.last_sight = sights_;
 }
 
-// Of the last point, whose rows stand in rows_. Observations of one frame that follow each other are a sight; there is
-// no branch for it, as it cannot be foreseen. Returns whether no frame comes before one with a lower number.
+// Adds the observations of the last point, whose rows are in rows_. Observations of one frame that follow each other
+// form a group (`sight`). The loop has no branch for it, because the processor could not predict it. Returns whether
+// the frames are in ascending order.
 bool PointEquations::add_lanes(std::int64_t first, std::int64_t count, const Eigen::Vector3d& point) {
   const double* step = steps_.data() + (std::ssize(points_) - 1) * kRecordSize;
   std::int64_t sight = sights_ - 1;
@@ -218,7 +220,7 @@ void PointEquations::weigh(Point& point, bool curvature) {
       sum += squares;
       usual &= squares <= usual_squares_;
     }
-    if (usual) {  // most: nothing is to be done but to count
+    if (usual) {  // the usual case: all that remains is to add up
       point.rho = point.weighted_squares = sum;
       point.shared_end = point.shared_begin;
       return;
@@ -243,7 +245,7 @@ void PointEquations::weigh_each(Point& point, bool curvature) {
   }
 }
 
-// One in the tail of the loss.
+// Weighs an observation in the tail of the loss.
 void PointEquations::weigh_lane(Point& point, std::int64_t lane, bool curvature) {
   const Eigen::Vector2d residual = lanes_.residual(lane);
   const double squares = residual.squaredNorm();
@@ -254,7 +256,7 @@ void PointEquations::weigh_lane(Point& point, std::int64_t lane, bool curvature)
              weight.weighted(lanes_.by_point(lane), residual));
 }
 
-// One whose camera or shared unknowns ask for more.
+// Linearises an observation whose camera model or shared unknowns the kernels do not have.
 void PointEquations::linearise_lane(Point& point, std::int64_t lane, bool curvature) {
   const std::int64_t row = rows_[at(lane)], image = problem_.image[at(row)].value;
   const ImageView& view = views_[at(image)];
@@ -265,7 +267,7 @@ void PointEquations::linearise_lane(Point& point, std::int64_t lane, bool curvat
     throw ComputeError("a kept observation of point " + std::to_string(problem_.points[at(point.point)].index) +
                        " lies behind image " + std::to_string(problem_.images[at(image)].image.value));
   const double squares = r.residual.squaredNorm();
-  if (!std::isfinite(squares))  // as a pivot it would pass for a direction that nothing observes
+  if (!std::isfinite(squares))  // a NaN pivot would look like a direction that nothing observes
     throw ComputeError("the observation of point " + std::to_string(problem_.points[at(point.point)].index) +
                        " in image " + std::to_string(problem_.images[at(image)].image.value) +
                        " or its sigma is not a finite number");
@@ -302,7 +304,7 @@ void PointEquations::add_shared(const ImageUnknowns& unknowns, const ImageView& 
 }
 
 void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows, Point& point) {
-  std::size_t slot = at(point.shared_begin);  // a few at most
+  std::size_t slot = at(point.shared_begin);  // a point has a few of them at most
   while (slot < shared_.size() && shared_[slot].unknown != unknown) ++slot;
   if (slot == shared_.size()) {
     shared_.push_back({unknown, dimension, take(3 * dimension), take(3 * dimension)});
@@ -313,7 +315,7 @@ void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const do
     for (int i = 0; i < dimension; ++i) sum[i + j * dimension] += w[i + j * rows];
 }
 
-// V and b.
+// Sums V and b of the points, and adds their priors.
 void PointEquations::sum_up() {
   for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first_sight;
   begin_[points_.size()] = sights_;
@@ -379,7 +381,7 @@ void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vec
     for (int k = 0; k < 3; ++k) out[at(points_[i].point)][k] = point_value(kPointOwnStep + k, i);
 }
 
-// The measurements still stand in the lanes.
+// The measured coordinates are still in the lanes.
 std::span<const double> PointEquations::squares_of(const SeenImages& images,
                                                    const std::vector<Eigen::Vector3d>& points) {
   bool simple = true;

@@ -1,21 +1,21 @@
-// One point's part of the normal equations: shared by condensation, back-substitution and covariances, which all
-// linearise again (cheaper than keeping it).
+// One point's part of the normal equations. Condensation, back-substitution and covariances use it. Each of them
+// linearises the observations again, because that is cheaper than storing the linearisation.
 //
-// With u = X - C, a residual's Jacobian J_p by the point gives that by the frame, J_f = J_p G, G = -[[u]x I]. So all
-// that a frame's observations k of the point say is in V_f = sum J_pk'J_pk and b_f = -sum J_pk'r_k:
+// With u = X - C, the Jacobian J_p of a residual by the point gives the one by the frame, J_f = J_p G, G = -[[u]x I].
+// The observations k of the point in one frame therefore enter by V_f = sum J_pk'J_pk and b_f = -sum J_pk'r_k alone:
 //
 //     V = sum V_f,  b = sum b_f,  W_f = J_f'J_p = G'V_f,  J_f'J_f = W_f G,  -J_f'r = G'b_f.
 //
-// Shared unknowns s (intrinsics, free mounts) have Jacobians of their own: W_sk = J_sk'J_pk, W_s = sum W_sk,
-// J_s'J_f = sum W_sk G. With V + lambda D + priors = C C': Y_i = W_i C^-T, z = C^-1 b, and the point's step is
+// Shared unknowns s (intrinsics, free mounts) have Jacobians of their own: W_sk = J_sk'J_pk, W_s = sum W_sk, J_s'J_f =
+// sum W_sk G. With V + lambda D + priors = C C': Y_i = W_i C^-T, z = C^-1 b, and the point's step is
 //
 //     x_p = C^-T (z - sum Y_i'x_i) = C^-T C^-1 (b - sum W_i'x_i),   W_f'x_f = V_f G x_f.
 //
-// A prior of the point joins V and b.
+// A prior of the point is added to V and b.
 //
-// Points are worked on many at once, by kernels over their observations, their sights and the points
-// (point_kernels.h). A sight is what a frame observes of a point, in one image or in several of its cameras: V_f, b_f
-// and u, which no mount changes.
+// Many points are processed at once, by kernels over observations, over groups of observations, and over points
+// (point_kernels.h). A group, `sight` in the code, holds the observations of a point in one frame: in one image, or in
+// several cameras of a rig. It has one V_f, one b_f and one u, which no mount changes.
 #pragma once
 
 #include <span>
@@ -27,27 +27,27 @@
 
 namespace megablock {
 
-// The unknowns of an image's residuals: positions in TilePlan::unknowns, -1: held.
+// The unknowns in the residuals of an image: positions in TilePlan::unknowns, -1: held.
 struct ImageUnknowns {
   std::int64_t frame = -1, camera = -1, mount = -1;
   ParameterMask free = 0;  // of the camera
   int camera_width = 0;
   int shared_width = 0;           // of camera and mount, in this order
-  std::int64_t calibration = -1;  // number of this (camera, mount) among those with shared unknowns
-  bool plain = false;             // a camera that the kernels know, without shared unknowns
+  std::int64_t calibration = -1;  // number of this (camera, mount) among the pairs with shared unknowns
+  bool plain = false;             // the kernels have the model of its camera, and it has no shared unknowns
 };
 std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan,
                                           const std::vector<LaneView>& views);  // [images]
 
-// Row of the point's prior in TileProblem::point_priors, -1: none. [points]
+// The row of the point's prior in TileProblem::point_priors, -1: none. [points]
 std::vector<std::int64_t> prior_rows(const TileProblem& problem);
 
-// Sums over observations of a frame, by point_kernels::FrameValue.
+// The sums over the observations of a frame, by point_kernels::FrameValue.
 struct alignas(64) FrameSum {
   std::array<double, point_kernels::kFrameSize> values{};
 };
 
-// A step of plan.unknowns, as the points' steps read it.
+// A step of plan.unknowns in the layout that the steps of the points read.
 class UnknownMotions {
  public:
   UnknownMotions(const TilePlan& plan, const double* x);  // x outlives it
@@ -60,11 +60,11 @@ class UnknownMotions {
   std::vector<std::array<double, 8>> frames_;
 };
 
-// What the threads of a tile share, of one state.
+// Tables of one state that the threads of a tile share.
 struct PointTables {
   SeenImages images;
   std::vector<ImageUnknowns> unknowns;  // [images]
-  std::vector<std::int32_t> frames;     // [images] of these, what is asked most
+  std::vector<std::int32_t> frames;     // [images] ImageUnknowns::frame, which is read most often
   std::vector<std::int64_t> prior;      // [points] (prior_rows)
   PointTables(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 };
@@ -72,7 +72,7 @@ struct PointTables {
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
-  // One of the points at hand, with its observations, lanes [first, last), and sights [first_sight, last_sight).
+  // One of the present points. Its observations are the lanes [first, last), its groups [first_sight, last_sight).
   struct Point {
     std::int64_t point = -1;
     std::int64_t first = 0, last = 0;
@@ -83,61 +83,62 @@ class PointEquations {
     std::int64_t observation_count() const { return last - first; }
     std::int64_t sight_count() const { return last_sight - first_sight; }
   };
-  // An unknown that sees the point.
+  // An unknown in the residuals of the point.
   struct Block {
     std::int64_t unknown = -1;
     int dimension = 0;
     const double* y = nullptr;  // Y, [dimension x 3] column by column
     Rows3 matrix() const { return {y, dimension, 3}; }
   };
-  // Shared unknowns of an observation.
+  // The shared unknowns in the residual of an observation.
   struct SharedRows {
     const double* jacobian = nullptr;  // J_s, [2 x shared_width] row by row, weighted
     const double* by_point = nullptr;  // W_sk, [shared_width x 3] column by column
   };
 
-  // All three outlive it.
+  // All three arguments outlive the object.
   PointEquations(const TileProblem& problem, const TileState& state, const PointTables& tables);
 
-  // Linearises all kept observations of the first of the points, as many as there is room for, and factorises their own
-  // blocks. Returns how many. Throws ComputeError behind a camera.
+  // Linearises the kept observations of the first of these points, of as many as there is room for, and factorises
+  // their matrices V. Returns the number of points. Throws ComputeError when an observation lies behind its camera.
   std::size_t linearise(std::span<const std::int32_t> points, const Pass& pass);
-  const std::vector<Point>& points() const { return points_; }  // those
+  const std::vector<Point>& points() const { return points_; }  // the present points, those of the last linearise()
 
-  // After linearise(): Y of all unknowns that see the points; the frames' sums grow by theirs. [plan.unknowns]
+  // After linearise(): computes Y of all unknowns in the residuals of the points, and adds the contributions of the
+  // frames to `sums` [plan.unknowns].
   void reduce(std::vector<FrameSum>& sums);
-  // After linearise(), once: the points' steps into `out` [problem.points].
+  // After linearise(), once: writes the steps of the points to `out` [problem.points].
   void steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out);
 
-  // Squared residuals |r|^2 of the lanes in another state, of these images and points; not finite where the camera
-  // cannot project the point. Behind it comes the next linearise().
+  // The squared residuals |r|^2 of the lanes in another state, with these images and points; not finite where the
+  // camera cannot project the point. Only linearise() may follow.
   std::span<const double> squares_of(const SeenImages& images, const std::vector<Eigen::Vector3d>& points);
 
   const ImageUnknowns& unknowns_of(std::int64_t lane) const { return *lane_unknowns_[at(lane)]; }
   Eigen::Vector2d residual(std::int64_t lane) const { return lanes_.residual(lane); }      // weighted, as the Jacobians
   Eigen::Vector3d from_frame(std::int64_t lane) const { return lanes_.from_frame(lane); }  // u
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const { return lanes_.by_point(lane); }  // J_p
-  std::int64_t row_of(std::int64_t lane) const { return rows_[at(lane)]; }                         // in the problem
+  std::int64_t row_of(std::int64_t lane) const { return rows_[at(lane)]; }                         // row in the problem
   const SharedRows& shared(std::int64_t lane) const { return shared_rows_[at(lane)]; }
   const double* y(std::int64_t sight) const { return y_.data() + sight * point_kernels::kYSize; }
-  const std::int64_t* begin() const { return begin_.data(); }  // [points() + 1] sights
+  const std::int64_t* begin() const { return begin_.data(); }  // [points() + 1] first group of each point
   std::int64_t sight_count() const { return sights_; }
   std::int64_t frame_of(std::int64_t sight) const { return sight_frames_[at(sight)]; }  // position in plan.unknowns
   const point_kernels::Kernels& kernels() const { return *kernels_; }
 
-  // Of point number i of points().
+  // These three take the number i of a point in points().
   Eigen::Matrix3d inverse_factor(std::size_t i) const;  // C^-1, zero rows where held
   Eigen::Vector3d z(std::size_t i) const {
     return {point_value(point_kernels::kPointZ, i), point_value(point_kernels::kPointZ + 1, i),
             point_value(point_kernels::kPointZ + 2, i)};
   }
-  Eigen::Vector3d diagonal(std::size_t i) const;  // of V with the prior
+  Eigen::Vector3d diagonal(std::size_t i) const;  // diagonal of V with the prior
   int held(std::size_t i) const { return static_cast<int>(point_value(point_kernels::kPointHeld, i)); }
-  // After reduce(): the frames, one of each sight, then the shared unknowns.
+  // After reduce(): the frames, one for each group of the point, then the shared unknowns.
   void blocks(std::size_t i, std::vector<Block>& list) const;
-  // The point's prior in TileProblem::point_priors (-1).
+  // The row of the point's prior in TileProblem::point_priors, or -1.
   std::int64_t prior_row(std::int64_t point) const { return prior_[at(point)]; }
-  // Jacobians of an observation by its unknowns; how many.
+  // The Jacobians of an observation by its unknowns. Returns their number.
   int jacobians(std::int64_t lane, std::array<JacobianBlock<IntrinsicJacobian>, 3>& blocks) const;
 
  private:
@@ -173,33 +174,33 @@ class PointEquations {
   const TileProblem& problem_;
   const TileState& state_;
   const point_kernels::Kernels* kernels_;
-  double usual_squares_;  // squared residuals up to there cost what they are
-  bool all_plain_;        // all images
+  double usual_squares_;  // the loss leaves squared residuals up to this value unchanged
+  bool all_plain_;        // all images are `plain`
   const std::vector<ImageView>& views_;
   const std::vector<LaneView>& lane_views_;
   const std::vector<ImageUnknowns>& unknowns_;
   const std::vector<std::int32_t>& frames_;
   const std::vector<std::int64_t>& prior_;
-  // Of the points at hand.
+  // These belong to the present points.
   std::vector<Point> points_;
   ObservationLanes lanes_;
-  std::vector<std::int64_t> rows_;                   // [lanes] of the problem
+  std::vector<std::int64_t> rows_;                   // [lanes] row in the problem
   std::vector<const ImageUnknowns*> lane_unknowns_;  // [lanes]
   std::vector<SharedRows> shared_rows_;              // [lanes]
   std::vector<double> squares_;                      // [lanes]
-  std::vector<std::int64_t> sight_of_lane_;          // [lanes]
+  std::vector<std::int64_t> sight_of_lane_;          // [lanes] number of the group
   std::int64_t sights_ = 0;
-  std::vector<std::int32_t> sight_frames_;    // [sights] positions in plan.unknowns
-  std::vector<const double*> step_of_sight_;  // [sights] in steps_
-  std::vector<double*> frame_sums_;           // [sights]
-  std::vector<const double*> motions_;        // [sights]
-  AlignedValues records_;                     // [lanes, then sights x kRecordSize]
-  AlignedValues y_, moved_;                   // [sights x kYSize]; [3 x sights]
-  std::vector<std::int64_t> begin_;           // [points + 1] sights
+  std::vector<std::int32_t> sight_frames_;    // [groups] positions in plan.unknowns
+  std::vector<const double*> step_of_sight_;  // [groups] records in steps_
+  std::vector<double*> frame_sums_;           // [groups]
+  std::vector<const double*> motions_;        // [groups]
+  AlignedValues records_;                     // [lanes, then groups x kRecordSize]
+  AlignedValues y_, moved_;                   // [groups x kYSize]; [3 x groups]
+  std::vector<std::int64_t> begin_;           // [points + 1] first group of each point
   AlignedValues point_values_;                // by PointValue
   AlignedValues sums_, steps_;                // [points x kRecordSize] each
   std::vector<SharedPart> shared_;
-  std::vector<double> store_;  // what the pointers of shared_ and shared_rows_ point to
+  std::vector<double> store_;  // memory of the pointers in shared_ and shared_rows_
   std::size_t taken_ = 0;
 };
 

@@ -1,5 +1,5 @@
-// Internal to merge/tile/: point_kernels_*.cpp include it and set the width of vectors. Formulas: point_equations.h,
-// cell_assembler.h.
+// The code of the kernels in point_kernels.h, for vectors of any width. Internal to merge/tile/: each
+// point_kernels_*.cpp sets the width and includes it. The formulas are in point_equations.h and cell_assembler.h.
 #pragma once
 
 #if MEGABLOCK_LANE_WIDTH == 8
@@ -24,10 +24,10 @@ template <int kCount>
   for (int k = 0; k < kCount; ++k) rows[k] = load(values + k * stride);
 }
 
-// Lower triangle by rows.
+// Index in the lower triangle, stored by rows.
 constexpr int lower(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : lower(j, i); }
 
-// Rows of one group of lanes to records side by side, kWidth lanes apart from each other.
+// Writes rows of one group of lanes as records, kWidth lanes apart from each other.
 template <int kCount, typename Record, typename Write>
 [[gnu::always_inline]] inline void to_records(const Lanes (&values)[kCount], Record record, Write write) {
   static_assert(kCount % kWidth == 0);
@@ -42,7 +42,7 @@ template <int kCount, typename Record, typename Write>
   }
 }
 
-// Values of one group of lanes to records that follow each other.
+// Writes the values of one group of lanes as records that follow each other.
 [[gnu::always_inline]] inline void write_records(const Lanes (&values)[kRecordSize], double* records) {
   to_records(
       values, [&](int lane) __attribute__((always_inline)) { return records + lane * kRecordSize; },
@@ -66,9 +66,9 @@ void normal(const double* linearised, std::int64_t linearised_stride, std::int64
   }
 }
 
-// Without branches: which observations share a sight cannot be foreseen.
+// The loop has no branches, because the processor cannot predict which observations belong to one frame.
 void merge(std::int64_t count, const std::int64_t* sight, double* records) {
-  constexpr int kLast = kB + 2;  // of what is summed
+  constexpr int kLast = kB + 2;  // last value that is summed
   constexpr int kVectors = kRecordSize / kWidth;
   Lanes sums[kVectors]{};
   LaneMask summed[kVectors];
@@ -111,7 +111,7 @@ void factorise(std::int64_t count, double lambda, double floor, const double* su
     const auto invert = [&](const Lanes& pivot, const Lanes& diagonal) __attribute__((always_inline)) {
       const LaneMask free = pivot > floor * diagonal;
       held += free ? zero : zero + 1;
-      return free ? 1 / square_root(pivot) : zero;  // a held row and column vanish
+      return free ? 1 / square_root(pivot) : zero;  // the row and column of a held pivot become zero
     };
     const Lanes i00 = invert(v[0] + lambda * v[0], v[0]);
     const Lanes c10 = v[1] * i00, c20 = v[3] * i00;
@@ -139,7 +139,7 @@ void factorise(std::int64_t count, double lambda, double floor, const double* su
   }
 }
 
-// u x m
+// The cross product u x m.
 [[gnu::always_inline]] inline void cross(const Lanes (&u)[3], const Lanes& m0, const Lanes& m1, const Lanes& m2,
                                          Lanes (&out)[3]) {
   out[0] = u[1] * m2 - u[2] * m1;
@@ -147,7 +147,7 @@ void factorise(std::int64_t count, double lambda, double floor, const double* su
   out[2] = u[0] * m1 - u[1] * m0;
 }
 
-// V, b and u of one group of sights.
+// V, b and u of one group of lanes.
 struct Sights {
   Lanes values[kRecordSize];
   const Lanes *v = values + kV, *b = values + kB;
@@ -273,7 +273,7 @@ void solve(std::int64_t count, const Columns& points) {
   }
 }
 
-// kRows rows of a column, in as few vectors as this processor needs; 1 to 8, or 2, 4, 6, 8.
+// A column of kRows rows, in as few vectors as this processor needs. kRows is 1 to 8, or 2, 4, 6, 8.
 #if MEGABLOCK_LANE_WIDTH == 8
 template <int kRows>
 struct Column {
@@ -286,7 +286,7 @@ struct Column {
   }
 };
 #else
-// Vectors of four and of two; the compiler halves the former where the processor has no such.
+// Vectors of four and of two. Where the processor has no vectors of four, the compiler halves them.
 template <int kRows>
 struct Column {
   typedef double Four __attribute__((vector_size(32)));
@@ -318,7 +318,7 @@ struct Column {
 };
 #endif
 
-// C -= A B'; numbers of columns that are known when compiling, or 0.
+// C -= A B'. kColumns is the number of columns of C when it is known at compile time, else 0.
 template <int kRows, int kColumns>
 [[gnu::always_inline]] inline void subtract_block(double* c, std::int64_t c_stride, const double* a,
                                                   std::int64_t a_stride, const double* b, std::int64_t b_stride,
@@ -341,7 +341,7 @@ void subtract_product(double* c, std::int64_t c_stride, const double* a, std::in
     subtract_block<kRows, 0>(c, c_stride, a, a_stride, b, b_stride, columns);
   };
   for (; rows > 8; rows -= 8, c += 8, a += 8) block(std::integral_constant<int, 8>());
-  switch (rows) {  // 6 of frames and mounts, 8 of Brown's cameras
+  switch (rows) {  // 6 for frames and mounts, 8 for Brown's cameras
     case 1:
       return block(std::integral_constant<int, 1>());
     case 2:
@@ -363,7 +363,7 @@ void subtract_product(double* c, std::int64_t c_stride, const double* a, std::in
 
 void subtract_pairs(std::int64_t points, const std::int64_t* begin, const double* y, const std::int64_t* frames,
                     const Pairs& pairs) {
-  constexpr int kRows = kWidth == kPairStride ? kPairStride : 6;  // the longest vectors take the unused rows along
+  constexpr int kRows = kWidth == kPairStride ? kPairStride : 6;  // vectors of 8 values include the unused rows
   const auto subtract = [&](std::int64_t i, std::int64_t j) {
     const std::int64_t number = pair_number(frames[i], frames[j]);
     pairs.used[number] = 1;

@@ -21,13 +21,13 @@ namespace {
 
 constexpr int kMaxSteps = 100;
 constexpr double kLeastDamping = 1e-4, kMostDamping = 1e6;
-constexpr std::size_t kAtOnce = 256;  // points: what is kept of them stays in the second cache
+constexpr std::size_t kAtOnce = 256;  // points at a time: their data stay in the second cache
 
-// A point's cost at held poses, with its derivatives.
+// The cost of a point at held poses, with its derivatives.
 struct PointCost {
   double images = 0, prior = 0;                          // infinite where a camera cannot project the point
-  Eigen::Matrix3d reweighted = Eigen::Matrix3d::Zero();  // rho' alone
-  Eigen::Matrix3d curved = Eigen::Matrix3d::Zero();      // with the loss's curvature
+  Eigen::Matrix3d reweighted = Eigen::Matrix3d::Zero();  // with weights rho' alone
+  Eigen::Matrix3d curved = Eigen::Matrix3d::Zero();      // with the curvature of the loss
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
 
   double whole() const { return images + prior; }
@@ -65,7 +65,7 @@ struct Trial {
   Eigen::Vector3d position;
 };
 
-// The costs of many points at once, their observations in lanes.
+// Computes the costs of many points at once, with their observations in lanes.
 class PointCosts {
  public:
   PointCosts(const TileProblem& problem, const SeenImages& images)
@@ -109,7 +109,7 @@ class PointCosts {
     }
     lanes_.clear();
   }
-  // Of a camera that the lanes do not know.
+  // Adds an observation of a camera model that the lanes do not have.
   void add_other(const Eigen::Vector3d& position, std::int64_t row, PointCost& cost) const {
     const ImageView& view = views_[problem_.image[row].value];
     CameraResidual r;
@@ -131,7 +131,7 @@ class PointCosts {
 
 class PointRefiner {
  public:
-  // `images` of the state, which outlive it.
+  // `images` belong to the state and outlive the object.
   PointRefiner(const TileProblem& problem, TileState& state, const SeenImages& images, double settled)
       : problem_(problem),
         state_(state),
@@ -139,7 +139,7 @@ class PointRefiner {
         views_(images.views),
         costs_(problem, images) {}
 
-  // Brings points to their optimum; returns what their observations cost then.
+  // Moves points to their optimum. Returns the cost of their observations there.
   double refine(std::span<const std::int64_t> points) {
     start(points);
     while (!trials_.empty()) {
@@ -196,7 +196,7 @@ class PointRefiner {
     of_trial_.push_back(work);
   }
 
-  // The next trials.
+  // Makes the next trial of every point that is not done.
   void take_steps() {
     trials_.clear();
     of_trial_.clear();
@@ -214,7 +214,7 @@ class PointRefiner {
     if (cost.whole() < work.cost.whole()) {
       work.position = position;
       work.cost = cost;
-      if (!work.raised) work.damping /= 10;  // else it is just right
+      if (!work.raised) work.damping /= 10;  // a damping that was just raised stays
       work.raised = false;
     } else {
       work.damping *= 10;
@@ -241,10 +241,10 @@ class PointRefiner {
   const double settled_squared_;
   const std::vector<ImageView>& views_;
   PointCosts costs_;
-  // Of the points at hand.
+  // These belong to the present points.
   std::vector<Work> works_;
   std::vector<Trial> trials_;
-  std::vector<std::size_t> of_trial_;  // [trials_] in works_
+  std::vector<std::size_t> of_trial_;  // [trials_] index in works_
   std::vector<PointCost> costs_of_trials_;
   std::vector<Ray> rays_;
 };
@@ -258,7 +258,7 @@ void LossSums::add(std::int64_t point, std::span<const double> squares) {
     sum += s;
     usual &= s <= usual_squares_;
   }
-  if (usual) {  // most: nothing is to be done but to count
+  if (usual) {  // the usual case: all that remains is to add up
     settled_ += sum;
     return;
   }

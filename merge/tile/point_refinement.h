@@ -3,9 +3,9 @@
 // A point with few observations, most of them in the tail, has hardly any curvature along some direction. Neither the
 // reweighted nor the true normal equations of the block then bring it to its optimum in few iterations, and a handful
 // of such points delays all others. For a single point the problem is small: damped Newton iterations in three
-// unknowns, with the curvature of the loss (tile_linearisation.h, bounded by zero only). It is solved for the trial
-// state of every iteration. So it only lowers the cost by which the step is judged, and the optimum stays the same
-// (inner iterations).
+// unknowns, with the curvature of the loss (tile_linearisation.h), which is only kept from becoming negative. It is
+// solved for the trial state of every iteration. This only lowers the cost by which the step is judged, and the optimum
+// stays the same (inner iterations).
 #pragma once
 
 #include <span>
@@ -16,13 +16,13 @@
 
 namespace megablock {
 
-// What points cost, and which of them have an observation beyond the corner (Cauchy's loss has none: all of it is tail)
-// or behind its camera.
+// Sums the costs of points, and lists those that have an observation in the tail of the loss or behind its camera. The
+// tail begins at the corner of the loss; Cauchy's loss has no corner, and all of it is tail.
 class LossSums {
  public:
   explicit LossSums(const RobustLoss& loss) : loss_(loss), usual_squares_(end_of_squares(loss)) {}
-  void add(std::int64_t point, std::span<const double> squares);  // |r|^2 of its observations
-  double settled() const { return settled_; }                     // twice the cost of all others
+  void add(std::int64_t point, std::span<const double> squares);  // squares: |r|^2 of its observations
+  double settled() const { return settled_; }                     // twice the cost of the points that are not in tail()
   const std::vector<std::int64_t>& tail() const { return tail_; }
 
  private:
@@ -32,14 +32,15 @@ class LossSums {
   std::vector<std::int64_t> tail_;
 };
 
-// Moves active points that have an observation in the tail and are off their optimum by more than `settled` sigmas; all
-// others keep their bits. A point that a step has put behind a camera starts from the intersection of its rays; where
-// they do not meet in front of all cameras, it is left alone. Returns the cost then: that of
-// evaluate_cost (linearise.h) but for the order of the sum.
+// Moves the active points that have an observation in the tail and are farther than `settled` sigmas from their
+// optimum. All other points keep their bits. A point that a step has put behind a camera starts from the intersection
+// of its rays; where the rays do not meet in front of all cameras, the point stays where it is. Returns the cost
+// afterwards; it differs from that of evaluate_cost (linearise.h) only by the order of the sum.
 constexpr double kPointSettled = 1e-6;
 double refine_points(const TileProblem& problem, const TilePlan& plan, TileState& state,
                      double settled = kPointSettled);
-// The same where the squares are known: `images` of the state, `sums` of portions of its points, in their order.
+// The same when the squares are known. `images` belong to the state, and `sums` to the portions of its points, in their
+// order.
 double refine_tail(const TileProblem& problem, TileState& state, const SeenImages& images,
                    const std::vector<LossSums>& sums, double settled);
 

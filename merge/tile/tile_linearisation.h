@@ -1,13 +1,14 @@
-// Weights of the robust losses, and linearised residuals without a point of one cell: shared by condensation and
-// covariances (point_equations.h has those with one).
+// Gives the weights of the robust losses, and the linearised residuals without a point of a cell. Condensation and
+// covariances use them; point_equations.h has the residuals with a point.
 //
-// Losses. The second derivative of 1/2 rho(|r|^2) by r is rho' (I + 2 rho''/rho' r r'): rho' across the residual, and
-// rho' (1 + 2 s rho''/rho') along it, s = |r|^2: nothing for Huber beyond its corner, less than nothing for Cauchy
-// beyond its scale. Normal equations with rho' I alone (iteratively reweighted least squares; they define decrement and
-// covariances) overestimate the curvature along such residuals and approach the optimum by a constant factor per step.
-// A pass with curvature takes the smaller value, but no less than kLeastCurvature rho', so that the normal equations
-// stay positive definite: J and r are scaled by sqrt(rho') and, along r, further by (1 - k) and 1 / (1 - k),
-// (1 - k)^2 = the value (Triggs et al. 2000, "Bundle adjustment", 4.3). The gradient stays what it is.
+// The second derivative of 1/2 rho(|r|^2) by r is rho' (I + 2 rho''/rho' r r'). With s = |r|^2 this is rho' across the
+// residual, and rho' (1 + 2 s rho''/rho') along it: zero for Huber's loss beyond its corner, negative for Cauchy's loss
+// beyond its scale. Normal equations with rho' I alone are iteratively reweighted least squares; they define decrement
+// and covariances. They overestimate the curvature along such residuals, and approach the optimum by a constant factor
+// per step. A sweep with curvature takes the smaller value along the residual, but no less than kLeastCurvature rho',
+// so that the normal equations stay positive definite. It scales J and r by sqrt(rho') and, along r, further by (1 - k)
+// and 1 / (1 - k), where (1 - k)^2 is that value over rho' (Triggs et al. 2000, "Bundle adjustment", 4.3). The gradient
+// stays the same.
 #pragma once
 
 #include <array>
@@ -24,13 +25,13 @@ namespace megablock {
 
 inline constexpr double kLeastCurvature = 0.1;
 
-// The largest squared norm s with rho(s) = s; -1: none.
+// The largest squared norm s up to which rho(s) = s; -1: there is none.
 inline double end_of_squares(const RobustLoss& loss) {
   if (loss.kind == RobustLoss::Kind::kNone) return std::numeric_limits<double>::max();
   return loss.has_corner() ? loss.scale * loss.scale : -1;
 }
 
-// Weighting of a residual under a loss.
+// The weight of a residual under a loss.
 struct LossWeight {
   double rho = 0, first = 1;  // of the squared norm
   double root = 1;            // sqrt(rho')
@@ -54,7 +55,7 @@ struct LossWeight {
   }
 };
 
-// Jacobian of a residual by one unknown (position in TilePlan::unknowns), weighted.
+// The weighted Jacobian of a residual by one unknown, which is a position in TilePlan::unknowns.
 template <typename Jacobian>
 struct JacobianBlock {
   std::int64_t unknown = -1;
@@ -89,7 +90,7 @@ struct TermResidual {
   }
 };
 
-// Calls visit for every observation without a point of a cell.
+// Calls `visit` for every observation without a point that belongs to a cell.
 void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                  std::size_t cell, const std::function<void(const TermResidual&)>& visit);
 

@@ -1,5 +1,5 @@
-// Gathers one value for each tile on every rank, in the order of the tiles. Sums over the result have the same bits
-// on any number of ranks.
+// Gathers one value for each tile on every rank, in the order of the tiles. A sum over the gathered values therefore
+// has the same bits on any number of ranks.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,8 @@ inline void read(ByteReader& reader, UnknownList& unknowns) { unknowns = reader.
 
 }  // namespace tile_bytes
 
-// [tiles] all tiles of the block, each held by one rank or none; `tile_of(i)`: number of the tile of values[i].
+// `tiles`: number of all tiles of the block; each is held by one rank or by none. `tile_of(i)` is the tile of
+// values[i].
 template <typename Value, typename TileOf>
 std::vector<Value> gather_by_tile(TreeCommunicator& ranks, std::size_t tiles, const std::vector<Value>& values,
                                   const TileOf& tile_of) {

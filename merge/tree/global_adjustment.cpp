@@ -13,9 +13,9 @@ namespace megablock {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kUnresolvable = 1e3 * kEpsilon;  // of the cost
+constexpr double kUnresolvable = 1e3 * kEpsilon;  // share of the cost: smaller decreases are lost in rounding
 constexpr double kMaxLambda = 1e12;
-constexpr double kTrustworthy = 0.75;  // gain ratio
+constexpr double kTrustworthy = 0.75;  // gain ratio from which the next iteration takes the curvature of the losses
 constexpr double kHardlyDamped = 1e-2;
 
 void stop(GlobalState& state, GlobalOutcome outcome) {
@@ -105,7 +105,7 @@ void report_down(GlobalState& state, const GlobalOptions&, const DownReport& rep
     state.floor_decrement = -1;
     return decrease > 0 ? accept(state, decrease / state.predicted) : reject(state);
   }
-  // Here the expected decrease is below rounding, so the cost can only expose a plainly wrong step.
+  // The expected decrease is below rounding here, so that the cost can only expose a plainly wrong step.
   if (-decrease > kUnresolvable * kUnresolvable + 1e6 * kEpsilon * state.cost) return reject(state);
   state.floor_decrement = std::sqrt(state.decrement_squared);
   accept(state, 1);

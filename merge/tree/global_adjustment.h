@@ -1,18 +1,20 @@
-// The global Levenberg-Marquardt iteration of the whole block, as a state machine that knows nothing of how the passes
-// are run: `next_action` says what to do, the `report_*` functions take what came out. The state is a plain struct, so
-// that it can be written after every accepted iteration and picked up again in the middle.
+// Decides on the Levenberg-Marquardt iterations of the whole block: damping, acceptance and convergence. It is a state
+// machine that does not know how sweeps are run: `next_action` says what to do, and the `report_*` functions take the
+// results. The state is a plain struct, so that it can be stored after every accepted iteration and resumed later.
 //
-// Damping after Nielsen (1999): lambda *= max(1/3, 1 - (2 rho - 1)^3) on acceptance, no floor; on rejection
-// lambda *= max(10 nu, 1e-6 / lambda), nu *= 2. Tiles come adjusted and aligned, so lambda starts at 1e-10.
+// Damping follows Nielsen (1999): lambda *= max(1/3, 1 - (2 rho - 1)^3) on acceptance, without a floor; on rejection
+// lambda *= max(10 nu, 1e-6 / lambda) and nu *= 2. The tiles are adjusted and aligned beforehand, so lambda starts at
+// 1e-10.
 //
-// A pass takes the curvature of the robust losses (tile_linearisation.h) while steps do what their model promises:
-// after a step of gain ratio >= 0.75, until one falls short of it or is rejected.
+// A sweep up takes the curvature of the robust losses (tile_linearisation.h) while steps decrease the cost as
+// predicted: after a step of gain ratio >= 0.75, until a step has a smaller one or is rejected.
 //
-// Stop on the Newton decrement d^2 = b'H^-1 b = sum |L^-1 b|^2 (every unknown is within d of its own posterior sigma of
-// the optimum), measured with lambda = 0 and the weights of the covariances: when the decrement of a pass falls below
-// the limit, the same state is condensed once more with lambda = 0, and that pass decides. When it does not confirm and
-// its step is no good, the next step is damped and taken, however small. When the predicted decrease is below
-// 1e3 eps F the cost cannot resolve it: the step is accepted, and the iteration goes on as long as d falls.
+// The iterations stop on the Newton decrement d^2 = b'H^-1 b = sum |L^-1 b|^2: every unknown is then within d of its
+// own posterior sigma of the optimum. It is measured with lambda = 0 and with the weights of the covariances. When the
+// decrement of a sweep falls below the limit, the same state is condensed once more with lambda = 0, and the decrement
+// of that sweep decides. When it does not confirm convergence and its step is rejected, the next step is damped and
+// tried, however small its decrement is. When the predicted decrease is below 1e3 eps F, the cost F cannot resolve it:
+// the step is accepted, and the iterations go on as long as d falls.
 #pragma once
 
 #include <functional>
@@ -25,20 +27,21 @@ namespace megablock {
 struct GlobalOptions {
   double initial_lambda = 1e-10;
   double max_decrement = 1e-4;  // posterior sigmas; exactness tests use 1e-7
-  bool confirm = true;          // the limit with a pass of lambda = 0; without, a pass that is hardly damped may do
-  int max_iterations = 50;      // accepted and rejected steps
-  // Above 0: also stops when a step that is hardly damped changes the cost by less than this share of it, or promises
-  // to. Of tiles on their own, which only start the block: not every weak mode is at its optimum then.
+  // a sweep with lambda = 0 must confirm the limit; if false, a sweep that is hardly damped suffices
+  bool confirm = true;
+  int max_iterations = 50;  // accepted and rejected steps
+  // Above 0, the iterations also stop when a hardly damped step changes the cost by less than this share of it, or is
+  // predicted to. It is meant for single tiles, which only start the block: not every weak mode is at its optimum then.
   double function_tolerance = 0;
   void check() const;  // throws InputError
 };
 
-// Result of an upward pass: sums at the root.
+// The result of a sweep up: the sums at the root.
 struct UpReport {
   SubtreeSums sums;
 };
 
-// Result of a downward pass and the evaluation of the trial state, summed over tiles in tile order.
+// The result of a sweep down and of the evaluation of the trial state, summed over the tiles in their order.
 struct DownReport {
   double damping_norm = 0;  // sum of TileStep::damping_norm
   double trial_cost = 0;    // infinite when a point falls behind a camera
@@ -54,7 +57,7 @@ enum class GlobalAction : std::int32_t {
 
 enum class GlobalOutcome : std::int32_t {
   kRunning = 0,
-  kConverged = 1,      // decrement below the limit on a pass with lambda = 0
+  kConverged = 1,      // the decrement of a sweep with lambda = 0 is below the limit
   kRoundingFloor = 2,  // the decrement no longer falls and the cost cannot resolve a decrease
   kIterationLimit = 3,
   kFailed = 4  // no step decreases the cost
@@ -64,16 +67,18 @@ struct GlobalState {
   GlobalAction next = GlobalAction::kUp;
   GlobalOutcome outcome = GlobalOutcome::kRunning;
   double lambda = 1e-10, nu = 2;
-  double pass_lambda = 1e-10;  // of the current pass: lambda, or 0 for a confirming pass
+  double pass_lambda = 1e-10;  // of the current sweep: lambda, or 0 for a confirming sweep
   double cost = 0, initial_cost = -1;
-  double decrement_squared = 0;  // of the last upward pass
-  double floor_decrement = -1;   // decrement before an unresolvable step, -1: the last step was resolvable
+  double decrement_squared = 0;  // of the last sweep up
+  // decrement before a step that the cost could not resolve; -1: it resolved the last step
+  double floor_decrement = -1;
   double predicted = 0, trial_cost = 0;
   std::int32_t iterations = 0;  // steps tried
   std::int32_t accepted = 0;
-  std::int32_t curvature = 0;       // the last step did what its model promised: the next one takes the losses' own
-  std::int32_t pass_curvature = 0;  // of the current pass; 0 for a confirming pass
-  std::int32_t confirm = 1;         // 0: a confirming pass failed at the current state and its step was rejected
+  // 1: the last step decreased the cost as predicted, and the next one takes the curvature of the losses
+  std::int32_t curvature = 0;
+  std::int32_t pass_curvature = 0;  // of the current sweep; 0 for a confirming sweep
+  std::int32_t confirm = 1;         // 0: a confirming sweep failed at the current state and its step was rejected
 };
 
 GlobalState start_global(const GlobalOptions& options);
@@ -84,8 +89,8 @@ void report_down(GlobalState& state, const GlobalOptions& options, const DownRep
 void report_accepted(GlobalState& state, const GlobalOptions& options);
 void report_rejected(GlobalState& state, const GlobalOptions& options);
 
-// What the global adjustment asks of the runner of the tree (merge_tree_runner.h), or of a single tile
-// (tile_solver.cpp).
+// The sweeps that the global adjustment asks for. The runner of the tree (merge_tree_runner.h) implements them, and so
+// does a single tile (tile_solver.cpp).
 class TreeRunner {
  public:
   virtual ~TreeRunner() = default;
@@ -95,8 +100,8 @@ class TreeRunner {
   virtual void reject() = 0;
 };
 
-// Runs until kStop. `on_iteration` (may be empty) is called after every accepted or rejected step and at the end, when
-// `state` can be stored. Starting from a stored state resumes.
+// Iterates until kStop. `on_iteration` (may be empty) is called after every accepted or rejected step and at the end;
+// `state` can be stored then. A stored state resumes the iterations.
 void adjust_globally(TreeRunner& runner, const GlobalOptions& options, GlobalState& state,
                      const std::function<void(const GlobalState&)>& on_iteration = {});
 

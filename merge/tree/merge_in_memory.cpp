@@ -7,7 +7,7 @@ namespace megablock {
 
 namespace {
 
-// All tiles stay in memory.
+// Keeps all tiles in memory.
 MemoryOptions with_all_tiles(MemoryOptions memory) {
   memory.tile_bytes = std::numeric_limits<std::int64_t>::max();
   return memory;

@@ -1,6 +1,5 @@
-// The merge of a block whose tiles are all in memory, in one process: for blocks of one tile, for comparisons and for
-// tests. It is the runner of the merge tree (merge_tree_runner.h) with one rank, together with its tiles and its
-// results.
+// Merges a block whose tiles are all in memory, in one process. It serves blocks of one tile, comparisons and tests. It
+// holds the runner of the merge tree (merge_tree_runner.h) with one rank, the tiles and the results.
 #pragma once
 
 #include <memory>
@@ -12,7 +11,8 @@ namespace megablock {
 
 class MergeInMemory : public TreeRunner {
  public:
-  // problems[t] and states[t] of tile t; the states' common unknowns must agree. `solver` outlives the object.
+  // `problems[t]` and `states[t]` belong to tile t. Unknowns that tiles share must have the same values in all of them.
+  // `solver` outlives the object.
   MergeInMemory(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
                 MemoryOptions memory = {}, const NodeSolver& solver = dense_node_solver());
 
@@ -21,10 +21,10 @@ class MergeInMemory : public TreeRunner {
   void accept() override;
   void reject() override { runner_.reject(); }
 
-  // At the solution: a sweep up with lambda = 0, seams, datum and covariances.
+  // At the solution: runs a sweep up with lambda = 0 and computes seam checks, datum and covariances.
   UpReport final_up();
-  // From final_up(). Covariances by tile, with inner constraints where the datum is free; seams of all inner nodes in
-  // the order of the nodes; every tile against the rest of the block; the datum.
+  // The results of final_up(): the covariances by tile, under inner constraints where the datum is free; the seams of
+  // all inner nodes, in the order of the nodes; the check of every tile against the rest of the block; the datum.
   const std::vector<TileCovariance>& covariances() const { return covariances_; }
   const std::vector<SeamReport>& seams() const { return posterior_.seams; }
   const std::vector<TileCheck>& tile_checks() const { return posterior_.tile_checks; }
@@ -36,7 +36,7 @@ class MergeInMemory : public TreeRunner {
   const std::vector<TileState>& states() const { return states_; }
   const BlockGauge& block_gauge() const { return runner_.gauge(); }  // of the last sweep up
   const MemoryStatistics& memory() const { return runner_.memory(); }
-  // Of the last down(), points included, until accept().
+  // The steps of the last down() with those of the points; valid until accept().
   const std::vector<TileStep>& steps() const;
 
  private:
@@ -50,7 +50,7 @@ class MergeInMemory : public TreeRunner {
   std::vector<TilePlan> tile_plans_;
   Pass pass_ = 0;                        // of the last down()
   std::vector<Step> unknown_steps_;      // [tiles] of the last down()
-  mutable std::vector<TileStep> steps_;  // [tiles] with the points, once asked for
+  mutable std::vector<TileStep> steps_;  // [tiles] with the points; made when they are first asked for
   MergeTreeRunner::Posterior posterior_;
   std::vector<TileCovariance> covariances_;
   GaugeReport gauge_;

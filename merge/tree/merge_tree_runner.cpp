@@ -1,4 +1,4 @@
-// Plans, ranks and datum of the merge tree.
+// Gives every node of the merge tree its plan and its rank, and finds the datum of the block.
 #include "merge/tree/merge_tree_runner.h"
 
 #include <algorithm>
@@ -59,7 +59,7 @@ void MergeTreeRunner::make_plans(const MergeTree& tree, std::size_t tile_count) 
                     tiles_.in_scratch(row));
   }
   for (PlanNode& node : plan_.nodes)
-    if (node.leaf >= 0) node.eliminated = node.owned = {};  // the tiles' own plans have it
+    if (node.leaf >= 0) node.eliminated = node.owned = {};  // the plans of the tiles have these lists
 }
 
 double MergeTreeRunner::seam_probability() const {

@@ -1,16 +1,16 @@
-// The runner of the merge tree: one for any number of ranks, one process being the trivial case.
+// Runs the sweeps over the merge tree of a block, on any number of ranks.
 //
-// Each rank condenses its own tiles. An inner node is eliminated by the rank of its left child. A sweep up moves update
-// matrices from children to parents; a sweep down moves steps, or covariances, from parents to children. Where parent
-// and child are on different ranks they travel as messages (tree_communicator.h). All sums are formed in the order of
-// the tiles or of the children, so that the bits do not depend on the ranks.
+// Each rank condenses its own tiles. The rank of the left child eliminates an inner node. A sweep up sends the updates
+// of the children to their parents; a sweep down sends steps, or covariances, from parents to children. Where parent
+// and child are on different ranks these values travel as messages (tree_communicator.h). All sums are formed in the
+// order of the tiles or of the children, so that the bits do not depend on the ranks.
 //
-// Tiles lie in a store of their own, partly out of core (merge/step/tile_store.h): a sweep asks once for each tile as a
-// whole. Factors wait for the sweep down in memory, else in the rank's scratch, else they are computed again
-// (merge/step/memory.h). The factors of a node whose subtree lies on several ranks are never given up: to compute them
-// again would need the other ranks.
+// Tiles lie in a store of their own, partly out of core (merge/step/tile_store.h), and a sweep asks once for each whole
+// tile. Factors wait for the sweep down in memory; beyond the budget they wait in the scratch directory of the rank,
+// and without room there they are computed again (merge/step/memory.h). The factors of a node whose subtree lies on
+// several ranks are never dropped, because to compute them again would need the other ranks.
 //
-// The code: merge_tree_runner.cpp (plans and datum), sweep_up.cpp, sweep_down.cpp, posterior.cpp.
+// The code is in merge_tree_runner.cpp (plans and datum), sweep_up.cpp, sweep_down.cpp and posterior.cpp.
 #pragma once
 
 #include <functional>
@@ -39,8 +39,8 @@ namespace megablock {
 // Wall clock of this rank in all sweeps up and down, seconds.
 struct SweepSeconds {
   double tiles = 0;   // work on its tiles
-  double fronts = 0;  // work on the fronts above its tiles
-  double all = 0;     // everything, waiting for other ranks included
+  double fronts = 0;  // work on the fronts of inner nodes
+  double all = 0;     // everything, including the time spent waiting for other ranks
   std::int64_t sweeps_up = 0;
 };
 
@@ -50,8 +50,8 @@ std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::
 
 class MergeTreeRunner : public TreeRunner {
  public:
-  // Collective. `tiles`: the tiles of this rank, ascending; rank_of_tile: of all tiles. `tiles` and `solver` outlive
-  // the runner.
+  // Collective. `tiles` holds the tiles of this rank, ascending; `rank_of_tile` lists all tiles. `tiles` and `solver`
+  // outlive the runner.
   MergeTreeRunner(TreeCommunicator& ranks, const MergeTree& tree, std::vector<int> rank_of_tile, TileStore& tiles,
                   const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
   ~MergeTreeRunner() override;
@@ -61,15 +61,18 @@ class MergeTreeRunner : public TreeRunner {
   void accept() override;
   void reject() override;
 
-  // Records sweeps up from now on; the first one resumes where the record that was found ends. Records hold subtrees
-  // that are on this rank alone; nodes that join several ranks are computed again. `recorder` outlives the runner.
+  // Records sweeps up from now on. The first sweep resumes where the record of a killed run ends. A record holds
+  // subtrees that are on this rank alone; nodes that join several ranks are computed again. `recorder` outlives the
+  // runner.
   void record_passes(PassRecorder& recorder) { recorder_ = &recorder; }
 
-  // The next sweep with lambda = 0 may be the last one. It stores what the posterior needs, so that the posterior takes
-  // no sweep of its own. This does not work for free blocks, whose covariances take further right-hand sides.
+  // Says that the next sweep with lambda = 0 may be the last one. That sweep stores the data of the posterior, so that
+  // the posterior needs no sweep of its own. This does not work for a block with a free datum, whose covariances need
+  // further right-hand sides.
   void expect_posterior() { posterior_expected_ = true; }
 
-  // Collective, at the solution: a sweep up with lambda = 0, the seams and the datum, then covariances.
+  // Collective, at the solution: runs a sweep up with lambda = 0, checks the seams, finds the datum and computes the
+  // covariances.
   struct Posterior {
     SubtreeSums sums;  // of the whole block
     BlockGauge gauge;
@@ -81,7 +84,7 @@ class MergeTreeRunner : public TreeRunner {
   using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
   Posterior posterior(const VisitCovariance& visit = {});
 
-  // The unknowns that the kept residuals of a tile touch. The reference is valid until another tile is asked for.
+  // The unknowns that occur in the kept residuals of a tile. The reference is valid until another tile is asked for.
   const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
   const EliminationPlan& plan() const { return plan_; }
   const SweepSeconds& seconds() const { return seconds_; }
@@ -89,58 +92,61 @@ class MergeTreeRunner : public TreeRunner {
   const TilePlan& tile_plan(std::size_t row) const { return tile_plans_[row]; }  // until another one is asked for
   // Called in down() with the step of each tile's unknowns, by row, before the trial state is formed.
   void on_step(std::function<void(std::size_t row, const Step&)> visit) { on_step_ = std::move(visit); }
-  // The datum of a tile in the last sweep up.
+  // The datum of a tile as the last sweep up took it.
   TileDatum datum_of(std::size_t row) const;
   const MemoryStatistics& memory() const { return factors_.statistics(); }
-  // Largest memory of a front above the tiles together with the updates of its children and all pending updates, bytes.
+  // The largest memory of a front of an inner node, together with the updates of its children and all pending updates,
+  // bytes.
   std::int64_t peak_front_bytes() const { return peak_front_bytes_; }
 
  private:
   bool mine(std::int64_t node) const;
   UpdateMatrix child_update(std::int64_t child);
   void deliver_update(std::int64_t node, UpdateMatrix update);
-  // Sends each child its part of the values of a front; receives the values of a node from its parent.
+  // Sends each child its part of the values of a front; receives the values of a node from its parent (sweep_values.h).
   template <typename Values>
   void pass_down(std::int64_t node, const Values& front);
   template <typename Values>
   Values from_parent(std::int64_t node);
-  std::size_t row_of_leaf(std::int64_t leaf) const {  // row in tiles_ of a node that is a tile of this rank
+  std::size_t row_of_leaf(std::int64_t leaf) const {  // row of this node's tile in tiles_
     return static_cast<std::size_t>(own_tile_of_node_[static_cast<std::size_t>(leaf)]);
   }
-  // Whether tile and plan of this row are in memory beside those of any other row. A tile may leave scratch without its
-  // plan.
+  // Whether the tile of this row and its plan stay in memory when another row is loaded. A tile may come back from
+  // scratch while its plan stays there.
   bool in_memory(std::size_t row) const { return !tiles_.in_scratch(row) && !tile_plans_.in_scratch(row); }
   UpdateMatrix store_factors(std::int64_t leaf,
                              TileCondensation condensed);  // stores its factors and returns its update
-  // Condenses the tiles of these nodes, ascending, and calls `visit` for one after the other.
+  // Condenses the tiles of these nodes, ascending, and calls `visit` for one tile after the other.
   using VisitCondensation = std::function<void(std::size_t i, TileCondensation)>;
   void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const VisitCondensation& visit);
   UpdateMatrix join_children(std::int64_t node, const Pass& pass);
   void send_update(std::int64_t node, UpdateMatrix update);  // records it as well
   UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
                                bool check_seam_here);
-  // Bytes of the front of a node at work, in either direction; bytes of all values that wait for a parent or a child.
+  // The bytes of the front of a node during its elimination or the sweep down; the bytes of all updates and values that
+  // wait for a parent or a child.
   std::int64_t front_bytes(std::int64_t node) const;
   std::int64_t pending_update_bytes() const;
   // Condenses again the subtree of a node, which is on this rank alone.
   UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
   const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
-  // Marks the nodes of these subtrees. [nodes]
+  // Marks the nodes of these subtrees. The result has one entry for each node.
   std::vector<bool> nodes_of(const std::vector<std::int64_t>& subtrees) const;
-  // Takes over the part of the sweep that a killed run has done. Returns the nodes that are done.
+  // Takes over the finished part of the sweep of a killed run. Returns the nodes that are done.
   std::vector<bool> resume(const PassRecord& record);
-  // Records the sweep, if a record is due, after the front of a node is eliminated.
+  // Records the sweep after the front of a node is eliminated, if a record is due.
   void record(std::int64_t node, const UpdateMatrix& update);
-  // Whether the update of the node leaves the subtrees that are on this rank alone.
+  // Whether the parent of the node joins several ranks, or there is no parent: then the update leaves the subtrees of
+  // this rank.
   bool update_leaves(std::int64_t node) const;
-  // A sweep up with the datum in gauge_.
+  // Runs a sweep up with the datum in gauge_.
   UpReport condense_all(const Pass& pass);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   void find_gauges();
   double seam_probability() const;  // of a false alarm at one seam
   BlockGauge gather_gauge() const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
-  // A sweep down with the present factors: the steps of the unknowns of this rank's tiles, points excepted.
+  // Runs a sweep down with the present factors. Returns the steps of the unknowns of this rank's tiles, without points.
   std::vector<TileStep> steps_down(const Pass& pass);
   // Forms the trial states of these steps and calls `visit` for one tile after the other.
   using VisitTrial = std::function<void(std::size_t row, TileTrial)>;
@@ -150,10 +156,10 @@ class MergeTreeRunner : public TreeRunner {
   TreeCommunicator& ranks_;
   TileStore& tiles_;
   const NodeSolver& solver_;
-  PlanStore tile_plans_;                          // of tiles_
-  std::vector<TileGauge> gauges_, trial_gauges_;  // of tiles_, at their states and after a step
+  PlanStore tile_plans_;                          // the plans of tiles_
+  std::vector<TileGauge> gauges_, trial_gauges_;  // [tiles_] at the present states, and at the trial states
   std::vector<int> rank_of_node_;
-  std::vector<std::int64_t> own_tile_of_node_;  // row of tiles_, -1
+  std::vector<std::int64_t> own_tile_of_node_;  // row in tiles_; -1: no tile of this rank
   EliminationPlan plan_;
   std::vector<bool> on_one_rank_;                 // [nodes]: the whole subtree is this rank's
   FactorStore factors_;                           // of this rank's nodes
@@ -164,7 +170,7 @@ class MergeTreeRunner : public TreeRunner {
   bool with_columns_ = false;  // the sweep has the further right-hand sides of a free datum
   bool check_seams_ = false;
   bool posterior_expected_ = false;
-  std::optional<SubtreeSums> last_pass_;  // of a sweep at the present state that stored what the posterior needs
+  std::optional<SubtreeSums> last_pass_;  // sums of a sweep at the present state that stored the data of the posterior
   std::vector<SeamReport> seams_;
   SweepSeconds seconds_;
   std::int64_t peak_front_bytes_ = 0;

@@ -13,7 +13,7 @@ class DenseNodeSolver final : public NodeSolver {
     Front front(node.eliminated, node.passed, std::max(left.right_hand_sides, right.right_hand_sides));
     for (UpdateMatrix* child : {&left, &right}) {
       front.add(*child);
-      *child = UpdateMatrix();  // its memory is wanted
+      *child = UpdateMatrix();  // frees its memory
     }
     return std::move(front).eliminate(lambda);
   }

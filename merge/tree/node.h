@@ -1,5 +1,5 @@
-// The elimination at an inner node or the root of the merge tree. The runner of the tree (merge_tree_runner.h) moves
-// the updates up and the steps down.
+// Eliminates the unknowns of an inner node or of the root of the merge tree, and computes steps and covariances from
+// the factors. The runner of the tree (merge_tree_runner.h) sends the updates up and the steps down.
 #pragma once
 
 #include <vector>
@@ -9,24 +9,25 @@
 
 namespace megablock {
 
-// The interface of the solver of a node. A front that is too large for one rank would take another implementation,
-// which spreads it over several ranks; its factors, steps and covariances have the same form.
+// The interface of the solver of a node. A front that is too large for one rank needs another implementation, which
+// spreads the front over several ranks. Its factors, steps and covariances would have the same form.
 class NodeSolver {
  public:
   virtual ~NodeSolver() = default;
 
-  // Adds the children, left before right, damps the unknowns that complete at `node` and eliminates them.
+  // Adds the updates of the children, the left one first, damps the unknowns that are eliminated at `node`, and
+  // eliminates them.
   virtual Front::Result eliminate(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) const = 0;
 
-  // Step of the node's front (eliminated and passed unknowns) from the step of its parent's front; at the root `parent`
-  // is empty. The child's boundary step is inside it.
+  // The step of all unknowns of the node's front, from the step of its separator unknowns. `parent` has these unknowns
+  // and perhaps others; at the root it is empty.
   virtual Step back_substitute(const FrontFactor& factor, const Step& parent) const = 0;
 
-  // Covariance of the node's front from that of the unknowns that it passes to its parent.
+  // The covariance of the node's front from the covariance of its separator unknowns.
   virtual FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix passed) const = 0;
 };
 
-// The whole front in this process's memory (front.h). Stateless.
+// Keeps the whole front in the memory of this process (front.h). Stateless.
 const NodeSolver& dense_node_solver();
 
 }  // namespace megablock

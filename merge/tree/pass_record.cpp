@@ -106,7 +106,7 @@ std::optional<PassRecord> PassRecordFiles::read() const {
     if (std::accumulate(sizes.begin(), sizes.end(), static_cast<std::int64_t>(size)) > scratch_->budget())
       return std::nullopt;
     return record;
-  } catch (const StoreError&) {  // cut short
+  } catch (const StoreError&) {  // the record ends too early
     return std::nullopt;
   }
 }

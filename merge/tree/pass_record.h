@@ -1,9 +1,9 @@
-// The record of a sweep up, from which a killed run resumes in the middle of the sweep. It holds the updates of
-// finished subtrees. The factors of their nodes are in the scratch directory of the rank, or are copied there
-// (memory.h). A resumed sweep has the same bits, because it reads back the values that were computed.
+// Records a sweep up, so that a killed run resumes in the middle of the sweep. The record holds the updates of finished
+// subtrees. The factors of their nodes are in the scratch directory of the rank, or are copied there (memory.h). A
+// resumed sweep has the same bits, because it reads the computed values back.
 //
-// A record survives the process, but not a restart of the machine: nothing is forced to the disk. A record of an
-// earlier start of the machine, or of another machine, is ignored, and the sweep begins again.
+// A record survives the process, but not a restart of the machine, because nothing is forced to the disk. A record of
+// an earlier start of the machine or of another machine is ignored, and the sweep begins again.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +22,11 @@ namespace megablock {
 struct PassRecord {
   std::uint64_t state = 0;             // hash of the state at which the sweep linearises
   std::uint64_t pass = 0;              // hash of this state and of the kind of the sweep
-  Bytes position;                      // where the global adjustment stands, as its owner writes it
-  std::int64_t tiles = 0;              // number of them in the finished subtrees
-  std::vector<std::int64_t> subtrees;  // nodes whose subtree is finished, none within another's
-  std::vector<std::int64_t> factors;   // nodes of the subtrees whose factors are in scratch
-  std::vector<SeamReport> seams;       // of the nodes of the subtrees, where the sweep checks seams
+  Bytes position;                      // position of the global adjustment, as its owner writes it
+  std::int64_t tiles = 0;              // number of tiles in the finished subtrees
+  std::vector<std::int64_t> subtrees;  // top nodes of the finished subtrees; no subtree contains another
+  std::vector<std::int64_t> factors;   // nodes of these subtrees whose factors are in scratch
+  std::vector<SeamReport> seams;       // of the nodes of these subtrees, where the sweep checks seams
 };
 
 // The record of one rank in its scratch directory.
@@ -34,16 +34,18 @@ class PassRecordFiles {
  public:
   explicit PassRecordFiles(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
 
-  // Writes the update of a subtree. It comes before the record that names it. False when there is no room.
+  // Writes the update of a subtree. Call it before writing the record that names the subtree. Returns false when there
+  // is no room.
   bool write_update(std::int64_t node, const UpdateMatrix& update) const;
   // Throws StoreError.
   UpdateMatrix read_update(std::int64_t node) const;
   void remove_update(std::int64_t node) const;
 
-  // Replaces the record as a whole. False when there is no room, or when this system does not tell when it was started.
+  // Replaces the whole record. Returns false when there is no room, or when the system does not tell when the machine
+  // was started.
   bool write(const PassRecord& record) const;
-  // Returns nothing when there is no record, when it is of another start of the machine, when files that it names are
-  // missing or have another size, or when they exceed the budget of the scratch directory.
+  // Returns nothing when there is no record or when it is of another start of the machine; also when files that it
+  // names are missing, have another size, or exceed the budget of the scratch directory.
   std::optional<PassRecord> read() const;
   void remove() const;  // the record alone
   void remove_files_of(const PassRecord& record) const;
@@ -51,7 +53,7 @@ class PassRecordFiles {
   void keep_only(const std::optional<PassRecord>& record) const;
 
  private:
-  std::vector<std::int64_t> sizes_of(const PassRecord& record) const;  // of its files; empty: one is not there
+  std::vector<std::int64_t> sizes_of(const PassRecord& record) const;  // sizes of its files; empty when one is missing
 
   std::shared_ptr<ScratchSpace> scratch_;
 };

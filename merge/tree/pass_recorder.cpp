@@ -41,7 +41,7 @@ PassRecord PassRecorder::begin(const Kind& kind) {
     written_.insert(found->subtrees.begin(), found->subtrees.end());
     return *found;
   }
-  files_.remove();  // before anything that it names is written over
+  files_.remove();  // before the files that it names are overwritten
   if (found) files_.remove_files_of(*found);
   for (const std::int64_t node : written_) files_.remove_update(node);
   written_.clear();

@@ -1,8 +1,8 @@
-// Writes the record of a sweep up while it runs (pass_record.h), and finds the record of a killed run.
+// Writes the record of a sweep up while the sweep runs (pass_record.h), and finds the record of a killed run.
 //
-// A record is due when the work since the last one took the given time, and also a second for every 20 MB that it will
-// write, so that records cost a few percent at most. Once a graceful stop is requested a record is due after every
-// subtree, because the sweep may take longer than the process has left.
+// A record is due when the work since the last one took the given time, and also a second for every 20 MB of the new
+// record. Records therefore cost a few percent of the time at most. When a graceful stop is requested, a record is due
+// after every subtree, because the sweep may take longer than the process has left.
 #pragma once
 
 #include <functional>
@@ -20,40 +20,41 @@ namespace megablock {
 
 class PassRecorder {
  public:
-  // Where the global adjustment stands: a hash of the state at which sweeps linearise and of the distribution of tiles
-  // to ranks, and the data that a resumed run needs.
+  // The position of the global adjustment: a hash of the state at which sweeps linearise and of the distribution of
+  // tiles to ranks, and the data that a resumed run needs.
   struct Position {
     std::uint64_t state = 0;
     Bytes bytes;
   };
-  // The properties of a sweep, besides the state, that decide its bits.
+  // The properties of a sweep, besides the state, on which its bits depend.
   struct Kind {
     Pass pass;
     bool seams = false, columns = false;
   };
 
-  // `seconds` between records; 0: one after every subtree. `stop_requested`: whether the process is asked to stop.
+  // `seconds`: time between two records; 0: a record after every subtree. `stop_requested` says whether the process is
+  // asked to stop.
   PassRecorder(
       std::shared_ptr<ScratchSpace> scratch, double seconds,
       std::function<bool()> stop_requested = [] { return false; });
 
-  // The record that was found, of any sweep.
+  // The record of a killed run, of any sweep.
   const std::optional<PassRecord>& found() const { return found_; }
   // Call it before anything is written to the scratch directory. It removes everything that an earlier run left there
   // except the record, if that is of this state.
   void keep_found(std::uint64_t state);
   void set_position(std::function<Position()> position) { position_ = std::move(position); }
 
-  // Begins a sweep. Returns what a killed run has done of it; an empty record if nothing.
+  // Begins a sweep. Returns the finished part of the same sweep of a killed run, or an empty record.
   PassRecord begin(const Kind& kind);
   UpdateMatrix read_update(std::int64_t node) const { return files_.read_update(node); }
 
   // Whether a record of so many bytes is due. `leaves`: the update of the subtree goes to another rank or into a front
-  // of several ranks, from where it cannot be read later.
+  // of several ranks, and cannot be read from there later.
   bool due(std::int64_t bytes, bool leaves) const;
-  // Writes the updates of finished subtrees, which a record may name afterwards. False when there is no room.
+  // Writes the updates of finished subtrees, so that a record can name them. Returns false when there is no room.
   bool write_updates(const std::map<std::int64_t, const UpdateMatrix*>& updates);
-  // `record`: tiles, subtrees, factors, seams. Updates that it does not name are removed.
+  // Writes `record` with its tiles, subtrees, factors and seams. Removes the updates that it does not name.
   void write(PassRecord record);
   void give_up() { given_up_ = true; }  // no further record of this sweep
 
@@ -63,7 +64,7 @@ class PassRecorder {
   std::function<bool()> stop_requested_;
   std::function<Position()> position_;
   std::optional<PassRecord> found_;
-  // Of the present sweep.
+  // These two belong to the present sweep.
   Position at_;
   std::uint64_t pass_ = 0;
   double begin_s_ = 0, last_s_ = 0;

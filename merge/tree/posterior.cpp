@@ -1,4 +1,5 @@
-// At the solution: seams, datum, covariances and the checks of tiles.
+// Computes what the adjusted block needs besides its state: the seam checks, the datum, the covariances, and the checks
+// of the tiles.
 #include <algorithm>
 #include <utility>
 
@@ -14,7 +15,7 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   if (last_pass_) {
     posterior.sums = *std::exchange(last_pass_, std::nullopt);
   } else {
-    find_gauges();  // states may have followed what other tiles moved
+    find_gauges();  // frames, cameras and mounts may have moved with other tiles
     gauge_ = gather_gauge();
     with_columns_ = gauge_.free();
     posterior.sums = condense_all(0).sums;

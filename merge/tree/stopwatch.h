@@ -1,16 +1,16 @@
-// Wall clock of the sweeps over the merge tree.
+// Measures the wall clock of the sweeps over the merge tree.
 #pragma once
 
 #include <chrono>
 
 namespace megablock {
 
-// Seconds on a clock that only goes forward.
+// Seconds on a clock that never goes back.
 inline double clock_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// Adds the time of its life to a sum, seconds.
+// Adds the seconds of its own lifetime to a sum.
 class Stopwatch {
  public:
   explicit Stopwatch(double& sum) : sum_(sum), start_(clock_seconds()) {}

@@ -1,4 +1,4 @@
-// The sweep down: the step of every unknown, and the trial state that it leads to.
+// The sweep down: computes the step of every unknown, and the trial state after the step.
 #include <utility>
 
 #include "geometry/threads/rounds.h"
@@ -49,7 +49,7 @@ DownReport MergeTreeRunner::down(const Pass& pass) {
     double damping_norm = 0, trial_cost = 0;
   };
   const Stopwatch watch(seconds_.all);
-  last_pass_.reset();  // factors that are computed again have not what the posterior needs
+  last_pass_.reset();  // factors that are computed again lack what the posterior needs
   std::vector<TileStep> steps = steps_down(pass);
   std::vector<MotionSums> own;
   for (std::size_t row = 0; row < tiles_.size(); ++row) {

@@ -1,4 +1,4 @@
-// The sweep up: tiles are condensed and fronts eliminated, children before parents.
+// The sweep up: condenses tiles and eliminates fronts, children before parents.
 #include <algorithm>
 #include <iterator>
 #include <set>
@@ -63,9 +63,9 @@ UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass
   return eliminate_inner(node, std::move(left), std::move(right), pass, false);
 }
 
-// The memory of a front: the eliminated columns, and the update once as a full matrix and once as a triangle. The
+// The memory of a front holds the eliminated columns, and the update once as a full matrix and once as a triangle. The
 // covariances need as much. The check of a seam works on a copy of the update. A tile has no front of all its unknowns,
-// because the fronts of its cells are small.
+// because its cells are eliminated in small fronts.
 std::int64_t MergeTreeRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
@@ -90,7 +90,7 @@ const NodeFactors& MergeTreeRunner::factors_of(std::int64_t node, const Pass& pa
 UpReport MergeTreeRunner::up(const Pass& pass) {
   const Stopwatch watch(seconds_.all);
   ++seconds_.sweeps_up;
-  // The datum is taken at the present state, not at the first one, so that a resumed run gets the same bits.
+  // The datum belongs to the present state, not to the first one, so that a resumed run gets the same bits.
   gauge_ = gather_gauge();
   last_pass_.reset();
   check_seams_ = posterior_expected_ && pass.lambda == 0 && !pass.curvature && !gauge_.free();
@@ -158,8 +158,8 @@ UpdateMatrix MergeTreeRunner::join_children(std::int64_t n, const Pass& pass) {
   return eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
 }
 
-// Records, messages and fronts above the tiles come one after the other, in the order of the nodes; meanwhile other
-// threads are ahead at the next tile.
+// One thread makes records, sends messages and eliminates the fronts of inner nodes, in the order of the nodes. The
+// other threads work ahead on the next tile meanwhile.
 void MergeTreeRunner::condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass,
                                      const VisitCondensation& visit) {
   std::vector<std::unique_ptr<TileCondenser>> tiles(leaves.size());
@@ -196,8 +196,8 @@ UpReport MergeTreeRunner::condense_all(const Pass& pass) {
     if (mine(n) && plan_.nodes[static_cast<std::size_t>(n)].leaf >= 0 && !done[static_cast<std::size_t>(n)])
       leaves.push_back(n);
   leaves.push_back(std::ssize(plan_.nodes));
-  std::int64_t next = 0;  // node
-  // What is between two tiles: nodes above tiles, and those that the record has.
+  std::int64_t next = 0;  // next node to visit
+  // Handles the nodes between two tiles: inner nodes, and nodes that the record of a killed run has.
   const auto advance_to = [&](std::int64_t leaf) {
     for (; next < leaf; ++next) {
       if (!mine(next)) continue;

@@ -1,4 +1,5 @@
-// Values on their way down the merge tree: a step or covariances of the unknowns that a node passes to its parent.
+// Sends values down the merge tree: each child gets from its parent the steps or covariances of its separator unknowns.
+// These are the unknowns that the sweep up left uneliminated in the child and sent to the parent as its update.
 // Internal to merge/tree/.
 #pragma once
 
@@ -6,8 +7,9 @@
 
 namespace megablock {
 
-// Messages of the two directions never mix: an upward pass has ended everywhere (its root is broadcast) before a
-// downward one begins, and the other way round (its sums are gathered).
+// The messages of sweeps up and sweeps down never mix. A sweep up has ended on all ranks before a sweep down begins,
+// because the values of its root are broadcast. A sweep down has ended on all ranks before the next sweep up begins,
+// because its sums are gathered.
 template <typename Values>
 void MergeTreeRunner::pass_down(std::int64_t n, const Values& front) {
   const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];

@@ -16,9 +16,10 @@ namespace megablock {
 
 namespace {
 
-constexpr double kSettled = 1e-2;  // sigmas, of a point at held poses: the next step moves them on
+// sigmas: a point nearer to its optimum at held poses is left there, because the next step moves the poses on
+constexpr double kSettled = 1e-2;
 
-// Passes over a tree of one leaf.
+// The sweeps over a tree of one leaf.
 class LoneTile : public TreeRunner {
  public:
   LoneTile(const TileProblem& problem, const TilePlan& plan, TileState& state)
@@ -61,11 +62,12 @@ class LoneTile : public TreeRunner {
   BlockGauge gauge_;
 };
 
-// Damping that a start deserves. Where residuals are many sigmas, steps without damping go astray: measured on street
-// rigs 2 m and 1 degree off, a tenth of them ended in another minimum. Where they are a few sigmas, damping only holds
-// back the weak modes; so it does where all positions are held, and the attitudes' errors are all that is to be found.
+// The damping with which the iterations of a tile start. Where residuals are many sigmas, undamped steps go astray: of
+// street rigs that were 2 m and 1 degree off, a tenth ended in another minimum. Where residuals are a few sigmas,
+// damping only holds back the weak modes. The same is true where all positions are held and only the attitudes are
+// wrong.
 double initial_lambda(const TileProblem& problem, const TilePlan& plan, double cost) {
-  constexpr double kPoor = 10;  // cost per observation; half is what noise costs
+  constexpr double kPoor = 10;  // cost per observation; noise alone costs half of it
   constexpr double kFar = 1e-2, kNear = 1e-10;
   const auto held_frames = std::count_if(problem.positions.begin(), problem.positions.end(),
                                          [](const auto& term) { return held(term.prior); });

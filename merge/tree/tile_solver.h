@@ -1,9 +1,10 @@
 // Solves the adjustment of a single tile with the condensation of the merge. cluster/ gives this solver to adjust_tile,
 // because adjust/ must not include merge/.
 //
-// The tile is a block of its own, of one leaf, and its steps are those of the global adjustment (global_adjustment.h):
-// points eliminated one by one, cells of 32 frames as dense fronts, the curvature of the losses, steps that turn the
-// whole tile applied as a similarity. It ends when the cost hardly falls, as a tile is only a start for the block.
+// The tile is treated as a block with a tree of one leaf, and its iterations are those of the global adjustment
+// (global_adjustment.h): points are eliminated one by one, cells of 32 frames are dense fronts, the curvature of the
+// losses is taken, and the part of a step that turns the whole tile is applied as a similarity. The iterations end when
+// the cost hardly falls, because a tile is only a start for the block.
 //
 // A tile may start metres away from its optimum. Three measures make it converge from there. Damping starts high where
 // residuals are many sigmas, and falls while steps decrease the cost as predicted. A step that moves a point behind a
@@ -15,7 +16,7 @@
 
 namespace megablock {
 
-// As TileSolver; deterministic.
+// A TileSolver of adjust_tile. Deterministic.
 AdjustSummary solve_by_condensation(const TileProblem& problem, TileState& state, const SolveOptions& options);
 
 }  // namespace megablock

@@ -1,5 +1,5 @@
-// The messages that the runner of the merge tree needs between ranks. merge/ knows no MPI: cluster/mpi/communicator.h
-// is the communicator of a run over ranks, OneProcess the trivial case of a single process.
+// The messages between ranks that the runner of the merge tree needs. It is an interface, because merge/ does not know
+// MPI: the communicator of cluster/mpi/communicator.h sends messages between ranks, and OneProcess is for one process.
 #pragma once
 
 #include <string>
@@ -16,18 +16,18 @@ class TreeCommunicator {
   virtual int rank() const = 0;  // of this process, 0 ... size() - 1
   virtual int size() const = 0;
 
-  // Collective: every rank calls them in the same order. They return when this rank has what it asked for.
+  // Collective: every rank makes these calls in the same order. A call returns when this rank has its result.
   virtual std::string broadcast(const std::string& bytes, int root) = 0;      // the root's bytes, on every rank
   virtual std::vector<std::string> gather_all(const std::string& bytes) = 0;  // every rank's bytes, in rank order
 
-  // Point to point. Messages between two ranks are told apart by their tag (>= 0); a tag is used once in a sweep.
-  // send() returns at once, flush_sends() when all messages of this rank have left.
+  // Point to point. The tag (>= 0) tells the messages between two ranks apart; a tag is used once in a sweep. send()
+  // returns at once; flush_sends() returns when all messages of this rank have left.
   virtual void send(int to, int tag, std::string bytes) = 0;
   virtual std::string receive(int from, int tag) = 0;
   virtual void flush_sends() = 0;
 };
 
-// One rank: nobody sends anything.
+// A run of one rank, where no message is sent.
 class OneProcess : public TreeCommunicator {
  public:
   int rank() const override { return 0; }
