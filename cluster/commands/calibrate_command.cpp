@@ -23,7 +23,7 @@ const std::map<std::string, MountFreedom> kMounts = {{"stated", MountFreedom::kS
 
 constexpr const char* kCalibration = "calibration.yaml";
 
-// An option with named values.
+// Adds an option whose values have names.
 template <typename Value>
 void add_choice(CLI::App& command, const std::string& name, Value& value, const std::map<std::string, Value>& values,
                 const std::string& usual, const std::string& help) {
@@ -49,13 +49,17 @@ void add_rig_options(CLI::App& command, CalibrationSettings& settings) {
       ->check(CLI::ExistingFile);
   command.add_option("--held-out", rig.held_out_share, "Share of the points held out for that decision")
       ->capture_default_str();
-  command.add_option("--max-position-sigma", rig.max_position_sigma_m, "Of a mount, m; above: warning")
+  command
+      .add_option("--max-position-sigma", rig.max_position_sigma_m,
+                  "Largest sigma of a mount's position, m; above it: warning")
       ->capture_default_str();
-  command.add_option("--max-rotation-sigma", rig.max_rotation_sigma_deg, "Of a mount, degrees; above: warning")
+  command
+      .add_option("--max-rotation-sigma", rig.max_rotation_sigma_deg,
+                  "Largest sigma of a mount's rotation, degrees; above it: warning")
       ->capture_default_str();
   command
       .add_option("--min-quadrant", rig.min_quadrant_measurements,
-                  "Measurements in a quadrant of a sensor; below: warning")
+                  "Fewest measurements in a quadrant of a sensor; below it: warning")
       ->capture_default_str();
   command.add_flag("--json", settings.json, "Figures as JSON");
 }
@@ -82,7 +86,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   add_log_level(*command, options->log.level);
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   add_rig_options(*command, *settings);
-  auto modes = std::make_shared<std::vector<CalibrateMode>>();  // each added here by a function of its own file
+  auto modes = std::make_shared<std::vector<CalibrateMode>>();  // a function of its own file adds each of them
   modes->push_back(add_panoramic(*command));
   modes->push_back(add_compare_models(*command));
   command->callback([=, &action, &ranks] {
@@ -90,7 +94,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
       on_first_rank(ranks, [&] {
         const std::vector<std::string> inputs = inputs_of(options->project, "calibration");
         check_output(options->directory + "/" + kCalibration, inputs, kCalibration);
-        // That of rigs goes on in its own job directory; other modes have none.
+        // The calibration of rigs continues in its own job directory; other modes have none.
         if (std::ranges::any_of(*modes, [](const CalibrateMode& mode) { return mode.chosen(); }))
           check_output(options->directory, inputs);
         return std::string();

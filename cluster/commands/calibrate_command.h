@@ -12,8 +12,8 @@ namespace megablock {
 class Communicator;
 struct RunOptions;
 
-// A mode of `calibrate` besides the calibration of rigs. It adds its options to the command. When one of these options
-// is given, the mode runs instead, with the project and the folder (RunOptions::directory) of the command.
+// A mode of `calibrate` besides the calibration of rigs. It adds its options to the command. If one of these options is
+// given, the mode runs instead, with the project and the folder (RunOptions::directory) of the command.
 struct CalibrateMode {
   std::function<bool()> chosen;               // whether one of its options is given; asked after parsing
   std::function<int(const RunOptions&)> run;  // exit code

@@ -35,7 +35,7 @@ struct PanoramicSettings {
   double image_sigma_px = 0;  // 0: that of the project
 };
 
-// The measurements of one camera, each track an image once.
+// The observations of one camera. Each track has at most one observation in an image.
 PanoramicTracks tracks_of(const CalibrationInput& input, CameraIndex camera) {
   PanoramicTracks result;
   std::map<ImageIndex, int> number;

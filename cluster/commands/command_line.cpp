@@ -49,7 +49,7 @@ namespace megablock {
 
 namespace {
 
-// Path of a finished job's result; warns of one that is older than what was asked since.
+// The path of a finished job's result. Warns when the result is older than the last request to the job.
 std::string finished_result(const std::string& job) {
   const JobStore store(job);
   if (!std::filesystem::exists(store.path("job.json")))
@@ -63,7 +63,7 @@ std::string finished_result(const std::string& job) {
 void add_init(CLI::App& app, Action& action) {
   auto options = std::make_shared<InitOptions>();
   CLI::App* command = app.add_subcommand("init", "Scan images (EXIF, XMP) and write the project file");
-  command->footer("Example: megablock init photos -o block.yaml");
+  command->footer("Example: megablock init images -o block.yaml");
   command->add_option("images", options->images, "Folder of images, searched recursively")->required();
   command->add_option("-o,--output", options->output, "Project file to write")->check(named())->capture_default_str();
   command->add_option("--control", options->gcp_file, "Control points: gcp_list.txt, OpenSfM JSON or CSV");
@@ -107,15 +107,15 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
       ->add_option(
           "--scratch", options->scratch_mib,
           "All files per rank in the job's scratch during the merge, MiB; beyond it (0: at once) tiles stay in memory, "
-          "factors are computed again, passes are not recorded")
+          "factors are computed again, sweeps are not recorded")
       ->check(mebibytes(kMostMib));
   command
       ->add_option(
           "--record", options->record_s,
-          "Seconds of a pass of the merge after which what is done of it is kept in the job's scratch, so that a "
-          "killed run goes on in its middle; 0: after every tile")
+          "Seconds of work in a sweep of the merge between two records in the job's scratch, from which a killed "
+          "run resumes; 0: a record after every tile")
       ->check(not_negative());
-  auto level = std::make_shared<std::string>();  // taken before there is a parser
+  auto level = std::make_shared<std::string>();  // read before there is a parser
   command
       ->add_option(kArithmeticOption, *level,
                    "Of the whole job, avx2 or avx512: faster dense algebra, other last digits. Default: avx2")
@@ -141,7 +141,7 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
 int watch(const JobStore& store) {
   const bool terminal = isatty(STDOUT_FILENO) != 0;
   for (;;) {
-    const bool done = job_is_done(store);  // before the text, which then shows the end
+    const bool done = job_is_done(store);  // asked before the text, so that the text shows the end
     std::printf("%s%s", terminal ? "\033[H\033[J" : "", for_terminal(status_text(store)).c_str());
     std::fflush(stdout);
     if (done) return kExitDone;
@@ -325,7 +325,7 @@ std::string unknown_command_message(const CLI::App& app, const std::string& name
          (nearest.empty() ? "see 'megablock --help'" : "did you mean '" + nearest + "'?");
 }
 
-// A misspelled option is named first: one that is missing may be what was meant by it.
+// A misspelled option is named first, because a missing option may be the one that was meant.
 std::string usage_message(const CLI::App& command, const std::string& name, const CLI::Error& error) {
   std::vector<std::string> known;
   for (const CLI::Option* option : command.get_options([](const CLI::Option* o) { return o->nonpositional(); }))
@@ -340,7 +340,8 @@ std::string usage_message(const CLI::App& command, const std::string& name, cons
   return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
 }
 
-// 'help', no command at all, or an unknown one: the exit code, the same on every rank; one of them says why.
+// Answers 'help', no command at all, and an unknown command. Returns the exit code, the same on every rank; only one
+// rank writes the message.
 std::optional<int> answer_without_command(const CLI::App& app, int argc, char** argv, bool speaks) {
   const std::string name = argc > 1 ? argv[1] : "";
   if (name.empty() || name == "help") {
@@ -364,7 +365,7 @@ std::string as_words(std::string text) {
   return " " + text + " ";
 }
 
-// What must be otherwise is named as it was given: "--min-frames 9: min_frames must be 3 or 4".
+// Names a wrong value as the user gave it: "--min-frames 9: min_frames must be 3 or 4".
 std::string with_given_value(const CLI::App& app, const std::string& message) {
   const std::size_t end = message.find(" must ");
   if (end == std::string::npos) return message;
@@ -382,7 +383,8 @@ std::string with_given_value(const CLI::App& app, const std::string& message) {
   return given + message;
 }
 
-// An error all ranks agree on is said once; one that a single rank has ends the others, which would wait for it.
+// Runs the action. An error that all ranks agree on is reported once. An error of a single rank ends the others, which
+// would wait for it.
 int run_action(const CLI::App& app, const Action& action, Communicator& ranks) {
   try {
     return action();
@@ -419,7 +421,7 @@ int command_line(int argc, char** argv) {
     limit_libraries_to_one_thread();
     Communicator ranks(&argc, &argv);
     Action action;  // of all ranks together
-    Action by_one;  // of a command that knows nothing of ranks: the first one's
+    Action by_one;  // of a command that knows nothing of ranks; only the first rank runs it
     add_init(app, by_one);
     add_run(app, action, ranks, "run", "", "Run all stages; the same command again resumes");
     for (const Stage& stage : all_stages())

@@ -29,14 +29,15 @@ namespace {
 using Solver = CoplanarityOptions::Solver;
 const std::map<std::string, Solver> kSolvers = {{"lsqr", Solver::kLsqr}, {"direct", Solver::kDirect}};
 
-// The normal equations of all angles are one full matrix: 3 million numbers, a few seconds.
+// The normal equations of all angles are one full matrix. For this many frames it has 3 million numbers and takes a few
+// seconds.
 constexpr std::size_t kMostFrames = 600;
 
 struct CoplanarityCommand {
   std::string job, output, hold = "none", solver = "lsqr";
-  double forcing = 0.02;       // published
-  double angle_sigma_deg = 0;  // 0: of the observed attitudes
-  double image_sigma_px = 0;   // 0: of the job
+  double forcing = 0.02;       // the published value
+  double angle_sigma_deg = 0;  // 0: that of the observed attitudes
+  double image_sigma_px = 0;   // 0: that of the job
   int steps = 1;
   bool json = false;
 };
@@ -78,7 +79,7 @@ double rms_shift(const CoplanarityNetwork& before, const CoplanarityNetwork& aft
   return std::sqrt(squares / static_cast<double>(before.image.size()));
 }
 
-// An infinite condition: null.
+// The figures as JSON; an infinite condition becomes null.
 std::string figures_json(const CoplanarityBlock& block, const CoplanaritySolution& found) {
   const CoplanarityDiagnosis& d = found.diagnosis;
   const double condition = d.angle_condition();

@@ -1,4 +1,4 @@
-// The command `coplanarity`: computes the attitudes of the frames of a job by the determinant method
+// The command `coplanarity` computes the attitudes of the frames of a job by the determinant method
 // (adjust/coplanarity/coplanarity_adjustment.h).
 #pragma once
 

@@ -1,4 +1,4 @@
-// The command `diagnose`: finds gaps, weak links and missing overlap of a block, before or after its adjustment
+// The command `diagnose` finds gaps, weak links and missing overlap of a block, before or after its adjustment
 // (Kalantari 2009).
 #pragma once
 

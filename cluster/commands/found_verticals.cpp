@@ -13,7 +13,7 @@ namespace megablock {
 
 namespace {
 
-constexpr std::uint64_t kFormat = 1;  // the file's fingerprint
+constexpr std::uint64_t kFormat = 1;  // fingerprint of the file
 
 using ByKey = std::unordered_map<std::uint64_t, PictureVertical>;
 
@@ -78,7 +78,7 @@ void FoundVerticals::save() {
       if (!(out << text).flush()) throw StoreError(path + ": cannot be written");
     });
   } catch (const std::exception&) {
-    // The table goes to the same disk, and its writing says what is wrong with it.
+    // The table is written to the same disk, and that error says what is wrong.
   }
   saved_ = true;
 }

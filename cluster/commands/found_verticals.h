@@ -1,9 +1,9 @@
 // The verticals that the command `verticals` has found so far, in a file beside its table. A run after a kill, or one
 // with more images, reads only the images that are not in the file.
 //
-// A sealed text file (io/store/job/job_store.h): for each image a line "key found roll segments length",
-// then its row of the table, of `length` bytes. The key is the hash of everything on which the row depends. Images that
-// could not be read are not in the file.
+// The file is a sealed text file (io/store/job/job_store.h). For each image it has a line "key found roll segments
+// length", and then its row of the table, of `length` bytes. The key is the hash of everything on which the row
+// depends. Images that could not be read are not in the file.
 #pragma once
 
 #include <cstdint>

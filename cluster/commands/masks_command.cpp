@@ -40,13 +40,13 @@ struct MasksOptions {
 // The mask proposed for a camera.
 struct Proposal {
   std::string camera, file;  // file: empty when nothing is masked, or the camera could not be judged
-  int images = 0;            // looked at
+  int images = 0;            // images that were compared
   double masked = 0;         // share of the image
   std::string note;
   std::string preview;  // JPEG of an image with the mask over it
 };
 
-// The images of every camera in order of acquisition, without those taken where the one before was.
+// The images of every camera in order of acquisition, without those taken at the same place as the one before.
 IndexedVector<CameraIndex, std::vector<ImageIndex>> images_to_look_at(const Block& block,
                                                                       const StaticRegionOptions& options) {
   IndexedVector<CameraIndex, std::vector<ImageIndex>> chosen(block.cameras.size());
@@ -83,7 +83,7 @@ IndexedVector<CameraIndex, std::vector<ImageIndex>> images_to_look_at(const Bloc
 }
 
 struct Judged {
-  cv::Mat mask;    // empty: not judged
+  cv::Mat mask;    // empty: the camera was not judged
   cv::Mat sample;  // an image in the middle of the drive
   int images = 0;
   std::string failure;
@@ -157,7 +157,7 @@ Proposal propose(const Block& block, const Camera& camera, const std::vector<Ima
   const std::string png(bytes.begin(), bytes.end());
   if (!fs::exists(file)) {
     JobStore(options.output).write_text(file.filename().string(), png);
-  } else if (!holds(file, png)) {  // else it is this proposal, of an earlier run
+  } else if (!holds(file, png)) {  // else the file is this proposal, from an earlier run
     proposal.note = file.string() + " is there already and stays as it is";
     return proposal;
   }
@@ -178,7 +178,7 @@ std::string base64(const std::string& bytes) {
   return text;
 }
 
-// What is said of a camera: "16 images, 3.5 % masked; ...".
+// The line about a camera: "16 images, 3.5 % masked; ...".
 std::string finding(const Proposal& p) {
   std::string text = fmt::format("{} images", p.images);
   if (p.masked > 0) text += fmt::format(", {:.1f} % masked", 100 * p.masked);
@@ -207,7 +207,8 @@ int propose_masks(MasksOptions options) {
   const Project project = read_project(options.project);
   const Block& block = project.block;
   if (!has_pictures(block))
-    throw InputError(options.project + ": the project has no pictures; masks are found from what they show");
+    throw InputError(options.project +
+                     ": the project has no image files, from which masks are found; give 'images' in it");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "mask_proposals").string();
   check_output((fs::path(options.output) / kPage).string(), inputs_of(options.project));
   make_folder(options.output);

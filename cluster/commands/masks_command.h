@@ -1,4 +1,4 @@
-// The command `masks`: proposes a mask for each camera from the parts of its images that never change, such as the
+// The command `masks` proposes a mask for each camera. It masks the parts of its images that never change, such as the
 // vehicle (Cannelle 2013).
 #pragma once
 

@@ -79,12 +79,12 @@ std::string quoted(const std::string& name, bool json) {
   return text + "\"";
 }
 
-// NaN: an empty cell, null.
+// A number; NaN becomes an empty cell, or null.
 std::string number(float value, bool json) {
   return std::isfinite(value) ? fmt::format("{:.4f}", value) : json ? "null" : "";
 }
 
-// adjusted: with what the result says of the rows.
+// `adjusted`: with the columns from the result.
 std::string table(const MeasurementStore& store, const Measurements& rows, bool adjusted, bool json) {
   std::vector<ImageIndex> images = rows.image;
   std::sort(images.begin(), images.end());
@@ -131,7 +131,7 @@ int measurements(const MeasurementsOptions& options) {
 
 void add_measurements(CLI::App& app, std::function<int()>& action) {
   auto options = std::make_shared<MeasurementsOptions>();
-  CLI::App* command = app.add_subcommand("measurements", "Measurements of tie points in some images, or about a place");
+  CLI::App* command = app.add_subcommand("measurements", "List tie point observations in some images, or near a place");
   command->footer(
       "Example: megablock measurements job --image 0001.jpg --image 0002.jpg -o rows.csv\n"
       "         megablock measurements job --near 120,85 --radius 10");
@@ -145,7 +145,7 @@ void add_measurements(CLI::App& app, std::function<int()>& action) {
       ->type_name("EAST,NORTH[,UP]")
       ->expected(1, 3)
       ->allow_extra_args(false);
-  command->add_option("--radius", options->radius_m, "About that position, m: of the adjusted points")
+  command->add_option("--radius", options->radius_m, "Radius about that position, within which adjusted points lie, m")
       ->check(positive());
   command->add_option("-o,--output", options->output, "File to write instead of standard output")->check(named());
   command->add_flag("--json", options->json, "JSON instead of CSV");

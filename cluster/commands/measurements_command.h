@@ -1,4 +1,4 @@
-// The command `measurements`: lists the observations of tie points in some images or near a place (Cannelle 2013).
+// The command `measurements` lists the tie point observations in some images or near a place (Cannelle 2013).
 #pragma once
 
 #include <functional>

@@ -80,8 +80,8 @@ void add_resect(CLI::App& app, std::function<int()>& action) {
       ->required();
   command->add_flag("--without-trajectory", options->without_trajectory,
                     "Without approximate poses: three points are then ambiguous");
-  command->add_option("--min-points", r.min_points, "Agreeing points, at least")->capture_default_str();
-  command->add_option("--max-error", r.max_error_sigmas, "Residual of an agreeing measurement, sigmas")
+  command->add_option("--min-points", r.min_points, "Fewest inlier points")->capture_default_str();
+  command->add_option("--max-error", r.max_error_sigmas, "Largest residual of an inlier, sigmas")
       ->capture_default_str();
   command->add_option("--max-sigma", r.max_position_sigma_m, "Sigma of the position above which a pose is refused, m")
       ->capture_default_str();
@@ -139,10 +139,13 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
   command->add_option("--max-sigma", s.pairs.max_position_sigma_m, "2x2: sigma above which a place is refused, m")
       ->capture_default_str();
   command
-      ->add_option("--chain-sigma", s.trajectory.chain_position_sigma_m,
-                   "Of successive frames, m; 0: as stated, with --chain-rotation-sigma 0")
+      ->add_option(
+          "--chain-sigma", s.trajectory.chain_position_sigma_m,
+          "Sigma of the relative positions of successive frames, m; 0: as stated, with --chain-rotation-sigma 0")
       ->capture_default_str();
-  command->add_option("--chain-rotation-sigma", s.trajectory.chain_rotation_sigma_deg, "Of successive frames, degrees")
+  command
+      ->add_option("--chain-rotation-sigma", s.trajectory.chain_rotation_sigma_deg,
+                   "Sigma of the relative rotations of successive frames, degrees")
       ->capture_default_str();
   command->add_flag_callback(
       "--no-registrations", [options] { options->settings.use_registrations = false; },

@@ -1,4 +1,4 @@
-// The commands `resect` (poses from control points) and `register` (registration of a trajectory).
+// The commands `resect` (poses of frames from control points) and `register` (registration of a trajectory).
 #pragma once
 
 #include <functional>

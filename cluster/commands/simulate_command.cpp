@@ -38,7 +38,8 @@ std::vector<std::string> names_in(const std::map<std::string, Value>& map) {
   return names;
 }
 
-// What an option has an effect on: scenes (none named: all of them), and what is made of them.
+// The scenes on which an option has an effect (none named: all of them), and whether it concerns tie points or rendered
+// images.
 struct Effect {
   std::vector<std::string> scenes;
   enum class On { kBoth, kTiePoints, kPictures } on = On::kBoth;
@@ -49,11 +50,11 @@ const Effect kAerial{{"aerial"}}, kStereopolis{{"stereopolis"}}, kTargetField{{"
     kPanorama{{"panorama"}};
 const Effect kStreets{{"street", "stereopolis"}}, kTerrain{{"aerial", "street", "stereopolis"}};
 const Effect kVehicle{{"stereopolis", "target-field"}}, kRigs{{"street", "stereopolis", "target-field"}};
-const Effect kAnyCamera{{"aerial", "street", "panorama"}};                     // the vehicle's are of one model
-const Effect kNoTrajectory{{"aerial", "street", "target-field", "panorama"}};  // priors are white noise
+const Effect kAnyCamera{{"aerial", "street", "panorama"}};  // the cameras of the vehicle are of one model
+const Effect kNoTrajectory{{"aerial", "street", "target-field", "panorama"}};  // position priors have white noise
 
-// The options of the command line. What is not given has the default of the scene, which is known after parsing; what
-// is given without an effect is refused.
+// The options of the command line. An option that is not given has the default of the scene, which is known after
+// parsing. An option that is given without an effect is refused.
 class SimulateOptions {
  public:
   explicit SimulateOptions(CLI::App* command) : command_(command) {}
@@ -135,7 +136,7 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--depth-spread", &O::depth_spread, "Panorama: distances are that, times 1 +- this [0]", kPanorama);
   s.add("--off-centre", &O::off_centre_m, "Panorama: projection centre ahead of the point it turns about, m [0]",
         kPanorama);
-  s.add_switch("--vehicle", &O::vehicle, "Stereopolis, rendered: parts of the vehicle are in the pictures",
+  s.add_switch("--vehicle", &O::vehicle, "Stereopolis, rendered: parts of the vehicle are in the images",
                {{"stereopolis"}, Effect::On::kPictures}, true);
   s.add("--repeated-facades", &O::repeated_facades,
         "Street, stereopolis, rendered: share of houses with repeated facades, 0..1 [0]",
@@ -151,8 +152,7 @@ void add_observation_options(SimulateOptions& s) {
         "Tie points: observations per frame [300; stereopolis, panorama 200, target-field 350]", kTiePoints);
   s.add("--mean-track", &O::mean_track, "Tie points: observations per point [5]", kTiePoints);
   s.add("--noise", &O::image_noise_px, "Image noise per axis, px [0.5]");
-  s.add("--outliers", &O::outlier_share, "Tie points: share of wrong observations, 0..1 [0; stereopolis 0.03]",
-        kTiePoints);
+  s.add("--outliers", &O::outlier_share, "Tie points: share of outliers, 0..1 [0; stereopolis 0.03]", kTiePoints);
   s.add("--width", &O::image_width, "Image width, px [1920]");
   s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
   s.add("--focal", &O::focal_px, "Focal length, px [1400]");
@@ -205,7 +205,7 @@ void add_prior_options(SimulateOptions& s) {
 }  // namespace
 
 void add_simulate(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("simulate", "Make a block with known truth: tie points or rendered pictures");
+  CLI::App* command = app.add_subcommand("simulate", "Make a block with known truth: tie points or rendered images");
   command->footer(
       "Example: megablock simulate --scene aerial --frames 500 -o simulated\n"
       "         megablock simulate --scene stereopolis --frames 2000 --control-zones 7 -o stereopolis\n"
@@ -218,7 +218,7 @@ void add_simulate(CLI::App& app, Action& action) {
                           ->check(CLI::IsMember(names_in(kPaths)))
                           ->capture_default_str(),
                       kTargetField);
-  command->add_flag("--rendered", options->rendered, "Render pictures (small blocks) instead of tie points");
+  command->add_flag("--rendered", options->rendered, "Render images (small blocks) instead of tie points");
   add_scene_options(*options);
   add_observation_options(*options);
   add_prior_options(*options);

@@ -1,4 +1,4 @@
-// The command `simulate`: makes a block with known truth.
+// The command `simulate` makes a block with known truth.
 #pragma once
 
 #include <functional>

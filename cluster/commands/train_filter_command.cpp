@@ -33,7 +33,8 @@ struct Row {
   std::vector<MatchFeature> features;
 };
 
-// Share classified rightly by features and number of samples, the mean over trainings with samples drawn anew.
+// Prints the share of correct classifications by features and number of samples. Each figure is the mean over several
+// trainings, with samples drawn anew.
 void print_table(const std::vector<LabelledMatch>& matches, const TrainFilterOptions& options) {
   using enum MatchFeature;
   const std::vector<Row> rows = {{"r_im", {kReprojection}},

@@ -1,4 +1,4 @@
-// The command `train-filter`: trains the match filter on a block whose wrong matches are known (Cannelle 2013).
+// The command `train-filter` trains the match filter on a block whose wrong matches are known (Cannelle 2013).
 #pragma once
 
 #include <functional>

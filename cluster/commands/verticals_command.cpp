@@ -33,10 +33,10 @@ struct VerticalsOptions {
   SegmentOptions segments;
 };
 
-// Part of what an image's row follows from; raised when results change.
+// Part of the key of an image's row; raised when results change.
 constexpr int kAlgorithm = 1;
 
-// Attitudes of sensors are those of the sensor: mountings, and edges of buildings, are off by this much.
+// An attitude belongs to the sensor. Its mounting, and the edges of buildings, are off by this much.
 constexpr double kLeastSensorSigma = 2 * kDegree;
 
 constexpr double kGivenPoseSigma = 5 * kDegree;  // approximate poses
@@ -62,20 +62,20 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
   try {
     prior.down = down_of_exif_orientation(read_image_header(block.path_of(i)).orientation);
   } catch (const InputError&) {
-  }  // reading the image says what is wrong with it
+  }  // the error is reported when the image is read
   return prior;
 }
 
-// Cameras are held within a sigma of the level two times out of three. What looks upright from above, rows of fields or
-// trees, lies anywhere.
+// Cameras are held within a sigma of the level two times out of three. In images taken from above, the edges that look
+// upright (rows of fields or trees) lie in any direction.
 std::string remark_on(const std::vector<PictureVertical>& pictures) {
   constexpr std::size_t kFewest = 5;
   std::vector<double> rolls;
   for (const PictureVertical& v : pictures)
     if (v.found) rolls.push_back(std::abs(v.roll));
   if (rolls.size() < kFewest || median(rolls) < 1) return "";
-  return "Most of them are turned farther than cameras are held: pictures from above show no vertical, but rows of "
-         "fields look as if. Look at some before you use them.\n";
+  return "Most of them are turned farther than cameras are held: images from above show no vertical, but rows of "
+         "fields look like one. Check some of them before you use them.\n";
 }
 
 namespace {
@@ -99,7 +99,7 @@ SeenVertical seen_vertical(ImageIndex image, const ImageVertical& found, const I
           Eigen::Map<const Eigen::VectorXd>(camera.data(), camera.size()), found.by_camera};
 }
 
-// With the sigmas that the camera's own add, for the reader of the table.
+// The row of an image. Its sigmas are also given with the errors of the camera, for the reader of the table.
 std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
   const std::string& name = block.name_of(i);
   const std::string found_in = fmt::format("{},{},{}", v.segments, v.vanishing_points, v.lines);
@@ -127,7 +127,7 @@ std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prio
   return hasher.value();
 }
 
-// What the command says of every image: of those in `file` as it is there, the others are looked at.
+// Finds the verticals of all images. Images in `file` are not read again.
 std::vector<PictureVertical> look_at_pictures(const Block& block, const SegmentOptions& segments, const JobStore& store,
                                               const std::string& file) {
   IndexedVector<CameraIndex, std::uint64_t> masks;
@@ -170,7 +170,8 @@ int write_verticals(VerticalsOptions options) {
   const Block& block = project.block;
   namespace fs = std::filesystem;
   if (!has_pictures(block))
-    throw InputError(options.project + ": the project has no pictures; verticals are found from what they show");
+    throw InputError(options.project +
+                     ": the project has no image files, from which verticals are found; give 'images' in it");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "verticals.csv").string();
   check_output(options.output, inputs_of(options.project, "verticals"));
   const fs::path output = fs::absolute(options.output);
@@ -204,13 +205,14 @@ int write_verticals(VerticalsOptions options) {
 void add_verticals(CLI::App& app, std::function<int()>& action) {
   auto options = std::make_shared<VerticalsOptions>();
   SegmentOptions& s = options->segments;
-  CLI::App* command = app.add_subcommand("verticals", "Write where down is in every picture, from its straight edges");
+  CLI::App* command =
+      app.add_subcommand("verticals", "Find the direction of down in every image, from its straight edges");
   command->footer("Example: megablock verticals block.yaml -o verticals.csv");
   command->add_option("project", options->project, "Project file")->required();
   command
       ->add_option("-o,--output", options->output,
-                   "CSV file [verticals.csv beside the project]; what is found is kept in FILE.found, so that the "
-                   "command, started again, looks at other pictures only")
+                   "CSV file [verticals.csv beside the project]; found verticals are kept in FILE.found, so that the "
+                   "command, when it is started again, only reads the other images")
       ->check(named());
   command->add_option("--min-length", s.min_length_px, "Shortest segment, px of images reduced to --max-megapixels")
       ->capture_default_str();

@@ -1,4 +1,4 @@
-// The command `verticals`: finds the vertical of every image from its straight edges (Kalantari 2009).
+// The command `verticals` finds the vertical of every image from its straight edges (Kalantari 2009).
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@ namespace megablock {
 // in the EXIF header.
 VerticalPrior expected_vertical(const Block& block, ImageIndex image);
 
-// A warning when most verticals lie in directions in which no camera is held; else empty.
+// Returns a warning when most verticals lie in directions in which no camera is held; otherwise an empty text.
 std::string remark_on(const std::vector<PictureVertical>& pictures);
 
 void add_verticals(CLI::App& app, std::function<int()>& action);

@@ -26,7 +26,7 @@ TrackSet no_tracks() {
   return tracks;
 }
 
-// Tracks on their way to their tiles; what memory does not hold waits in a scratch file, run behind run.
+// Collects the tracks of each tile. Tracks beyond the memory limit wait in a scratch file, one run after the other.
 class TracksOfTiles {
  public:
   TracksOfTiles(std::int64_t tiles, std::string scratch_file, std::int64_t most)
@@ -47,12 +47,13 @@ class TracksOfTiles {
     if (observations_ > most_) write_all();
   }
 
-  // When all are added. Where some wait in scratch all do: a tile is put together without the others' tracks beside it.
+  // Call it when all tracks are added. If some tracks wait in scratch, all do: a tile is then put together without the
+  // tracks of other tiles in memory.
   void finish() {
     if (file_) write_all();
   }
 
-  // Of the tile, in the order in which they were added.
+  // The tracks of a tile, in the order in which they were added.
   TrackSet take(std::size_t tile) {
     if (runs_[tile].empty()) return std::exchange(held_[tile], {});
     TrackSet tracks = no_tracks();
@@ -79,7 +80,7 @@ class TracksOfTiles {
 
   void write_all() {
     if (!file_) {
-      std::error_code ignored;  // reported when the file cannot be opened
+      std::error_code ignored;  // it is reported when the file cannot be opened
       std::filesystem::create_directories(std::filesystem::path(path_).parent_path(), ignored);
       file_.reset(std::fopen(path_.c_str(), "w+b"));
       if (!file_) fail("written");
@@ -102,10 +103,10 @@ class TracksOfTiles {
       tracks = no_tracks();
     }
     observations_ = 0;
-    return_freed_memory();  // lists that grow leave holes
+    return_freed_memory();  // growing lists leave unused memory behind
   }
 
-  // Room for as much as there is: what grows has twice of it at a time.
+  // Reserves memory for exactly these tracks. A list that grows takes twice its memory for a while.
   static void reserve(const std::vector<Run>& runs, TrackSet& tracks) {
     std::int64_t own = 0, observations = 0;
     for (const Run& run : runs) {

@@ -1,5 +1,5 @@
-// Reads job.json (docs/reference/file-formats.md), which another program may have changed. Whatever cannot be read
-// becomes one line that names the file, the key and the remedy.
+// Reads job.json (docs/reference/file-formats.md), which another program may have changed. An error is one line that
+// names the file, the key and the remedy.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,25 +15,25 @@ class JobJson {
  public:
   static constexpr int kVersion = 1;  // version that this program writes
 
-  // `text`: contents of the file at `path`. Throws InputError when it is no JSON object.
+  // `text` holds the contents of the file at `path`. Throws InputError when it is not a JSON object.
   JobJson(const std::string& path, const std::string& text);
   // Returns nothing when there is no file.
   static std::optional<JobJson> read(const JobStore& store);
-  // Of a folder that must be a job. Throws InputError when it is none.
+  // Reads the file of a folder that must be a job. Throws InputError when it is none.
   static JobJson of_job(const JobStore& store);
 
-  // Throws InputError for another version.
+  // Throws InputError when the file has another version.
   void check_version() const;
-  // The project file's settings as they were read. Throws InputError.
+  // The settings of the project file as they were read. Throws InputError.
   StageSettings settings() const;
 
-  // The value of a key that must be there. Throws InputError.
+  // The value of a key that must be present. Throws InputError.
   template <typename Value>
   Value at(const std::string& key) const {
     if (!json_.contains(key)) refuse(key, "is missing");
     return converted<Value>(key);
   }
-  // The value of a key, or `otherwise` when it is missing. Throws InputError.
+  // The value of a key, or `otherwise` when the key is missing. Throws InputError.
   template <typename Value>
   Value value(const std::string& key, const Value& otherwise) const {
     return json_.contains(key) ? converted<Value>(key) : otherwise;

@@ -1,5 +1,5 @@
-// One description of each option struct serves both the project file and the fingerprints, so that no option can be
-// read without being hashed.
+// Describes each option struct once, for both the project file and the fingerprints, so that no option can be read
+// without being hashed.
 
 #include "cluster/job/job_options.h"
 
@@ -144,7 +144,7 @@ void for_each_section(JobOptionsOrConst& o, Function&& function) {
   function("diagnostics", o.diagnostics);
 }
 
-// Visitor that feeds every described value to a hash.
+// Adds every described value to a hash.
 class HashVisitor {
  public:
   explicit HashVisitor(Hasher& hasher) : hasher_(hasher) {}
@@ -158,7 +158,7 @@ class HashVisitor {
   Hasher& hasher_;
 };
 
-// Visitor that writes every described value down.
+// Writes every described value as text.
 class TextVisitor {
  public:
   TextVisitor(std::string section, std::vector<OptionValue>& values) : section_(std::move(section)), values_(values) {}
@@ -182,7 +182,7 @@ class TextVisitor {
   std::vector<OptionValue>& values_;
 };
 
-// The message names the key: the word as a whole, not as a part of another key.
+// Whether the message names the key as a whole word, not as a part of another key.
 bool names_key(const std::string& message, const std::string& key) {
   const auto part_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
   for (std::size_t at = message.find(key); at != std::string::npos; at = message.find(key, at + 1)) {
@@ -193,7 +193,7 @@ bool names_key(const std::string& message, const std::string& key) {
   return false;
 }
 
-// A value that is wrong for itself, with the place where the project file sets it.
+// Checks options whose values do not depend on others. The error names the place where the project file sets the value.
 template <typename Options>
 void check_section(const StageSettings& settings, const std::string& section, const Options& options) {
   try {
@@ -232,7 +232,7 @@ JobOptions read_options(const StageSettings& settings) {
   for_each_section(options, [&](const std::string& section, const auto&... parts) {
     (check_section(settings, section, parts), ...);
   });
-  options.orientation.observations = options.adjustment.observations;  // one description for all stages
+  options.orientation.observations = options.adjustment.observations;  // all stages share one description of them
   return options;
 }
 
@@ -240,7 +240,7 @@ JobOptions options_of_job(const JobStore& store) { return read_options(JobJson::
 
 std::vector<OptionValue> option_values(const JobOptions& options) {
   std::vector<OptionValue> values;
-  JobOptions described = options;  // a visitor may also write
+  JobOptions described = options;  // a copy, because a visitor could also write
   for_each_section(described, [&](const std::string& section, auto&... parts) {
     TextVisitor visitor(section, values);
     (describe(visitor, parts), ...);

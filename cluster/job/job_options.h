@@ -21,9 +21,9 @@
 
 namespace megablock {
 
-// Options of the merge that a project file can set.
+// The options of the merge that a project file can set.
 struct MergeSettings {
-  int max_iterations = 50;   // global Levenberg-Marquardt steps between two screenings
+  int max_iterations = 50;   // iterations of the global adjustment between two screenings
   double decrement = 1e-4;   // Newton decrement at which the block is adjusted (no unit)
   int screening_rounds = 2;  // tests of all observations after convergence, each followed by an adjustment
   // Estimates the sigmas of positions, attitudes and relative poses from their residuals (adjust/tile/sigma_scales.h),
@@ -51,7 +51,7 @@ JobOptions read_options(const StageSettings& settings);
 // The options of the last run of a job.
 JobOptions options_of_job(const JobStore& store);
 
-// The values in force, in the order of the documents.
+// One option with its present value; lists of them are in the order of the documentation.
 struct OptionValue {
   std::string section, key, value;
 };

@@ -13,7 +13,7 @@ namespace megablock {
 
 namespace {
 
-// The last generation's orientation, if it is of the block as it is now.
+// The orientation of the last generation, if it was made from the present block.
 std::optional<BlockState> oriented_state(const JobStore& store, const Block& block) {
   std::vector<std::string> units = store.list("orient");
   std::sort(units.begin(), units.end());

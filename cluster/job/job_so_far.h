@@ -1,4 +1,4 @@
-// The block, poses and tracks of a job that has no result yet.
+// Reads the block, the poses and the tracks of a job that has no result yet.
 #pragma once
 
 #include <functional>
@@ -13,12 +13,13 @@ namespace megablock {
 struct JobSoFar {
   Block block;
   BlockState state;
-  std::string source;  // of the poses: "the initial orientation", "the given poses" (or position and attitude priors)
+  // origin of the poses: "the initial orientation", "the given poses" (or position and attitude priors)
+  std::string source;
 };
 // Throws InputError for a job without a block.
 JobSoFar read_job_so_far(const JobStore& store);
 
-// Tile by tile in their order, as far as the job has tracks.
+// Calls `take` with the tracks of each tile in turn, as far as the job has tracks.
 void visit_tracks(const JobStore& store, const std::function<void(TrackSet&&)>& take);
 
 }  // namespace megablock

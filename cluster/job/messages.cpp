@@ -8,7 +8,7 @@ namespace megablock {
 
 namespace {
 
-constexpr std::size_t kStageWidth = 13;  // of the column of stages on the console
+constexpr std::size_t kStageWidth = 13;  // width of the column of stage names on the console
 
 void print_line(const std::string& stage, const std::string& text) {
   std::string line = stage;

@@ -13,21 +13,21 @@ namespace {
 
 constexpr std::size_t kLeastBytes = 1 << 20;
 
-// A file without a name.
+// A temporary file that has no name in any folder.
 class ScratchFile {
  public:
   explicit ScratchFile(const std::string& directory) {
-    std::string path = directory + "/tables-XXXXXX";  // mkostemp puts letters of its own in their place
+    std::string path = directory + "/tables-XXXXXX";  // mkostemp replaces the Xs
     descriptor_ = mkostemp(path.data(), O_CLOEXEC);
     if (descriptor_ >= 0) unlink(path.c_str());
   }
   ~ScratchFile() {
-    if (descriptor_ >= 0) close(descriptor_);  // what is mapped keeps the file
+    if (descriptor_ >= 0) close(descriptor_);  // the mapped pages keep the file
   }
   ScratchFile(const ScratchFile&) = delete;
   ScratchFile& operator=(const ScratchFile&) = delete;
 
-  // To the disk itself: pages of a file that wait to be written do not leave memory.
+  // Writes to the disk itself, because pages of a file that wait to be written stay in memory.
   bool write(const char* from, std::size_t bytes) const {
     for (std::size_t done = 0; done < bytes;) {
       const ssize_t written = pwrite(descriptor_, from + done, bytes - done, static_cast<off_t>(done));
@@ -53,7 +53,7 @@ void PagedTables::put(const void* table, std::size_t bytes) {
   void* const at = reinterpret_cast<void*>(first);
   const ScratchFile file(directory_);
   if (file.descriptor() < 0 || !file.write(static_cast<const char*>(at), last - first)) return;
-  // Takes the place of the pages that are there, in one step or not at all.
+  // Replaces the pages that are there, either all at once or not at all.
   if (mmap(at, last - first, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_FIXED, file.descriptor(), 0) != at) return;
   pages_.push_back({at, last - first});
 }

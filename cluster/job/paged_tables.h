@@ -12,7 +12,7 @@ namespace megablock {
 
 class PagedTables {
  public:
-  // The file is made in this folder of the job. It has no name there, and it disappears with the process.
+  // The file is made in this folder of the job. It has no name there, and disappears with the process.
   explicit PagedTables(std::string directory) : directory_(std::move(directory)) {}
 
   // A table below a megabyte stays in memory, as does a table for which the disk has no room.
@@ -20,8 +20,8 @@ class PagedTables {
   void put(const std::vector<Value>& table) {
     put(table.data(), table.size() * sizeof(Value));
   }
-  // Call it before a table is freed while others stay. Otherwise release() would push the data that take its place to
-  // the swap space of the system. The bits are safe in either case.
+  // Call it before a table is freed while others stay. Otherwise release() would move the data at its former addresses
+  // to the swap space of the system. The bits are safe in either case.
   template <typename Value>
   void forget(const std::vector<Value>& table) {
     forget(table.data(), table.size() * sizeof(Value));

@@ -19,10 +19,10 @@ std::string file_of(const std::string& stage) { return "stages/" + stage + ".jso
 
 bool is_merge(const StageRecord& record) { return record.stage == "merge"; }
 
-// The events that made the stage's present units.
+// The events of the present units of a stage.
 std::vector<UnitEvent> latest_events(const StageRecord& record, const std::vector<UnitEvent>& events) {
   std::vector<UnitEvent> found;
-  if (is_merge(record)) {  // its iterations, and the result that ends it
+  if (is_merge(record)) {  // the events of its iterations, and of the result that ends it
     bool ended = false;
     for (const UnitEvent& event : events) {
       if (event.stage != record.stage) continue;
@@ -41,7 +41,7 @@ std::vector<UnitEvent> latest_events(const StageRecord& record, const std::vecto
   return found;
 }
 
-// Length of the union of the events' intervals.
+// The total length of the events' intervals; where they overlap, time counts once.
 double covered_seconds(const std::vector<UnitEvent>& events) {
   std::vector<std::pair<double, double>> intervals;
   for (const UnitEvent& event : events) intervals.emplace_back(event.time_s - event.seconds, event.time_s);

@@ -28,7 +28,7 @@ std::vector<std::size_t> claim_order(const std::vector<Unit>& units) {
   return order;
 }
 
-// The failures and counts of one rank, exchanged at the end of the stage.
+// The failures and counts of one rank, which are exchanged at the end of the stage.
 struct RankRecord {
   std::vector<std::pair<std::size_t, std::string>> failures;  // unit number, reason
   std::int64_t computed = 0;
@@ -47,7 +47,7 @@ RankRecord from_text(const std::string& text) {
   return record;
 }
 
-// Writes the unit and its event; a failure has its event too, and is thrown on.
+// Computes and writes the unit and its event. A failure is recorded as an event too, and thrown again.
 void compute_unit(Job& job, const std::string& stage, const Unit& unit, double claim_s) {
   const double start = monotonic_seconds();
   UnitEvent event;
@@ -67,7 +67,7 @@ void compute_unit(Job& job, const std::string& stage, const Unit& unit, double c
   try {
     event.bytes = static_cast<std::int64_t>(job.store.write(unit.name, unit.fingerprint, unit.write).length);
   } catch (const InputError&) {
-    throw;  // the run's, not the unit's
+    throw;  // it concerns the run, not the unit
   } catch (const std::exception& error) {
     event.failure = error.what();
     log();
@@ -121,7 +121,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
   job.peak_memory.begin_stage();
   job.ranks.reset_counter();
   RankRecord mine;
-  std::string fatal;  // concerns the run, not the unit: a full disk, a read-only job
+  std::string fatal;  // an error of the run, not of a unit: a full disk, a read-only job
   {
     const std::int64_t count = std::accumulate(units.begin(), units.end(), std::int64_t{0},
                                                [](std::int64_t sum, const Unit& unit) { return sum + unit.parts; });
@@ -151,8 +151,8 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
       }
       part_done(job, unit.parts - job.parts_done);
     }
-    if (stop_requested()) job.ranks.use_up_counter();  // the other ranks stop too, if the signal was for this one alone
-    share_error(job.ranks, 'i', fatal);                // the others' units are shown until they are done
+    if (stop_requested()) job.ranks.use_up_counter();  // the other ranks stop too, if only this one got the signal
+    share_error(job.ranks, 'i', fatal);                // the progress shows the units of the others until they are done
   }
   if (job.ranks.any(stop_requested()))
     throw AgreedError<Interrupted>("stopped in stage '" + stage + "' as asked; run the same command to resume");

@@ -21,7 +21,7 @@ bool started_by_launcher() {
          std::getenv("PMI_RANK") != nullptr;
 }
 
-// Completes a request without spinning: other ranks and our own progress thread need the core.
+// Waits for a request without spinning, because other ranks and our own progress thread need the core.
 void wait_politely(MPI_Request& request) {
   int done = 0;
   auto pause = std::chrono::microseconds(20);
@@ -34,7 +34,7 @@ void wait_politely(MPI_Request& request) {
 
 enum Counted : MPI_Aint { kClaimed, kDone, kCounters };
 
-constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // counts of MPI 3 are int
+constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // the counts of MPI 3 are int
 
 }  // namespace
 
@@ -42,16 +42,16 @@ struct Communicator::Mpi {
   MPI_Comm world = MPI_COMM_NULL;
   MPI_Comm progress_world = MPI_COMM_NULL;
   MPI_Win window = MPI_WIN_NULL;
-  std::int64_t* counters = nullptr;  // memory of the window, significant on rank 0; below what is counted where
+  std::int64_t* counters = nullptr;  // memory of the window on rank 0: a number for each value of Counted
   std::atomic<bool> stop{false};
   std::thread progress;
   struct Sent {
     std::string bytes;
     std::vector<MPI_Request> requests;
   };
-  std::list<Sent> sent;  // buffers of sends under way
+  std::list<Sent> sent;  // buffers of sends that are not complete
 
-  // Returns the value before.
+  // Changes a counter and returns its value before.
   std::int64_t change(Counted which, std::int64_t value, MPI_Op operation) {
     std::int64_t before = 0;
     MPI_Fetch_and_op(&value, &before, MPI_INT64_T, 0, which, operation, window);
@@ -62,7 +62,8 @@ struct Communicator::Mpi {
 
 Communicator::Communicator(int* argc, char*** argv) {
   if (!started_by_launcher()) return;
-  // Open MPI takes this component for windows over TCP, though it refuses MPI_THREAD_MULTIPLE; others can serve it.
+  // Open MPI chooses this component for windows over TCP, although it refuses MPI_THREAD_MULTIPLE. Other components can
+  // be used instead.
   setenv("OMPI_MCA_osc", "^pt2pt", 0);
   int provided = 0;
   MPI_Init_thread(argc, argv, MPI_THREAD_MULTIPLE, &provided);
@@ -84,8 +85,8 @@ Communicator::Communicator(int* argc, char*** argv) {
   MPI_Win_lock_all(0, mpi_->window);
   barrier();
 
-  // Over TCP the counter's rank must enter the library for others' claims to be served: this thread does while the
-  // main thread computes.
+  // Over TCP the rank of the counter must call the library so that claims of other ranks are served. This thread does
+  // so while the main thread computes.
   if (rank_ == 0 && size_ > 1) {
     mpi_->progress = std::thread([this] {
       while (!mpi_->stop) {
@@ -150,7 +151,7 @@ bool Communicator::any(bool value) {
 
 void Communicator::send(int to, int tag, std::string bytes) {
   Mpi::Sent& sent = mpi_->sent.emplace_back(Mpi::Sent{std::move(bytes), {}});
-  // In parts; one shorter than the largest (perhaps empty) is the last.
+  // A long message is sent in parts. A part shorter than the largest (perhaps empty) is the last one.
   std::size_t count = kLargestMessage;
   for (std::size_t at = 0; count == kLargestMessage; at += count) {
     count = std::min(kLargestMessage, sent.bytes.size() - at);
@@ -218,7 +219,7 @@ void Communicator::add_done(std::int64_t parts) {
 
 std::int64_t Communicator::done() const {
   if (!mpi_) return local_done_;
-  // Its memory is read as it is: the progress display asks from a thread of its own and must not enter the window.
+  // The counter is read without the window, which the thread of the progress display must not use.
   return rank_ == 0 ? std::atomic_ref<std::int64_t>(mpi_->counters[kDone]).load() : 0;
 }
 

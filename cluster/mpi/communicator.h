@@ -1,7 +1,7 @@
-// The ranks of a run. This is the only place that calls MPI.
+// The ranks of a run. Only this class calls MPI.
 //
 // Without mpirun there is one rank, and MPI is never initialised. Waiting ranks poll with short sleeps instead of
-// spinning. Ranks that share a core therefore do not hold up one another.
+// spinning, so that ranks that share a core do not hold up each other.
 #pragma once
 
 #include <atomic>
@@ -25,13 +25,13 @@ class Communicator : public TreeCommunicator {
 
   int rank() const override { return rank_; }
   int size() const override { return size_; }
-  // Number of ranks on the host of this rank, which share its cores.
+  // The number of ranks on the host of this rank, which share its cores.
   int ranks_on_host() const { return ranks_on_host_; }
 
   void barrier();
-  // The root's bytes on every rank.
+  // The bytes of the root, on every rank.
   std::string broadcast(const std::string& bytes, int root = 0) override;
-  // Every rank's bytes, in rank order, on every rank.
+  // The bytes of every rank, in rank order, on every rank.
   std::vector<std::string> gather_all(const std::string& bytes) override;
   // True on every rank when it is true on any rank.
   bool any(bool value);
@@ -41,15 +41,15 @@ class Communicator : public TreeCommunicator {
   std::string receive(int from, int tag) override;
   void flush_sends() override;
 
-  // The shared counter from which units are claimed. reset() is collective.
+  // The shared counter from which units are claimed. reset_counter() is collective.
   void reset_counter();
-  std::int64_t claim();   // next number, from 0; never given twice between resets
+  std::int64_t claim();   // the next number, from 0; never given twice between resets
   void use_up_counter();  // every later claim gets a number beyond any list
-  // Progress of all ranks together, for display; 0 after a reset. One thread of a rank at a time.
+  // The progress of all ranks together, for display; 0 after a reset. One thread of a rank at a time may call it.
   void add_done(std::int64_t parts);
-  std::int64_t done() const;  // on rank 0 only, 0 elsewhere
+  std::int64_t done() const;  // on rank 0; 0 on other ranks
 
-  // Ends all ranks at once with this exit code (a rank that fails alone must not leave the others waiting).
+  // Ends all ranks at once with this exit code. A rank that fails alone must not leave the others waiting.
   [[noreturn]] void abort(int exit_code);
 
  private:

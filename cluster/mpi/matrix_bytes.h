@@ -1,4 +1,4 @@
-// Fixed-size matrices and vectors of them in messages (merge/scratch/bytes.h takes plain values only).
+// Writes and reads fixed-size matrices and vectors of them in messages. merge/scratch/bytes.h takes plain values only.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,7 +37,7 @@ inline Eigen::MatrixXd read_matrix(ByteReader& reader) {
   return Eigen::Map<const Eigen::MatrixXd>(flat.data(), size, size);
 }
 
-// (x, y, z, w of the quaternion, centre)
+// Each pose is x, y, z, w of the quaternion, then the centre.
 inline void write_poses(ByteWriter& writer, const std::vector<Pose>& poses) {
   std::vector<double> flat;
   for (const Pose& pose : poses) {

@@ -37,7 +37,7 @@ std::vector<BlockChecks::Line> check_lines(const Block& block, const BlockState&
 
 std::optional<LevelCheck> check_level(const TrackBatches& tracks) {
   constexpr std::int64_t kEnough = 10'000;
-  constexpr std::size_t kFewest = 10;  // fewer say nothing
+  constexpr std::size_t kFewest = 10;  // fewer points show nothing
   const auto sample = sample_of(tracks, kEnough);
   if (sample.points.size() < kFewest) return std::nullopt;
   return check_one_level(sample.points);
@@ -82,7 +82,7 @@ void check_subsets(const BlockResult& figures, const std::string& path, const Ob
     return;
   }
   const std::vector<MotionReference> motion = motion_references(result.block, result.tiles);
-  if (motion.size() > 1) {  // what all attitudes have in common is one part's
+  if (motion.size() > 1) {  // a rotation common to all attitudes belongs to one part only
     checks.no_subsets = fmt::format("it has {} parts", motion.size());
     return;
   }
@@ -111,7 +111,7 @@ std::vector<std::vector<ImageIndex>> indices_of(const Block& block,
   return found;
 }
 
-// Gathers what the subsets' images see.
+// Gathers the tie points that the images of the subsets see.
 class SubsetTracks {
  public:
   SubsetTracks(const Block& block, const std::vector<std::vector<ImageIndex>>& subsets) : subsets_(subsets) {
@@ -120,7 +120,7 @@ class SubsetTracks {
       for (const ImageIndex image : images) wanted_[image] = 1;
     seen_.begin.push_back(0);
   }
-  // `kept`: empty, or by observation.
+  // `kept` has one entry for each observation, or is empty: all count.
   void add(const TrackSet& tracks, const std::vector<std::uint8_t>& kept) {
     for (std::int64_t t = 0; t < tracks.track_count(); ++t) {
       const std::size_t before = seen_.image.size();
@@ -135,7 +135,7 @@ class SubsetTracks {
  private:
   const std::vector<std::vector<ImageIndex>>& subsets_;
   IndexedVector<ImageIndex, std::uint8_t> wanted_;
-  TrackSet seen_;  // images alone
+  TrackSet seen_;  // the images of the tracks alone
 };
 
 std::vector<std::string> names_of(const ImageSubset& subset, const Block& block) {

@@ -12,14 +12,14 @@ namespace megablock {
 
 namespace {
 
-// Gathers links of frames and, where they matter, heights of what images see from tracks.
+// Gathers from tracks the links of frames and, where they are needed, the heights of the points that images see.
 class TieGatherer {
  public:
   TieGatherer(const Block& block, bool with_heights) : block_(block) {
     if (with_heights) heights_.resize(block.images.size());
   }
 
-  // `kept` and `points` may be empty: all observations, no points.
+  // `kept` and `points` may be empty: then all observations count, and no points.
   void add(const TrackSet& tracks, const std::vector<std::uint8_t>& kept, const std::vector<Eigen::Vector3d>& points) {
     for (std::size_t t = 0; t < tracks.id.size(); ++t) {
       frames_.clear();
@@ -46,14 +46,14 @@ class TieGatherer {
   }
 
  private:
-  struct Heights {  // of points
+  struct Heights {  // heights of points
     double sum = 0;
     std::int64_t count = 0;
   };
   const Block& block_;
   TieEvidence gathered_;
   IndexedVector<ImageIndex, Heights> heights_;
-  std::vector<FrameIndex> frames_;  // of one track
+  std::vector<FrameIndex> frames_;  // the frames of one track
 };
 
 }  // namespace

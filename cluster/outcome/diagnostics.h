@@ -1,4 +1,4 @@
-// The diagnostics of a job (io/block/block_diagnostics.h), from its result or from its state before there is one.
+// Gives the diagnostics of a job (io/block/block_diagnostics.h), from its result or from its state before there is one.
 #pragma once
 
 #include <string>
@@ -12,17 +12,18 @@
 namespace megablock {
 
 inline constexpr const char* kDiagnostics = "result/diagnostics.json";
-inline constexpr const char* kReportPage = "result/report.html";  // the page that shows them
+inline constexpr const char* kReportPage = "result/report.html";  // the page that shows the diagnostics
 
-// From poses and kept observations of a result. Passes once through its tracks.
+// The diagnostics from the poses and kept observations of a result. Reads its tracks once.
 BlockDiagnostics diagnose_result(const BlockResult& result, const TrackBatches& tracks,
                                  const DiagnosticsOptions& options);
 
-// From the result of the job. Without one, from its initial orientation or given poses and from its tracks, if any.
+// The diagnostics from the result of the job. Without one, from its initial orientation or given poses, and from its
+// tracks, if any.
 struct JobDiagnostics {
   Block block;
   BlockDiagnostics found;
-  std::string source;  // what they are of: "the result", "the initial orientation", "the given poses"
+  std::string source;  // origin of the poses: "the result", "the initial orientation", "the given poses"
 };
 JobDiagnostics diagnose_job(const JobStore& store);
 

@@ -35,13 +35,13 @@ double cost_after_ceres(const ResultTile& tile) {
   return summary.final_cost;
 }
 
-// A priori, whatever the job was told to report.
+// The a-priori sigma, even if the job reports scaled ones.
 double sigma_of(const BlockResult& result, FrameIndex frame, int k) {
   const double factor = result.sigma_scaled ? result.variance_factor : 1;
   return std::sqrt(result.frame_covariance[frame](k, k) / factor);
 }
 
-// The job's own where a dense covariance of the one problem would take more than 2 GiB.
+// The sigmas of the job, where a dense covariance of the monolithic problem would take more than 2 GiB.
 std::optional<FrameSigmas> sigmas_to_compare_by(const BlockResult& result, const TileProblem& problem) {
   constexpr std::size_t kDenseFrames = 2500;
   if (problem.frames.size() <= kDenseFrames) return std::nullopt;
@@ -51,7 +51,7 @@ std::optional<FrameSigmas> sigmas_to_compare_by(const BlockResult& result, const
   return sigmas;
 }
 
-// Every component off by a normal deviate of a tenth of its sigma.
+// Moves every component by a normal deviate of a tenth of its sigma.
 TileState disturbed(const BlockResult& result, const ResultTile& tile) {
   constexpr double kShare = 0.1;
   std::mt19937_64 random(1);

@@ -68,7 +68,7 @@ Json seams(const BlockResult& result) {
   return {{"tested", tested}, {"alarms", alarms}, {"largest_sigmas", largest}};
 }
 
-// Without those that seams and failures tell.
+// The notes of a job, without those that seams and failures already give.
 Json notes(const BlockResult& result) {
   Json list = Json::array();
   for (const std::string& note : result.notes)
@@ -85,12 +85,12 @@ Json failures(const BlockResult& result) {
   return list;
 }
 
-// The figures that were written for the present result, or an empty text if there are none.
+// The figures that were stored for the present result, or an empty text if there are none.
 std::string written_figures(const JobStore& store) {
   std::ifstream file(store.path(kResultFigures));
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const Json json = Json::parse(text, nullptr, false);
-  const bool complete = json.is_object() && json.contains("notes");  // programs before did not tell notes
+  const bool complete = json.is_object() && json.contains("notes");  // older programs stored no notes
   const bool of_result = complete && json.value("digest", "") == read_result_digest(store.path(kResult));
   return of_result ? text : std::string();
 }

@@ -1,4 +1,4 @@
-// The figures of a result for `status`. They are stored beside the result, because to compute them takes all tracks.
+// The figures of a result for `status`. They are stored beside the result, because computing them reads all tracks.
 #pragma once
 
 #include <string>
@@ -11,16 +11,16 @@ namespace megablock {
 
 inline constexpr const char* kResultFigures = "result/figures.json";
 
-// The figures that take all tracks.
+// The figures for which all tracks are read.
 struct ResultFigures {
   ReprojectionStatistics statistics;
   std::vector<std::string> remarks;
 };
 
-// One JSON object; keys as in 'status --json', `failures` with the images that got no pose.
+// One JSON object with the keys of 'status --json'; `failures` includes the images that got no pose.
 std::string to_json(const ResultFigures& figures, const BlockResult& result);
 
-// The figures of the result of a job, which exists: as they were stored, else computed again.
+// The figures of the result of a job, which exists. They are read from the store, or else computed again.
 std::string result_figures(const JobStore& store);
 
 // The remarks among the figures, which a reader must not overlook. None without a result.

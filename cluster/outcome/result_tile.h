@@ -1,4 +1,4 @@
-// The result of a job as one tile: its poses, points and kept observations, with the sigmas of the adjustment.
+// Gives the result of a job as one tile: its poses, points and kept observations, with the sigmas of the adjustment.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"
@@ -10,7 +10,7 @@ struct ResultTile {
   TileProblem problem;
   TileState state;
 };
-// `result` with its tracks. Measured control points are taken as kept where the residual is finite and at most 4
+// `result` comes with its tracks. Measured control points count as kept where the residual is finite and at most 4
 // sigmas.
 ResultTile tile_of_result(const BlockResult& result, const ObservationOptions& options);
 

@@ -22,21 +22,22 @@ constexpr const char* kAvx512Cores = "SkylakeX";
 constexpr Setting kSettings[] = {
     {"OPENBLAS_NUM_THREADS", "1"},
     {"OPENCV_IPP", "disabled"},
-    // Ceres' own remarks on standard error; a unit that fails is reported with its reason by us.
+    // Silences the remarks of Ceres on standard error. A unit that fails is reported with its reason by this program.
     {"GLOG_minloglevel", "3"},
-    // Large images: keep malloc from returning and re-faulting pages between features of one image and the next. Huge
-    // pages, where the system offers them (glibc 2.35, transparent huge pages at "madvise"): a merge maps its fronts
-    // anew (use_memory_sparingly), and by pages of 4 KiB a third of its time is the system's.
+    // For large images: keeps malloc from returning pages between the features of one image and the next, and fetching
+    // them again. Huge pages are used where the system offers them (glibc 2.35, transparent huge pages at "madvise"): a
+    // merge maps its fronts anew (use_memory_sparingly), and with pages of 4 KiB the system would take a third of its
+    // time.
     {"GLIBC_TUNABLES",
      "glibc.malloc.mmap_threshold=1073741824:glibc.malloc.trim_threshold=2147483648:glibc.malloc.hugetlb=1"},
 };
-// Unless the user has one: threads that wait for another leave the processor to it, or to other programs. Where these
-// keep one of two busy, waiting at work is most of what there is to measure.
+// Set unless the user has set it. Threads that wait for another one then leave the processor to it, or to other
+// programs. Where other programs keep one of two cores busy, active waiting would cost most of the time.
 constexpr Setting kWaiting = {"OMP_WAIT_POLICY", "passive"};
-// Named only where the processor has it: OpenCV complains of features it cannot disable.
+// Set only where the processor has AVX-512, because OpenCV complains about features that it cannot disable.
 constexpr Setting kWithoutAvx512 = {"OPENCV_CPU_DISABLE", "AVX512-SKX"};
 
-// True when it was so already.
+// Sets a variable of the environment. Returns true when it had this value already.
 bool set(const Setting& setting) {
   const char* present = std::getenv(setting.name);
   if (present != nullptr && std::strcmp(present, setting.value) == 0) return true;
@@ -44,7 +45,7 @@ bool set(const Setting& setting) {
   return false;
 }
 
-// The option's value wherever it stands; the command line's parser checks it afterwards.
+// The value of the option, wherever it stands on the command line. The parser of the command line checks it afterwards.
 std::string wanted_level(int argc, char** argv) {
   const std::string option = kArithmeticOption;
   for (int i = 1; i < argc; ++i) {

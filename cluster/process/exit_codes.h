@@ -5,7 +5,7 @@ namespace megablock {
 
 inline constexpr int kExitDone = 0;
 inline constexpr int kExitFailedUnits = 1;   // finished, with failed units (listed)
-inline constexpr int kExitBadInput = 2;      // usage or bad input
-inline constexpr int kExitInterrupted = 75;  // interrupted and resumable
+inline constexpr int kExitBadInput = 2;      // wrong usage or input
+inline constexpr int kExitInterrupted = 75;  // interrupted; the same command resumes
 
 }  // namespace megablock

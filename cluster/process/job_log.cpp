@@ -34,7 +34,7 @@ std::string log_line(std::string_view stage, std::string_view unit, std::string_
     if (!line.empty()) line += part.data() == text.data() && !unit.empty() ? ": " : " ";
     line += part;
   }
-  // A message of several lines stays one record.
+  // A message of several lines stays one record, on one line.
   std::replace(line.begin(), line.end(), '\n', ' ');
   return line;
 }
@@ -87,7 +87,7 @@ JobLog::JobLog(const std::string& directory, int rank, const JobLogOptions& opti
       std::make_unique<spdlog::pattern_formatter>("%Y-%m-%dT%H:%M:%S.%eZ %l %v", spdlog::pattern_time_type::utc));
   log.set_level(spdlog_level(options.level));
   log.flush_on(spdlog::level::info);
-  // A full disk must not stop the job, nor fill the console with one message for each line.
+  // A full disk must not stop the job, nor fill the console with a message for each line.
   log.set_error_handler([](const std::string&) {});
 }
 

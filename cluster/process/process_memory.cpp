@@ -14,7 +14,7 @@ namespace megablock {
 
 namespace {
 
-// Value in KiB of a "Name:   123 kB" line; 0 when it is not there.
+// The value in KiB of a line "Name:   123 kB"; 0 when the line is missing.
 double read_kib(const char* file, const std::string& name) {
   std::ifstream in(file);
   std::string line;
@@ -38,7 +38,8 @@ void return_freed_memory() { malloc_trim(0); }
 
 namespace {
 
-// Of the heap as it is: where it has holes, a byte in use would hold a huge page (arithmetic.cpp) in memory.
+// Divides the huge pages of the present heap. Otherwise a few bytes in use would keep a whole huge page in memory
+// (arithmetic.cpp).
 void divide_huge_pages_of_heap() {
   std::ifstream maps("/proc/self/maps");
   std::string line;
@@ -71,7 +72,7 @@ double control_group_memory_mib(const std::string& list, const std::string& root
   double least = std::numeric_limits<double>::infinity();
   std::ifstream in(list);
   std::string line;
-  while (std::getline(in, line)) {  // number:controllers:path; version 2 names no controllers
+  while (std::getline(in, line)) {  // a line is number:controllers:path; version 2 names no controllers
     const std::size_t first = line.find(':'), second = line.find(':', first + 1);
     if (second == std::string::npos) continue;
     const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";

@@ -13,7 +13,7 @@ namespace megablock {
 namespace {
 
 std::atomic<bool>& line_is_open() {
-  static std::atomic<bool> open{false};  // there is one terminal
+  static std::atomic<bool> open{false};  // whether the line of the progress bar is unfinished; there is one terminal
   return open;
 }
 
@@ -65,7 +65,7 @@ Progress::~Progress() {
   if (terminal_) print(done_(), true);
 }
 
-// The rate over the last half minute. A resumed run passes its finished units at once; they drop out of the rate soon.
+// The rate over the last half minute. A resumed run counts its finished units at once; they soon drop out of the rate.
 double Progress::rate_per_second(std::int64_t done) {
   constexpr double kWindow_s = 30;
   const double now_s = monotonic_seconds();

@@ -1,5 +1,5 @@
-// Decides when to save unfinished work: at the earliest a second after the last time, and so seldom that saving takes
-// at most a twentieth of the time.
+// Decides when to save unfinished work: at least a second after the last time, and so seldom that saving takes at most
+// a twentieth of the time.
 #pragma once
 
 #include <algorithm>

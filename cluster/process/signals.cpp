@@ -14,7 +14,7 @@ namespace megablock {
 
 namespace {
 
-// A signal belongs to the process: the one piece of state it can have.
+// A signal concerns the whole process, so that its flags cannot be local.
 struct Flags {
   std::atomic<bool> stop{false}, end_of_work{false};
 };
@@ -25,7 +25,7 @@ Flags& flags() {
 
 void write_line(const char* text, std::size_t size) {
   if (::write(STDERR_FILENO, text, size) < 0) {
-    // Nothing to do: the terminal is gone and we are leaving.
+    // Nothing is left to do: the terminal is gone, and the process ends.
   }
 }
 

@@ -59,13 +59,13 @@ void check_job_json(const JobStore& store, const JobJson& job) {
                      " on a processor that has it, or start a new job directory");
 }
 
-// An image is the same when its file is, or its name where there is no file.
+// Two images are the same if their files are or, where there is no file, their names.
 std::uint64_t identity(const Block& block, ImageIndex image) {
   const std::uint64_t hash = block.images[image].file_hash;
   return hash != 0 ? hash : Hasher().add(block.image_names[image]).value();
 }
 
-// A job is not replaced by that of quite another block, which mostly is a slip of -j.
+// Refuses to replace a job by that of another block, which is usually a mistake in -j.
 void refuse_another_block(const JobStore& store, const Block& previous, const Project& project) {
   std::vector<std::uint64_t> own;
   own.reserve(previous.images.size());
@@ -78,7 +78,7 @@ void refuse_another_block(const JobStore& store, const Block& previous, const Pr
                    " images; name another folder with -j, or delete this one to begin anew");
 }
 
-// The block of the job's last run, or nothing if there is none or it is damaged.
+// The block of the job's last run; nothing if there is none or it is damaged.
 std::optional<Block> previous_block(const JobStore& store, const JobLog& log) {
   if (!std::filesystem::exists(store.path("block.h5"))) return std::nullopt;
   const std::string damage = store.problem("block.h5");
@@ -87,7 +87,7 @@ std::optional<Block> previous_block(const JobStore& store, const JobLog& log) {
   return std::nullopt;
 }
 
-// The images of an earlier run keep their indices; new ones follow. Records when the block grew.
+// Gives the images of an earlier run their former indices; new images follow. Records when the block grew.
 std::vector<std::int64_t> merge_with_previous(const JobStore& store, const JobLog& log,
                                               const std::optional<JobJson>& job, PagedTables& tables,
                                               Project& project) {
@@ -96,13 +96,13 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const JobLo
   if (const std::optional<Block> previous = job ? previous_block(store, log) : std::nullopt) {
     PagedTables older(store.directory());
     page_tables(*previous, older);
-    const auto release = [&] {  // of two blocks one table is there at a time
+    const auto release = [&] {  // only one of the two blocks' tables is in memory at a time
       tables.release();
       older.release();
     };
     refuse_another_block(store, *previous, project);
     release();
-    // Images taken away or changed start a new block; growing keeps what is there.
+    // If images were removed or changed, a new block starts; if images were only added, the existing data are kept.
     const bool grown = has_all_images_of(*previous, block);
     release();
     if (grown) {
@@ -116,7 +116,7 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const JobLo
   return generations;
 }
 
-// Before anything is written: what is wrong with the project is said here, once.
+// Reads the project before anything is written, so that its errors are reported here, once.
 Project read_whole_project(const RunOptions& options) {
   if (!std::filesystem::exists(options.project))
     throw InputError(options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
@@ -125,7 +125,7 @@ Project read_whole_project(const RunOptions& options) {
   return project;
 }
 
-// A folder that holds other things than a job (photographs, say) does not become one.
+// A folder that holds other files than those of a job (photographs, say) does not become one.
 void refuse_other_folders(const JobStore& store) {
   const std::filesystem::path folder(store.directory());
   std::error_code error;
@@ -134,7 +134,7 @@ void refuse_other_folders(const JobStore& store) {
   throw InputError(store.directory() + ": the folder holds other files and no job; name a new folder with -j");
 }
 
-// Rank 0 leaves block.h5 and job.json; returns what the other ranks need to know besides.
+// Rank 0 writes block.h5 and job.json. Returns the further data that the other ranks need.
 std::string prepare(const RunOptions& options, const JobStore& store, const JobLog& log, Project project) {
   store.remove_temporaries();
   PagedTables tables(store.directory());
@@ -173,7 +173,7 @@ std::string prepare(const RunOptions& options, const JobStore& store, const JobL
 
 int default_threads(const Communicator& ranks) { return std::max(1, host_cores() / ranks.ranks_on_host()); }
 
-// Unit files of an earlier state of the block that no stage asks for any more (rank 0, when all stages are done).
+// Removes unit files of an earlier state of the block that no stage uses any more (rank 0, when all stages are done).
 void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
   if (!job.is_first_rank()) return;
   std::set<std::string> wanted(tracks.begin(), tracks.end());
@@ -232,7 +232,7 @@ TrackSource track_source(Job& job, const std::string& tie_points) {
   return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }, matches};
 }
 
-// Tracks and start poses of a calibration. Off-line nothing is matched.
+// Prepares the tracks and start poses of a calibration. An off-line calibration needs no matching.
 void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSettings& settings) {
   const bool targets_alone = settings.rig.mode == CalibrationMode::kOffLine;
   const TrackSource source = targets_alone ? TrackSource() : track_source(job, tie_points);
@@ -248,7 +248,7 @@ void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSe
   run_calibration(job, start, tracks, settings);
 }
 
-// The log of this rank. A log that cannot be written is said once and stops nothing.
+// Opens the log of this rank. A log that cannot be written is reported once and stops nothing.
 JobLog open_log(const RunOptions& options, int rank) {
   JobLog log(options.directory, rank, options.log);
   if (!log.problem().empty())
@@ -256,7 +256,7 @@ JobLog open_log(const RunOptions& options, int rank) {
   return log;
 }
 
-// The error that ends a run is the last line of the log.
+// Runs the stages. An error that ends the run is written as the last line of the log.
 void run_logged(const Job& job, const std::function<void()>& stages) {
   try {
     stages();
@@ -274,7 +274,8 @@ using Stages = std::function<void(Job& job, const std::string& tie_points)>;
 
 // Opens the job, runs the stages and returns the exit code.
 int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& stages) {
-  // The block's tables then lie where all of their memory can be given back (page_tables), not among what stays.
+  // The tables of the block then lie in memory that can be given back as a whole (page_tables), apart from blocks that
+  // stay.
   use_memory_sparingly();
   JobStore store(run_options.directory);
   std::optional<JobLock> lock;
@@ -291,9 +292,9 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   const JobJson written(store.path("job.json"), text);
   const auto tie_points = written.at<std::string>("tie_points");
   if (tie_points.empty())
-    keep_freed_memory();  // images come next
+    keep_freed_memory();  // features of images come next
   else
-    use_memory_sparingly();  // the heap, too, that preparing has left
+    use_memory_sparingly();  // gives back the heap that the preparation has freed, too
   Job job{.options = run_options,
           .ranks = ranks,
           .store = store,
@@ -309,7 +310,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   page_tables(job.block, job.tables);
   if (tie_points.empty()) restore_names(job);
   if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
-  omp_set_num_threads(job.options.threads);  // where no other number is asked for: inside tiles
+  omp_set_num_threads(job.options.threads);  // the default inside tiles
   if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
   for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
     job.failures.push_back({"init", file, reason});
@@ -318,7 +319,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
                             ranks.size(), counted(job.options.threads, "thread")));
   for (const std::string& warning : job.notes) job.log.write(LogLevel::kWarning, "init", "", warning);
   run_logged(job, [&] { stages(job, tie_points); });
-  ranks.barrier();  // the lock is held until everybody is done
+  ranks.barrier();  // the lock is held until all ranks are done
   return job.failures.empty() ? kExitDone : kExitFailedUnits;
 }
 
@@ -335,7 +336,7 @@ void refuse_environment(const Job& job, const std::string& command) {
   });
 }
 
-// What all ranks were given alike is refused by all together.
+// All ranks get the same settings, and all of them refuse wrong ones together.
 void check_once(Communicator& ranks, const auto& settings) {
   on_first_rank(ranks, [&] {
     settings.check();

@@ -11,11 +11,11 @@
 
 namespace megablock {
 
-// Collective. Brings the job up to date as far as options.last_stage and returns the exit code (kExitDone or
-// kExitFailedUnits). Throws the project's errors, the same on every rank.
+// Collective. Brings the job up to date as far as options.last_stage, and returns the exit code (kExitDone or
+// kExitFailedUnits). Throws the errors of the project, the same on every rank.
 int run_job(const RunOptions& options, Communicator& ranks);
 
-// Collective. Opens the same job, brings its tracks up to date and registers its trajectory
+// Collective. Opens the same kind of job, brings its tracks up to date and registers its trajectory
 // (registration/registration.h).
 int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks);
 

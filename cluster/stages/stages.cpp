@@ -42,14 +42,14 @@ void tracks(Job& job, StageResults& results) {
   index_measurements(job, results.tracks);
 }
 
-// An orientation that only takes over the poses of the project has nothing to say of single images.
+// Whether the report of the orientation may name single images. It does not when all poses are taken from the project.
 bool orients_by_names(const Block& block) {
   return !block.verticals.empty() ||
          std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
 }
 
 void orientation(Job& job, StageResults& results) {
-  return_freed_memory();  // of the tracks
+  return_freed_memory();  // memory of the tracks
   job.tables.release();
   if (orients_by_names(job.block)) restore_names(job);
   results.oriented = run_orientation(job, results.matches);

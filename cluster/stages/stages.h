@@ -1,9 +1,9 @@
 // The table of the stages of a job.
 //
-// To add a stage, write one file in cluster/stages/pipeline/ that brings the stage's units up to date (run_stage() in
-// cluster/job/work_queue.h runs them over all ranks, skips those that are there, and records what failed), and add one
-// line to the table in stages.cpp. The pipeline, the commands that run as far as a stage, `status` and the cleaning of a
-// job ask the table. docs/developer/add-stage.md has the steps, and the places that do not ask it yet.
+// To add a stage, write one file in cluster/stages/pipeline/ that brings the units of the stage up to date, and add one
+// line to the table in stages.cpp. run_stage() in cluster/job/work_queue.h runs the units over all ranks, skips those
+// that are up to date, and records failures. The pipeline, the commands that run as far as a stage, `status` and the
+// cleaning of a job read the table. docs/developer/add-stage.md has the steps, and the places that do not read it yet.
 #pragma once
 
 #include <span>
@@ -17,7 +17,7 @@
 
 namespace megablock {
 
-// The results that stages hand on to later ones. Each member is written once, by the stage that is named; the data
+// The results of stages that later stages use. Each member is written once, by the stage that is named; the data
 // themselves stay in the store of the job.
 struct StageResults {
   std::string tie_points;             // file of given tie points, before all stages; empty: the job starts from images
@@ -35,9 +35,9 @@ struct Stage {
   const char* command;        // the command that ends with this stage in a job of images; "" where none does
   const char* command_given;  // the same in a job of given tie points; nullptr: the stage does not run there
   const char* help;           // of the command; nullptr where none ends here in a job of images
-  const char* folder;         // of its unit files, where units of an earlier block may be left over; nullptr: none
-  bool optional;              // a job may do without it: `status` leaves it out then
-  void (*run)(Job& job, StageResults& results);  // collective; throws the project's errors, alike on every rank
+  const char* folder;  // folder of its unit files, where units of an earlier block may be left over; nullptr: none
+  bool optional;              // a job may not need it: `status` leaves it out then
+  void (*run)(Job& job, StageResults& results);  // collective; throws the errors of the project, the same on every rank
 
   // Whether it runs in a job that starts from images, or from given tie points.
   bool runs(bool given_tie_points) const { return !given_tie_points || command_given != nullptr; }

@@ -57,7 +57,7 @@ Json failures_json(const JobJson& job, const std::vector<StageStatus>& stages) {
   return list;
 }
 
-// All keys from the start; null where nothing is known yet.
+// All keys are present from the start; the value is null where nothing is known yet.
 Json status(const JobStore& store) {
   const JobJson job = JobJson::of_job(store);
   const std::vector<StageStatus> stages = stages_of(store, job);
@@ -131,7 +131,7 @@ std::string figures_text(const Json& json) {
   const auto number = [&](const char* key) { return json[key].get<std::int64_t>(); };
   return fmt::format(
       "  {} of {} oriented, {}, {}, mean residual {:.3f} px\n"
-      "  sigma0 squared {:.4f} with {:.3f} px per tie point measurement, {}, {}, {}\n  digest {}\n",
+      "  sigma0 squared {:.4f} with {:.3f} px per tie point observation, {}, {}, {}\n  digest {}\n",
       number("oriented"), counted(number("images"), "image"), counted(number("points"), "point"),
       counted(number("observations"), "observation"), json["mean_reprojection_px"].get<double>(),
       json["chi2_per_dof"].get<double>(), json["image_sigma_px"].get<double>(), counted(number("tiles"), "tile"),

@@ -6,7 +6,7 @@
 
 namespace megablock {
 
-// Wraps lines at the width of the terminal (terminal_text.h), else at 80 columns. Footers hold commands to copy; they
+// Wraps lines at the width of the terminal (terminal_text.h), else at 80 columns. Footers hold commands to copy, and
 // are not wrapped.
 class HelpText : public CLI::Formatter {
  public:

@@ -1,4 +1,4 @@
-// Checks the values of options on the command line, with messages that name the remedy.
+// Checks the values of options on the command line. The messages say how to correct a value.
 #pragma once
 
 #include <fmt/core.h>
@@ -12,14 +12,14 @@
 
 namespace megablock {
 
-// The name of a file or folder.
+// Accepts the name of a file or folder, which must not be empty.
 inline CLI::Validator named() {
   return CLI::Validator(
       [](std::string& text) { return text.empty() ? std::string("the name is empty; name a file or folder") : ""; }, "",
       "named");
 }
 
-// A number for which `holds` is true; `words` names these numbers in the message.
+// Accepts a number for which `holds` is true; `words` describes these numbers in the message.
 template <typename Holds>
 CLI::Validator number(Holds holds, const std::string& words, const std::string& name) {
   return CLI::Validator(
@@ -39,8 +39,8 @@ inline CLI::Validator positive() {
   return number([](double value) { return value > 0; }, "above 0", "positive");
 }
 
-// Threads of a process; 0: as many as there are cores. Each has a stack and tables of its own; thousands of them would
-// end the process without a message.
+// Accepts a number of threads of a process; 0 means as many as there are cores. Each thread has a stack and tables of
+// its own, so that thousands of them would end the process without a message.
 inline CLI::Validator threads() {
   return number([](double value) { return value >= 0 && value <= 1024; }, "of 0 to 1024", "threads");
 }
@@ -55,7 +55,7 @@ inline void add_log_level(CLI::App& command, LogLevel& level) {
       ->check(CLI::IsMember(log_level_names()));
 }
 
-// An amount of memory or of disk space, MiB.
+// Accepts an amount of memory or of disk space, MiB.
 inline CLI::Validator mebibytes(double most) {
   return number([=](double value) { return value >= 0 && value <= most; }, fmt::format("of 0 to {:g} MiB", most),
                 "mebibytes");

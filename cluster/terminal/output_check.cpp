@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Links followed as far as there is something, without a slash at the end.
+// The path with links followed as far as it exists, and without a slash at the end.
 fs::path place_of(const std::string& path) {
   const fs::path whole = (fs::absolute(path) / "").lexically_normal().parent_path();
   std::error_code error;
@@ -35,7 +35,7 @@ bool takes_place_of(const fs::path& output, const std::string& input) {
   return fs::exists(output, error) && is_image_name(output.string()) && lies_below(output, place_of(input));
 }
 
-// The innermost one that is or holds the output.
+// The innermost job directory that is the output or contains it.
 std::optional<fs::path> job_around(const fs::path& output) {
   std::error_code error;
   for (fs::path folder = output; folder.has_relative_path(); folder = folder.parent_path())
@@ -48,7 +48,7 @@ bool is_new_in_result(const std::string& name) {
   return name.starts_with("result/") && std::ranges::find(of_the_job, name) == of_the_job.end();
 }
 
-// Empty: the job knows no project.
+// The project file of a job; empty when the job does not name one.
 std::string project_of(const std::string& job) {
   const std::optional<JobJson> json = JobJson::read(JobStore(job));
   return json ? json->value("project", std::string()) : std::string();
@@ -63,7 +63,7 @@ std::vector<std::string> inputs_of(const std::string& source, const std::string&
     inputs = {fs::is_directory(source, error) ? project_of(source) : source};
     for (const std::string& file : files_named_in(inputs.front(), made)) inputs.push_back(file);
   } catch (const InputError&) {
-    // It is said where the source is read.
+    // The reader of the source reports the error.
   }
   return inputs;
 }

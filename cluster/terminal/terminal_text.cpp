@@ -13,7 +13,7 @@ namespace {
 
 bool breaks_at(const std::string& line, std::size_t at) { return line[at] == ' ' || line[at - 1] == ','; }
 
-// The last place at or before `columns`, else the first one behind; never before `least`.
+// The last place to break at or before `columns`, else the first one after it; never before `least`.
 std::size_t place_to_break(const std::string& line, std::size_t least, std::size_t columns) {
   for (std::size_t at = columns; at > least; --at)
     if (breaks_at(line, at)) return at;

@@ -371,7 +371,8 @@ GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge, const 
     if (directions > gauge.defect()) report.text += "; parts that share a rig have one scale";
   }
   if (report.undetermined > 0)
-    report.text += "; " + std::to_string(report.undetermined) + " parameters held that too little observes, first of " +
+    report.text += "; " + std::to_string(report.undetermined) +
+                   " parameters held because too few observations determine them, first of " +
                    name(root.held.front().id);
   if (root.held_points > 0)
     report.text += "; " + std::to_string(root.held_points) + " undetermined point coordinates held";

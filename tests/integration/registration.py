@@ -71,7 +71,7 @@ with tempfile.TemporaryDirectory() as folder:
     assert "--d-cons: '0' is not a number above 0" in refused("register", project, "-j", work / "job", "--d-cons", 0)
     megablock("simulate", "--scene", "street", "--frames", 6, "--rig-cameras", 2, "-o", work / "bare")
     assert "no measured control points" in refused("resect", work / "bare/block.yaml", "-o", work / "resected.csv")
-    assert "no pictures" in refused("masks", work / "bare/block.yaml", "-o", work / "masks")
+    assert "no image files" in refused("masks", work / "bare/block.yaml", "-o", work / "masks")
 
     # Tie points that are none: told at once, not as places that nobody registers.
     bare, tie_points = work / "bare/block.yaml", work / "bare/tie_points.h5"

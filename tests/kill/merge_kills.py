@@ -89,7 +89,7 @@ with tempfile.TemporaryDirectory() as folder:
     job, kills, resumed, finished, left_s = fresh("killed"), 0, 0, 0, []
     while kills < options.kills:
         there = checkpoints(job)
-        run = begin(job, 2, "--record", "0")  # of every subtree that is done, so that runs go on within a pass
+        run = begin(job, 2, "--record", "0")  # of every subtree that is done, so that runs resume within a sweep
         try:
             if moments.random() < 0.75:  # behind the next checkpoint, however fast or busy the machine
                 while run.poll() is None and checkpoints(job) <= there:
@@ -120,8 +120,8 @@ with tempfile.TemporaryDirectory() as folder:
             sys.exit("digest differs after kills")
         job = fresh("killed")
     last = finish(job, 2)
-    tiles = [int(n) for n in re.findall(r"goes on within a pass: (\d+) tiles", (work / "log").read_text())]
-    print(f"{kills} kills, {resumed} runs went on from a checkpoint, {len(tiles)} within a pass with {tiles} of its tiles "
+    tiles = [int(n) for n in re.findall(r"resumes within a sweep: (\d+) tiles", (work / "log").read_text())]
+    print(f"{kills} kills, {resumed} runs went on from a checkpoint, {len(tiles)} within a sweep with {tiles} of its tiles "
           f"done, {finished + 1} came to their end, digest {last}; "
           f"without a rank the others ended in at most {max(left_s, default=0):.1f} s")
     if last != found[1]:
@@ -129,4 +129,4 @@ with tempfile.TemporaryDirectory() as folder:
     if resumed < max(1, kills // 3):
         sys.exit(f"only {resumed} of {kills} runs went on from a checkpoint")
     if len(tiles) < max(1, kills // 5):
-        sys.exit(f"only {len(tiles)} of {kills} runs went on within a pass")
+        sys.exit(f"only {len(tiles)} of {kills} runs resumed within a sweep")

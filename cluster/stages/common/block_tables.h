@@ -5,10 +5,10 @@
 
 namespace megablock {
 
-// Moves frames, images and their names, and relative poses to the disk: 100 MB for a million images of ten cameras.
+// Moves frames, images with their names, and relative poses to the disk: 100 MB for a million images of ten cameras.
 void page_tables(const Block& block, PagedTables& tables);
 
-// Frees the names of images, which tiles, tracks and adjustments do not need: a third as much again.
+// Frees the names of images, which tiles, tracks and adjustments do not need. They are a third of that size.
 void release_names(Job& job);
 void restore_names(Job& job);
 

@@ -6,7 +6,7 @@
 
 namespace megablock {
 
-// Leaves out the indices of points in the block, which the adjustment does not use and which may change when the block
+// Leaves out the indices of points in the block. The adjustment does not use them, and they may change when the block
 // grows.
 void add_to_hash(Hasher& hasher, const TileProblem& problem, const TileState& start);
 

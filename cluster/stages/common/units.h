@@ -1,4 +1,4 @@
-// What the units of all stages have in common: the algorithm numbers in their fingerprints, and their names.
+// Names and algorithm numbers of the units of all stages.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace megablock {
 
-// Algorithm number of each stage: part of its fingerprints, raised when its results change.
+// The algorithm number of each stage is part of its fingerprints. Raise it when the results of the stage change.
 namespace algorithm {
 inline constexpr int kFeatures = 1, kCandidates = 1, kMatching = 12, kTiles = 3, kTracks = 3, kOrientation = 9,
                      kAdjustment = 17, kMerge = 19, kResult = 1;

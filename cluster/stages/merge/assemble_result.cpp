@@ -41,7 +41,7 @@ void find_boundary(BlockResult& result, const std::vector<TilePart>& parts) {
   for (const int count : touched) result.boundary.push_back(count > 1 ? 1 : 0);
 }
 
-// Images without pose, each with its reason.
+// Lists the images without a pose, each with its reason.
 void list_failures(const Job& job, BlockResult& result) {
   result.failures = job.failures;
   std::unordered_set<std::string> told;

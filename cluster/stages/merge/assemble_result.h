@@ -9,8 +9,8 @@
 
 namespace megablock {
 
-// The result without its tracks and digest. `parts`: of all tiles. It takes over the block of the job, which is empty
-// afterwards, and the outcome, so that a block of a million images is not in memory twice.
+// The result without its tracks and digest. `parts` are those of all tiles. It takes over the outcome and the block of
+// the job, which is empty afterwards, so that a block of a million images is not in memory twice.
 BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, const std::vector<TilePart>& parts);
 
 }  // namespace megablock

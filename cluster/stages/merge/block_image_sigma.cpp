@@ -22,7 +22,7 @@ std::int64_t orientation_unknowns(const Block& block, const BlockState& state) {
   return count;
 }
 
-// Sums in tile order, whatever the ranks.
+// Sums the residuals in tile order, so that the bits do not depend on the ranks.
 ImageResiduals block_image_residuals(Job& job, TileStore& own, std::size_t tile_count) {
   std::vector<ImageResiduals> residuals;  // [own]
   for (std::size_t row = 0; row < own.size(); ++row) {

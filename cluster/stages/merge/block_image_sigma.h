@@ -1,4 +1,4 @@
-// The sigma of the observations of tie points (adjust/tile/image_sigma.h). All tiles of a block are adjusted with the
+// Gives the sigma of the tie point observations (adjust/tile/image_sigma.h). All tiles of a block are adjusted with the
 // same value.
 #pragma once
 
@@ -10,15 +10,16 @@
 
 namespace megablock {
 
-// Before the adjustment of the block: the root mean square of the tiles' own estimates, weighted by kept observations.
+// The sigma before the adjustment of the block: the root mean square of the tiles' own estimates, weighted by kept
+// observations.
 double start_image_sigma(const Job& job, const std::vector<std::string>& adjusted);
 
-// Collective, at a solution: estimates the sigma of the block, and gives it to the tiles of this rank when it differs
-// so much that another adjustment is worth while. The answer is the same on every rank. `oriented`: which frames are
-// unknowns.
+// Collective, at a solution. Estimates the sigma of the block, and gives it to the tiles of this rank when it differs
+// so much that another adjustment is worth while. The answer is the same on every rank. `oriented` tells which frames
+// are unknowns.
 bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented);
 
-// Collective: the sigma with which the tiles were adjusted, also on ranks without tiles.
+// Collective. The sigma with which the tiles were adjusted, also on ranks without tiles.
 double common_image_sigma(Job& job, const TileStore& own);
 
 }  // namespace megablock

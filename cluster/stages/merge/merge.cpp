@@ -1,6 +1,6 @@
 #include "cluster/stages/merge/merge.h"
 
-// The merge: exact block-wise compensation of all tiles over all ranks, then the result.
+// Runs the merge: the exact block-wise adjustment of all tiles over all ranks, then the result.
 
 #include <fmt/core.h>
 
@@ -59,9 +59,10 @@ int most_rounds(const MergeSettings& settings) {
   return settings.estimate_sigmas ? std::max(settings.screening_rounds, kSigmaRounds) : settings.screening_rounds;
 }
 
-// The folder itself stays where another disk is mounted, and so do folders of this run's ranks while they `use` them.
+// Clears the scratch folder of the job. The folder itself stays, because another disk may be mounted there. Folders of
+// this run's ranks stay while the ranks `use` them.
 void clear_scratch(Job& job, bool use) {
-  const std::vector<std::string> kept =  // ranks have removed their own files before they say so
+  const std::vector<std::string> kept =  // ranks have removed their own files before they report
       job.ranks.gather_all(use ? scratch_folder_of_rank(job) : std::string());
   on_first_rank(job.ranks, [&] {
     const std::filesystem::path folder(job.store.path("scratch"));
@@ -74,9 +75,9 @@ void clear_scratch(Job& job, bool use) {
   });
 }
 
-// The last round alone goes to the end. Those before it only lead to verdicts on observations and to sigmas: a
-// hundredth of a sigma of the frames' unknowns, in the mean, is enough for them. Chi-square is then off by 1e-4 of
-// their number.
+// Only the last round iterates to the end. The rounds before it only lead to decisions on observations and to sigmas. A
+// mean of a hundredth of a sigma of the frames' unknowns is enough for these: chi-square is then off by 1e-4 of their
+// number.
 GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool last) {
   constexpr double kSettled = 0.01;
   const double settled = kSettled * std::sqrt(6 * static_cast<double>(frames));
@@ -87,8 +88,8 @@ GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool
   return options;
 }
 
-// Where a round before the last one ends by its own, looser limit, the line says so: "converged" alone would promise
-// that of the options.
+// A round before the last one ends by its own, looser limit. The line then names that limit, because "converged" alone
+// would mean the limit of the options.
 void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions& options) {
   if (!job.is_first_rank()) return;
   std::string line = describe(state);
@@ -97,7 +98,8 @@ void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions
   say(job, "merge", line);
 }
 
-// This rank's tiles from their own adjustments, or from the checkpoint that was found, and the block's state.
+// Loads this rank's tiles from their own adjustments, or from the checkpoint that was found. Returns the state of the
+// block.
 BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
                       const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
                       TileStore& tiles) {
@@ -147,7 +149,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
     const GlobalOptions options = options_of(job.settings.merge, frames, last);
     MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
     runner.record_passes(recorder);
-    return_freed_memory();  // what the plans were made from
+    return_freed_memory();  // memory from which the plans were made
     if (last) runner.expect_posterior();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       return_freed_memory();
@@ -184,19 +186,19 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   return adjusted;
 }
 
-// The largest of the figures of all ranks. Collective.
+// Collective. The largest of the figures of all ranks.
 double largest(Job& job, double figure) {
   for (const std::string& text : job.ranks.gather_all(std::to_string(figure)))
     figure = std::max(figure, std::stod(text));
   return figure;
 }
 
-// Why a result that is there is a failed unit all the same, now and in runs that find it; empty: it is none.
+// Why an existing result counts as a failed unit, in this run and in later ones that find it; empty: it does not.
 std::string shortfall(const Adjusted& adjusted) {
   if (!adjusted.converged) return "the global adjustment did not converge: " + describe(adjusted.position.global);
   if (std::ranges::none_of(adjusted.state.oriented, [](std::uint8_t oriented) { return oriented != 0; }))
-    return "no image is oriented: too few observations hold in the adjustment; check start poses and cameras, and what "
-           "'adjustment' asks of tie points";
+    return "no image is oriented: too few observations hold in the adjustment; check start poses and cameras, and "
+           "the limits for tie points under 'adjustment' in the project file";
   return "";
 }
 
@@ -211,7 +213,7 @@ std::string shortfall_before(Job& job) {
   });
 }
 
-// Of all stages, this one as far as `event`, which ends it, says.
+// The statistics of all stages; this one's end with `event`.
 std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
   std::vector<UnitEvent> events = read_events(job.store);
   event.time_s = seconds_since_1970();
@@ -263,7 +265,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
     if (!is_current(job, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
   });
-  if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
+  if (!current.empty()) {  // a run that was killed after its result may have left checkpoints
     if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();
     return add_shortfall(job, before);
   }
@@ -271,7 +273,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   MergeCheckpoint checkpoint(job, fingerprint);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
   const std::string reason = shortfall(adjusted);
-  return_freed_memory();  // fronts, tiles
+  return_freed_memory();  // memory of fronts and tiles
   clear_scratch(job, false);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
   UnitEvent event;
@@ -285,7 +287,7 @@ void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vec
   on_first_rank(job.ranks, [&] {
     restore_names(job);
     write_final(job, inputs, fingerprint, adjusted, reason, make_outcome(job, adjusted, inputs.tiles), parts, event);
-    // What was written could not say it of itself.
+    // The result could not yet contain the peak memory of its own writing.
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());
     process_peak_mib = std::max(process_peak_mib, job.peak_memory.mib());
     event.figures["process_peak_rss_mib"] = process_peak_mib;

@@ -1,4 +1,4 @@
-// The stage of the merge: the exact adjustment of all tiles together, and the result of the job.
+// The stage of the merge: adjusts all tiles together, exactly, and makes the result of the job.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace megablock {
 
-// Merge and result: merge/..., result/block.h5, result/report.html. The job's block is not to be used afterwards.
+// Makes merge/..., result/block.h5 and result/report.html. The block of the job must not be used afterwards.
 void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
                const std::vector<std::string>& adjusted);
 

@@ -41,7 +41,7 @@ TileAdjustment snapshot(const RankTile& tile) {
 
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
-// The layout that docs/reference/file-formats.md gives.
+// The layout of the marker as docs/reference/file-formats.md describes it.
 static_assert(sizeof(MergePosition) == 232 && offsetof(MergePosition, tried_steps) == 4 &&
               offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
@@ -71,7 +71,7 @@ std::string MergeCheckpoint::folder(const MergePosition& position) const {
 
 std::uint64_t MergeCheckpoint::fingerprint(const std::string& folder) const {
   Hasher hasher;
-  // With the size of the marker: a checkpoint of another layout does not count.
+  // The size of the marker is hashed too, so that a checkpoint of another layout does not count.
   hasher.add(inputs_).add(folder).add(std::int64_t{sizeof(MergePosition)});
   return hasher.value();
 }
@@ -173,7 +173,7 @@ std::optional<MergePosition> MergeCheckpoint::find_pass(const MergePosition& sta
     std::memcpy(&position, there.data(), sizeof position);
     if (!furthest || order(furthest->global) < order(position.global)) furthest = position;
   }
-  if (furthest) say(job_, "merge", "goes on within a pass: " + std::to_string(tiles) + " tiles are done");
+  if (furthest) say(job_, "merge", "resumes within a sweep: " + std::to_string(tiles) + " tiles are done");
   return furthest;
 }
 

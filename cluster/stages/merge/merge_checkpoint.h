@@ -1,6 +1,6 @@
-// Checkpoints of the global adjustment. After each accepted iteration every rank writes its tiles, and then rank 0
-// writes the state of the iteration, which makes the checkpoint valid. A killed run resumes at the last valid
-// checkpoint, with the same bits.
+// Writes and finds checkpoints of the global adjustment. After each accepted iteration every rank writes its tiles, and
+// then rank 0 writes the state of the iteration, which makes the checkpoint valid. A killed run resumes at the last
+// valid checkpoint, with the same bits.
 #pragma once
 
 #include <optional>
@@ -15,30 +15,30 @@
 namespace megablock {
 
 struct MergePosition {
-  std::int32_t round = 0;        // number of the screening
-  std::int32_t tried_steps = 0;  // in the adjustments before
+  std::int32_t round = 0;        // number of the round of screening
+  std::int32_t tried_steps = 0;  // in earlier adjustments
   GlobalState global;
   SigmaScales scales;  // factors of the stated sigmas
 };
 
 class MergeCheckpoint {
  public:
-  // `inputs`: fingerprint of everything from which the merge is computed.
+  // `inputs` is the fingerprint of everything from which the merge is computed.
   MergeCheckpoint(Job& job, std::uint64_t inputs) : job_(job), inputs_(inputs) {}
 
   // Collective.
   void write(const MergePosition& position, TileStore& tiles, const BlockState& state);
-  // The last valid position on disk; the same on every rank. Collective.
+  // Collective. The last valid position on disk, the same on every rank.
   std::optional<MergePosition> find();
   // The state and the points of the position that was found.
   BlockState state() const;
   void load_tile(RankTile& tile) const;
-  // Deletes all checkpoints (the result is written). Rank 0.
+  // Deletes all checkpoints, when the result is written. Rank 0 calls it.
   void clear();
 
-  // Records of sweeps (pass_recorder.h). of_pass(): the position as a record holds it. find_pass(), collective: the
-  // furthest position of any rank's record of a sweep from the state of `start`, which is the last checkpoint or the
-  // beginning. Other records are dropped.
+  // For records of sweeps (pass_recorder.h). of_pass(): the position in the form that a record holds. find_pass() is
+  // collective: it gives the furthest position of all ranks' records of a sweep from the state of `start`, which is the
+  // last checkpoint or the beginning. Other records are dropped.
   PassRecorder::Position of_pass(const MergePosition& position) const;
   std::optional<MergePosition> find_pass(const MergePosition& start, PassRecorder& recorder);
 

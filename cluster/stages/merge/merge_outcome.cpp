@@ -49,7 +49,7 @@ Bytes read_file(const std::string& path) {
   return bytes;
 }
 
-// Writes the covariances of the frames, cameras and mounts of a tile, zero where the tile does not touch one.
+// Writes the covariances of the frames, cameras and mounts of a tile; zero for an unknown that the tile does not touch.
 void write_covariances(const std::string& path, const TileProblem& problem, const TileCovariance& covariance) {
   ByteWriter writer;
   writer.values(problem.frames);
@@ -61,7 +61,8 @@ void write_covariances(const std::string& path, const TileProblem& problem, cons
   write_file(path, writer.take());
 }
 
-// A frame of several tiles has the same bits in all of them; of a mount or a camera the lowest tile's are taken.
+// A frame of several tiles has the same bits in all of them. For a mount or a camera those of the lowest tile are
+// taken.
 template <typename Matrix>
 void take_first(const Matrix& from, Matrix& to) {
   if (to.isZero(0)) to = from;
@@ -134,7 +135,7 @@ std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, c
 }
 
 std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
-  constexpr std::int64_t kFewest = 100;  // measurements by which a tile is judged
+  constexpr std::int64_t kFewest = 100;  // observations that a tile needs to be judged
   constexpr std::size_t kLines = 3;
   double measured = 0, kept = 0;
   for (const TilePart& part : parts)
@@ -153,9 +154,9 @@ std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
   std::vector<std::string> lines;
   for (const TilePart* part : poor | std::views::take(kLines))
     lines.push_back(
-        fmt::format("tile {} disagrees with itself: it keeps {} of {} tie point measurements ({:.0f} %), the others "
-                    "{:.0f} %: little of "
-                    "what it was given holds, and what is left may agree by chance",
+        fmt::format("tile {} disagrees with itself: it keeps {} of {} tie point observations ({:.0f} %), the others "
+                    "{:.0f} %: most of its observations were rejected, and the others may agree by chance; check its "
+                    "start poses and matches",
                     part->tile, part->kept, part->measured, 100 * share(*part), 100 * share_of_others(*part)));
   if (poor.size() > kLines)
     lines.push_back(std::to_string(poor.size() - kLines) + " more tiles that keep less than half of what others do");
@@ -178,7 +179,7 @@ MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles
   for (const BlockComponent& part : gauge.components)
     if (!part.columns.empty()) {
       outcome.free_parts.push_back({FrameIndex(part.lowest_frame), static_cast<std::int32_t>(part.columns.size())});
-      outcome.degrees_of_freedom += part.defect;  // what only the datum fixes takes nothing of the observations
+      outcome.degrees_of_freedom += part.defect;  // a direction that only the datum fixes uses up no observations
     }
   outcome.seams = seam_checks(tiles.tree, adjusted.posterior);
   outcome.observations = adjusted.posterior.observations;

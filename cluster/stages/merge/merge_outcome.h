@@ -1,4 +1,4 @@
-// The outcome of the global adjustment: covariances, figures, and the part of each tile in the result.
+// Gives the outcome of the global adjustment: covariances, figures, and the part of each tile in the result.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ struct MergeOutcome {
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
   double variance_factor() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 1; }
-  double image_sigma_px = 0;  // sigma of the observations of tie points in the adjustment
+  double image_sigma_px = 0;  // sigma of the tie point observations in the adjustment
   int global_iterations = 0;
   double newton_decrement = 0;
   std::string gauge;
@@ -33,28 +33,28 @@ struct MergeOutcome {
 struct Adjusted {
   MergeTreeRunner::Posterior posterior;
   std::vector<TilePart> parts;  // parts of the tiles of this rank
-  double image_sigma_px = 0;    // of the observations of tie points
+  double image_sigma_px = 0;    // sigma of the tie point observations
   MergePosition position;
-  MergeCosts costs;  // of the last adjustment
+  MergeCosts costs;  // costs of the last adjustment
   BlockState state;
   bool converged = false;
 };
 
-// Files of a tile until the result is written: its tracks, and the covariances of the unknowns that it may share. They
-// are beside the checkpoints and are removed with them.
+// Names the file that holds the tracks of a tile and the covariances of the unknowns that it may share, until the
+// result is written. The files lie beside the checkpoints and are removed with them.
 std::string part_path(const Job& job, std::int64_t tile);
 std::string covariance_path(const Job& job, std::int64_t tile);
 
-// Covariances at the solution; each tile's part of the result is written. `references` of the block's components.
-// Collective.
+// Collective. Computes the covariances at the solution and writes each tile's part of the result. `references` are
+// those of the block's components.
 void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     MergeTreeRunner& runner, Adjusted& adjusted);
 
-// All tiles' parts, on every rank; collective.
+// Collective. The parts of all tiles, on every rank.
 std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);
 
-// The parts of the orientation that only attitude priors determine (common_motion.h), one line for each case and part
-// of the block.
+// Names the parts of the orientation that only attitude priors determine (common_motion.h), one line for each case and
+// part of the block.
 std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, const std::vector<TilePart>& parts);
 
 // Names tiles that keep less than half the share of observations that all others keep, the worst first, one line each,
@@ -62,7 +62,8 @@ std::vector<std::string> judge_motions(const Block& block, const Tiles& tiles, c
 // residuals or seams (merge/checks/seam_check.h) then finds such a tile.
 std::vector<std::string> judge_kept(const std::vector<TilePart>& parts);
 
-// Takes over the state when all ranks have written the files of their tiles; reads the covariances from these.
+// Takes over the state when all ranks have written the files of their tiles, and reads the covariances from these
+// files.
 MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles);
 
 }  // namespace megablock

@@ -30,7 +30,7 @@ bool has_datum(const Job& job) {
   return priors || control >= 3;
 }
 
-// From where each tile was adjusted to where all fit together; moves the tiles there.
+// The similarities that move each tile from its own adjustment to where all tiles fit together. Also moves the tiles.
 std::vector<Similarity> bring_together(const Job& job, std::vector<AlignmentTile>& tiles) {
   std::vector<Similarity> motions(tiles.size());
   const auto move = [&](const std::vector<Similarity>& further) {
@@ -44,7 +44,7 @@ std::vector<Similarity> bring_together(const Job& job, std::vector<AlignmentTile
   return motions;
 }
 
-// Means of what tiles share, weighted by observations.
+// The means of the values that tiles share, weighted by observations.
 class SharedMeans {
  public:
   explicit SharedMeans(const Block& block) : block_(block), cameras_(block.cameras.size()) {
@@ -93,7 +93,7 @@ class SharedMeans {
   };
   struct MountMean {
     Pose first;
-    PoseIncrement sum = PoseIncrement::Zero();  // from the first tile's
+    PoseIncrement sum = PoseIncrement::Zero();  // of differences from the first tile's pose
     double weight = 0;
   };
   const Block& block_;
@@ -101,10 +101,10 @@ class SharedMeans {
   std::vector<std::vector<MountMean>> mounts_;  // [rigs][mounts]
 };
 
-// Three points fix the pose of a camera; a frame with fewer than twice as many would hang on single observations.
+// Three points fix the pose of a camera. A frame with fewer than twice as many would depend on single observations.
 constexpr std::int64_t kFewestObservations = 6;
 
-// Poses from the tile that holds most of a frame's observations.
+// Takes the pose of every frame from the tile that holds most of its observations.
 void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<TileIndex>& numbers, MergeStart& start) {
   struct Observations {
     std::int64_t richest = 0, total = 0;  // in the tile that has most of them, in all tiles
@@ -126,7 +126,7 @@ void take_richest(const std::vector<AlignmentTile>& tiles, const std::vector<Til
     if (observations[f].total < kFewestObservations) state.oriented[f] = 0;
 }
 
-// Points with a frame that has not gone with the tile, and those that the tile has not found. [points]
+// [points] Marks points with a frame that has not moved with the tile, and points without a position.
 std::vector<std::uint8_t> left_behind(const MergeTile& merge, const MergeStart& start) {
   const TileProblem& problem = merge.problem;
   std::vector<std::uint8_t> result(problem.points.size(), 0);
@@ -141,7 +141,7 @@ std::vector<std::uint8_t> left_behind(const MergeTile& merge, const MergeStart& 
   return result;
 }
 
-// `values` of `keys` (ascending, those of the adjustment) for each of `wanted`, where they are.
+// Picks the values of `wanted` from `values`, whose ascending keys are `keys`, where they exist.
 template <typename Key, typename Value>
 void take_known(const std::vector<Key>& keys, const std::vector<Value>& values, const std::vector<Key>& wanted,
                 std::vector<Value>& to) {
@@ -151,7 +151,7 @@ void take_known(const std::vector<Key>& keys, const std::vector<Value>& values, 
   }
 }
 
-// A tile as its own adjustment left it. A run that resumes in the middle of the merge still knows this state, and
+// The state of a tile after its own adjustment. A run that resumes in the middle of the merge has the same state, and
 // corrects measurements by the same bits.
 TileState own_solution(const TileProblem& problem, const TileAdjustment& adjustment, TileState state) {
   std::vector<MountId> mounts;
@@ -187,7 +187,7 @@ MergeStart merge_start(const Job& job, const BlockState& oriented, const std::ve
   const std::vector<Similarity> motions = bring_together(job, tiles);
   for (std::size_t i = 0; i < tiles.size(); ++i) start.motions[static_cast<std::size_t>(numbers[i].value)] = motions[i];
   take_richest(tiles, numbers, start);
-  return_freed_memory();  // what else the adjustments hold, beside which all frames are read now
+  return_freed_memory();  // the other data of the adjustments, before all frames are read
   const IndexedVector<FrameIndex, Pose> before = start.state.frames;
   turn_back_stretches(job.block, oriented, start.state);
   for (FrameIndex f(0); before.contains(f); ++f.value)

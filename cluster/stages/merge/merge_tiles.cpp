@@ -36,7 +36,7 @@ BlockState gather_state(Job& job, const BlockState& start, const TileStore& tile
   ByteWriter writer;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const RankTile& tile = tiles.outline(i);
-    // What no kept residual of the tile touches has not moved with the block.
+    // Unknowns that no kept residual of the tile touches have not moved with the block.
     const UnknownList& touched = runner.unknowns(i);
     const auto write = [&](const auto& table, const auto& values, auto&& id_of, auto&& write_values) {
       std::decay_t<decltype(table)> rows;
@@ -111,7 +111,8 @@ std::int64_t screen(Job& job, TileStore& tiles) {
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change(row, [&](RankTile& tile) {
       const TileProblem& problem = tile.problem;
-      bool any = false;  // a tile whose own adjustment failed keeps nothing, and has no residuals to judge by
+      // a tile whose own adjustment failed keeps no observations, and has no residuals for a judgement
+      bool any = false;
       for (std::int64_t p = 0; p < problem.point_count() && !any; ++p) any = problem.active(p);
       if (!any) return;
       changed += screen_observations(tile.problem, tile.state,

@@ -1,5 +1,5 @@
-// The tiles of this rank in the merge: loading them, screening between adjustments, and gathering the state of the
-// block.
+// Handles the tiles of this rank in the merge: loads them, tests their observations between adjustments, and gathers
+// the state of the block.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ namespace megablock {
 
 // The inputs of the merge. Unit names are by tile, and empty for tiles that could not be adjusted.
 struct MergeInputs {
-  BlockState oriented;  // empty after the tiles are loaded
+  BlockState oriented;  // emptied when the tiles are loaded
   const Tiles& tiles;
   const std::vector<std::string>& tracks;
   const std::vector<std::string>& adjusted;
@@ -27,23 +27,24 @@ void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart&
                     const std::vector<int>& rank_of_tile, const std::function<void(RankTile&)>& prepare,
                     TileStore& own);
 
-// Collective: the state of the block from the tiles of all ranks. Tiles hold the same bits of the unknowns that they
+// Collective. The state of the block from the tiles of all ranks. Tiles hold the same bits of the unknowns that they
 // share, so that their order does not matter.
 BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner);
 
-// Gives every tile the present state, before its observations are tested against it.
+// Gives the present state to every tile, before its observations are tested against it.
 void follow(const BlockState& state, TileStore& tiles);
 
-// Collective: whether the sigmas of positions, attitudes and relative poses have changed so much that another
+// Collective. Whether the sigmas of positions, attitudes and relative poses have changed so much that another
 // adjustment is needed.
 bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales);
 
-// Collective: tests every observation at the solution again. Returns the number of changed verdicts in the whole block.
+// Collective. Tests every observation at the solution again. Returns the number of changed decisions in the whole
+// block.
 std::int64_t screen(Job& job, TileStore& tiles);
 
 // Folder of this rank in the scratch of the job.
 std::string scratch_folder_of_rank(const Job& job);
-// The memory of this rank, half of it for tiles, and its scratch; then the part that the tiles leave for factors.
+// The memory of this rank, half of it for tiles, and its scratch. When the tiles are loaded, the rest is for factors.
 MemoryOptions memory_of_rank(const Job& job);
 MemoryOptions memory_of_factors(MemoryOptions memory, const TileStore& tiles);
 
@@ -53,8 +54,8 @@ struct MergeCosts {
   double seconds = 0;                          // all sweeps, on the slowest rank
   std::int64_t passes = 0;                     // sweeps up
   std::int64_t tiles = 0, tiles_in_scratch = 0;
-  MemoryStatistics factors;           // peak_bytes: of the rank with the largest
-  std::int64_t peak_front_bytes = 0;  // of the rank with the largest: a front at work and all pending updates
+  MemoryStatistics factors;           // peak_bytes: that of the rank with the largest
+  std::int64_t peak_front_bytes = 0;  // bytes of a front at work and all pending updates, on the rank with the largest
   FrontCosts fronts;
   std::map<std::string, double> figures() const;  // by name, for the event of the merge
 };

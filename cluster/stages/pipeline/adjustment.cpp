@@ -25,7 +25,7 @@ namespace megablock {
 
 namespace {
 
-// What the tiles are made of.
+// The data from which tiles are made.
 struct OrientedTiles {
   const BlockState& oriented;
   const Tiles& tiles;
@@ -51,7 +51,8 @@ TileStart measured_start(const Job& job, const OrientedTiles& from, TileIndex ti
   return start;
 }
 
-// The heights of the ground that the correction needs are those of the points as measured.
+// The correction needs the heights of the ground. It takes those of the points intersected from the uncorrected
+// measurements.
 void correct_environment(const Job& job, TileStart& start) {
   const std::vector<std::uint8_t> kept = start.problem.kept;
   TileState at = start.state;
@@ -66,8 +67,8 @@ TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, 
   return start;
 }
 
-// An adjusted tile, its tracks split; the merge intersects the parts that are put back. What the tile was made of goes
-// before it is made again: two of them are twice the memory of the stage.
+// An adjusted tile with its tracks split into parts. The merge intersects the parts that were put back. The adjusted
+// tile is freed before the split one is made, because two of them would double the memory of the stage.
 TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::function<TileStart(TrackSet)>& start) {
   const std::vector<std::int64_t> rows = rows_of_split(adjusted.tracks, parts);
   TrackSet tracks = split_tracks(adjusted.tracks, parts);
@@ -77,7 +78,7 @@ TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::fun
   adjusted = {};
 
   TileStart split = start(std::move(tracks));
-  split.problem.kept = kept;  // control points' rows are behind the tracks'
+  split.problem.kept = kept;  // rows of control points follow those of the tracks
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto row = static_cast<std::size_t>(rows[i]);
     split.problem.kept[i] = parts[row] > 0 || kept[row];
@@ -141,7 +142,7 @@ struct TileMark {
   std::int64_t observations = 0;
 };
 
-// Of all tiles: every rank reads its share of them. Collective.
+// Collective. The marks of all tiles; every rank reads its share of the tiles.
 std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, const std::vector<std::string>& tracks) {
   const auto ranks = static_cast<std::size_t>(job.ranks.size());
   ByteWriter writer;

@@ -33,7 +33,7 @@ VerificationSite read_site(const std::string& file) {
   return {std::move(project.block), std::move(tracks)};
 }
 
-// What is left without a pose takes no part.
+// Frames without a pose take no part in the calibration.
 void warn_of_lost_frames(const Block& block, const BlockState& start, RigCalibration& calibration) {
   const auto lost = std::count(start.oriented.begin(), start.oriented.end(), std::uint8_t{0});
   if (lost == 0) return;
@@ -61,14 +61,14 @@ std::string calibrate(Job& job, const BlockState& start, const TrackSet& tracks,
   return "the calibration is refused, it is no better than the start: " + calibration.refused +
          ". The rig stays as it was; what was found is in " + job.store.path(name) +
          (only_there ? ". Was the site recorded with this rig? Else measure" : ". Measure") +
-         " more, better spread over the pictures, or hold what is weak (--hold-intrinsics)";
+         " more, better spread over the images, or hold the cameras (--hold-intrinsics)";
 }
 
 }  // namespace
 
 void resect_missing(const Block& block, BlockState& state) {
   if (all_oriented(state)) return;
-  // Mounts and cameras are not calibrated yet: measurements are off by what they are wrong.
+  // Mounts and cameras are not calibrated yet, and their errors shift the observations.
   constexpr double kUncalibratedPx = 10, kPositionM = 1;
   Block rough = block;
   for (ControlPoint& point : rough.control_points)

@@ -13,15 +13,15 @@ namespace megablock {
 struct CalibrationSettings {
   RigCalibrationOptions rig;
   std::string verification;  // project file of another site; empty: none
-  bool json = false;         // figures instead of the table
+  bool json = false;         // prints figures instead of the table
 };
 
-// Collective. `start`: frames, with poses where they are known. Writes calibration.yaml (calibration-refused.yaml when
-// the result is no better than the start) and calibration.html into the job folder, and prints the figures. Throws on
-// every rank when the calibration is refused.
+// Collective. `start` has the frames, with poses where they are known. Writes calibration.yaml
+// (calibration-refused.yaml when the result is no better than the start) and calibration.html into the job folder, and
+// prints the figures. Throws on every rank when the calibration is refused.
 void run_calibration(Job& job, const BlockState& start, const TrackSet& tracks, const CalibrationSettings& settings);
 
-// Adds poses of frames without one, from the control points that they see.
+// Finds poses of frames without one from the control points that they see.
 void resect_missing(const Block& block, BlockState& state);
 
 }  // namespace megablock

@@ -50,7 +50,7 @@ CandidateGraph run_candidates(Job& job, const FeatureStage& features) {
   unit.fingerprint = candidates_fingerprint(job, features);
   unit.write = [&](const std::string& path) {
     const GlobalDescriptors descriptors = read_descriptors(job, features);
-    // Grown as the block grew, so that pairs and cells of earlier images stay what they were.
+    // Grown step by step as the block has grown, so that pairs and cells of earlier images stay the same.
     CandidateGraph graph;
     std::int64_t before = 0;
     for (const std::int64_t n : job.generations) {

@@ -24,7 +24,7 @@ std::uint64_t mask_hash(const std::string& path) { return path.empty() ? 0 : has
 
 struct Shard {
   std::string name;
-  std::int64_t first = 0;                         // image
+  std::int64_t first = 0;                         // first image
   std::vector<std::uint64_t> image_fingerprints;  // of its images
 };
 
@@ -49,7 +49,8 @@ std::vector<std::uint64_t> image_fingerprints(const Job& job) {
   return fingerprints;
 }
 
-// A shard that grew at its end keeps the features of its first images: as many as the file there was made of.
+// A shard to which images were added keeps the features of its first images, those from which the existing file was
+// made.
 std::vector<ImageFeatures> features_to_keep(const Job& job, const std::string& name,
                                             const std::vector<std::uint64_t>& fingerprints) {
   for (std::size_t count = fingerprints.size() - 1; count > 0; --count) {
@@ -60,8 +61,9 @@ std::vector<ImageFeatures> features_to_keep(const Job& job, const std::string& n
   return {};
 }
 
-// The features of a shard in the making. Its first images are saved now and then, as if the shard ended there, so that
-// an interruption costs seconds and not the whole unit: what is there is kept (features_to_keep).
+// Collects the features of a shard while they are computed. From time to time the first images are saved as if the
+// shard ended there, so that an interruption loses seconds and not the whole unit: existing features are kept
+// (features_to_keep).
 class GrowingShard {
  public:
   GrowingShard(const Job& job, const Shard& shard)
@@ -74,12 +76,12 @@ class GrowingShard {
   std::int64_t kept() const { return static_cast<std::int64_t>(saved_); }
   const std::vector<ImageFeatures>& images() const { return images_; }
 
-  // One thread at a time; others may be at work on later images.
+  // One thread at a time; others may work on later images.
   void add(std::int64_t image, ImageFeatures features) {
     images_[static_cast<std::size_t>(image)] = std::move(features);
     done_[static_cast<std::size_t>(image)] = 1;
   }
-  // The same; on the main thread, to which HDF5 belongs.
+  // The same, on the main thread, which alone may use HDF5.
   void save_now_and_then() {
     const auto end = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), 0) - done_.begin());
     if (end == saved_ || end == done_.size() || !times_.due()) return;
@@ -97,7 +99,7 @@ class GrowingShard {
       store_.write(shard_.name, fingerprint, [&](const std::string& path) { write_features(path, first); });
       saved_ = count;
     } catch (const std::exception&) {
-      // The unit itself will be written to the same disk, and says what is wrong with it.
+      // The unit itself will be written to the same disk, and that error says what is wrong.
     }
     std::move(first.begin(), first.end(), images_.begin());
   }
@@ -131,7 +133,7 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
   write_features(path, growing.images());
 }
 
-// Images without features become failures of the run, with their reasons.
+// Records images without features as failures of the run, with their reasons.
 void list_unreadable(Job& job, const FeatureStage& stage) {
   const std::string text = on_first_rank(job.ranks, [&] {
     nlohmann::json failed = nlohmann::json::array();

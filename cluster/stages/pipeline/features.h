@@ -1,4 +1,4 @@
-// The stage of features: features/<shard>.h5, keypoints and descriptors of 64 images each.
+// The stage of features. It makes features/<shard>.h5, keypoints and descriptors of 64 images each.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace megablock {
 
-// The outcome of the stage: the fingerprint of the features of each image (of its file, mask and options), and the
-// units.
+// The outcome of the stage: a fingerprint of the features of each image (of its file, its mask and the options), and
+// the units.
 struct FeatureStage {
   std::vector<std::uint64_t> image_fingerprint;
   std::vector<std::string> shards;
@@ -24,7 +24,7 @@ class FeatureCache {
  public:
   FeatureCache(const JobStore& store, std::size_t capacity_shards) : store_(store), capacity_(capacity_shards) {}
   const ImageFeatures& features(ImageIndex image);
-  // Loads the shards of these images together. References stay valid until the next call.
+  // Loads the shards of these images, all at the same time. References stay valid until the next call.
   void load(const std::vector<ImageIndex>& images);
 
  private:

@@ -25,8 +25,8 @@ void add_camera(Hasher& hasher, const Camera& camera) {
   add_to_hash(hasher, camera.intrinsics);
 }
 
-// Where images see down, with all its errors, as far as it is good to half a degree but for those of the camera: these
-// turn the verticals of both images of a pair alike, which for one camera hardly matters.
+// The directions in which images see down, where they are known to half a degree apart from the errors of the camera.
+// These errors turn the verticals of both images of a pair alike, which hardly matters for one camera.
 std::map<ImageIndex, AxisDirection> good_verticals(const Block& block) {
   constexpr double kGood = 0.5 * kDegree;
   std::map<ImageIndex, AxisDirection> good;
@@ -38,13 +38,14 @@ std::map<ImageIndex, AxisDirection> good_verticals(const Block& block) {
   return good;
 }
 
-// A pair of a cell; it goes by its verticals where both images have one and their given poses allow for both.
+// A pair of a cell. It is matched by its verticals when both images have one and their given poses do not contradict
+// them.
 struct CellPair {
   ImageIndex a, b;
   bool by_verticals = false;
 };
 
-// What the trajectory and the images' verticals say of pairs before they are matched.
+// What is known of pairs before they are matched: the trajectory, and the verticals of the images.
 struct Knowledge {
   explicit Knowledge(const Job& job)
       : trajectory(job.block, job.settings.matching.trust),
@@ -81,7 +82,7 @@ std::vector<CellPair> cell_pairs(const CandidateGraph& graph, std::size_t cell, 
   return pairs;
 }
 
-// Algorithm number of what verticals do in matching: pairs without them stay valid when it is raised.
+// Algorithm number of the use of verticals in matching. Pairs without verticals stay valid when it is raised.
 constexpr int kUprightMatching = 3;
 
 std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<CellPair>& pairs,
@@ -110,7 +111,7 @@ std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, con
   return hasher.value();
 }
 
-using UprightSectors = std::map<ImageIndex, std::vector<std::int8_t>>;  // of images with a vertical
+using UprightSectors = std::map<ImageIndex, std::vector<std::int8_t>>;  // by image with a vertical
 
 std::vector<StandingPair> standing_of(const Job& job, const std::vector<CellPair>& pairs,
                                       const std::vector<const ImageFeatures*>& a,

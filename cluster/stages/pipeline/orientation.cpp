@@ -1,7 +1,7 @@
 #include "cluster/stages/pipeline/orientation.h"
 
-// Initial orientation, one unit per generation of the block: images that are added later are oriented with respect to
-// those that were there, whose orientation stays what it was.
+// Orients the block initially, in one unit for each generation of the block. Images that are added later are oriented
+// with respect to the existing ones, which keep their orientation.
 
 #include <fmt/core.h>
 
@@ -34,9 +34,9 @@ namespace megablock {
 namespace {
 
 using Frames = std::set<FrameIndex>;
-using Links = std::map<FrameIndex, Frames>;  // of frames with a verified pair
+using Links = std::map<FrameIndex, Frames>;  // frames that a verified pair links to each frame
 
-// Algorithm number of what is believed of verticals: orientations without them stay valid when it is raised.
+// Algorithm number of the check of verticals. Orientations without verticals stay valid when it is raised.
 constexpr int kVerticalCheck = 2;
 
 void add_vertical_values(Hasher& hasher, const Block& block) {
@@ -78,7 +78,7 @@ Links links_of(const Block& block, const std::vector<VerifiedPair>& pairs) {
   return links;
 }
 
-// Sets of frames without a pose that hang together by pairs and of which one is new, by first frame.
+// Sets of frames without a pose that pairs connect and that contain a new frame, ordered by their first frame.
 std::vector<Frames> sets_to_orient(const BlockState& state, const Frames& new_frames, const Links& links) {
   std::vector<Frames> sets;
   Frames seen;
@@ -98,7 +98,8 @@ std::vector<Frames> sets_to_orient(const BlockState& state, const Frames& new_fr
   return sets;
 }
 
-// With the frames they are linked to and those these are linked to: enough to intersect the points they see.
+// The set with the frames that are linked to it and those that are linked to these: enough to intersect the points that
+// the set sees.
 Frames with_surroundings(const Frames& set, const Links& links) {
   Frames all = set;
   for (int ring = 0; ring < 2; ++ring) {
@@ -108,7 +109,7 @@ Frames with_surroundings(const Frames& set, const Links& links) {
   return all;
 }
 
-// Orients one set; frames that had a pose keep it, and the cameras with them.
+// Orients one set. Frames that had a pose keep it, and so do their cameras.
 void orient_set(const Job& job, const Block& block, const std::vector<VerifiedPair>& pairs, const Frames& set,
                 const Links& links, InitialOrientation& orientation) {
   BlockState& state = orientation.state;
@@ -120,7 +121,7 @@ void orient_set(const Job& job, const Block& block, const std::vector<VerifiedPa
   try {
     const TrackSet tracks = build_tracks(read_keypoints(job), own, job.settings.tracks);
     oriented = orient_component(block, state, {frames.begin(), frames.end()}, own, tracks, job.settings.orientation);
-  } catch (const ComputeError& error) {  // stays without poses; the result lists its images
+  } catch (const ComputeError& error) {  // the frames stay without poses; the result lists their images
     for (const FrameIndex frame : set) orientation.failed.emplace_back(frame, error.what());
     return;
   }
@@ -141,7 +142,7 @@ Frames frames_from(const Block& block, std::int64_t first_image) {
   return frames;
 }
 
-// The state of a block that grew: what it had, and start values for the rest.
+// The state of a block that has grown: the state before, and start values for the new frames.
 BlockState grow(const BlockState& state, const Block& block) {
   BlockState grown = initial_state(block);
   std::copy(state.frames.begin(), state.frames.end(), grown.frames.begin());
@@ -151,8 +152,8 @@ BlockState grow(const BlockState& state, const Block& block) {
   return grown;
 }
 
-// Pairs of the cells that belong to a generation (a cell is of the generation of its latest image) or an earlier one;
-// cells without a verified pair say nothing.
+// The pairs of the cells that belong to this generation or an earlier one; a cell belongs to the generation of its
+// latest image. Cells without a verified pair do not count.
 std::vector<VerifiedPair> pairs_of_generation(const Job& job, const std::vector<std::string>& matches,
                                               std::int64_t images, Hasher& hasher) {
   std::vector<VerifiedPair> pairs;
@@ -166,7 +167,7 @@ std::vector<VerifiedPair> pairs_of_generation(const Job& job, const std::vector<
   return pairs;
 }
 
-// What is held is not a matter of the orientation, which only comes near it.
+// Puts held poses back in their place, because the orientation only comes near them.
 BlockState held_in_place(const Job& job, BlockState state) {
   BlockState placed = state;
   place_held_frames(job.block, placed);
@@ -178,7 +179,7 @@ BlockState held_in_place(const Job& job, BlockState state) {
   return state;
 }
 
-// From here on the block does without them.
+// Removes these verticals from the block, and adds them to `all`.
 void set_aside(Job& job, const std::vector<SetAsideVertical>& verticals, std::vector<SetAsideVertical>& all) {
   std::set<ImageIndex> images;
   for (const SetAsideVertical& vertical : verticals) images.insert(vertical.image);
@@ -193,13 +194,14 @@ void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std
   say(job, "orientation", text);
 }
 
-// Where every pose is given nothing is oriented; given poses may still be poor.
+// With all poses given nothing is oriented. Given poses may still be poor, and are then adjusted to the observations of
+// their frames.
 BlockState given_orientation(const Job& job, BlockState given) {
   const GivenTrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
   if (change.frames > 0)
     say(job, "orientation",
-        fmt::format("given poses drift away from what was observed of their frames; adjusted to that as a start: {} "
-                    "frames in {}, moved by {:.3g} m rms, {:.3g} m at most",
+        fmt::format("given poses drift away from the observations of their frames and are adjusted to them as a start: "
+                    "{} frames in {}, moved by {:.3g} m rms, {:.3g} m at most",
                     change.frames, counted(change.trajectories, "drive"), change.rms_m, change.largest_m));
   return held_in_place(job, std::move(given));
 }

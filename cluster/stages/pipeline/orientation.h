@@ -1,4 +1,4 @@
-// The stage of orientation: orient/<generation>.h5, initial poses of all frames.
+// The stage of orientation. It makes orient/<generation>.h5, initial poses of all frames.
 #pragma once
 
 #include <string>

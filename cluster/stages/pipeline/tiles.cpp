@@ -19,15 +19,15 @@ namespace megablock {
 
 namespace {
 
-// Grown as the block grew, so that earlier frames keep their tiles.
+// Extends the tiles as the block has grown, so that earlier frames keep their tiles.
 Tiles grow_tiles(const Job& job, LinkWeights links) {
   Tiles tiles;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const std::int64_t frames = frames_of_first_images(job.block, job.generations[g]);
     const FrameGraph graph = links.graph(frames);
-    if (g + 1 == job.generations.size()) {  // makes room for what METIS needs
+    if (g + 1 == job.generations.size()) {  // makes room for METIS
       links = {};
-      job.tables.release();  // images, whose frames were counted
+      job.tables.release();  // the images are not needed any more, because their frames are counted
       return_freed_memory();
     }
     tiles = g == 0 ? make_tiles(graph, job.settings.tiles) : extend_tiles(graph, tiles, job.settings.tiles);

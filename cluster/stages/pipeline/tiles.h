@@ -1,4 +1,4 @@
-// The stage of tiles: tiles.h5, the tiles of the block and the merge tree.
+// The stage of tiles. It makes tiles.h5, the tiles of the block and the merge tree.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace megablock {
 
-// Collective; from verified matches, or from given tracks.
+// Collective. Works from verified matches, or from given tracks.
 Tiles run_tiles(Job& job, const std::vector<std::string>& matches);
 Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points);
 

@@ -1,9 +1,9 @@
 #include "cluster/stages/pipeline/tracks.h"
 
-// Tracks of the whole block are built by one rank, in memory that does not grow with the matches
-// (match/tracks/tracks.h), and written tile by tile; tracks/index.txt, the unit of the stage, lists the content hash of
-// every tile's file. A tile's file is rewritten only when its tracks changed, so that adding an image touches only the
-// tiles it is seen in.
+// One rank builds the tracks of the whole block, in memory that does not grow with the matches (match/tracks/tracks.h),
+// and writes them tile by tile. tracks/index.txt, the unit of the stage, lists the content hash of every tile's file.
+// The file of a tile is only rewritten when its tracks have changed, so that adding an image touches only the tiles in
+// which it is seen.
 
 #include <algorithm>
 #include <fstream>
@@ -35,7 +35,7 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kFeatureBits = 24;  // SIFT features of one image stay far below 2^24
+constexpr std::int64_t kFeatureBits = 24;  // one image has far fewer than 2^24 SIFT features
 
 std::int64_t track_key(ImageIndex image, std::int32_t feature) { return (image.value << kFeatureBits) | feature; }
 
@@ -49,7 +49,7 @@ std::uint64_t content_fingerprint(const TrackSet& tracks) {
   return hasher.value();
 }
 
-// The files named in the index are there and whole.
+// Whether the files that the index names exist and are undamaged.
 bool index_holds(const Job& job, const std::string& index, const std::vector<std::string>& names) {
   if (!job.store.seal(index)) return false;
   std::ifstream in(job.store.path(index));
@@ -90,7 +90,7 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
   return names;
 }
 
-// Adds the pairs that take part, each in the generation of its later image.
+// Adds the pairs that take part to the builder, each in the generation of its later image.
 void add_pairs(const Job& job, const std::vector<std::string>& matches, const Tiles& tiles, TrackBuilder& builder) {
   std::set<std::pair<FrameIndex, FrameIndex>> dropped;
   for (const FrameEdge& edge : tiles.dropped_links) dropped.insert({edge.a, edge.b});
@@ -102,8 +102,8 @@ void add_pairs(const Job& job, const std::vector<std::string>& matches, const Ti
     }
 }
 
-// A track of two images adds no check to its point. Such tracks stay only where one of their images has few longer ones
-// by the time the later image comes; so a block that grows keeps the tracks it has.
+// A track of two images adds no check to its point. Such tracks only stay where one of their images has few longer
+// tracks when the later image is added. A block that grows therefore keeps its tracks.
 constexpr std::int64_t kEnoughLongTracks = 200;
 
 bool stays(const Job& job, const TrackBuilder& builder, const Track& track) {
@@ -113,7 +113,7 @@ bool stays(const Job& job, const TrackBuilder& builder, const Track& track) {
   return so_far[track.images[0]] < kEnoughLongTracks || so_far[track.images[1]] < kEnoughLongTracks;
 }
 
-// The tracks that stay, by owner tile: those of tile t are numbers[begin[t] ...), ascending.
+// The tracks that stay, by the tile that owns them: those of tile t are numbers[begin[t] ...), ascending.
 struct OwnedTracks {
   std::vector<std::int64_t> begin;
   std::vector<FeatureNumber> numbers;
@@ -150,7 +150,7 @@ std::vector<ImageFeatures> shard_keypoints(const Job& job, std::int64_t shard) {
   return read_keypoints(job.store.verified_path(unit_name("features", shard)));
 }
 
-// Positions of the observations in the images of one shard: rows [first, last) of `order`.
+// Fills in the positions of the observations in the images of one shard: rows [first, last) of `order`.
 void measure(const Job& job, std::int64_t shard, const std::int64_t* first, const std::int64_t* last,
              TrackSet& tracks) {
   const std::vector<ImageFeatures> features = shard_keypoints(job, shard);
@@ -177,7 +177,7 @@ void measure(const Job& job, std::int64_t shard, const std::int64_t* first, cons
   }
 }
 
-// Shard after shard, so that the keypoints of 64 images are in memory at a time.
+// Fills in all positions shard by shard, so that the keypoints of only 64 images are in memory at a time.
 void measure(const Job& job, TrackSet& tracks) {
   tracks.x.resize(tracks.image.size());
   tracks.y.resize(tracks.image.size());

@@ -1,4 +1,4 @@
-// The stage of tracks: tracks/<tile>.h5, the tie points that each tile owns.
+// The stage of tracks. It makes tracks/<tile>.h5, the tie points that each tile owns.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace megablock {
 
-// Collective. Returns the unit names by tile. The id of a track is its first image times 2^24 plus the feature, so that
-// it stays the same when the block grows; the result has dense indices.
+// Collective. Returns the unit names by tile. The id of a track is its first image times 2^24 plus the feature. It
+// stays the same when the block grows; the result has dense indices.
 std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& matches, const Tiles& tiles);
 std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles);
 

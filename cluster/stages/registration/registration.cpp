@@ -25,7 +25,7 @@ namespace megablock {
 
 namespace {
 
-constexpr int kAlgorithm = 5;  // of the registration's stages, part of their fingerprints
+constexpr int kAlgorithm = 5;  // algorithm number of the registration's stages, part of their fingerprints
 constexpr const char* kRig = "register/rig.h5";
 constexpr const char* kPlaces = "register/places.h5";
 constexpr const char* kTrajectory = "register/trajectory.h5";
@@ -41,7 +41,7 @@ void add(Hasher& h, const PairRegistrationOptions& o) {
   h.add(o.max_rotation_sigma_deg).add(o.max_shift_m).add(o.max_turn_deg);
 }
 
-// What the chain is made with; the rest of the options says which control points take part.
+// Adds the options from which the chain is made. The other options only select control points.
 void add_chain(Hasher& h, const TrajectoryOptions& o) {
   h.add(o.chain_position_sigma_m).add(o.chain_rotation_sigma_deg).add(o.difference_position_sigma_m);
   h.add(o.difference_rotation_sigma_deg).add(o.max_gap_m).add(o.max_gap_s);
@@ -64,7 +64,7 @@ void add(Hasher& h, const JointOptions& o) {
   h.add(o.rounds).add(o.iterations).add(o.last_iterations);
 }
 
-// The tracks of the block, read by ranks that compute.
+// The tracks of the block; only ranks that compute a unit read them.
 class LazyTracks {
  public:
   LazyTracks(const Block& block, const TrackSource& source) : block_(block), source_(source) {}
@@ -80,7 +80,7 @@ class LazyTracks {
   std::unique_ptr<FrameTracks> tracks_;
 };
 
-// What is wrong with the trajectory is wrong on every rank.
+// Reads the trajectory. Its errors are found on every rank.
 Trajectory agreed_trajectory(const Job& job, const TrajectoryOptions& options) {
   try {
     return trajectory_of(job.block, options);
@@ -114,7 +114,8 @@ TileAdjustment rig_file_of(const RigEstimate& estimate) {
   return file;
 }
 
-// From here on the block's cameras and mounts start from the estimated ones. Returns what was done.
+// Estimates cameras and mounts. The block's cameras and mounts start from the estimated ones afterwards. Returns the
+// outcome in words.
 std::string run_rig(Job& job, LazyTracks& tracks, const RegistrationSettings& settings) {
   if (!settings.estimate_rig || !has_free_rig(job.block)) return "as given";
   const Trajectory trajectory = agreed_trajectory(job, settings.trajectory);
@@ -156,7 +157,8 @@ std::vector<Eigen::Vector3d> positions_of(const JointInput& input) {
   return positions;
 }
 
-// The poses of a place with the pairs' relative poses from the chain, where it has them.
+// The poses of the four frames of a place. The relative poses within each pair are those of the chain, where it has
+// them.
 std::array<Pose, 4> poses_of(const Place& place, const JointInput& input,
                              const std::map<std::pair<FrameIndex, FrameIndex>, const ChainLink*>& chain) {
   const auto start = [&](FrameIndex f) { return input.start[static_cast<std::size_t>(f.value)]; };
@@ -206,7 +208,7 @@ std::vector<RegisteredPlace> register_places(const Job& job, const FrameTracks& 
 
 struct Registrations {
   std::vector<RegisteredPlace> rows;
-  std::uint64_t hash = 0;  // of the units' contents
+  std::uint64_t hash = 0;  // hash of the units' contents
 };
 
 Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& trajectory,
@@ -235,7 +237,7 @@ Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& 
   Hasher hasher;
   for (const Unit& unit : units) {
     const auto seal = job.store.seal(unit.name);
-    if (!seal) continue;  // failed, and recorded so
+    if (!seal) continue;  // the unit failed, which is recorded
     hasher.add(seal->content_hash);
     const std::vector<RegisteredPlace> part = read_registrations(job.store.verified_path(unit.name));
     all.rows.insert(all.rows.end(), part.begin(), part.end());
@@ -247,7 +249,7 @@ Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& 
 RegisteredTrajectory adjust_trajectory(const Job& job, Trajectory trajectory, const std::vector<RegisteredPlace>& rows,
                                        const RegistrationSettings& settings) {
   JointInput& input = trajectory.input;
-  // Neighbouring places may have been moved to the same frames: these count once.
+  // Neighbouring places may have been moved to the same frames; their registrations count once.
   std::map<std::pair<FrameIndex, FrameIndex>, std::size_t> link_of;
   for (std::size_t i = 0; settings.use_registrations && i < rows.size(); ++i) {
     const auto& [place, registration] = rows[i];
@@ -300,7 +302,7 @@ RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, cons
   return read_trajectory(job.store.verified_path(kTrajectory));
 }
 
-// A reason without its numbers.
+// A reason without its numbers, so that equal reasons can be counted.
 std::string kind_of(const std::string& reason) {
   constexpr const char* kNumber = "…";
   std::string kind;
@@ -314,7 +316,7 @@ std::string kind_of(const std::string& reason) {
   return kind;
 }
 
-// The datum may hang on nothing: then the trajectory stays about where it was.
+// Notes a datum that nothing fixes: the trajectory then stays about where it was.
 void note_free_position(const JointInput& input, const RegisteredTrajectory& registered,
                         const RegistrationSettings& settings, std::vector<std::string>& notes) {
   const bool control =

@@ -1,5 +1,5 @@
-// The registration of a trajectory, as stages of a job: register/rig.h5 (one unit, where cameras or mounts are free),
-// register/places.h5 (one unit), register/pairs/<n>.h5 (some hundred places each, claimed by the ranks),
+// Registers a trajectory, in four stages of a job: register/rig.h5 (one unit, where cameras or mounts are free),
+// register/places.h5 (one unit), register/pairs/<n>.h5 (some hundred places each, claimed by the ranks), and
 // register/trajectory.h5 (one unit).
 #pragma once
 
@@ -23,18 +23,19 @@ struct RegistrationSettings {
   PairRegistrationOptions pairs{.min_frames = 3};
   TrajectoryOptions trajectory;
   JointOptions joint;
-  bool use_registrations = true;  // false: relative poses of successive frames and absolute observations alone
-  bool use_resections = false;    // resections of frames that see three control points or more
+  bool use_registrations = true;  // false: only relative poses of successive frames and absolute observations
+  bool use_resections = false;    // uses resections of frames that see three control points or more
   int units_places = 250;         // places in a unit
   void check() const;             // throws InputError
 };
 
-// The tracks of the block, which are read when they are first needed. `fingerprint`: of all tracks.
+// The tracks of the block, which are read when they are first needed. `fingerprint` is that of all tracks.
 struct TrackSource {
   std::string file;  // file of given tracks; empty: tracks of the job
   std::uint64_t fingerprint = 0;
   std::function<TrackSet()> read;
-  std::vector<std::string> matches;  // units of the verified pairs from which they were built; empty for given tracks
+  // units of the verified pairs from which the tracks were built; empty for given tracks
+  std::vector<std::string> matches;
 };
 
 struct RegistrationSummary {
@@ -43,9 +44,9 @@ struct RegistrationSummary {
   using Reasons =
       std::vector<std::pair<std::string, std::int64_t>>;  // the reason without its numbers, and how often it occurs
   Reasons refusals, not_resected;
-  double median_move_m = 0, largest_move_m = 0;  // movement of frames from the start
+  double median_move_m = 0, largest_move_m = 0;  // movements of frames from the start
   std::vector<std::string> check_points;         // one line each
-  double check_rms_m = 0;                        // of check points adjusted as tie points; 0: none
+  double check_rms_m = 0;                        // of check points adjusted as tie points; 0: there are none
   std::vector<std::string> notes;                // on the trajectory: gaps, copies
   std::uint64_t digest = 0;                      // hash of the bits of the trajectory
 };

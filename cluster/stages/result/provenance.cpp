@@ -15,7 +15,7 @@ namespace megablock {
 
 namespace {
 
-// Names of the units of a stage; empty when the job has no such stage.
+// The names of the units of a stage; empty when the job does not have the stage.
 std::vector<std::string> units_of(const Job& job, const std::string& stage) {
   std::vector<std::string> names;
   for (const StageRecord& record : job.records)
@@ -26,9 +26,10 @@ std::vector<std::string> units_of(const Job& job, const std::string& stage) {
 
 }  // namespace
 
-// What a project file says of positions and attitudes is in the block's priors; here it is told as it was asked.
+// The block only holds the resulting priors of positions and attitudes. Here the options of the project file are listed
+// as they were written.
 void add_prior_options(const StageSettings& settings, std::vector<OptionRecord>& options) {
-  constexpr const char* kOwn = "as given";  // by the images or the block
+  constexpr const char* kOwn = "as given";  // the values are those of the images or of the block
   for (const auto& [section, key, otherwise] :
        {std::tuple("gps", "use", "true"), std::tuple("gps", "sigma_horizontal_m", kOwn),
         std::tuple("gps", "sigma_vertical_m", kOwn), std::tuple("gps", "lever_arm_m", "[0, 0, 0]"),
@@ -66,7 +67,7 @@ IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job) {
       record.features = static_cast<std::int64_t>(image.keypoints.size());
     }
   for (const std::string& cell : units_of(job, "matching")) {
-    if (!job.store.seal(cell)) continue;  // failed
+    if (!job.store.seal(cell)) continue;  // the unit failed
     for (const VerifiedPair& pair : read_matches(job.store.verified_path(cell))) {
       if (pair.model == PairModel::kNone) continue;
       for (const ImageIndex image : {pair.a, pair.b}) {

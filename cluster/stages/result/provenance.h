@@ -1,4 +1,4 @@
-// The provenance of a result: program, options and images.
+// Gives the provenance of a result: program, options and images.
 #pragma once
 
 #include <functional>

@@ -16,11 +16,11 @@ namespace megablock {
 
 namespace {
 
-// Columns of a batch of tracks have some hundred KiB. In the heap they would come to lie in ever other ones of the
-// holes that the merge has left there, until all of these are in memory: 60 MiB on the first rank of a million images.
+// The columns of a batch of tracks have some hundred KiB each. In the heap they would be placed in ever different holes
+// that the merge has left there, until all of these holes are in memory: 60 MiB on the first rank for a million images.
 constexpr int kColumn = 1 << 17;  // bytes
 
-// Says when they are first asked for.
+// Reports the beginning of the gathering, when the tracks are first read.
 class AnnouncedTracks final : public TrackBatches {
  public:
   AnnouncedTracks(const TrackBatches& tracks, std::function<void()> begin)
@@ -48,15 +48,16 @@ void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_
     tables.release();
     return_freed_memory();
   };
-  release_all();  // what the result was put together from
+  release_all();  // the parts from which the result was put together
   const PartTracks tracks(std::move(parts), result.sigma_scaled ? result.variance_factor : 1, release_all);
   const auto gather = [&] {
     BlockDiagnostics diagnostics = diagnose_result(result, tracks, options);
     release_all();  // links of frames
     return std::pair(std::move(diagnostics), Report(result, tracks, release_all));
   };
-  // Both go through all tracks, while the other ranks have nothing left to do; not before the tables that the file
-  // begins with are written, as gathering begins with passes over them, too.
+  // Gathering and writing each read all tracks, while the other ranks have nothing left to do, and run at the same
+  // time. The gathering only starts when the tables at the beginning of the file are written, because it begins by
+  // reading them too.
   std::future<std::pair<BlockDiagnostics, Report>> gathered;
   const AnnouncedTracks announced(tracks, [&] {
     release_all();

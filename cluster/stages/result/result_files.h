@@ -12,8 +12,8 @@
 
 namespace megablock {
 
-// `result` has no tracks; these are in `parts`. Its tables that grow with the block are in `tables`, and they leave
-// memory after each batch of tracks, dataset and section that has used them.
+// `result` has no tracks; these are in `parts`. The tables of `result` that grow with the block are in `tables`, and
+// they leave memory after each batch of tracks, dataset and section that has used them.
 void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_t fingerprint, BlockResult result,
                         std::vector<PartTracks::File> parts, const DiagnosticsOptions& options);
 

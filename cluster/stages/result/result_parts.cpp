@@ -20,11 +20,11 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kPieceTracks = 64;       // read at a time of each tile, of which there may be thousands
-constexpr std::int64_t kBatchTracks = 1 << 14;  // handed on at a time
+constexpr std::int64_t kPieceTracks = 64;       // read at a time from each tile, of which there may be thousands
+constexpr std::int64_t kBatchTracks = 1 << 14;  // tracks in a batch
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-// Adjusted minus measured; NaN where there is no point or it lies behind the camera.
+// Adjusted minus measured coordinates; NaN when there is no point or it lies behind the camera.
 Eigen::Vector2d residual(const RankTile& tile, std::int64_t point, std::int64_t o) {
   const Eigen::Vector2d undefined = Eigen::Vector2d::Constant(kNaN);
   const Eigen::Vector3d& ground = tile.state.points[static_cast<std::size_t>(point)];
@@ -37,7 +37,7 @@ Eigen::Vector2d residual(const RankTile& tile, std::int64_t point, std::int64_t 
                       {tile.problem.x[static_cast<std::size_t>(o)], tile.problem.y[static_cast<std::size_t>(o)]});
 }
 
-// Marks the kept observations of a tile. Those of points that take no part do not count as kept.
+// Marks the kept observations of a tile. Those of points that take no part count as rejected.
 std::vector<std::uint8_t> verdicts(const TileProblem& problem) {
   std::vector<std::uint8_t> kept = problem.kept;
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
@@ -55,12 +55,12 @@ void count_measurements(const TileProblem& problem, const std::vector<std::uint8
   }
 }
 
-// In 1 / 255 (TrackResults); what takes no part is NaN.
+// The redundancy in units of 1 / 255 (TrackResults). NaN stands for an observation that takes no part.
 std::uint8_t stored_redundancy(float value) {
   return value > 0 ? static_cast<std::uint8_t>(std::lround(255 * std::min(value, 1.f))) : 0;
 }
 
-// One of the tile's tracks, behind those of `to`; its id is its key.
+// Appends one of the tile's tracks to `to`. Its id becomes its key.
 void append_track(const RankTile& tile, const TrackSet& tracks, const std::vector<std::uint8_t>& kept,
                   const TileCovariance& covariance, std::int64_t track, TrackResults& to) {
   const auto t = static_cast<std::size_t>(track);
@@ -69,7 +69,7 @@ void append_track(const RankTile& tile, const TrackSet& tracks, const std::vecto
   to.file_tiles.push_back(TileIndex(tile.tile));
   to.points.push_back(tile.state.points[t]);
   if (!covariance.points.empty()) to.point_covariance.push_back(covariance.points[t]);
-  std::size_t row = to.kept.size();  // of the observation in `to`
+  std::size_t row = to.kept.size();  // row of the observation in `to`
   for (std::int64_t observation = tracks.begin[t]; observation < tracks.begin[t + 1]; ++observation, ++row) {
     const auto o = static_cast<std::size_t>(observation);
     to.tracks.x[row] = to_fixed_pixel(tile.problem.x[o]);
@@ -116,7 +116,7 @@ std::vector<FrameIndex> touched_frames(const TileProblem& problem, const std::ve
   return frames;
 }
 
-// Columns of tracks as bytes and back, one list for both.
+// Writes or reads the columns of tracks as bytes; both use this one list.
 template <typename Tracks, typename Visit>
 void visit_columns(Tracks& t, Visit&& visit) {
   visit(t.tracks.id);
@@ -152,7 +152,7 @@ TrackResults tracks_of(const Bytes& bytes) {
   return tracks;
 }
 
-// Tracks ascending by key; parts of one track, which have one key, stay in their order.
+// The rows of the tracks, ascending by key. Parts of one track have the same key and keep their order.
 std::vector<std::int64_t> key_order(const TrackSet& tracks) {
   std::vector<std::int64_t> order(tracks.id.size());
   std::iota(order.begin(), order.end(), std::int64_t{0});
@@ -162,14 +162,14 @@ std::vector<std::int64_t> key_order(const TrackSet& tracks) {
   return order;
 }
 
-// Reads a part piece by piece; the file is open only while a piece is read, as there may be thousands of parts.
+// Reads a part piece by piece. The file is only open while a piece is read, because there may be thousands of parts.
 class PartCursor {
  public:
   explicit PartCursor(const PartTracks::File& file) : file_(file), left_(file.track_count) { next_piece(); }
 
   bool at_end() const { return row_ == piece_.tracks.id.size(); }
   TrackIndex key() const { return piece_.tracks.id[row_]; }
-  // Hands over the tracks up to this key, or before it, as far as this piece has them.
+  // Moves the tracks up to this key (`with_key`), or before it, to the batch, as far as the present piece has them.
   void move_to(TrackIndex key, bool with_key, TrackResults& batch) {
     const std::vector<TrackIndex>& id = piece_.tracks.id;
     const auto from = id.begin() + static_cast<std::ptrdiff_t>(row_);
@@ -197,7 +197,7 @@ class PartCursor {
   }
 
   const PartTracks::File& file_;
-  std::int64_t left_;  // tracks of further pieces
+  std::int64_t left_;  // number of tracks in further pieces
   std::streamoff offset_ = 0;
   TrackResults piece_;
   std::size_t row_ = 0;
@@ -299,7 +299,7 @@ void PartTracks::visit(const Visit& visit) const {
   while (!order.empty()) {
     const std::size_t p = order.top().second;
     order.pop();
-    // The next part's first track comes after this one's of the same key when that part is the later one.
+    // Of two parts with tracks of the same key, that with the lower number comes first.
     const Next end =
         order.empty() ? Next(TrackIndex(std::numeric_limits<std::int64_t>::max()), parts.size()) : order.top();
     parts[p].move_to(end.first, p < end.second, batch);

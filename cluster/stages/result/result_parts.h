@@ -14,7 +14,7 @@
 
 namespace megablock {
 
-// The part of a tile in the result besides its tracks.
+// The part of a tile in the result, apart from its tracks.
 struct TilePart {
   std::int64_t tile = -1;
   std::int64_t track_count = 0;
@@ -23,7 +23,7 @@ struct TilePart {
   std::vector<std::int64_t> control_rows;  // in block.control_points
   std::vector<BlockResult::ControlResult> control;
   std::vector<std::vector<Eigen::Vector2d>> control_measured;  // px, with the corrections of the adjustment
-  std::int32_t component = -1;  // component of the block; -1: its motion cannot be judged
+  std::int32_t component = -1;  // component of the block; -1: its common motion cannot be judged
   CommonMotion motion;
   Bytes to_bytes() const;
   static TilePart from_bytes(const Bytes& bytes);
@@ -42,7 +42,7 @@ class PartTracks final : public TrackBatches {
     std::string path;
     std::int64_t track_count = 0;
   };
-  // `after_batch` is called after every batch of a visit. Several visits may run at a time.
+  // `after_batch` is called after every batch of a visit. Several visits may run at the same time.
   PartTracks(std::vector<File> files, double covariance_factor, std::function<void()> after_batch = {});
   std::int64_t track_count() const override { return count_; }
   void visit(const Visit& visit) const override;

@@ -135,7 +135,7 @@ TEST(BadTiles, FrameSeenByOnePoint) {
   EXPECT_EQ(held_of(with_up), 1);
   EXPECT_EQ(with_gauge.undetermined, 1);
   EXPECT_EQ(with_gauge.defect, 0);
-  EXPECT_NE(with_gauge.text.find("too little observes"), std::string::npos) << with_gauge.text;
+  EXPECT_NE(with_gauge.text.find("too few observations determine"), std::string::npos) << with_gauge.text;
   EXPECT_TRUE(without_up.sums.held.empty());
   EXPECT_EQ(without_gauge.defect, 3);
 }
