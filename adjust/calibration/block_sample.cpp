@@ -68,7 +68,7 @@ class Sampler {
   const TrackSet& tracks_;
   IndexedVector<FrameIndex, std::vector<std::int64_t>> tracks_of_frame_;
   IndexedVector<FrameIndex, std::uint8_t> taken_;
-  std::map<FrameIndex, std::int64_t> shared_;  // tracks that frames at the rim share with those taken
+  std::map<FrameIndex, std::int64_t> shared_;  // tracks that frames outside the sample share with its frames
 };
 
 void append_track(const TrackSet& from, std::int64_t track, const std::vector<std::int64_t>& rows, TrackSet& to) {

@@ -1,4 +1,4 @@
-// What a comparison of camera models prints and draws.
+// Makes the text and the page of a comparison of camera models.
 #include <fmt/core.h>
 
 #include "adjust/calibration/model_comparison.h"

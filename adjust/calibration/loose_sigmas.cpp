@@ -20,7 +20,7 @@ IntrinsicSigmas loose_sigmas(const Intrinsics& start, int width, int height) {
   constexpr double kLooser = 10;
   IntrinsicSigmas sigma = weak_sigmas(start, 0, width);
   for (double& s : sigma) s *= kLooser;
-  // weak_sigmas() speaks of one focal length from the centre; long lenses end far inside of it.
+  // weak_sigmas() refers to one focal length from the centre; the images of long lenses end far inside of it.
   const double corner = std::min(1.0, 0.5 * std::hypot(width, height) / start[kFocal]);
   const std::vector<CameraParameter>& parameters = camera_parameters(start.model());
   for (std::size_t p = 0; p < parameters.size(); ++p)

@@ -6,8 +6,8 @@
 
 namespace megablock {
 
-// Ten times weak_sigmas(). The sigma of a radial term is a correction of 2 half diagonals at the corner of the image,
-// whatever the focal length. The focal length has no prior (0, as for fixed parameters).
+// Ten times weak_sigmas(). The sigma of a radial term corresponds to a correction of 2 half diagonals at the corner of
+// the image, whatever the focal length. The focal length has no prior (0, as for fixed parameters).
 IntrinsicSigmas loose_sigmas(const Intrinsics& start, int width, int height);
 
 }  // namespace megablock

@@ -46,8 +46,8 @@ ModelCandidate find_candidate(const std::string& name) {
   const auto read = std::from_chars(name.data() + slash + 1, end, terms);
   const int most = count_of(radial_terms(*model, kMaxIntrinsics));
   if (read.ec != std::errc() || read.ptr != end || terms < 1 || terms > most)
-    throw InputError("'" + name + "': behind the slash stands how many of the " + std::to_string(most) +
-                     " radial terms of " + model_name(*model) + " are estimated");
+    throw InputError("'" + name + "': the number after the slash is that of the estimated radial terms, 1 to " +
+                     std::to_string(most) + " for " + model_name(*model));
   return candidate_of(*model, terms);
 }
 
@@ -167,7 +167,7 @@ class Comparer {
     return result;
   }
 
-  // Pseudo-measurements that say nothing.
+  // The number of priors that are too weak to count as observations.
   static std::int64_t weak_priors(const TileProblem& problem) {
     std::int64_t count = 0;
     for (const auto& term : problem.intrinsic_priors)
@@ -223,7 +223,7 @@ class Comparer {
       result_.recommended.push_back(best >= 0 ? best : least);
     }
   }
-  // Of two clean ones: fewer parameters, then the lower RMS.
+  // Of two models without structure the one with fewer parameters is better, then the one with the lower RMS.
   bool better(int a, int b, std::size_t c) const {
     const ModelTrial &x = result_.trials[a], &y = result_.trials[b];
     if (x.candidate.parameters() != y.candidate.parameters())
@@ -235,7 +235,7 @@ class Comparer {
   const ModelComparisonOptions& options_;
   TileProblem problem_;
   TileState start_;
-  std::vector<Intrinsics> given_;  // [problem cameras] what candidates are fitted to
+  std::vector<Intrinsics> given_;  // [problem cameras] the candidates are fitted to these
   ModelComparison result_;
 };
 

@@ -18,7 +18,7 @@
 
 namespace megablock {
 
-// A model, of whose radial terms only the first ones are estimated.
+// A camera model of whose radial terms only the first ones are estimated.
 struct ModelCandidate {
   CameraModel model;
   ParameterMask free = 0;
@@ -26,7 +26,7 @@ struct ModelCandidate {
   int parameters() const { return count_of(free); }
 };
 
-// Throws InputError for what is no model or has fewer radial terms.
+// Throws InputError for a name that is no model or asks for more radial terms than the model has.
 ModelCandidate find_candidate(const std::string& name);
 // Candidates for a camera of this kind in the order of their parameters: fisheyes for fisheyes, else pinhole, radial
 // corrections of one to three terms and more, Brown's model and parts of it, polynomials, Legendre polynomials, Fourier
@@ -36,7 +36,7 @@ std::vector<ModelCandidate> default_candidates(const CameraModel& given);
 struct ModelComparisonOptions {
   AdjustOptions adjustment;
   BlockSampleOptions sample;
-  double probability = 0.01;  // a field of which noise makes as much less often has structure
+  double probability = 0.01;  // a field has structure when noise produces as much with a smaller probability
   int max_iterations = 60;    // of a trial
   void check() const;         // throws InputError
 };
@@ -50,25 +50,25 @@ struct ModelFigures {
 
 struct ModelTrial {
   ModelCandidate candidate;
-  std::string failure;  // why there are no figures; empty: there are
+  std::string failure;  // why there are no figures; empty: there are figures
   std::int64_t degrees_of_freedom = 0;
-  double rms_px = 0, sigma_px = 0;    // of all cameras; sigma: per axis, squares over degrees of freedom
+  double rms_px = 0, sigma_px = 0;    // of all cameras; sigma: per axis, from squares over degrees of freedom
   std::vector<ModelFigures> cameras;  // [ModelComparison::cameras]
 };
 
 struct ModelComparison {
   std::vector<CameraIndex> cameras;  // of the sample
   std::vector<ModelTrial> trials;    // by number of parameters
-  // [cameras] row of trials: the smallest without structure; where every model leaves some, that which leaves least
-  // (no other one less by a tenth and smaller).
+  // [cameras] The row of the recommended trial: the smallest model without structure. Where every model leaves
+  // structure, it is the smallest model whose structure is within a tenth of the least.
   std::vector<int> recommended;
   std::vector<std::uint8_t> without_structure;  // [cameras] 0: every model leaves structure
   double probability = 0;
   std::int64_t frames = 0, images = 0, points = 0, observations = 0;
 };
 
-// `state`: poses to start from. `tracks`: measurements, wrong ones are screened out. Throws InputError when there is
-// nothing to compare, ComputeError when no model can be adjusted.
+// `state` has the poses to start from. Outliers among the observations of `tracks` are screened out. Throws InputError
+// when there is nothing to compare, ComputeError when no model can be adjusted.
 ModelComparison compare_models(const Block& block, const BlockState& state, const TrackSet& tracks,
                                const std::vector<ModelCandidate>& candidates, const ModelComparisonOptions& options);
 

@@ -46,7 +46,7 @@ std::vector<HomologousPair> linked_pairs(const PanoramicTracks& tracks, int min_
   return pairs;
 }
 
-// Rotation a -> b and the median length of what it leaves, in pixels.
+// The rotation a -> b, and the median length of the differences that it leaves, in pixels.
 struct PairFit {
   Eigen::Quaterniond rotation;
   double median_px = 0;
@@ -69,11 +69,11 @@ PairFit fit_pair(const PanoramicTracks& tracks, const HomologousPair& pair, cons
   return fit;
 }
 
-// The camera with the focal length under which pairs of images agree best.
+// The camera with the focal length with which pairs of images agree best.
 Intrinsics with_best_focal(const PanoramicTracks& tracks, const std::vector<HomologousPair>& pairs,
                            const Intrinsics& start) {
   if (is_fixed(start.model(), kFocal)) return start;
-  constexpr int kSteps = 8;  // per factor of two
+  constexpr int kSteps = 8;  // steps for a factor of two
   Intrinsics best = start;
   double lowest = std::numeric_limits<double>::infinity();
   for (int step = -kSteps; step <= kSteps; ++step) {
@@ -107,7 +107,7 @@ std::vector<std::optional<Eigen::Quaterniond>> start_rotations(const PanoramicTr
       .rotation;
 }
 
-// Levenberg-Marquardt, and the rounds around it.
+// Runs the Levenberg-Marquardt iterations, and the rounds around them.
 class Calibration {
  public:
   Calibration(const PanoramicTracks& tracks, const std::vector<std::uint8_t>& linked, const PanoramicPrior& prior,
@@ -116,7 +116,7 @@ class Calibration {
 
   PanoramicSystem& system() { return system_; }
 
-  // Linearises anew, screens at `width` times the threshold, and adjusts; the same again until nothing moves.
+  // Linearises anew, screens at `width` times the threshold, and adjusts; repeats this until nothing changes.
   void adjust(PanoramicState& state, ParameterMask free, double width) {
     constexpr int kMaxRounds = 12;
     for (int round = 0; round < kMaxRounds; ++round) {
@@ -140,7 +140,8 @@ class Calibration {
     return 2 * system_.kept_rows() - 2 * system_.kept_tracks() - system_.unknowns(free);
   }
 
-  // Of the free parameters and rotations for unit noise; scaled to unit diagonal before it is inverted.
+  // The covariance of the free parameters and rotations for unit noise. The normal matrix is scaled to a unit diagonal
+  // before it is inverted.
   Eigen::MatrixXd covariance(const PanoramicState& state, ParameterMask free) const {
     const Eigen::MatrixXd normal = system_.normal(state, free).matrix;
     if (normal.size() == 0)
@@ -155,7 +156,7 @@ class Calibration {
     return normal.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 1.0; });
   }
 
-  // In pixels, from the median of the residuals; as long as nothing is left out, of all of them.
+  // The threshold in pixels, from the median of the residuals; while nothing is left out, from that of all of them.
   double threshold(const PanoramicState& state, ParameterMask free) const {
     std::vector<double> lengths;
     for (const Eigen::Vector2d& e : system_.residuals(state))
@@ -174,7 +175,8 @@ class Calibration {
     double damping = 1e-4;
     bool settled_at_once = false;
     PanoramicSystem::Normal normal = system_.normal(state, free);
-    if (!std::isfinite(normal.cost)) return false;  // some pixels have no ray: linearised anew, they are left out
+    // Some pixels have no ray. They are left out when the system is linearised anew.
+    if (!std::isfinite(normal.cost)) return false;
     for (int step = 0; step < kMaxSteps; ++step) {
       const Eigen::VectorXd scale = scale_of(normal.matrix);
       const Eigen::MatrixXd scaled = scale.asDiagonal() * normal.matrix * scale.asDiagonal();
@@ -265,12 +267,12 @@ void warn_of_structure(const PanoramicOptions& options, PanoramicResult& result)
   if (s.degrees > 0 && s.probability < options.structure_probability)
     result.warnings.push_back(
         fmt::format("the residuals have structure over the sensor ({:.2f} px, probability {:.1g}): the model {} does "
-                    "not say what the lens does, or the centre was not the same; try a larger model",
+                    "not describe the lens, or the centre was not the same; try a larger model",
                     s.structure_px, s.probability, model_name(result.camera.model())));
 }
 
-// What the images do not determine is at the mercy of its prior: refused, but for the centre of symmetry, which a lens
-// with little distortion has no use for.
+// A parameter that the images do not determine follows its prior alone, and the result is refused. The centre of
+// symmetry is an exception, because it hardly matters for a lens with little distortion.
 void check_determined(const PanoramicPrior& prior, PanoramicResult& result) {
   constexpr double kWeakFocal = 0.1, kWeakPrior = 0.5;
   const CameraModel& model = result.camera.model();
@@ -301,7 +303,7 @@ void require_freedom(const PanoramicTracks& tracks, const Intrinsics& start, std
                   std::ssize(tracks.begin) - 1, model_name(start.model()), 1 - freedom));
 }
 
-// The rows and columns of the free parameters, the others zero.
+// The covariance of all parameters: that of the free ones, and zero for the others.
 Eigen::MatrixXd of_all_parameters(const Eigen::MatrixXd& covariance, ParameterMask free, int parameters) {
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(parameters, parameters);
   std::vector<int> rows;
@@ -367,8 +369,8 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   Calibration calibration(tracks, result.linked, prior, options);
   calibration.system().linearise_at(state);
   require_freedom(tracks, start, calibration.freedom(result.free));
-  // Where a circle closes, a focal length that is off by little pulls right measurements far apart: once it is known
-  // they are given a chance to come back.
+  // Where the images form a closed circle, even a small error of the focal length pulls correct observations far apart.
+  // When the focal length is known they are tested again with wide limits, so that they can come back.
   for (const ParameterMask free : {ParameterMask{0}, leading(start.model(), result.free), result.free})
     calibration.adjust(state, free, kRough);
   for (const double wider : {64.0, 16.0, 4.0, 1.0}) calibration.adjust(state, result.free, wider);
@@ -386,7 +388,7 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   PanoramicState before{start, state.rotations};
   calibration.adjust_without_screening(before, 0);
   result.start_rms_px = rms_of(calibration.system().residuals(before));
-  constexpr double kSame = 1 + 1e-6;  // a start that is the optimum is found again
+  constexpr double kSame = 1 + 1e-6;  // a start that is the optimum already is accepted
   if (!(result.rms_px <= kSame * result.start_rms_px))
     throw ComputeError(
         fmt::format("the calibration (RMS {:.3f} px) is not better than its start ({:.3f} px), which is kept",

@@ -1,5 +1,5 @@
-// With right perturbations R_i Exp(w) of the rotations, r = R'ray has the derivatives dr/dw = [r]x, dr/dk = R' dray/dk.
-// Of a track with rows L_i A_i = U, L_i = H (L_i = B_i^-1), the mean is eliminated by the projector
+// With right perturbations R_i Exp(w) of the rotations, r = R'ray has the derivatives dr/dw = [r]x and dr/dk = R'
+// dray/dk. The mean of a track with rows L_i A_i = U and L_i = H (L_i = B_i^-1) is eliminated by the projector
 //     J = U - H (H'H)^-1 H'U,    e = L y - H (H'H)^-1 H'L y.
 #include "adjust/calibration/panoramic_system.h"
 
@@ -46,7 +46,7 @@ void PanoramicSystem::linearise_at(const PanoramicState& state) {
 
 void PanoramicSystem::linearise_track(std::int64_t track, const PanoramicState& state) {
   const std::int64_t begin = tracks_.begin[track], end = tracks_.begin[track + 1];
-  // The mean direction of the last linearisation's pixels; that of all rows where too few are kept.
+  // The mean direction of the kept pixels, or that of all usable rows where fewer than two are kept.
   Eigen::Vector3d kept = Eigen::Vector3d::Zero(), all = kept;
   int kept_count = 0;
   for (std::int64_t r = begin; r < end; ++r) {
@@ -262,14 +262,14 @@ std::int64_t PanoramicSystem::kept_tracks() const {
 
 std::int64_t PanoramicSystem::unknowns(ParameterMask free) const { return count_of(free) + rotation_columns_; }
 
-// With q = T (y - mu) and n = d x q, a residual along the displacement of s has n'(R_i' - R_mean')s = 0: of
-// a = (R_i - R_mean) n it is a's = 0. M = sum aa' is held against what the residuals' covariance B (I - weight) B'
-// makes it, N, by the smallest eigenvalue of M s = lambda N s; its deviation from the one of noise, the energy per
-// degree of freedom, is told from the scatter of its own terms.
+// With q = T (y - mu) and n = d x q, a residual along the displacement of s has n'(R_i' - R_mean')s = 0. With a = (R_i
+// - R_mean) n this is a's = 0. M = sum aa' is compared with N, the value that follows from the covariance B (I -
+// weight) B' of the residuals, by the smallest eigenvalue of M s = lambda N s. The scatter of its own terms shows how
+// far this eigenvalue deviates from that of noise, which is the energy per degree of freedom.
 Parallax PanoramicSystem::parallax(const PanoramicState& state) const {
   std::vector<Eigen::Vector3d> terms;
   std::vector<Eigen::Matrix3d> expected;
-  std::vector<std::size_t> ends;  // of the tracks, whose terms are one draw of noise
+  std::vector<std::size_t> ends;  // ends of the tracks in `terms`; the terms of a track share their noise
   std::vector<Eigen::Vector2d> e;
   double squares = 0, redundancy = 0;
   for (std::int64_t t = 0; t < track_count(); ++t) {
@@ -304,7 +304,7 @@ Parallax PanoramicSystem::parallax(const PanoramicState& state) const {
     m += terms[i] * terms[i].transpose();
     n += expected[i];
   }
-  // Turned about one axis: a displacement along it does nothing.
+  // For a camera turned about one axis, a displacement along that axis has no effect.
   const SymmetricEigen scale = symmetric_eigen(n);
   Eigen::Index told = 0;
   while (told < 3 && scale.values[2 - told] > 1e-4 * scale.values[2]) ++told;

@@ -1,4 +1,4 @@
-// The conditions of panoramic.h and their normal equations. Internal to calibration.
+// The conditions of panoramic.h and their normal equations. Internal to adjust/calibration/.
 #pragma once
 
 #include <limits>
@@ -12,30 +12,30 @@ struct PanoramicState {
   std::vector<Eigen::Quaterniond> rotations;  // [images] panorama -> camera
 };
 
-// Weak priors of the camera's parameters at their start values; sigma 0: none.
+// Weak priors of the camera's parameters at their start values; a sigma of 0 means no prior.
 struct PanoramicPrior {
   Intrinsics value;
   IntrinsicSigmas sigma{};
-  double image_sigma_px = 0.5;  // squares of the prior count as so many pixels
+  double image_sigma_px = 0.5;  // converts the squares of the prior to pixels
 };
 
 class PanoramicSystem {
  public:
-  // `linked` [images]: measurements of other images take no part.
+  // `linked` [images]: observations of other images take no part.
   PanoramicSystem(const PanoramicTracks& tracks, const std::vector<std::uint8_t>& linked, const PanoramicPrior& prior);
 
   // Linearises anew at the adjusted pixels of this state.
   void linearise_at(const PanoramicState& state);
-  // Re-tests every measurement: of each track the worst is left out until the rest agrees to `threshold_px`. Uses the
-  // last linearisation. Returns how many changed.
+  // Tests every observation again: of each track the worst one is left out until the rest agrees within `threshold_px`.
+  // Uses the last linearisation. Returns the number of changes.
   std::int64_t screen(const PanoramicState& state, double threshold_px);
 
-  // Sum of squares [px^2], priors included; infinity where a pixel has no ray.
+  // The sum of squares [px^2] with the priors; infinite where a pixel has no ray.
   double cost(const PanoramicState& state) const;
-  // Lengths of the residuals of all linked rows in their tracks as they are kept, or NaN.
+  // The lengths of the residuals of all linked rows, in their tracks as these are kept, or NaN.
   std::vector<Eigen::Vector2d> residuals(const PanoramicState& state) const;  // measured minus adjusted, px
 
-  // Columns: the free parameters, then three per linked image but the first.
+  // The columns are the free parameters, then three for each linked image except the first.
   struct Normal {
     Eigen::MatrixXd matrix;
     Eigen::VectorXd gradient;
@@ -51,7 +51,7 @@ class PanoramicSystem {
 
  private:
   struct Row {
-    bool usable = false;  // of a linked image, with a ray
+    bool usable = false;  // whether the image is linked and the pixel has a ray
     bool kept = false;
     Eigen::Vector2d adjusted;  // pixel at which the conditions are linearised
     Eigen::Matrix2d whiten;    // B^-1
@@ -62,9 +62,9 @@ class PanoramicSystem {
   std::int64_t track_count() const { return static_cast<std::int64_t>(tracks_.begin.size()) - 1; }
   std::vector<std::int64_t> kept_in(std::int64_t track) const;  // rows; empty when fewer than two
   void linearise_track(std::int64_t track, const PanoramicState& state);
-  // y of a row; false where the pixel has no ray.
+  // y of a row; returns false where the pixel has no ray.
   bool ray_in_plane(std::int64_t row, const Plane& plane, const PanoramicState& state, Eigen::Vector2d& y) const;
-  // e of some rows of a track about their own mean; false where a pixel has no ray.
+  // e of some rows of a track about their own mean; returns false where a pixel has no ray.
   bool residuals_of(const std::vector<std::int64_t>& rows, std::int64_t track, const PanoramicState& state,
                     std::vector<Eigen::Vector2d>& e) const;
   bool add_track(std::int64_t track, const PanoramicState& state, const std::vector<int>& parameters,
@@ -74,7 +74,7 @@ class PanoramicSystem {
   const PanoramicTracks& tracks_;
   const std::vector<std::uint8_t>& linked_;
   PanoramicPrior prior_;
-  std::vector<int> column_of_image_;  // behind the parameters; -1: held or not linked
+  std::vector<int> column_of_image_;  // after the parameters; -1: held or not linked
   std::int64_t rotation_columns_ = 0;
   std::vector<Row> rows_;
   std::vector<Plane> planes_;  // [tracks] tangent basis of the mean direction

@@ -9,11 +9,11 @@ namespace megablock {
 
 namespace {
 
-constexpr double kPerCell = 20;  // residuals a cell has in the mean, at least
+constexpr double kPerCell = 20;  // least mean number of residuals in a cell
 constexpr int kMostCells = 16;   // along the longer side
 constexpr int kFewestCells = 3;
 
-// Square cells, as many as the residuals allow.
+// Square cells, as many as the number of residuals allows.
 ResidualField empty_field(std::size_t residuals, int width, int height) {
   const double area = static_cast<double>(width) * height, longer = std::max(width, height);
   const double cells = std::max(1.0, static_cast<double>(residuals) / kPerCell);

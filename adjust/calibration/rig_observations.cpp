@@ -25,8 +25,8 @@ void remove_datum(Block& block) {
   for (Frame& frame : block.frames) frame.position_prior.reset(), frame.attitude_prior.reset();
 }
 
-// All mounts but the references, or those that the project frees without a sigma. The tie to the start must be felt by
-// the scale of a small rig too.
+// Frees all mounts but the references, or only those that the project frees without a sigma. The sigma of the position
+// is limited by the size of the rig, so that it also holds the scale of a small rig.
 void free_mounts(Rig& rig, bool all, const RigCalibrationOptions& options) {
   double extent = 0;
   for (const Mount& mount : rig.mounts)
@@ -144,10 +144,10 @@ WholeBlock adjust_with_rig_held(const Block& block, const BlockState& start, con
   whole.problem.image_sigma_px = like.problem.image_sigma_px;
   whole.problem.image_loss = {RobustLoss::Kind::kNone, 1};
   constexpr int kIterations = 50;
-  constexpr double kTolerance = 1e-9;  // of the cost
+  constexpr double kTolerance = 1e-9;  // share of the cost
   const AdjustSummary summary = solve_with_ceres(whole.problem, whole.state, kIterations, kTolerance);
   if (summary.usable) return whole;
-  // The mounts were moved so far that the start sees points of the result behind it.
+  // The mounts were moved so far that, with the start, points of the result lie behind a camera.
   return adjust_whole(held, start, tracks, options);
 }
 
@@ -176,7 +176,7 @@ ImageFit total(const std::vector<ImageFit>& fits) {
 
 double intersection_sigma_px(const Block& block, const BlockState& state, const TrackSet& tracks,
                              const AdjustOptions& options) {
-  constexpr double kMedian = 1.1774100225;  // of a Rayleigh distribution of sigma 1
+  constexpr double kMedian = 1.1774100225;  // median of a Rayleigh distribution of sigma 1
   WholeBlock whole = whole_block(block, state, tracks, options.observations);
   triangulate_points(whole.problem, whole.state, options);
   std::vector<double> lengths;

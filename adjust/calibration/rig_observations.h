@@ -1,8 +1,8 @@
-// Prepares the calibration of a rig (Cannelle 2013): it chooses the observations and unknowns of a block that take
-// part, and tells how well a rig with given mounts and cameras fits.
+// Prepares the calibration of a rig (Cannelle 2013): chooses the observations and unknowns of a block that take part,
+// and computes how well a rig with given mounts and cameras fits.
 //
 // A calibration is the adjustment of one block whose mounts are free: with surveyed targets (off-line), from tie points
-// alone (on-line, a free network), or with all that the project gives.
+// alone (on-line, a free network), or with everything that the project gives.
 #pragma once
 
 #include <string>
@@ -18,17 +18,18 @@ enum class MountFreedom { kStated, kFree };
 
 struct RigCalibrationOptions {
   CalibrationMode mode = CalibrationMode::kAll;
-  // kStated: free with the sigmas of the project as priors, or held. kFree: all but the rig's reference are free; they
-  // are tied to their start by the sigmas below alone, which only what nothing else determines feels (the scale of the
-  // rig, from tie points alone): the constant damping of the thesis (eq. 9 to 11).
+  // kStated: the sigmas of the project are priors of the mounts, or hold them. kFree: all mounts but the rig's
+  // reference are free. They are tied to their start by the sigmas below alone, which only affect directions that
+  // nothing else determines (the scale of the rig, from tie points alone). This is the constant damping of the thesis
+  // (eq. 9 to 11).
   MountFreedom mounts = MountFreedom::kStated;
   double free_position_sigma_m = 0.1, free_rotation_sigma_deg = 5;
-  bool estimate_intrinsics = true;       // those that the project frees; else all are held
-  double held_out_share = 0.1;           // of tracks, of the comparison with the start
+  bool estimate_intrinsics = true;       // those that the project frees; otherwise all are held
+  double held_out_share = 0.1;           // share of the tracks that is held out for the comparison with the start
   double max_position_sigma_m = 0.005;   // posterior sigma of a mount (worst axis) above which a warning is given
   double max_rotation_sigma_deg = 0.05;  // the same of its rotation
   int min_quadrant_measurements = 4;     // fewer in a quadrant of a sensor: warning
-  double largest_ratio = 1.01;           // residuals of the result / of the start, above: refused
+  double largest_ratio = 1.01;           // residuals of the result over those of the start; a larger ratio is refused
   int max_iterations = 50;               // of the last adjustment
   AdjustOptions adjustment;
   void check() const;  // throws InputError
@@ -36,8 +37,8 @@ struct RigCalibrationOptions {
 
 std::string mode_name(CalibrationMode mode);
 
-// The block with the observations and the free unknowns of the calibration. Off-line: control points alone; on-line:
-// tie points alone, nothing that fixes the datum. Throws InputError when there is nothing to calibrate.
+// The block with the observations and the free unknowns of the calibration. Off-line it has only control points;
+// on-line only tie points, and nothing that fixes the datum. Throws InputError when there is nothing to calibrate.
 Block calibration_block(Block block, const RigCalibrationOptions& options);
 
 // The block with cameras and mounts held at the values of `rig`.
@@ -54,27 +55,28 @@ struct WholeBlock {
 WholeBlock whole_block(const Block& block, const BlockState& state, const TrackSet& tracks,
                        const ObservationOptions& options);
 
-// The whole adjustment of a block (adjust_tile).
+// The whole adjustment of a block, by adjust_tile.
 WholeBlock adjust_whole(const Block& block, const BlockState& start, const TrackSet& tracks,
                         const AdjustOptions& options);
 
-// Frames and points adjusted in least squares, to the measurements that `like` keeps and from its frames, with the rig
-// held at the values of `start`. Where these cannot be projected so, from the frames of `start`, with a screening of
-// its own.
+// Frames and points adjusted by least squares, with the rig held at the values of `start`. The observations are those
+// that `like` keeps, and the frames begin at those of `like`. Where a point then lies behind a camera, the adjustment
+// begins at the frames of `start`, with a screening of its own.
 WholeBlock adjust_with_rig_held(const Block& block, const BlockState& start, const WholeBlock& like,
                                 const TrackSet& tracks, const AdjustOptions& options);
 
-// Of the kept image measurements, by row of problem.mounts.
+// The residuals of the kept image observations, by row of problem.mounts.
 std::vector<ImageFit> fit_by_mount(const WholeBlock& block);
 ImageFit total(const std::vector<ImageFit>& fits);
 
-// Residual lengths of measurements that took no part, after their points were intersected at the state's frames and
-// rig: robust sigma per axis from their median, px. NaN without any.
+// The robust sigma per axis of observations that took no part, px. It comes from the median of their residual lengths,
+// with their points intersected at the frames and rig of the state. NaN without observations.
 double intersection_sigma_px(const Block& block, const BlockState& state, const TrackSet& tracks,
                              const AdjustOptions& options);
 
-// Points of known position, intersected at the state's frames and rig, against their given positions; by a similarity
-// where the datum is free. Empty with fewer than three (one with a datum).
+// Points of known position, intersected at the frames and rig of the state, compared with their given positions. With
+// `align` a similarity fits them to these first, for a free datum. Empty with fewer than four points, or without any
+// when they are not aligned.
 std::optional<PointFit> intersect_known_points(const Block& block, const BlockState& state,
                                                const std::vector<ControlPoint>& points, bool align,
                                                const AdjustOptions& options);

@@ -22,9 +22,9 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix67 = Eigen::Matrix<double, 6, 7>;
 using Matrix37 = Eigen::Matrix<double, 3, 7>;
 
-constexpr double kHalf = 0.5;  // of the information: below, the attitude priors tell more
+constexpr double kHalf = 0.5;  // share of the information: below it, the attitude priors give more than everything else
 
-// Movement of a point by (phi, t, s).
+// The movement of a point by (phi, t, s).
 Matrix37 moved(const Eigen::Vector3d& point, const MotionReference& reference) {
   const Eigen::Vector3d arm = point - reference.centre;
   Matrix37 move;
@@ -37,7 +37,7 @@ double weight_of(const RobustLoss& loss, const Residual& residual) {
   return loss.evaluate(residual.squaredNorm())[1];
 }
 
-// Normal equations of a frame and of what it shares with the movement of the ground.
+// The normal equations of a frame, and their coupling with the movement of the ground.
 struct FrameEquations {
   Matrix6 known = Matrix6::Zero(), attitude = Matrix6::Zero();
   Matrix67 coupling = Matrix67::Zero();
@@ -117,7 +117,8 @@ class MotionSummation {
     sums_.known = sums_.all = motion_;
   }
 
-  // R^-1 W, scaled to a unit diagonal. A frame that its images do not determine takes no part along that direction.
+  // R^-1 W, computed with R scaled to a unit diagonal. Along a direction that its images do not determine, a frame does
+  // not respond to the movement.
   static Matrix67 solved(const Matrix6& normal, const Matrix67& coupling) {
     const Eigen::Matrix<double, 6, 1> scale =
         normal.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
@@ -159,14 +160,14 @@ Shares shares_of(const CommonMotion& motion) {
   const Eigen::MatrixXd whiten = all.vectors * scale.asDiagonal();
   Eigen::MatrixXd known = whiten.transpose() * motion.known * whiten;
   for (int i = 0; i < 7; ++i)
-    if (scale(i) == 0) known(i, i) = 1;  // of the datum, which is judged elsewhere (datum.h)
+    if (scale(i) == 0) known(i, i) = 1;  // a direction of the datum, which is judged elsewhere (datum.h)
   const SymmetricEigen shares = symmetric_eigen(0.5 * (known + known.transpose()));
   return {shares.values, whiten * shares.vectors};
 }
 
-// The line through the frames, where they lie on one; zero otherwise.
+// The line through the frames, if they lie on one; otherwise zero.
 struct PlaceLine {
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();  // middle: from c
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();  // middle: relative to c
 };
 PlaceLine line_of(const CommonMotion& motion) {
   if (motion.frames < 2) return {};
@@ -273,8 +274,8 @@ std::vector<std::string> describe(const MotionVerdict& verdict) {
   std::vector<std::string> lines;
   if (verdict.collinear)
     lines.push_back(
-        fmt::format("the positions lie on one straight line: of the rotation about it the attitude priors alone tell "
-                    "(sigma {:.2g} degrees); add a control point away from the line, or a cross strip",
+        fmt::format("the positions lie on one straight line: the rotation about it is known from the attitude priors "
+                    "alone (sigma {:.2g} degrees); add a control point away from the line, or a cross strip",
                     degrees(verdict.line_sigma_rad)));
   if (verdict.weak_common_rotation())
     lines.push_back(

@@ -1,22 +1,24 @@
 // Finds the part of the attitudes that comes from the attitude priors alone, in blocks with known positions.
 //
 // Let the ground move by a similarity m = (phi, t, s) about a centre c (rotation, shift L t, scale 1 + s; L a length of
-// the block), and every frame answer as it fits best. The information on m is then, summed over the frames f,
+// the block), and let every frame respond so that its residuals grow least. The information about m is then, summed
+// over the frames f,
 //
-//     G = M - sum W_f' R_f^-1 W_f,
+//     G = M - sum W_f' R_f^-1 W_f.
 //
-// R_f the normal equations of the frame (6 x 6: its images, position, lines and verticals), W_f their coupling with m,
-// M those of m; observations have the weights that their robust losses leave them. It is a sum over tiles (a frame that
-// two tiles see answers in each by itself, which errs to the careful side), whatever the size of the block. With the
-// attitude priors in R_f it is G_a. The share of m that the images, positions and control points determine is the
-// eigenvalue mu of G v = mu G_a v: near 1 where the priors do not matter, 0 where nothing else is known. Two cases are
-// told apart:
+// R_f holds the normal equations of the frame (6 x 6: its images, position, lines and verticals), W_f their coupling
+// with m, and M those of m. Observations have the weights of their robust losses. G is a sum over tiles, whatever the
+// size of the block. A frame that two tiles see responds in each of them independently, which errs on the safe side.
+// With the attitude priors in R_f the sum is G_a. The share of m that images, positions and control points determine is
+// the eigenvalue mu of G v = mu G_a v: near 1 where the priors do not matter, and 0 where nothing else gives
+// information. Two cases are distinguished:
 //
-//   * all positions on one straight line: the ground turns about it, and the frames with it;
-//   * a common rotation: satellites, or any small field of view from afar, where the frames turn in place and the
-//     ground follows; of K frames its sigma is that of the mean of K priors, sigma / sqrt(K), however many points.
+//   * all positions lie on one straight line: the ground turns about it, and the frames with it;
+//   * a common rotation, as of satellites or of any small field of view from afar: the frames turn in place and the
+//     ground follows. For K frames its sigma is that of the mean of K priors, sigma / sqrt(K), however many points.
 //
-// A control point or a cross strip repairs the first, control points the second. Cameras and mounts are taken as known.
+// A control point or a cross strip repairs the first case, control points the second. Cameras and mounts are taken as
+// known.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,20 +29,21 @@
 
 namespace megablock {
 
-// Centre and length unit of the similarities, the same for all tiles of a connected part of the block.
+// The centre and the unit of length of the similarities, the same for all tiles of a connected part of the block.
 struct MotionReference {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // mean of the positions, ground frame, m
   double length = 1;                                 // their rms distance from it, m
 };
-// Of every connected part (Tiles::component); a part without two known positions or without attitude priors keeps a
-// length of 0: there is nothing to judge.
+// One for every connected part (Tiles::component). A part without two known positions or without attitude priors keeps
+// a length of 0: there is nothing to judge.
 std::vector<MotionReference> motion_references(const Block& block, const Tiles& tiles);
 
-// Sums over a tile; its frames hang together.
+// Sums over the frames of a tile, which all belong to one connected part.
 struct CommonMotion {
   using Matrix7 = Eigen::Matrix<double, 7, 7>;
-  Matrix7 known = Matrix7::Zero(), all = Matrix7::Zero();                    // G, G_a
-  Eigen::Matrix<double, 3, 7> answer = Eigen::Matrix<double, 3, 7>::Zero();  // sum of the frames' rotations by m, rad
+  Matrix7 known = Matrix7::Zero(), all = Matrix7::Zero();  // G, G_a
+  // The sum of the rotations of the frames in response to m, rad.
+  Eigen::Matrix<double, 3, 7> answer = Eigen::Matrix<double, 3, 7>::Zero();
   double frames = 0;
   Eigen::Vector3d places = Eigen::Vector3d::Zero();          // sum of C - c over the frames, m
   Eigen::Matrix3d squared_places = Eigen::Matrix3d::Zero();  // sum of (C - c)(C - c)', m^2
@@ -52,17 +55,17 @@ struct CommonMotion {
 CommonMotion common_motion(const TileProblem& problem, const TileState& state, const MotionReference& reference);
 
 struct MotionVerdict {
-  int weak = 0;            // dimensions of m of which the attitude priors tell more than everything else
-  bool collinear = false;  // positions on one straight line, and the rotation about it among them
-  // Sigma of the common rotation of the frames in the weakest dimension, and about the line; rad. 0: not weak.
+  int weak = 0;            // dimensions of m about which the attitude priors give more than everything else
+  bool collinear = false;  // the positions lie on one straight line, and the rotation about it is weak
+  // The sigmas of the common rotation of the frames in the weakest dimension, and about the line; rad. 0: not weak.
   double common_sigma_rad = 0, line_sigma_rad = 0;
-  Eigen::Vector3d line = Eigen::Vector3d::Zero();  // direction, unit, where collinear
+  Eigen::Vector3d line = Eigen::Vector3d::Zero();  // unit direction, when collinear
   bool sound() const { return weak == 0; }
   bool weak_common_rotation() const { return weak > (collinear ? 1 : 0); }
 };
 MotionVerdict judge(const CommonMotion& motion, const MotionReference& reference);
 
-// The lines of the report, one per case; empty when sound.
+// The lines for the report, one for each case; empty when the motion is sound.
 std::vector<std::string> describe(const MotionVerdict& verdict);
 
 }  // namespace megablock

@@ -12,8 +12,8 @@ namespace megablock {
 
 namespace {
 
-// Plane through three of the points from which three tenths of all are nearest: of two levels with half of them each,
-// one.
+// Finds the plane through three of the points that is nearest to three tenths of all points. Of two levels with half of
+// the points each it finds one.
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset = 0;
@@ -88,7 +88,7 @@ LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& given) {
   for (const Eigen::Vector3d& p : points) heights.push_back(plane.distance(p));
   std::sort(heights.begin(), heights.end());
 
-  // The division that leaves least scatter within (Otsu).
+  // The division into two groups with the least scatter within them (Otsu).
   const auto count = static_cast<double>(heights.size());
   double sum = 0, squares = 0;
   for (double h : heights) sum += h, squares += h * h;
@@ -105,7 +105,7 @@ LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& given) {
     check.step = high - low;
     check.smaller_share = std::min(n, count - n) / count;
     const double within = 0.5 * (std::max(0.0, low_scatter) / n + std::max(0.0, high_scatter) / (count - n));
-    check.separation = check.step > 0 ? check.step / std::sqrt(within) : 0;  // infinite without any scatter
+    check.separation = check.step > 0 ? check.step / std::sqrt(within) : 0;  // infinite when there is no scatter
   }
   return check;
 }

@@ -12,7 +12,8 @@ namespace megablock {
 
 namespace {
 
-// Keeps every `count`-th of the tie points that take part, from `first` on, the reference and the control points.
+// Keeps the reference, the control points, and every `count`-th of the tie points that take part, beginning with number
+// `first`.
 void keep_subset(TileProblem& problem, std::int64_t reference, int first, int count) {
   std::int64_t turn = 0;
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
@@ -34,7 +35,7 @@ std::vector<Eigen::Vector2d> reference_images(const TileProblem& problem, const 
   return images;
 }
 
-// rms per component of [subsets][items] about the mean over subsets, and that of the means.
+// The rms per component of [subsets][items] about their mean over the subsets, and the rms of these means.
 template <typename Vector>
 struct Dispersion {
   double spread = 0, mean = 0;

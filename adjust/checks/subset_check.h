@@ -1,4 +1,4 @@
-// Tells the reliability of an adjustment without ground truth, by adjusting the same frames with disjoint subsets of
+// Shows the reliability of an adjustment without ground truth, by adjusting the same frames with disjoint subsets of
 // the points (Barrier and Martin).
 //
 // Each subset is adjusted by itself, with the priors and control points that all subsets share. One reference point is
@@ -15,15 +15,15 @@ namespace megablock {
 struct SubsetCheck {
   int subsets = 0;
   double rotation_spread_rad = 0;  // rms per axis about the mean of the subsets, over frames
-  double rotation_move_rad = 0;    // rms per axis, of that mean from the start
+  double rotation_move_rad = 0;    // rms per axis of the movement of that mean from the start
   double image_spread_px = 0;      // rms per axis of the reference point's adjusted image positions
-  double common_sigma_rad = 0;     // what all subsets share and none can show; 0: nothing
-  // Of the mean of the subsets, per axis.
+  double common_sigma_rad = 0;     // sigma of the error that all subsets share, so that none shows it; 0: there is none
+  // The sigma of the mean of the subsets, per axis.
   double rotation_sigma_rad() const;
 };
-// `state`: where each subset starts from; `reference`: a tie point, in all subsets. Other tie points go to the subsets
-// in turn. Throws InputError for fewer than two subsets or a reference that takes no part, ComputeError where a subset
-// cannot be adjusted.
+// Every subset starts from `state`. `reference` is a tie point that is in all subsets; other tie points go to the
+// subsets in turn. Throws InputError for fewer than two subsets or for a reference that takes no part, and ComputeError
+// when a subset cannot be adjusted.
 SubsetCheck check_point_subsets(const TileProblem& problem, const TileState& state, std::int64_t reference, int subsets,
                                 const MotionReference& motion, const TileSolver& solver);
 

@@ -22,7 +22,8 @@ namespace {
 
 using RowMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// Columns of the free parameters: angles camera by camera, then image coordinates observation by observation; -1: held.
+// The columns of the free parameters: angles camera by camera, then image coordinates observation by observation; -1:
+// held.
 struct FreeColumns {
   std::vector<std::int64_t> angle, image;  // [3 x cameras], [2 x observations]
   std::int64_t angles = 0, count = 0;
@@ -84,20 +85,21 @@ std::int64_t pair_count(const CoplanarityNetwork& network) {
   return rows;
 }
 
-// |m| |d_1| |d_2|, which the determinant is of where nothing is coplanar.
+// |m| |d_1| |d_2|, the size of the determinant where the three vectors are far from coplanar.
 double scale_of_determinant(const CoplanarityNetwork& network, std::size_t a, std::size_t b) {
   const auto length = [&](std::size_t o) { return std::hypot(1.0, network.image[o].norm() / network.focal_px); };
   return base_of(network, a, b).norm() * length(a) * length(b);
 }
 
-// Over all pairs of all points.
+// The mean over all pairs of all points.
 struct MeanDeterminant {
   double value = 0;     // of |F|
-  double rounding = 0;  // bound of what rounding makes of it
+  double rounding = 0;  // bound of the effect of rounding
 };
 MeanDeterminant mean_determinant(const CoplanarityNetwork& network) {
-  // A ray is rounded in its angles (up to pi), in their sines and cosines and in two products and sums one after the
-  // other, the determinant of two in its own three: some sixteen roundings of half of this.
+  // A ray has the rounding errors of its angles (up to pi), of their sines and cosines, and of two successive products
+  // and sums; the determinant of two rays has those of its own three. These are some sixteen roundings of half an
+  // epsilon.
   constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
   MeanDeterminant mean;
   const auto rows = static_cast<double>(pair_count(network));
@@ -109,7 +111,7 @@ MeanDeterminant mean_determinant(const CoplanarityNetwork& network) {
   return mean;
 }
 
-// The equations of a step. `total`: corrections made so far, which the forcing pulls back to zero.
+// The equations of a step. `total` holds the corrections made so far, which the forcing pulls back to zero.
 struct Equations {
   RowMatrix matrix;
   Eigen::VectorXd right;
@@ -139,7 +141,7 @@ Equations equations(const CoplanarityNetwork& network, const FreeColumns& free, 
   return result;
 }
 
-// Columns at unit length: radians and pixels differ by the focal length.
+// Columns are scaled to unit length, because radians and pixels differ by the focal length.
 Eigen::VectorXd solve_directly(const Equations& system) {
   Eigen::SparseMatrix<double> scaled = system.matrix;
   Eigen::VectorXd scale(scaled.cols());
@@ -174,8 +176,8 @@ void correct(CoplanarityNetwork& network, const FreeColumns& free, const Eigen::
   }
 }
 
-// Image coordinates at which the rays of every point meet, so that noise makes no ranks; points whose rays do not meet
-// in front of the cameras are left out.
+// The image coordinates at which the rays of every point meet, so that noise does not raise the ranks. Points whose
+// rays do not meet in front of the cameras are left out.
 CoplanarityNetwork brought_together(const CoplanarityNetwork& network, std::vector<std::uint8_t>& met) {
   CoplanarityNetwork result = network;
   met.assign(static_cast<std::size_t>(network.point_count()), 0);
@@ -202,7 +204,8 @@ CoplanarityNetwork brought_together(const CoplanarityNetwork& network, std::vect
   return result;
 }
 
-// The cameras of every point that three or more see. Two are always on a line, with 2K - 3 = K - 1 conditions.
+// Whether the cameras of every point that three or more see lie on one line. Two cameras always do, with 2K - 3 = K - 1
+// conditions.
 bool on_one_line(const CoplanarityNetwork& network) {
   bool any = false;
   for (std::size_t j = 0; j + 1 < network.begin.size(); ++j) {
@@ -219,7 +222,7 @@ bool on_one_line(const CoplanarityNetwork& network) {
   return any;
 }
 
-// Columns of the free parameters of one point alone: angles of the cameras that see it, its image coordinates.
+// The columns of the free parameters of one point: the angles of its cameras, or its image coordinates.
 std::vector<std::int64_t> free_columns(const CoplanarityNetwork& network, const FreeColumns& free, std::int64_t point,
                                        bool angles) {
   std::vector<std::int64_t> columns;
@@ -234,10 +237,10 @@ std::vector<std::int64_t> free_columns(const CoplanarityNetwork& network, const 
   return columns;
 }
 
-// The equations of one point, every row divided by |m| |d_1| |d_2|.
+// The equations of one point, with every row divided by |m| |d_1| |d_2|.
 struct PointEquations {
   std::vector<std::int64_t> angles;      // columns of the free angles of its cameras
-  Eigen::MatrixXd by_angles, by_images;  // [pairs x these], [pairs x free coordinates of the point]
+  Eigen::MatrixXd by_angles, by_images;  // [pairs x angles], [pairs x free coordinates of the point]
 };
 PointEquations point_equations(const CoplanarityNetwork& network, const FreeColumns& free, std::int64_t point) {
   const std::int64_t views =
@@ -264,7 +267,7 @@ PointEquations point_equations(const CoplanarityNetwork& network, const FreeColu
   return result;
 }
 
-// normal += A'A of rows that concern some columns alone.
+// normal += A'A, for rows A that have only these columns.
 void add_normal(const Eigen::MatrixXd& rows, const std::vector<std::int64_t>& columns, Eigen::MatrixXd& normal) {
   const Eigen::MatrixXd squared = rows.transpose() * rows;
   for (std::size_t r = 0; r < columns.size(); ++r)
@@ -272,7 +275,7 @@ void add_normal(const Eigen::MatrixXd& rows, const std::vector<std::int64_t>& co
       normal(columns[r], columns[c]) += squared(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
 }
 
-constexpr double kAngles = 1e-6;  // of the largest singular value, from normal equations of the angles
+constexpr double kAngles = 1e-6;  // share of the largest singular value, from normal equations of the angles
 
 std::int64_t rank_of(const Eigen::VectorXd& values, double tolerance) {
   std::int64_t rank = 0;
@@ -280,7 +283,7 @@ std::int64_t rank_of(const Eigen::VectorXd& values, double tolerance) {
   return rank;
 }
 
-// Of the points that met.
+// Uses only points whose rays met.
 std::vector<double> singular_values_of_angles(const CoplanarityNetwork& network, const FreeColumns& free,
                                               const std::vector<std::uint8_t>& met) {
   if (free.angles == 0) return {};
@@ -302,8 +305,8 @@ std::vector<double> singular_values_of_angles(const CoplanarityNetwork& network,
   return values;
 }
 
-// Directions that neither the equations nor the forcing determine. What is forced (or held) takes no part: the images
-// with forced angles have B alone, the angles with forced images A.
+// The number of directions that neither the equations nor the forcing determine. Forced and held parameters do not
+// count: with forced angles the images have the columns B alone, with forced images the angles have A alone.
 std::int64_t open_directions(const CoplanarityDiagnosis& diagnosis, const FreeColumns& free,
                              const CoplanarityOptions& options) {
   if (!options.forced()) return diagnosis.nullity();
@@ -359,7 +362,7 @@ double CoplanarityDiagnosis::angle_condition() const {
 
 CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   network.check();
-  constexpr double kRank = 1e-9;  // of the largest singular value, exact rays
+  constexpr double kRank = 1e-9;  // share of the largest singular value, for exact rays
   std::vector<std::uint8_t> met;
   const CoplanarityNetwork exact = brought_together(network, met);
   const FreeColumns free(network);
@@ -369,7 +372,8 @@ CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   result.collinear = on_one_line(network);
   result.angle_values = singular_values_of_angles(exact, free, met);
 
-  // What is left of A where the image coordinates have taken theirs: U_0'A with B = U S V', U_0 beyond the rank.
+  // The part of A that remains after the image coordinates have absorbed theirs: U_0'A with B = U S V', U_0 beyond the
+  // rank.
   Eigen::MatrixXd left = Eigen::MatrixXd::Zero(free.angles, free.angles), whole = left;
   for (std::int64_t j = 0; j < network.point_count(); ++j) {
     if (!met[static_cast<std::size_t>(j)]) continue;
@@ -407,8 +411,8 @@ CoplanaritySpectrum spectrum(const CoplanarityNetwork& network) {
       ++row;
     });
   }
-  // Eigenvalues of (0 C; C' 0), half of them negative: without squares, which would lose the small ones. Zeros are told
-  // by the rank that scaled rows have.
+  // The eigenvalues of (0 C; C' 0), half of them negative. No squares are formed, which would lose the small ones. The
+  // rank of the scaled rows tells how many are not zero.
   const auto above_zero = [](const Eigen::MatrixXd& c, std::int64_t rank) -> std::vector<double> {
     Eigen::MatrixXd symmetric = Eigen::MatrixXd::Zero(c.rows() + c.cols(), c.rows() + c.cols());
     symmetric.bottomLeftCorner(c.cols(), c.rows()) = c.transpose();

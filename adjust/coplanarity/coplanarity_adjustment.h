@@ -1,17 +1,17 @@
 // Adjusts angles and image coordinates by the coplanarity of rays alone, with known positions and without ground
-// points: the determinant method of Barrier and Martin, "Bundle adjustment with known positions".
+// points. It is the determinant method of Barrier and Martin, "Bundle adjustment with known positions", for comparison
+// and for screening; the adjustment of ground points with priors (tile_adjustment.h) is better in every case.
 //
-// For every point and every pair of the cameras that see it F = det(d_1 | d_2 | C_2 - C_1) = 0 (coplanarity.h). With
-// A = dF/d(angles), B = dF/d(image coordinates) a step solves, in least squares,
+// For every point and every pair of the cameras that see it, F = det(d_1 | d_2 | C_2 - C_1) = 0 (coplanarity.h). With A
+// = dF/d(angles) and B = dF/d(image coordinates), a step solves in least squares
 //
 //     (A B) (da, dx) = -F,          with forcing also   lambda_a / sigma_a da = 0,   lambda_x / sigma_x dx = 0.
 //
-// Without forcing, angles and image coordinates together are never determined: K concurrent rays carry 2K - 3
-// conditions (K - 1 where the cameras lie on one line), whatever the number of pairs, so that (A B) of N points has the
-// rank N (2K - 3) and 3N + 3K directions are free. LSQR then gives the solution of least norm, which need not be nearer
-// to the truth: such solutions are marked. Image coordinates alone, with angles held that are wrong, move away from the
-// truth: marked too, by the chi-square of the corrections. This is the method of the report, for comparison and
-// for screening; the adjustment of ground points with priors (tile_adjustment.h) is better in every case.
+// Without forcing, angles and image coordinates together are never determined. K concurrent rays have 2K - 3 conditions
+// (K - 1 where the cameras lie on one line), whatever the number of pairs. So (A B) of N points has the rank N (2K -
+// 3), and 3N + 3K directions are free. LSQR then gives the solution of least norm, which need not be nearer to the
+// truth; such solutions are marked. When angles are held that are wrong, image coordinates alone move away from the
+// truth. The chi-square of the corrections shows this, and such solutions are marked too.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,8 @@
 
 namespace megablock {
 
-// Cameras of one focal length (px) and no distortion; image coordinates from the principal point. Observations of point
-// j are rows [begin[j], begin[j + 1]), cameras distinct within a point.
+// Cameras of one focal length (px) without distortion. Image coordinates are relative to the principal point.
+// Observations of point j are rows [begin[j], begin[j + 1]); the cameras of a point are distinct.
 struct CoplanarityNetwork {
   double focal_px = 0;
   std::vector<Eigen::Vector3d> centres;  // [cameras] ground frame, m
@@ -42,8 +42,8 @@ struct CoplanarityNetwork {
 
 struct CoplanarityOptions {
   enum class Solver : std::uint8_t {
-    kLsqr,   // as published: stops at twice the number of unknowns
-    kDirect  // sparse QR; refuses what is not determined
+    kLsqr,   // as published: it ends at twice the number of unknowns
+    kDirect  // sparse QR; refuses a system that has no unique solution
   };
   Solver solver = Solver::kLsqr;
   LsqrOptions lsqr;
@@ -54,13 +54,14 @@ struct CoplanarityOptions {
   void check() const;  // throws InputError
 };
 
-// Rank and condition of the equations of the free angles and image coordinates. They are evaluated at rays that were
-// made to meet, because noise would raise the ranks. Points whose rays do not meet in front of their cameras are left
-// out.
+// The rank and the condition of the equations of the free angles and image coordinates. They are evaluated at rays that
+// were made to meet, because noise would raise the ranks. Points whose rays do not meet in front of their cameras are
+// left out.
 struct CoplanarityDiagnosis {
   std::int64_t rows = 0, columns = 0, rank = 0;  // of (A B)
   std::int64_t image_rank = 0;                   // of B
-  // The cameras of every point that three or more see lie on one line (straight_line.h); false without such points.
+  // Whether the cameras of every point that three or more see lie on one line (straight_line.h); false without such
+  // points.
   bool collinear = false;
   std::vector<double> angle_values;  // singular values of A (free angles), descending
   std::int64_t nullity() const { return columns - rank; }
@@ -68,9 +69,10 @@ struct CoplanarityDiagnosis {
 };
 CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network);
 
-// Singular values above zero of A, B and (A B), m px^2 per radian and per pixel, descending: at the rays that meet,
-// of the free parameters. Their numbers are the ranks; their squares are what the report plots of A'A, B'B and M'M.
-// Dense, for the scenes of the report: seconds at 1 000 parameters, the third power of their number.
+// The singular values above zero of A, B and (A B), m px^2 per radian and per pixel, descending, for the free
+// parameters at the rays that meet. Their numbers are the ranks; their squares are the values that the report plots for
+// A'A, B'B and M'M. The computation is dense, for the scenes of the report: it takes seconds for 1 000 parameters, and
+// grows with the third power of their number.
 struct CoplanaritySpectrum {
   std::vector<double> angles, images, both;
 };
@@ -79,17 +81,17 @@ CoplanaritySpectrum spectrum(const CoplanarityNetwork& network);
 struct CoplanaritySolution {
   CoplanarityNetwork network;              // with corrected angles and image coordinates; held ones have the same bits
   double mean_before = 0, mean_after = 0;  // of |F|
-  double rounding = 0;                     // by which rounding alone may change this mean, at most
-  std::int64_t iterations = 0;             // of LSQR, all steps
+  double rounding = 0;                     // largest change of this mean that rounding alone may cause
+  std::int64_t iterations = 0;             // of LSQR, in all steps
   CoplanarityDiagnosis diagnosis;
-  std::int64_t open_directions = 0;          // of the parameters: neither determined nor forced
-  bool rank_deficient = false;               // there are some: one of many solutions
-  bool held_contradicted = false;            // with held angles: the corrections are larger than the sigmas allow
-  double chi2_per_freedom = 0;               // of the corrections, by the stated sigmas
+  std::int64_t open_directions = 0;          // directions of the parameters that are neither determined nor forced
+  bool rank_deficient = false;               // there are open directions: the solution is one of many
+  bool held_contradicted = false;            // with held angles, the corrections are larger than the sigmas allow
+  double chi2_per_freedom = 0;               // of the corrections, with the stated sigmas
   std::vector<std::string> remarks() const;  // one line each
 };
-// Throws InputError for a network or options that make no sense, ComputeError where kDirect is asked for what has no
-// unique solution.
+// Throws InputError for a network or options that make no sense, and ComputeError when kDirect is asked for a system
+// without a unique solution.
 CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, const CoplanarityOptions& options);
 
 }  // namespace megablock

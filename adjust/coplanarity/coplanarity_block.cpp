@@ -10,7 +10,7 @@ namespace megablock {
 
 namespace {
 
-// Of frames whose position and attitude are known.
+// The poses of frames whose position and attitude are known.
 using KnownPoses = IndexedVector<FrameIndex, std::optional<Pose>>;
 KnownPoses known_poses(const Block& block, const BlockState& start) {
   KnownPoses poses(block.frames.size());
@@ -26,7 +26,7 @@ KnownPoses known_poses(const Block& block, const BlockState& start) {
   return poses;
 }
 
-// The mount of the one image of every frame.
+// The mount of the single image of every frame.
 IndexedVector<FrameIndex, const Mount*> single_mounts(const Block& block) {
   IndexedVector<FrameIndex, const Mount*> mounts(block.frames.size(), nullptr);
   for (ImageIndex i(0); block.images.contains(i); ++i.value) {
@@ -39,7 +39,7 @@ IndexedVector<FrameIndex, const Mount*> single_mounts(const Block& block) {
   return mounts;
 }
 
-// Points that two or more frames of known pose see; camera: index of the frame.
+// Adds the points that two or more frames of known pose see. A camera is the index of a frame at first.
 void add_points(const Block& block, const KnownPoses& poses, const TrackSet& tracks, CoplanarityBlock& result) {
   CoplanarityNetwork& network = result.network;
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
@@ -63,7 +63,7 @@ void add_points(const Block& block, const KnownPoses& poses, const TrackSet& tra
   }
 }
 
-// Numbers the frames that see points, and says how they stand.
+// Numbers the frames that see points, and fills in their positions and attitudes.
 void add_cameras(const Block& block, const KnownPoses& poses, CoplanarityBlock& result) {
   CoplanarityNetwork& network = result.network;
   std::vector<std::int32_t> number(block.frames.size(), -1);

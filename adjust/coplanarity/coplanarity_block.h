@@ -1,9 +1,10 @@
 // Converts a block to the network of the determinant method (coplanarity_adjustment.h): single cameras of one focal
 // length.
 //
-// Positions are those observed, else those the frames start with; they are held. Angles start at the observed
-// attitudes, else at those the frames start with. Measurements become x f / z, y f / z of their viewing rays, which
-// frees them of distortion; f is the focal length of the first camera, so that for others a pixel is one of the first.
+// Positions are the observed ones, else those that the frames start with; they are held. Angles start at the observed
+// attitudes, else at those that the frames start with. Image observations become x f / z, y f / z of their viewing
+// rays, which removes the distortion. f is the focal length of the first camera, so that pixels of other cameras become
+// pixels of the first.
 #pragma once
 
 #include "adjust/coplanarity/coplanarity_adjustment.h"
@@ -16,11 +17,11 @@ struct CoplanarityBlock {
   CoplanarityNetwork network;
   std::vector<FrameIndex> frames;    // [cameras of the network], ascending
   std::vector<Pose> mounts;          // [cameras of the network]
-  double angle_sigma_rad = 0;        // rms over axes and frames of the observed attitudes; 0: of none
-  std::int64_t frames_left_out = 0;  // without position or attitude, or without a point that another one sees
-  std::int64_t points_left_out = 0;  // seen by fewer than two of the others
+  double angle_sigma_rad = 0;        // rms over axes and frames of the observed attitudes; 0: there are none
+  std::int64_t frames_left_out = 0;  // without position or attitude, or without a point that another frame sees
+  std::int64_t points_left_out = 0;  // seen by fewer than two of the other frames
 
-  // Of the frame of a camera that looks so; the camera's centre is held.
+  // The pose of the frame whose camera has these angles; the camera's centre is held.
   Pose frame_pose(std::size_t camera, const XyzAngles& angles) const;
 };
 

@@ -9,7 +9,7 @@ namespace megablock::lane_kernels {
 constexpr std::int64_t kGroup = 8;
 constexpr std::int64_t padded(std::int64_t count) { return (count + kGroup - 1) / kGroup * kGroup; }
 
-// Numbers of doubles that describe the image and the observation of a lane.
+// How many doubles describe the image and the observation of a lane.
 constexpr int kViewSize = 24;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [8], unused
 constexpr int kRecordSize = 8;  // point [3], measured x and y [2], inverse sigma, unused [2]
 
@@ -17,10 +17,10 @@ constexpr int kRecordSize = 8;  // point [3], measured x and y [2], inverse sigm
 enum Value : int { kResidual = 0, kFromFrame = 2, kByPoint = 5, kValueCount = 11 };
 
 struct Kernels {
-  // `views`: of each lane; `records`: [count x kRecordSize]. The residual alone: NaN behind the camera.
+  // `views`: one for each lane; `records`: [count x kRecordSize]. Computes the residual alone; NaN behind the camera.
   void (*project)(const double* const* views, const double* records, std::int64_t count, double* values,
                   std::int64_t stride);
-  // All values.
+  // Computes all values.
   void (*linearise)(const double* const* views, const double* records, std::int64_t count, double* values,
                     std::int64_t stride);
 };

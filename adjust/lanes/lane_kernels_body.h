@@ -1,5 +1,5 @@
-// Internal to adjust/lanes/: lane_kernels_*.cpp include it and set the width of vectors. Formulas: linearise.h,
-// geometry/camera/models/brown.h.
+// The code of the kernels, for vectors of any width. Internal to adjust/lanes/: each lane_kernels_*.cpp sets the width
+// and includes it. The formulas are in linearise.h and geometry/camera/models/brown.h.
 #pragma once
 
 #include "adjust/lanes/lane_kernels.h"
@@ -8,7 +8,7 @@
 namespace megablock::lane_kernels {
 namespace {
 
-// With `kDerivatives` all values, else the residual alone.
+// With `kDerivatives` it computes all values, otherwise the residual alone.
 template <bool kDerivatives>
 void work(const double* const* views, const double* records, std::int64_t count, double* values, std::int64_t stride) {
   for (std::int64_t i = 0; i < count; i += kWidth) {

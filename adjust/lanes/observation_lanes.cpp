@@ -11,7 +11,7 @@ using lane_kernels::kResidual;
 
 const lane_kernels::Kernels* lane_kernels_of_width(int width) {
   __builtin_cpu_init();
-  // What cmake/rooms.cmake compiles them for.
+  // cmake/rooms.cmake compiles the kernels for these instruction sets.
   if (width == 8) {
     const bool has =
         __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");

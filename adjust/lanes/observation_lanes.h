@@ -13,32 +13,32 @@
 
 namespace megablock {
 
-// The widest kernels of this processor; those of a width in doubles (2: any processor, 4: AVX2, 8: AVX-512), nullptr
-// where it has no such vectors.
+// The widest kernels of this processor. And the kernels of a width in doubles (2: any processor, 4: AVX2, 8: AVX-512),
+// or nullptr where the processor has no such vectors.
 const lane_kernels::Kernels& lane_kernels_of_processor();
 const lane_kernels::Kernels* lane_kernels_of_width(int width);
 
-// What an image's observations share, as the kernels read it.
+// The values that all observations of an image share, in the layout of the kernels.
 struct alignas(64) LaneView {
   std::array<double, lane_kernels::kViewSize> values{};
-  bool simple = false;  // a camera of Brown's model; else the values say nothing
+  bool simple = false;  // the camera has Brown's model; otherwise the values have no meaning
   explicit LaneView(const ImageView& view);
 };
 
-// The images of a tile as they are seen from a state; the threads of a tile share it.
+// The images of a tile at a state. The threads of a tile share it.
 struct SeenImages {
   std::vector<ImageView> views;
   std::vector<LaneView> lanes;
   SeenImages(const TileProblem& problem, const TileState& state);
 };
 
-// Doubles in a buffer that begins a line of the cache.
+// A buffer of doubles that begins at a cache line.
 class AlignedValues {
  public:
   AlignedValues() = default;
-  AlignedValues(const AlignedValues&) = delete;  // its first value would be another's
+  AlignedValues(const AlignedValues&) = delete;  // first_ would point to the buffer of the original
   AlignedValues& operator=(const AlignedValues&) = delete;
-  void resize(std::int64_t count);  // what stood there is lost
+  void resize(std::int64_t count);  // loses the contents
   double* data() { return first_; }
   const double* data() const { return first_; }
 
@@ -51,10 +51,10 @@ class ObservationLanes {
  public:
   // Number of lanes that fit into the first-level cache together with their values.
   static constexpr std::int64_t kUsual = 64;
-  // Takes `kernels` instead of the widest for tests.
+  // Tests pass other kernels than the widest.
   explicit ObservationLanes(const lane_kernels::Kernels& kernels = lane_kernels_of_processor()) : kernels_(&kernels) {}
 
-  // Empties it and makes room.
+  // Removes all lanes, and makes room for this many.
   void reserve(std::int64_t lanes);
   void clear() { size_ = 0; }
   void clear_from(std::int64_t lane) { size_ = lane; }
@@ -69,16 +69,16 @@ class ObservationLanes {
     record[4] = y;
     record[5] = inverse_sigma;
   }
-  // A lane's observation, seen otherwise.
+  // Replaces the view and the point of a lane; the measured coordinates stay.
   void see(std::int64_t lane, const LaneView& view, const Eigen::Vector3d& point) {
     views_[static_cast<std::size_t>(lane)] = view.values.data();
     std::copy_n(point.data(), 3, records_.data() + lane_kernels::kRecordSize * lane);
   }
   std::int64_t size() const { return size_; }
-  std::int64_t padded_size() const { return lane_kernels::padded(size_); }  // what the kernels work on
+  std::int64_t padded_size() const { return lane_kernels::padded(size_); }  // number of lanes that the kernels process
   std::int64_t capacity() const { return capacity_; }
 
-  // Residuals alone, NaN behind the camera; or all values.
+  // project() computes residuals alone, NaN behind the camera; linearise() computes all values.
   void project();
   void linearise();
 

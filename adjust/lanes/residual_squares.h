@@ -10,7 +10,8 @@ namespace megablock {
 
 class ResidualSquares {
  public:
-  // Problem, state and views outlive it, the latter of the state's frames, cameras and mounts; its points may move.
+  // Problem, state and views outlive the object. The views are those of the state's frames, cameras and mounts; its
+  // points may move.
   ResidualSquares(const TileProblem& problem, const TileState& state, const SeenImages& images)
       : problem_(problem), state_(state), images_(images) {
     lanes_.reserve(kLanes);

@@ -19,10 +19,11 @@
 namespace megablock {
 namespace {
 
-// Median of a chi-square variable.
+// The median of a chi-square variable.
 double chi_square_median(int degrees) { return chi_square_quantile(0.5, degrees); }
 
-// With M: x -> s R x + t from another frame, a step xi of that frame's target is this times xi in the other frame.
+// With M: x -> s R x + t from another frame, a step xi in the target frame of M is this matrix times xi in the other
+// frame.
 Block7 step_through(const Similarity& m) {
   const Eigen::Matrix3d back = m.rotation.conjugate().toRotationMatrix();
   Block7 result = Block7::Zero();
@@ -34,7 +35,7 @@ Block7 step_through(const Similarity& m) {
   return result;
 }
 
-// About its centroid, which it returns.
+// Moves the coordinates of a model to their centroid, which it returns.
 Eigen::Vector3d reduce(Model& model) {
   const auto by_number = [](const auto& a, const auto& b) { return a.number < b.number; };
   std::sort(model.points.begin(), model.points.end(), by_number);
@@ -61,10 +62,10 @@ void find_links(LinkedModels& linked, const LinkOptions& options) {
       linked.links.push_back(*link);
 }
 
-// Agreeing points times the share of triangles that close, one half without triangles.
+// The trust in each link: the number of inliers times the share of triangles that close (one half without triangles).
 std::vector<double> trust(const LinkedModels& linked, const LinkOptions& options) {
   std::map<std::pair<std::int32_t, std::int32_t>, std::size_t> link_of;
-  std::vector<std::vector<std::int32_t>> above(linked.models.size());  // linked models of higher row, ascending
+  std::vector<std::vector<std::int32_t>> above(linked.models.size());  // linked models in higher rows, ascending
   std::vector<Block7> covariances;
   for (std::size_t l = 0; l < linked.links.size(); ++l) {
     link_of[{linked.links[l].a, linked.links[l].b}] = l;
@@ -82,7 +83,7 @@ std::vector<double> trust(const LinkedModels& linked, const LinkOptions& options
       const auto found = link_of.find({a, c});
       if (found == link_of.end()) continue;
       const std::size_t ac = found->second, bc = link_of.at({b, c});
-      // c -> b -> a -> c, in c.
+      // The loop c -> b -> a -> c, expressed in c.
       const Similarity loop =
           linked.links[ac].similarity.inverse() * (linked.links[ab].similarity * linked.links[bc].similarity);
       const Block7 through = step_through(linked.links[bc].similarity);
@@ -103,7 +104,7 @@ std::vector<double> trust(const LinkedModels& linked, const LinkOptions& options
   return result;
 }
 
-// Spanning tree of the most trusted links, from the lowest model of each part.
+// Chains the similarities along the spanning tree of the most trusted links, from the lowest model of each part.
 void chain(LinkedModels& linked, const LinkOptions& options) {
   const std::vector<double> value = trust(linked, options);
   std::vector<std::size_t> order(linked.links.size());
@@ -136,7 +137,7 @@ void chain(LinkedModels& linked, const LinkOptions& options) {
   }
 }
 
-// What the models' similarities say of a link that they do not agree in, in b.
+// The misclosure of a link under the similarities of its two models, in b.
 SimilarityStep gap(const LinkedModels& linked, const ModelLink& link) {
   return step_of(link.similarity.inverse() *
                  (linked.similarity[nth(link.a)].inverse() * linked.similarity[nth(link.b)]));

@@ -22,15 +22,15 @@ namespace megablock {
 
 // All arrays [models] in the order of the models' numbers.
 struct LinkedModels {
-  std::vector<Model> models;            // what they hold by its number and about `centre`
-  std::vector<std::int32_t> given;      // row where it was given
-  std::vector<Eigen::Vector3d> centre;  // centroid of what a model holds
-  std::vector<Similarity> similarity;   // of what is about the centre -> frame of its part
-  std::vector<std::int32_t> reference;  // the model whose frame is the part's: the lowest, held at its centre
-  std::vector<SharedPlace> places;      // within parts
-  std::vector<ModelLink> links;         // a, b: rows here; of what is about the centres
+  std::vector<Model> models;            // their coordinates are about `centre`, and ascending by number
+  std::vector<std::int32_t> given;      // row in the given list
+  std::vector<Eigen::Vector3d> centre;  // centroid of the model's points and images
+  std::vector<Similarity> similarity;   // from coordinates about the centre to the frame of the part
+  std::vector<std::int32_t> reference;  // the model whose frame is that of the part: the lowest one, held at its centre
+  std::vector<SharedPlace> places;      // shared places within parts
+  std::vector<ModelLink> links;         // a, b: rows here; between coordinates about the centres
 
-  // One for each reference.
+  // 1 for each reference model, which is held.
   std::vector<std::uint8_t> held() const;
   // Moves the models by the solution of these equations. Returns the longest step of a model in the metric of its own
   // equations. Throws ComputeError for steps that are not finite.
@@ -44,11 +44,11 @@ struct LinkedModels {
 // InputError for values that are not finite, sigmas that are not positive, and numbers given twice.
 LinkedModels link_models(const std::vector<Model>& models, const LinkOptions& options);
 
-// Averages the similarities over all links from where they are, drops the links that contradict the result, and finds
-// the parts anew. Throws ComputeError where the links do not determine the similarities.
+// Averages the similarities over all links, beginning with the present ones. Drops the links that contradict the result
+// and finds the parts anew. Throws ComputeError where the links do not determine the similarities.
 void average_links(LinkedModels& linked, const LinkOptions& options);
 
-// The factor by which squares of these degrees of freedom exceed their expectation, by their median; at least 1.
+// The factor by which squares with these degrees of freedom exceed their expectation, from their median; at least 1.
 double inflation(const std::vector<double>& squares, int degrees);
 
 }  // namespace megablock

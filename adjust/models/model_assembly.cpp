@@ -16,12 +16,12 @@ void AssemblyOptions::check() const {
 
 namespace {
 
-// About the models' origins, rows as they came.
+// The link about the models' origins, with the rows of the given models.
 ModelLink as_given(const LinkedModels& linked, ModelLink link) {
   const Eigen::Vector3d &a = linked.centre[nth(link.a)], &b = linked.centre[nth(link.b)];
   Similarity& s = link.similarity;
   s.translation += a - s.scale * (s.rotation * b);
-  // xi about the centroid of b, as of xi about its origin.
+  // Turns a step xi about the origin of b into one about its centroid.
   Block7 about_centroid = Block7::Identity();
   about_centroid.bottomLeftCorner<3, 4>() << -skew(b), b;
   link.information = about_centroid.transpose() * link.information * about_centroid;

@@ -44,10 +44,12 @@ Eigen::Matrix<double, 3, 7> by_model_step(const Eigen::Vector3d& z) {
 
 namespace {
 
-constexpr double kSampleReach = 4;  // a sample's error grows away from its points
+// A factor of the first limit. The error of a sample grows with the distance from its points.
+constexpr double kSampleReach = 4;
 
-// What two models share, for the engine: three places, or an image's attitude with the distance of two places. The
-// residual of an image is the larger of those of place and attitude.
+// The places and attitudes that two models share, as an estimator for RANSAC. A sample is three places, or the attitude
+// of an image with the distance of two places. The residual of an image is the larger one of those of place and
+// attitude.
 class LinkEstimator {
  public:
   using Model = Similarity;
@@ -60,7 +62,7 @@ class LinkEstimator {
       turns_.push_back({p.pose.rotation.conjugate() * q.pose.rotation, std::hypot(p.rotation_sigma, q.rotation_sigma)});
     }
   }
-  LinkEstimator(const LinkEstimator&) = delete;  // by_places_ looks at places_
+  LinkEstimator(const LinkEstimator&) = delete;  // by_places_ refers to places_
   LinkEstimator& operator=(const LinkEstimator&) = delete;
 
   std::size_t size() const { return places_.size(); }
@@ -71,7 +73,8 @@ class LinkEstimator {
       if (agrees[i]) count += turn(i) ? 6 : 3;
     return count;
   }
-  // Of the places alone, which is careful: an image whose attitude must agree too does so by accident less often.
+  // The probability by the places alone. This is on the safe side: an image whose attitude must fit too does so by
+  // accident less often.
   double chance(double sigmas) const { return by_places_.chance(sigmas); }
   double extent() const { return by_places_.extent(); }
 
@@ -145,7 +148,7 @@ class LinkEstimator {
         information.topLeftCorner<3, 3>().diagonal().array() += trust;
         right.head<3>() += trust * rotation_log<double>(s.rotation.conjugate() * of_image->rotation);
       }
-      // The diagonal is scaled to one, so that small pivots show which components the points leave open.
+      // The diagonal is scaled to one, so that small pivots show the components that the points do not determine.
       const SimilarityStep size = information.diagonal().cwiseSqrt();
       if (!(size.minCoeff() > 0) || !size.allFinite()) return false;
       const SimilarityCovariance scaled =
@@ -167,7 +170,7 @@ class LinkEstimator {
     Eigen::Quaterniond rotation;  // b -> a
     double sigma;
   };
-  // Points, then the centres of images; from b to a.
+  // The places of points, then those of the centres of images, from b to a.
   static std::vector<SimilarityPair> places_of(const megablock::Model& a, const megablock::Model& b,
                                                const SharedRows& shared) {
     std::vector<SimilarityPair> places;
@@ -185,7 +188,7 @@ class LinkEstimator {
   static double turn_squares(const Similarity& s, const Turn& turn) {
     return std::pow(rotation_angle(s.rotation, turn.rotation) / turn.sigma, 2);
   }
-  // Unlike median() the mean of both middle ones: few images are in both models.
+  // Unlike median() it is the mean of both middle values, because few images are in both models.
   static double middle_of(std::vector<double> values) {
     const double upper = median(values);
     for (double& value : values) value = -value;
@@ -199,12 +202,12 @@ class LinkEstimator {
   double place_factor_ = 1, turn_factor_ = 1;  // of the variances
 };
 
-// The equations that a link needs.
+// The number of equations that a link needs.
 int fewest(const LinkOptions& options) { return 7 + options.min_redundancy; }
 
 std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimator, const LinkOptions& options,
                                                     double limit, std::uint64_t seed) {
-  constexpr double kMiss = 1e-6;  // probability that no sample is free of wrong points
+  constexpr double kMiss = 1e-6;  // probability that every sample contains a wrong point
   RansacOptions sampling;
   sampling.max_draws = options.max_samples;
   sampling.confidence = 1 - kMiss;
@@ -218,9 +221,10 @@ std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimat
   sampling.max_threshold = 0.1 * extent;
   const auto found = ransac(estimator, sampling);
   if (found && estimator.equations(found->consensus.inlier) >= fewest(options)) return found;
-  // A few bad places agree no better than by accident; other links tell whether they are right.
+  // A few bad places fit no better than by accident; other links decide about them.
   sampling.threshold = extent;
-  sampling.min_draws = std::min(20, options.max_samples);  // nearly all agree: one would be thought enough
+  // The first sample fits nearly all places, so that one draw would be thought enough.
+  sampling.min_draws = std::min(20, options.max_samples);
   return ransac(estimator, sampling);
 }
 
@@ -241,7 +245,7 @@ std::optional<ModelLink> fit_link(LinkEstimator& estimator, const LinkOptions& o
   for (int round = 0; round < kRounds; ++round) {
     if (!estimator.adjust(agrees, 10, s, link.information)) return std::nullopt;
     if (options.scale_sigmas && round < kRounds / 2) estimator.take_factors(s, agrees);
-    // Narrower with every round.
+    // The limit becomes narrower in every round.
     const double factor = std::max(1.0, kSampleReach / std::pow(2, round));
     const std::vector<std::uint8_t> next = estimator.agreeing(s, factor * factor * limit);
     if (estimator.equations(next) < fewest(options)) return std::nullopt;

@@ -2,14 +2,15 @@
 // (Kalantari 2009, chapter 9: similarity from three points).
 //
 // A model is a set of points and images in a frame of its own, free in place, attitude and scale. Steps of a similarity
+// A model is a set of points and images in a frame of its own, free in place, attitude and scale. Steps of a similarity
 // S (model -> common frame) are taken in the model's own frame and units, xi = (w, q, d):
 //
 //     S E(xi),   E(xi): x -> x + w x x + q x + d            so that    S^-1 X  moves by  -(w x z + q z + d),  z = S^-1
 //     X
 //
-// and nothing depends on the frame that the models happen to have. For a link b -> a the residuals are taken in b: of a
-// point or projection centre S^-1 x_a - x_b, variance sigma_b^2 + sigma_a^2 / s^2; of an image's attitude
-// Log(R' Q_a' Q_b), variances added.
+// Nothing then depends on the frames of the models. For a link b -> a the residuals are taken in b: of a point or
+// projection centre S^-1 x_a - x_b, with variance sigma_b^2 + sigma_a^2 / s^2; of an image's attitude Log(R' Q_a' Q_b),
+// with the sum of the variances.
 //
 // The start is the best of samples, by the sum of squares truncated at a threshold. A sample is three points or centres
 // (minimal_similarity.h), or one image's attitude with the distance of two of them. Least squares over the inliers
@@ -37,7 +38,7 @@ struct ModelImage {
 };
 struct Model {
   std::int64_t number = 0;
-  std::vector<ModelPoint> points;  // in any order, each number once; of interest are those that models share
+  std::vector<ModelPoint> points;  // in any order, each number once; only those that models share matter
   std::vector<ModelImage> images;
 };
 
@@ -51,13 +52,13 @@ struct ModelLink {
   Similarity similarity;                                            // b -> a
   SimilarityCovariance information = SimilarityCovariance::Zero();  // inverse covariance of xi, in b
   int shared = 0, agreeing = 0;                                     // points and images
-  bool kept = true;                                                 // false: contradicts the others
+  bool kept = true;                                                 // false: it contradicts the other links
 };
 
 struct LinkOptions {
-  double rejection_probability = 1e-5;  // of a good point or image, by chance
-  int min_redundancy = 8;               // equations that agree (3 a point, 6 an image) less 7; of three places at least
-  double min_share = 0.25;              // agreeing of shared points and images
+  double rejection_probability = 1e-5;  // probability that a good point or image is rejected by chance
+  int min_redundancy = 8;   // equations of the inliers (3 for a point, 6 for an image) less 7; three places at least
+  double min_share = 0.25;  // inliers / shared points and images
   int max_samples = 500;
   // Set this when only the order of magnitude of the models' errors is known. The sigmas of positions and of attitudes
   // are then each scaled by a factor of at least 1 that each link takes from the median misfit of its inliers. The

@@ -35,7 +35,7 @@ class PlaceEquations {
   }
 
  private:
-  // A place's position and attitude, from the entries that are kept.
+  // The position and the attitude of a place, as means of the kept entries.
   struct Mean {
     Eigen::Vector3d position;
     Eigen::Quaterniond rotation;
@@ -91,7 +91,7 @@ class PlaceEquations {
     }
     return result;
   }
-  // Limits of good places and attitudes.
+  // The limits for good places and attitudes.
   Misfit limits() const {
     std::vector<double> all_places, turns;
     for (const SharedPlace& place : linked_.places) {
@@ -138,7 +138,8 @@ class PlaceEquations {
     return std::any_of(place.entries.begin(), place.entries.end(), [](const auto& e) { return e.kept; });
   }
 
-  // Factorises the equations. Where they leave similarities open, models are taken apart until they do not.
+  // Factorises the equations. Where they leave similarities undetermined, models are taken apart until they no longer
+  // do.
   void factorise(SimilarityEquations& equations) {
     linearise(equations);
     for (std::int32_t open; (open = equations.factorise()) >= 0;) {
@@ -171,7 +172,7 @@ class PlaceEquations {
     linked_.find_parts();
   }
 
-  // The largest piece of a part stands for the part; the models of the other pieces are lost.
+  // The largest piece of a part represents the part; the models of the other pieces are lost.
   void find_lost(const std::vector<std::int32_t>& as_linked) {
     std::map<std::int32_t, std::map<std::int32_t, int>> pieces;
     for (std::size_t m = 0; m < as_linked.size(); ++m) ++pieces[as_linked[m]][linked_.reference[m]];

@@ -19,13 +19,13 @@
 namespace megablock {
 
 struct PlaceAdjustmentOptions {
-  double rejection_probability = 1e-5;  // of a good point or image, by chance
+  double rejection_probability = 1e-5;  // probability that a good point or image is rejected by chance
   int max_iterations = 30;              // at least 1
   bool covariances = true;
 };
 
 struct PlaceAdjustment {
-  std::vector<SimilarityCovariance> covariance;  // [models] of xi (model_link.h) about their centres, where asked for
+  std::vector<SimilarityCovariance> covariance;  // [models] of xi (model_link.h) about their centres, if asked for
   std::vector<std::int64_t> lost;  // numbers of the models that were taken out of the largest piece of their part
   double weighted_squares = 0;
   std::int64_t redundancy = 0;

@@ -21,10 +21,10 @@ struct SharedPlace {
     Eigen::Vector3d position;
     double sigma;
     Eigen::Quaterniond rotation;
-    double rotation_sigma;  // 0: a point
+    double rotation_sigma;  // 0 for a point
     bool kept;
   };
-  std::vector<Entry> entries;  // by model
+  std::vector<Entry> entries;  // ascending by model
   bool image = false;
 };
 
@@ -55,7 +55,7 @@ inline void check(const Model& model) {
   twice(images, "image");
 }
 
-// Points, then images, by number; the models that hold one in their order.
+// Lists points, then images, ascending by number. The models that hold one are in their order.
 inline std::vector<SharedPlace> shared_places(const std::vector<Model>& models) {
   std::vector<SharedPlace> places;
   struct Key {

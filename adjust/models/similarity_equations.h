@@ -18,11 +18,11 @@ using Block7 = SimilarityCovariance;
 
 inline std::size_t nth(std::int32_t i) { return static_cast<std::size_t>(i); }
 
-// The equations hold no unknowns for held models.
+// Held models have no unknowns in the equations.
 class SimilarityEquations {
  public:
   explicit SimilarityEquations(const std::vector<std::uint8_t>& held) { hold(held); }
-  // Begins anew with these models held.
+  // Starts new equations with these models held.
   void hold(const std::vector<std::uint8_t>& held) {
     row_.assign(held.size(), -1);
     right_.resize(held.size());
@@ -35,7 +35,7 @@ class SimilarityEquations {
     blocks_.clear();
     std::fill(right_.begin(), right_.end(), SimilarityStep::Zero());
   }
-  // Rows of m, columns of n.
+  // Adds a block with the rows of m and the columns of n.
   void add(std::int32_t m, std::int32_t n, const Block7& block) {
     if (row_[nth(m)] < row_[nth(n)] || row_[nth(n)] < 0) return;  // the lower triangle
     blocks_.try_emplace({row_[nth(m)], row_[nth(n)]}, Block7::Zero()).first->second += block;
@@ -54,7 +54,7 @@ class SimilarityEquations {
     Eigen::SparseMatrix<double> matrix(7 * rows_, 7 * rows_);
     matrix.setFromTriplets(entries.begin(), entries.end());
     factor_.compute(matrix);
-    constexpr double kOpen = 1e-14;  // share of a diagonal element that the others leave
+    constexpr double kOpen = 1e-14;  // smallest share of a diagonal element that the elimination may leave
     const Eigen::VectorXd diagonal = matrix.diagonal();
     const auto& row = factor_.permutationPinv().indices();
     for (int i = 0; i < diagonal.size(); ++i) {
@@ -99,9 +99,9 @@ class SimilarityEquations {
   }
 
  private:
-  // Z = (L D L')^-1 where L has entries, lower triangle: of column j, with the rows R below its diagonal,
+  // Z = (L D L')^-1 where L has entries, lower triangle. For column j, with the rows R below its diagonal,
   //
-  //     Z_Rj = -Z_RR L_Rj,     Z_jj = 1 / d_j - L_Rj' Z_Rj
+  //     Z_Rj = -Z_RR L_Rj,     Z_jj = 1 / d_j - L_Rj' Z_Rj,
   //
   // and Z_RR lies in the columns of R, which come after j.
   struct SelectedInverse {

@@ -57,8 +57,8 @@ void cut(const PartLinks& links, const std::vector<std::int32_t>& set, std::size
   cut(links, {middle, order.end()}, most, cores);
 }
 
-// Errors of a part's frames in units of its mean baseline and in radians: only their ratio matters, as assembly scales
-// them to what it finds.
+// The errors of a part's frames, in units of its mean baseline and in radians. Only their ratio matters, because the
+// assembly scales them to the misfits that it finds.
 constexpr double kCentreSigma = 1e-3, kRotationSigma = 2e-4;
 
 }  // namespace

@@ -43,8 +43,8 @@ class StretchTurner {
 
   std::int64_t run() {
     join_agreeing();
-    // In the order of the relative poses; a group that was moved joins the one it was moved to, so that others may
-    // follow.
+    // The relative poses are visited in their order. A group that was moved joins the one to which it was moved, so
+    // that others may follow.
     std::int64_t moved = 0;
     for (bool again = true; again;) {
       again = false;

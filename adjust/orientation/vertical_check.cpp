@@ -20,7 +20,7 @@ namespace megablock {
 namespace {
 
 constexpr double kLevel = 1e-3;            // share of correct pairs that the test rejects
-constexpr double kLeaning = 1 * kDegree;   // of walls that lean, and of a common drift of rotations
+constexpr double kLeaning = 1 * kDegree;   // allowance for walls that lean, and for a common drift of rotations
 constexpr double kFarthest = 3 * kDegree;  // largest sigma of a relative rotation for a comparison
 constexpr double kShareOfAll = 1. / 3, kShareOfAgreeing = 0.8;  // of an accepted group
 constexpr std::size_t kFewest = 2;                              // verticals of a group

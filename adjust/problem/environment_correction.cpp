@@ -13,8 +13,8 @@ namespace megablock {
 
 namespace {
 
-// Heights and verticals at places of the ground frame. A flat frame has its own; a topocentric one those of the sphere
-// below its origin.
+// Heights and verticals at places of the ground frame. In a flat frame they are those of the frame, in a topocentric
+// one those of the sphere below its origin.
 class Level {
  public:
   Level(const EnvironmentOptions& options, const GroundFrame& ground)
@@ -31,7 +31,7 @@ class Level {
   Eigen::Vector3d centre_;  // of the earth
 };
 
-// Heights of the points; the median of the known ones where unknown, NaN when none is known.
+// The heights of the points. Unknown ones get the median of the known ones, or NaN when none is known.
 std::vector<double> point_heights(const Level& level, const std::vector<Eigen::Vector3d>& points) {
   std::vector<double> heights, known;
   for (const Eigen::Vector3d& point : points) {
@@ -56,7 +56,7 @@ void check_environment(const EnvironmentOptions& options, const Block& block) {
     throw InputError(
         "environment.earth_curvature: the block is georeferenced, and its frame (east, north, up about the origin) is "
         "not curved; leave the option out");
-  // A free frame has any tilt and unit: neither a vertical nor heights.
+  // A free frame may have any tilt and unit, so that it has neither a vertical nor heights.
   const bool placed = std::any_of(block.frames.begin(), block.frames.end(),
                                   [](const Frame& frame) { return frame.position_prior || frame.given_pose; }) ||
                       std::any_of(block.control_points.begin(), block.control_points.end(),

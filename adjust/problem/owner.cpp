@@ -5,7 +5,7 @@
 namespace megablock {
 
 std::int64_t owner_part(std::vector<OwnerCandidate>& frames) {
-  // As unsigned numbers "none" is the greatest depth.
+  // As an unsigned number, -1 ("none") is the greatest depth.
   std::sort(frames.begin(), frames.end(), [](const OwnerCandidate& a, const OwnerCandidate& b) {
     const auto first = static_cast<std::uint32_t>(a.depth), second = static_cast<std::uint32_t>(b.depth);
     return first != second ? first > second : a.part < b.part;

@@ -12,7 +12,7 @@
 namespace megablock {
 
 std::array<double, 3> RobustLoss::evaluate_beyond(double squared_norm) const {
-  const double s = squared_norm, b = scale * scale, end_of_line = 4 * b;  // of Cauchy's tail
+  const double s = squared_norm, b = scale * scale, end_of_line = 4 * b;  // for Cauchy's tail
   constexpr double kTiny = std::numeric_limits<double>::min();
   if (kind == Kind::kHuber || (kind == Kind::kCauchyTail && s <= end_of_line)) {
     const double r = std::sqrt(s);

@@ -1,5 +1,5 @@
-// The observations and unknowns of one tile: the input of the tile bundle adjustment (adjust/), of the condensed normal
-// equations (merge/) and, with one tile for the whole block, of the monolithic reference.
+// The observations and unknowns of one tile. They are the input of the tile bundle adjustment (adjust/), of the
+// condensed normal equations (merge/) and, with one tile for the whole block, of the monolithic reference.
 //
 // Residuals, each divided by its sigma (r is dimensionless; cost F = 1/2 sum rho(|r|^2)):
 //   image            project(K, to_camera(frame, mount, X)) - measured                                   [2]
@@ -10,12 +10,12 @@
 //   intrinsics prior k - k_0                               (per parameter with finite sigma)             [1 each]
 //   mount prior      Log(R R_0'), C - C_0                                                                [6]
 //   line             off the vertical, or the horizontal (line_terms.h)                                 [1]
-//   vertical         where an image should see down - where it does (vertical_terms.h)                  [2]
-// Robust losses act on image residuals (all), position and attitude priors, relative poses, lines and verticals (their
-// own option).
+//   vertical         direction of down in an image, expected - seen (vertical_terms.h)                   [2]
+// Robust losses act on image residuals (all), position and attitude priors, relative poses, lines and verticals (each
+// with an option of its own).
 //
-// Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3).
-// Every table is ascending by global index; a local index is a row of its table.
+// Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3). Every table is
+// ascending by the index in the block; a local index is a row of its table.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,21 +32,23 @@
 namespace megablock {
 
 struct RobustLoss {
-  // Cauchy's tail: Huber's up to 2c, 3c^2 + 2c^2 log(s / 4c^2) beyond; Hampel's three parts are like it. It takes good
-  // observations for what they are, so that their sigmas and chi-square stay true, and forgets gross ones. Between c
-  // and 2c lie three good attitudes in a hundred. Under the logarithm they would come closer by a constant factor a
-  // step only, as the cost curves downwards there, which no step may use (merge/tile/tile_linearisation.h).
+  // Cauchy's tail: Huber's loss up to 2c, and 3c^2 + 2c^2 log(s / 4c^2) beyond; Hampel's three parts are similar. It
+  // leaves good observations as they are, so that their sigmas and chi-square stay true, and ignores gross errors.
+  // Between c and 2c lie three good attitudes in a hundred. Under the logarithm they would approach the optimum only by
+  // a constant factor per step, because the cost curves downwards there and a step must not use negative curvature
+  // (merge/tile/tile_linearisation.h).
   enum class Kind : std::uint8_t { kNone, kHuber, kCauchy, kCauchyTail };
   Kind kind = Kind::kNone;
-  double scale = 1;  // in sigmas: the corner c, Cauchy's scale
+  double scale = 1;  // in sigmas: the corner c, or Cauchy's scale
   // rho(s) of the squared norm s, with first and second derivative: {rho, rho', rho''}, as ceres::LossFunction.
   std::array<double, 3> evaluate(double squared_norm) const {
     return squares(squared_norm) ? std::array<double, 3>{squared_norm, 1, 0} : evaluate_beyond(squared_norm);
   }
-  // Whether rho(s) = s there, as for nearly every observation.
+  // Whether rho(s) = s at this s, as for nearly every observation.
   bool squares(double s) const { return kind == Kind::kNone || (has_corner() && !(s > scale * scale)); }
   bool has_corner() const { return kind == Kind::kHuber || kind == Kind::kCauchyTail; }
-  // For starts far off: what forgets would take good observations for gross ones there; Huber's pulls from anywhere.
+  // The loss for a start that is far off. A loss that ignores gross errors would ignore good observations there;
+  // Huber's loss pulls from any distance.
   RobustLoss from_afar() const {
     return kind == Kind::kCauchy || kind == Kind::kCauchyTail ? RobustLoss{Kind::kHuber, scale} : *this;
   }
@@ -80,7 +82,7 @@ struct TileProblem {
   std::vector<ParameterMask> camera_free;  // [cameras] intrinsic parameters that are unknowns
   std::vector<MountId> mounts;
   std::vector<std::uint8_t> mount_free;  // [mounts] 1: six unknowns
-  // Centre, in the rig, of its first mount, which is held.
+  // The centre in the rig of its first mount, which is held.
   std::vector<Eigen::Vector3d> reference_of_frame, reference_of_mount;  // [frames], [mounts]
   std::vector<TileImage> images;
 
@@ -90,8 +92,8 @@ struct TileProblem {
   std::vector<LocalImage> image;      // [observations]; -1 where the frame has no pose (never kept)
   std::vector<double> x, y;           // px
   std::vector<double> inverse_sigma;  // 1/px
-  double image_sigma_px = 0.5;        // of the measurements of tie points, per axis (set_image_sigma)
-  // 1 = takes part. Points with fewer than two kept observations and no prior take no part at all.
+  double image_sigma_px = 0.5;        // of the tie point observations, per axis (set_image_sigma)
+  // 1 = takes part. Points with fewer than two kept observations and without a prior take no part at all.
   std::vector<std::uint8_t> kept;
 
   struct PositionTerm {
@@ -121,24 +123,24 @@ struct TileProblem {
     Pose value;
     double rotation_sigma_rad, position_sigma_m;
   };
-  // A line known to be vertical or horizontal (line_terms.h); rays in the axes of the rig.
+  // A line known to be vertical or horizontal (line_terms.h); rays are in the axes of the rig.
   struct LineTerm {
     LocalFrame frame;
-    LocalFrame other;  // of a horizontal line; invalid: vertical
+    LocalFrame other;  // of a horizontal line; invalid: the line is vertical
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(), across = Eigen::Vector3d::Zero();
     Eigen::Vector3d other_normal = Eigen::Vector3d::Zero();
     Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // at the frame, ground axes
     double weight = 0;
     LocalFrame seen_by() const { return other.valid() ? other : frame; }
   };
-  // Where an image sees down (vertical_terms.h).
+  // The direction in which an image sees down (vertical_terms.h).
   struct VerticalTerm {
     LocalImage image;
     Eigen::Vector3d ground = -Eigen::Vector3d::UnitZ();  // down at the frame, ground axes
     Eigen::Vector3d seen = Eigen::Vector3d::UnitY();     // camera axes
     Eigen::Matrix<double, 2, 3> weight;                  // camera axes -> sigmas, across `seen`
-    Eigen::VectorXd camera;                              // parameters of the camera that `seen` goes with, or empty
-    Eigen::Matrix2Xd by_camera;                          // weight * d seen / d parameter
+    Eigen::VectorXd camera;      // parameters of the camera with which `seen` was found, or empty
+    Eigen::Matrix2Xd by_camera;  // weight * d seen / d parameter
   };
   // A number between two frames, in the unit of its type (io/block/frame_measurements.h).
   struct MeasuredTerm {
@@ -159,17 +161,17 @@ struct TileProblem {
 
   std::int64_t point_count() const { return static_cast<std::int64_t>(points.size()); }
   std::int64_t observation_count() const { return static_cast<std::int64_t>(image.size()); }
-  // A point takes part: two or more kept observations, or one and a prior.
+  // Whether a point takes part: it needs two or more kept observations, or one and a prior.
   bool active(std::int64_t point) const;
 };
 
-// Inverse sigma of one parameter of an intrinsics prior; 0 where the parameter is held or free without prior.
+// The inverse sigma of one parameter of a camera's prior; 0 where the parameter is held or free without prior.
 inline double intrinsic_prior_weight(const TileProblem::IntrinsicTerm& term, int parameter) {
   const double sigma = term.sigma[static_cast<std::size_t>(parameter)];
   return sigma > 0 ? 1 / sigma : 0;
 }
 
-// Values of the tile's unknowns, rows as in the problem's tables.
+// The values of the tile's unknowns; rows are those of the problem's tables.
 struct TileState {
   std::vector<Pose> frames;
   std::vector<Intrinsics> cameras;
@@ -178,7 +180,7 @@ struct TileState {
 };
 
 struct ObservationOptions {
-  double image_sigma_px = 0.5;  // a-priori sigma of a tie point measurement per axis, px
+  double image_sigma_px = 0.5;  // a-priori sigma of a tie point observation per axis, px
   RobustLoss image_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
   RobustLoss attitude_loss{RobustLoss::Kind::kCauchyTail, 3.0};
@@ -190,18 +192,20 @@ struct ObservationOptions {
   void check() const;  // throws InputError
 };
 
-// Which tile owns what (owner.h; docs/developer/decisions.md, "Whose a point is"): a track, by its images, invalid
-// where none lies in a tile; a relative pose or a line, by its frames, invalid unless both do.
+// The tile that owns a track, a relative pose or a line (owner.h; docs/developer/decisions.md, "Whose a point is"). A
+// track belongs to a tile by its images; the result is invalid where none lies in a tile. A relative pose or a line
+// belongs to a tile by its frames; the result is invalid unless both lie in tiles.
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end);
 TileIndex owner_tile(const Tiles& tiles, FrameIndex first, FrameIndex second);
 
 // The whole block as one tile.
 Tiles single_tile(const Block& block);
 
-// Whether a held mount and one of a lower row of its rig stand at different places: they give the scale of the ground.
+// Whether a held mount and one in a lower row of its rig are at different places. They then give the scale of the
+// ground.
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount);
 
-// Values for the problem's tables from the block's; points as given (one per row of problem.points).
+// The values for the problem's tables from the block's. `points` has one for each row of problem.points.
 TileState make_tile_state(const TileProblem& problem, const BlockState& state, std::vector<Eigen::Vector3d> points);
 // Writes frames, cameras and mounts of the tile back into the block's state.
 void store_tile_state(const TileProblem& problem, const TileState& tile, BlockState& state);

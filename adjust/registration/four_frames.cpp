@@ -11,12 +11,12 @@ namespace megablock {
 
 namespace {
 
-constexpr double kHeldRotation = 1e-9, kHeldPosition = 1e-7;  // sigmas that hold a pair, rad and m
-constexpr double kFarthest = 500;                             // of a point from its frame, metres
+constexpr double kHeldRotation = 1e-9, kHeldPosition = 1e-7;  // sigmas of a held pair, rad and m
+constexpr double kFarthest = 500;                             // largest distance of a point from its frame, metres
 
 double inverse_or(double sigma, double held) { return 1 / (sigma > 0 ? sigma : held); }
 
-// Nearest point to the rays (geometry/intersection/triangulation.h, all weights one), in the axes of A.
+// The point nearest to the rays (geometry/intersection/triangulation.h, with equal weights), in the axes of A.
 std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const std::array<Pose, 4>& poses,
                                              std::int32_t first, std::int32_t last) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
@@ -131,8 +131,8 @@ void FourFrames::add_track(const FourFrameTrack& track, double threshold_px) {
   right_ -= coupling.transpose() * points_inverse * points_right;
 }
 
-// Relative poses of the pairs. With R Exp(w): Log(R_D R_C' R_DC') changes by R_DC R_C (w_D - w_C), R_C (C_D - C_C) by
-// -R_C [C_D - C_C]x w_C + R_C (dC_D - dC_C).
+// Adds the relative poses of the pairs. With the increments R Exp(w), Log(R_D R_C' R_DC') changes by R_DC R_C (w_D -
+// w_C), and R_C (C_D - C_C) by -R_C [C_D - C_C]x w_C + R_C (dC_D - dC_C).
 void FourFrames::add_pairs() {
   for (int pair = 0; pair < 2; ++pair) {
     const Pose &from = poses_[static_cast<std::size_t>(2 * pair)], &to = poses_[static_cast<std::size_t>(2 * pair + 1)];
@@ -149,7 +149,7 @@ void FourFrames::add_pairs() {
     jacobian.block<3, 3>(3, 0) = -pair_position_ * r_from * skew<double>(to.centre - from.centre);
     jacobian.block<3, 3>(3, 3) = -pair_position_ * r_from;
     jacobian.block<3, 3>(3, 9) = pair_position_ * r_from;
-    if (pair == 0) {  // A is held: columns of B only
+    if (pair == 0) {  // A is held: only the columns of B exist
       normal_.topLeftCorner<6, 6>() += jacobian.rightCols<6>().transpose() * jacobian.rightCols<6>();
       right_.head<6>() -= jacobian.rightCols<6>().transpose() * residual;
     } else {

@@ -1,4 +1,5 @@
-// The system of a 2x2 registration: poses of four frames in the axes of the first, points, their normal equations.
+// The normal equations of a 2x2 registration: the unknowns are the poses of four frames in the axes of the first one,
+// and the points.
 #pragma once
 
 #include <optional>
@@ -15,10 +16,10 @@ class FourFrames {
              const PairRegistrationOptions& options);
 
   const Pose& pose(std::size_t frame) const { return poses_[frame]; }
-  // Moves C; D keeps its place in C.
+  // Moves C; D keeps its pose relative to C.
   void place_second_pair(const Pose& c);
 
-  // Point of a track from the views of the frames first..last, with its covariance (m^2) in the axes of A.
+  // The point of a track, intersected from the frames first to last, with its covariance (m^2) in the axes of A.
   struct Intersection {
     Eigen::Vector3d point;
     Eigen::Matrix3d covariance;
@@ -26,14 +27,15 @@ class FourFrames {
   std::optional<Intersection> intersect(const FourFrameTrack& track, std::int32_t first, std::int32_t last,
                                         double scale_px) const;
 
-  // One iteration: points are refined, measurements beyond the threshold left out, poses stepped. False: singular.
+  // Runs one iteration: refines the points, leaves out observations beyond the threshold, and steps the poses. Returns
+  // false when the system is singular.
   bool iterate(double threshold_px);
 
-  // Lengths of all residuals at the present poses, points intersected anew; infinite where there is no point.
+  // The lengths of all residuals at the present poses, with points intersected anew; infinite where there is no point.
   std::vector<double> residuals() const;
 
-  // After iterate(): measurements within its threshold, those residuals, and the covariance of C (right increment and
-  // centre), scaled by the residuals' variance where that is above the stated one.
+  // After iterate(): the number of observations within its threshold, their residuals, and the covariance of C (right
+  // increment and centre). The covariance is scaled by the variance of the residuals where that exceeds the stated one.
   std::int32_t kept() const { return kept_; }
   const std::vector<double>& kept_residuals() const { return kept_residuals_; }
   std::optional<Matrix6> covariance() const;
@@ -46,7 +48,7 @@ class FourFrames {
   double weight(double squared_px, double threshold_px) const;
 
   const std::vector<FourFrameTrack>& tracks_;
-  double inverse_variance_;               // of a measurement, 1/px^2
+  double inverse_variance_;               // of an observation, 1/px^2
   double pair_rotation_, pair_position_;  // inverse sigmas
   std::array<Pose, 4> poses_;             // axes of A -> frame
   Pose b_in_a_, d_in_c_;                  // trusted

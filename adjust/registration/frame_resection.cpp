@@ -29,7 +29,8 @@ std::vector<FrameResection> resect_frames(const Block& block, const std::vector<
     result.frame = frame;
     std::vector<std::int64_t> points;
     for (const RigSight& sight : seen) points.push_back(sight.id);
-    points.erase(std::unique(points.begin(), points.end()), points.end());  // ascending: control points in order
+    // The rows are ascending, so that control points are in order.
+    points.erase(std::unique(points.begin(), points.end()), points.end());
     result.points = static_cast<int>(points.size());
     std::optional<ApproximatePose> approximate;
     if (!start.empty()) approximate = ApproximatePose{start[static_cast<std::size_t>(frame.value)]};

@@ -11,13 +11,13 @@ namespace megablock {
 
 struct FrameResection {
   FrameIndex frame;
-  std::string refused;  // why there is no pose; empty: there is one
+  std::string refused;  // why there is no pose; empty: there is a pose
   int points = 0;       // known points that the frame sees
   RigResection resection;
 };
 
-// Frames that see a known control point, ascending. `start`: approximate poses, one per frame, or empty: none. Control
-// points whose height is not known take no part. The seed of a frame's samples is its index.
+// Resects the frames that see a known control point, ascending. `start` holds one approximate pose per frame, or is
+// empty. Control points of unknown height are not used. The seed of a frame's samples is its index.
 std::vector<FrameResection> resect_frames(const Block& block, const std::vector<Pose>& start,
                                           const TrajectoryOptions& which, const RigResectionOptions& options);
 

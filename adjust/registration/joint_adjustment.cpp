@@ -22,7 +22,7 @@ using residual::centre_of;
 using residual::rotation_of;
 using residual::Vector3;
 
-// W with W'W = C^-1.
+// A matrix W with W'W = C^-1.
 Matrix6 whitening(const Matrix6& covariance) {
   const Eigen::LLT<Matrix6> factor(covariance);
   if (factor.info() != Eigen::Success) throw ComputeError("the covariance of a relative pose is not positive definite");
@@ -36,7 +36,7 @@ void store(const Matrix6& white, const Vector3<Scalar>& a, const Vector3<Scalar>
   Eigen::Map<Eigen::Matrix<Scalar, 6, 1>>{result} = white.cast<Scalar>() * both * Scalar(std::sqrt(weight));
 }
 
-// `weight` points to a number that changes from round to round.
+// The residual of a link. `weight` points to a number that changes from round to round.
 struct LinkResidual {
   Pose pose;
   Matrix6 white;
@@ -115,7 +115,7 @@ struct PointResidual {
 
 double geman_mcclure(double q, double scale) { return 1 / std::pow(1 + q / (scale * scale), 2); }
 
-// From first to last in equal ratios; the last two rounds are alike.
+// The scale in a round. It falls from `first` to `last` in equal ratios; the last two rounds have the same scale.
 double falling(double first, double last, int round, int rounds) {
   const double part = rounds > 2 ? std::min(1.0, static_cast<double>(round) / (rounds - 2)) : 1;
   return first * std::pow(last / first, part);
@@ -239,7 +239,8 @@ class JointProblem {
     reweight_views(round);
   }
 
-  // Means of the squared residuals over the neighbours in the pass, by sums from the first frame on.
+  // Weights positions by the mean squared residuals of their neighbours in the pass. The means are differences of
+  // running sums.
   void reweight_positions(int round) {
     if (!options_.use_positions) return;
     const double sigma = falling(options_.first_position_sigma_m, options_.position_sigma_m, round, options_.rounds);
@@ -311,7 +312,7 @@ class JointProblem {
   const JointOptions& options_;
   std::size_t frames_;
   const double one_ = 1;
-  std::vector<double> values_;  // one allocation: Ceres orders blocks by their addresses
+  std::vector<double> values_;  // one allocation, because Ceres orders parameter blocks by their addresses
   std::vector<double> registration_weight_, position_weight_, inverse_position_sigma_, view_weight_;
   std::vector<Matrix6> registration_white_;
   PoseManifold manifold_;

@@ -1,15 +1,18 @@
 // Adjusts the poses of all frames of a trajectory together (Cannelle 2013: chain, registrations, resections and
-// control), from
+// control). The observations are
 //
-//   chain          successive frames of a pass: in the axes of the first, as a 2x2 registration, or, as published, in
-//                  ground axes: S_i - S_{i-1} = dS, R_i R_{i-1}' = dR
-//   registrations  relative poses of crossing passes with their covariances, weights switchable
+//   chain          successive frames of a pass: in the axes of the first frame, as a 2x2 registration, or, as
+//   published,
+//                  in ground axes: S_i - S_{i-1} = dS, R_i R_{i-1}' = dR
+//   registrations  relative poses of crossing passes with their covariances; their weights can be switched off
 //   resections     absolute poses of frames with their covariances
-//   positions      of the trajectory, whose sigmas nobody trusts
+//   positions      of the trajectory, whose stated sigmas are not trusted
 //   attitudes      of the trajectory
-//   control        image measurements of control points along the path; of check points, whose positions are not used
+//   control        image observations of control points along the path, and of check points, whose positions are not
+//   used
 //
-// as one sparse least squares problem (Ceres, SPARSE_NORMAL_CHOLESKY, one thread: the same bits every time).
+// They form one sparse least squares problem (Ceres, SPARSE_NORMAL_CHOLESKY, one thread, so that the bits are always
+// the same).
 //
 // Weights. A registration is either correct or altogether wrong. A position is good to centimetres, or off by metres
 // together with its neighbours. Both get the weight of Geman and McClure, w = (1 + q / c^2)^-2, with q the mean squared
@@ -48,7 +51,7 @@ struct ResectedFrame {
   Matrix6 covariance;  // of PoseIncrement
 };
 
-// Image measurements of one control point (known position) or of a tie point (none).
+// The image observations of one control point (with a known position) or of a tie point (without).
 struct PathPoint {
   struct View {
     FrameIndex frame;
@@ -56,32 +59,32 @@ struct PathPoint {
     double sigma_px = 0.5;
   };
   bool known = true;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // known: with sigma; else the start
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // known position, with sigma; otherwise the start
   Eigen::Vector3d sigma = Eigen::Vector3d::Constant(0.01);
   std::vector<View> views;
 };
 
 struct JointOptions {
-  double registration_scale = 3;          // c of the last round, in sigmas
-  double first_registration_scale = 300;  // of the first round
-  bool robust_registrations = true;       // false: all weigh one
+  double registration_scale = 3;          // c in the last round, in sigmas
+  double first_registration_scale = 300;  // c in the first round
+  bool robust_registrations = true;       // false: all have the weight one
   bool use_positions = true;
-  double first_position_sigma_m = 2;  // what the trajectory's positions are good for at first
-  double position_sigma_m = 0.05;     // and where they are good, per axis
+  double first_position_sigma_m = 2;  // error of the trajectory's positions that the first round allows for
+  double position_sigma_m = 0.05;     // sigma of good positions, per axis
   double position_scale = 3;          // c
-  int position_neighbours = 50;       // frames over which a trajectory's errors stay the same
+  int position_neighbours = 50;       // number of frames over which a trajectory's errors stay the same
   bool use_attitudes = true;
-  double attitude_sigma_deg = 0.05;                 // of the trajectory, about each axis; shared by position_neighbours
-  double first_image_scale = 100, image_scale = 3;  // c of control measurements, in sigmas
-  int rounds = 10;                                  // of reweighting
-  int iterations = 4;                               // at most, of each but the last
+  double attitude_sigma_deg = 0.05;  // of the trajectory, about each axis; position_neighbours frames share it
+  double first_image_scale = 100, image_scale = 3;  // c of control observations, in sigmas
+  int rounds = 10;                                  // rounds of reweighting
+  int iterations = 4;                               // at most, in each round but the last
   int last_iterations = 30;
-  std::vector<FrameIndex> covariance_of;  // frames whose covariance is asked for (small blocks)
+  std::vector<FrameIndex> covariance_of;  // frames whose covariance is computed (for small blocks)
   void check() const;                     // throws InputError
 };
 
 struct JointInput {
-  std::vector<Pose> start;            // [frames] of the trajectory; observed positions and attitudes as well
+  std::vector<Pose> start;  // [frames] poses of the trajectory; they are the observed positions and attitudes as well
   std::vector<std::int64_t> pass;     // [frames]
   std::vector<std::uint8_t> located;  // [frames] 1: its position is an observation
   std::vector<ChainLink> chain;

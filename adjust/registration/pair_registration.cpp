@@ -27,7 +27,7 @@ std::vector<FourFrameTrack> seen_by_enough(const std::vector<FourFrameTrack>& tr
   return result;
 }
 
-// Pose of C in the axes of A by resection of the rig of C and D from the points of A and B.
+// The pose of C in the axes of A, by a resection of the rig of C and D from the points of A and B.
 std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vector<FourFrameTrack>& tracks,
                                        const PairRegistrationOptions& options, std::uint64_t seed) {
   const Pose d_in_c = relative_to(system.pose(2), system.pose(3));
@@ -40,7 +40,7 @@ std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vect
       RigSight sight;
       sight.ray = view.frame == 2 ? view.ray : carried(view.ray, d_in_c);
       sight.point = intersection->point;
-      // The base of A and B is not exact: a share of the distance besides.
+      // The base between A and B is not exact, which adds an error in proportion to the distance.
       const double base_error = 0.002 * intersection->point.norm();
       sight.covariance = intersection->covariance + base_error * base_error * Eigen::Matrix3d::Identity();
       sight.sigma_px = options.image_sigma_px;
@@ -63,7 +63,7 @@ std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vect
 }
 
 bool adjust(FourFrames& system, double first_threshold_px, const PairRegistrationOptions& options) {
-  // The last quarter stays at the last threshold.
+  // The last quarter of the iterations has the last threshold.
   const int falling = std::max(1, options.iterations * 3 / 4);
   for (int i = 0; i < options.iterations; ++i) {
     const double part = std::min(1.0, static_cast<double>(i) / falling);
@@ -73,7 +73,7 @@ bool adjust(FourFrames& system, double first_threshold_px, const PairRegistratio
   return true;
 }
 
-// Empty: the registration holds.
+// Why the registration is refused; empty: it is accepted.
 std::string refusal(const PairRegistration& r, double turn_deg, const PairRegistrationOptions& options) {
   if (r.kept < options.min_measurements)
     return fmt::format("{} measurements stay, {} are needed", r.kept, options.min_measurements);
@@ -158,7 +158,7 @@ std::optional<Pose> register_3d_3d(const std::array<Pose, 4>& frames, const std:
                                    std::uint64_t seed) {
   const std::vector<FourFrameTrack> tracks = seen_by_enough(all_tracks, 4);
   const FourFrames system(frames, tracks, {});
-  std::vector<Eigen::Vector3d> first, second;  // in the axes of A, as either pair sees them
+  std::vector<Eigen::Vector3d> first, second;  // the points in the axes of A, as intersected by each pair
   for (const FourFrameTrack& track : tracks) {
     const auto a = system.intersect(track, 0, 1, 1e3), c = system.intersect(track, 2, 3, 1e3);
     if (!a || !c) continue;
@@ -168,7 +168,7 @@ std::optional<Pose> register_3d_3d(const std::array<Pose, 4>& frames, const std:
   if (first.size() < 3) return std::nullopt;
   const auto fit = fit_similarity_robust(second, first, std::vector<double>(first.size(), 0.2), 300, seed);
   if (!fit) return std::nullopt;
-  // Without the scale: about the centroid.
+  // The transformation about the centroid, without a scale.
   Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < first.size(); ++i) from += second[i], to += first[i];
   const double count = static_cast<double>(first.size());

@@ -24,7 +24,7 @@ std::size_t at(FrameIndex f) { return static_cast<std::size_t>(f.value); }
 
 using Links = std::map<FrameIndex, const ChainLink*>;  // by their second frame
 
-// First frames of windows of linked frames, one behind the other along the passes.
+// The first frames of windows of successive linked frames, which follow each other along the passes.
 std::vector<FrameIndex> cut_windows(const JointInput& input, const Links& links, int size) {
   std::vector<FrameIndex> windows;
   for (std::int64_t f = 0; f + size <= static_cast<std::int64_t>(input.start.size());) {
@@ -40,7 +40,7 @@ std::vector<FrameIndex> cut_windows(const JointInput& input, const Links& links,
   return windows;
 }
 
-// The windows that turn most, and as many spread over the others; ascending.
+// Chooses the windows that turn most, and as many spread evenly over the others; ascending.
 std::vector<FrameIndex> choose_windows(const JointInput& input, const Links& links, const RigEstimateOptions& options) {
   const std::vector<FrameIndex> all = cut_windows(input, links, options.window_frames);
   const auto wanted = static_cast<std::size_t>(options.windows);
@@ -61,7 +61,7 @@ std::vector<FrameIndex> choose_windows(const JointInput& input, const Links& lin
   return chosen;
 }
 
-// The frames of the windows as a block of their own.
+// The frames of the windows, as a block of their own.
 struct Part {
   Block block;
   TrackSet tracks;
@@ -94,7 +94,7 @@ void add_frames(const Block& whole, const JointInput& input, const Links& links,
     }
 }
 
-// Rows of the part's images by those of the whole block, -1: not in it.
+// Adds the images of the windows. Returns the new row of each image of the whole block; -1: not in a window.
 std::vector<std::int64_t> add_images(const Block& whole, Part& part) {
   std::vector<std::int64_t> frame_row(whole.frames.size(), -1);
   std::int64_t next = 0;
@@ -113,7 +113,7 @@ std::vector<std::int64_t> add_images(const Block& whole, Part& part) {
   return row;
 }
 
-// Each track within the window that has most of its observations.
+// Adds the observations of each track in the window that has most of them.
 void add_tracks(const Block& whole, const TrackSet& tracks, const std::vector<std::int64_t>& image_row, int min_track,
                 Part& part) {
   part.tracks.begin = {0};
@@ -152,7 +152,7 @@ Part make_part(const Block& whole, const JointInput& input, const TrackSet& trac
   return part;
 }
 
-// Of all observations, points intersected anew at the state's poses.
+// The median residual of all observations, with points intersected anew at the poses of the state.
 double median_residual(TileProblem problem, TileState state, const AdjustOptions& options) {
   for (std::size_t row = 0; row < problem.kept.size(); ++row) problem.kept[row] = problem.image[row].valid();
   triangulate_points(problem, state, options);
@@ -174,7 +174,7 @@ void adjust(const Part& part, const RigEstimateOptions& options, RigEstimate& es
   tiles.tile_of_frame.assign(part.block.frames.size(), TileIndex(0));
   tiles.component.assign(part.block.frames.size(), 0);
   ObservationOptions observations = options.adjustment.observations;
-  observations.use_position_priors = observations.use_attitude_priors = true;  // of the held frames
+  observations.use_position_priors = observations.use_attitude_priors = true;  // those of the held frames
   TileProblem problem = make_tile_problem(part.block, state, tiles, TileIndex(0), part.tracks, observations);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   TileState tile = make_tile_state(problem, state, std::vector<Eigen::Vector3d>(problem.points.size(), unknown));

@@ -16,7 +16,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kFree = 1e6;        // sigma of a coordinate that is not known, metres
+constexpr double kFree = 1e6;        // sigma of an unknown coordinate, metres
 constexpr double kSamePlace = 1e-3;  // metres
 
 using RelativeOf = std::map<std::pair<FrameIndex, FrameIndex>, const RelativePose*>;
@@ -32,9 +32,9 @@ Pose carry_on(const Pose& from, const Pose& relative) {
   return {(relative.rotation * from.rotation).normalized(), from.centre + from.rotation.conjugate() * relative.centre};
 }
 
-// Throws for a frame of the minority, whose clock runs against that of the others.
+// Throws InputError when some clock steps of a pass run against the others. It names a frame of the minority.
 void check_clock(const Block& block, const std::vector<FrameIndex>& pass) {
-  const auto run = [&](std::size_t i) {  // of the clock: 1 on, -1 back, 0 unknown or none
+  const auto run = [&](std::size_t i) {  // direction of the clock: 1 forwards, -1 backwards, 0 unknown or unchanged
     const double before = block.frames[pass[i - 1]].time_s, now = block.frames[pass[i]].time_s;
     return now > before ? 1 : now < before ? -1 : 0;
   };
@@ -49,7 +49,7 @@ void check_clock(const Block& block, const std::vector<FrameIndex>& pass) {
           block.frames[pass[i]].name, block.frames[pass[i]].pass, block.frames[pass[i - 1]].name));
 }
 
-// Frames of each pass in their order.
+// The frames of each pass in their order.
 std::map<std::int64_t, std::vector<FrameIndex>> passes_of(const Block& block) {
   std::map<std::int64_t, std::vector<FrameIndex>> passes;
   for (std::int64_t f = 0; f < std::ssize(block.frames); ++f)
@@ -57,7 +57,8 @@ std::map<std::int64_t, std::vector<FrameIndex>> passes_of(const Block& block) {
   return passes;
 }
 
-// The relative pose of two successive frames, stated in either direction: a pass may be listed backwards.
+// The relative pose of two successive frames. The block may state it in either direction, because a pass may be listed
+// backwards.
 std::optional<RelativePose> stated_link(FrameIndex from, FrameIndex to, const RelativeOf& relative) {
   if (const auto found = relative.find({from, to}); found != relative.end()) return *found->second;
   const auto found = relative.find({to, from});

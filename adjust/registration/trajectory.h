@@ -10,14 +10,15 @@
 namespace megablock {
 
 struct TrajectoryOptions {
-  // Sigmas of the chain, the same for all links, because stated ones lie; 0: as stated by the relative poses.
+  // Sigmas of the chain, the same for all links, because stated sigmas are often too small; 0: those of the relative
+  // poses.
   double chain_position_sigma_m = 0.005, chain_rotation_sigma_deg = 0.01;
-  // Of links made of the trajectory's own differences, where the block has no relative pose.
+  // Sigmas of links that are made of differences of the trajectory, where the block has no relative pose.
   double difference_position_sigma_m = 0.02, difference_rotation_sigma_deg = 0.02;
-  double max_gap_m = 50, max_gap_s = 60;  // successive frames farther apart are not linked by such differences
-  enum class CheckPoints { kIgnore, kTie } check_points = CheckPoints::kTie;  // both variants of Cannelle 2013
+  double max_gap_m = 50, max_gap_s = 60;  // successive frames farther apart get no such link
+  enum class CheckPoints { kIgnore, kTie } check_points = CheckPoints::kTie;  // both are variants of Cannelle 2013
   bool use_control = true;
-  std::string check_prefix;  // control points whose names begin so are check points too
+  std::string check_prefix;  // control points whose names begin with this are check points too
   void check() const;        // throws InputError
 };
 
@@ -27,9 +28,9 @@ struct Trajectory {
   std::vector<std::string> notes;       // gaps, copies; one line each
 };
 
-// Start poses: the given ones, else position and attitude priors, else the frame before carried on by a relative pose.
-// A pass may be listed against its times. Throws InputError naming the frame: no pose, not finite, times of a pass that
-// neither ascend nor descend throughout.
+// Gives start poses: the given ones, else position and attitude priors, else the pose of the frame before, continued by
+// a relative pose. A pass may be listed against its times. Throws InputError naming the frame when it has no pose, when
+// its pose is not finite, or when the times of its pass neither ascend nor descend throughout.
 Trajectory trajectory_of(const Block& block, const TrajectoryOptions& options);
 
 }  // namespace megablock

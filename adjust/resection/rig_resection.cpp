@@ -18,7 +18,7 @@ namespace {
 
 using Approximate = std::optional<ApproximatePose>;
 
-// Whitened difference from the pose known beforehand, by its increment: w of R = R_0 Exp(w), C - C_0.
+// The whitened difference from the approximate pose, as an increment: w of R = R_0 Exp(w), and C - C_0.
 PoseIncrement departure(const Approximate& known, const Pose& pose) {
   PoseIncrement d = PoseIncrement::Zero();
   if (!known) return d;
@@ -27,7 +27,7 @@ PoseIncrement departure(const Approximate& known, const Pose& pose) {
   return d;
 }
 
-// Truncated sum of squares of the sights.
+// The truncated sum of squares of the observations.
 double cost(std::span<const RigSight> sights, const Pose& pose, double limit_squared) {
   const auto squares = RigSightEstimator(sights).squared_residuals(pose);
   double sum = 0;
@@ -39,7 +39,7 @@ PoseNormal normal_matrix(std::span<const RigSight> sights, const Approximate& kn
                          double limit_squared, PoseIncrement& right) {
   PoseNormal normal = PoseNormal::Zero();
   right.setZero();
-  if (known) {  // the departure of the rotation is small: its derivative is the identity
+  if (known) {  // the rotation differs by a small angle, so that its derivative is nearly the identity
     PoseIncrement inverse_sigma;
     inverse_sigma << Eigen::Vector3d::Constant(1 / known->rotation_sigma_rad),
         Eigen::Vector3d::Constant(1 / known->position_sigma_m);
@@ -50,7 +50,7 @@ PoseNormal normal_matrix(std::span<const RigSight> sights, const Approximate& kn
   return normal;
 }
 
-// Levenberg-Marquardt on the truncated squares.
+// Levenberg-Marquardt iterations on the truncated squares.
 Pose refine(std::span<const RigSight> sights, const Approximate& known, Pose pose, double limit_squared) {
   const auto value_at = [&](const Pose& p) {
     return cost(sights, p, limit_squared) + departure(known, p).squaredNorm();
@@ -80,7 +80,8 @@ struct Candidate {
   Pose pose;
 };
 
-// The poses of most support, best first: of all samples of three where these are few, else of random ones.
+// The poses with most inliers, the best first. They come from all samples of three where these are few, else from
+// random ones.
 std::vector<Pose> best_poses(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed) {
   RansacOptions sampling;
   sampling.threshold = options.max_error_sigmas;
@@ -122,10 +123,10 @@ double largest_angle_deg(std::span<const RigSight> sights, const std::vector<std
   return std::acos(std::clamp(smallest_cosine, -1.0, 1.0)) / kDegree;
 }
 
-// The candidates that the sights cannot tell from the best one, refined, each once.
+// The candidates that the observations cannot tell from the best one, refined, each of them once.
 std::vector<Candidate> equally_good(std::span<const RigSight> sights, const Approximate& known,
                                     const std::vector<Pose>& found, double limit_squared) {
-  constexpr double kClear = 9;  // a pose whose squares are this much larger is worse
+  constexpr double kClear = 9;  // a pose whose sum of squares exceeds the smallest by more is worse
   std::vector<Candidate> refined;
   for (const Pose& start : found) {
     const Pose pose = refine(sights, known, start, limit_squared);

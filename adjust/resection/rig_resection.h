@@ -19,14 +19,15 @@
 namespace megablock {
 
 struct RigResectionOptions {
-  double max_error_sigmas = 4;        // length of the whitened residual of an agreeing sight
-  int samples = 500;                  // of three points; fewer where there are fewer triplets or the agreement is clear
-  int min_points = 3;                 // agreeing points
-  double min_share = 0.4;             // agreeing points / all
-  double min_line_ratio = 0.02;       // spread of the points across their line / along it; below: aligned, refused
-  double max_position_sigma_m = 0.1;  // of the result, length; above (points near a critical surface): refused
-  double warn_angle_deg = 20;         // largest angle between two agreeing points seen from the rig; below: warning
-  void check() const;                 // throws InputError
+  double max_error_sigmas = 4;   // length of the whitened residual of an inlier
+  int samples = 500;             // samples of three points; fewer when there are fewer triplets or the result is clear
+  int min_points = 3;            // inlier points
+  double min_share = 0.4;        // inlier points / all points
+  double min_line_ratio = 0.02;  // spread of the points across their line / along it; a smaller one is refused
+  double max_position_sigma_m = 0.1;  // of the result, length; a larger one (points near a critical surface) is refused
+  // The largest angle between two inlier points, seen from the rig; a smaller one gives a warning.
+  double warn_angle_deg = 20;
+  void check() const;  // throws InputError
 };
 
 struct ApproximatePose {
@@ -38,16 +39,16 @@ struct ApproximatePose {
 struct RigResection {
   Pose pose;                                                                     // ground -> rig
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  // of PoseIncrement, a priori
-  std::vector<std::uint8_t> agrees;                                              // [sights]
-  int points = 0;                                                                // agreeing ones
-  double rms_px = 0;                                                             // of the agreeing sights, per axis
-  double angle_deg = 0;                                                          // largest between agreeing points
+  std::vector<std::uint8_t> agrees;                                              // [observations] 1: inlier
+  int points = 0;                                                                // inlier points
+  double rms_px = 0;                                                             // of the inlier observations, per axis
+  double angle_deg = 0;  // largest angle between two inlier points
   std::vector<std::string> warnings;
 };
 
-// Deterministic: samples depend on `seed` and the order of the sights alone.
-// Throws ComputeError saying what is missing: fewer than three points, points on one line, no agreement, several poses
-// possible, position not determined.
+// Deterministic: samples depend on `seed` and on the order of the observations alone. Throws ComputeError with the
+// reason: fewer than three points, points on one line, no pose with enough inliers, several possible poses, or a
+// position that is not determined.
 RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed,
                         const std::optional<ApproximatePose>& approximate = {});
 

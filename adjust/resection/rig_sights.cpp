@@ -15,7 +15,7 @@ std::optional<WhitenedSight> whitened(const RigSight& sight, const Pose& pose, b
   const Eigen::Matrix<double, 2, 3> by_ground = r->by_point * pose.rotation.toRotationMatrix();
   const Eigen::Matrix2d covariance = sight.sigma_px * sight.sigma_px * Eigen::Matrix2d::Identity() +
                                      by_ground * sight.covariance * by_ground.transpose();
-  // Cholesky factor of a 2x2, by hand: this is the innermost loop.
+  // The Cholesky factor of a 2x2 matrix, written out because this is the innermost loop.
   const double a = std::sqrt(covariance(0, 0)), b = covariance(1, 0) / a,
                c = std::sqrt(std::max(covariance(1, 1) - b * b, 1e-300));
   const auto solve = [&](const auto& v) {

@@ -21,34 +21,34 @@ struct RigSight {
   RigRay ray;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();       // ground frame, metres
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the point, m^2
-  double sigma_px = 0.5;                                 // of the measurement, per axis
-  std::int64_t id = 0;                                   // of the point: sights of one point share it
+  double sigma_px = 0.5;                                 // of the observation, per axis
+  std::int64_t id = 0;  // of the point; several observations of one point have the same id
 };
 
-// Whitened residual and its derivative by the pose.
+// The whitened residual of an observation and its derivative by the pose.
 struct WhitenedSight {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6> by_pose;
   double squared_px;
 };
-// Empty where the point is not in front.
+// Empty where the point is not in front of the camera.
 std::optional<WhitenedSight> whitened(const RigSight& sight, const Pose& pose, bool with_jacobian);
 
 using PoseNormal = Eigen::Matrix<double, 6, 6>;
-// Adds the normal equations of the sights whose squares do not exceed the limit.
+// Adds the normal equations of the observations whose squared residuals do not exceed the limit.
 void add_normal_equations(std::span<const RigSight> sights, const Pose& pose, double limit_squared, PoseNormal& normal,
                           PoseIncrement& right);
 
-// Samples of three points (gp3p.h); refined by a few steps of least squares.
+// Draws samples of three points (gp3p.h), and refines a pose by a few least squares iterations.
 class RigSightEstimator {
  public:
   using Model = Pose;  // ground -> rig
   static constexpr std::size_t kSampleSize = 3;
-  // The sights must outlive it.
+  // The observations must outlive the object.
   explicit RigSightEstimator(std::span<const RigSight> sights) : sights_(sights) {}
   std::size_t size() const { return sights_.size(); }
   Solutions<Pose, 8> solve(const std::array<std::size_t, 3>& rows) const;
-  // Of the whitened residual; infinite behind a camera.
+  // Squares of the whitened residuals; infinite behind a camera.
   auto squared_residuals(const Pose& pose) const {
     return [sights = sights_, pose](std::size_t i) {
       const auto w = whitened(sights[i], pose, false);
@@ -62,7 +62,7 @@ class RigSightEstimator {
 };
 
 // Finds the pose with most inliers for a lost frame or a lost part of a tile, with up to 500 samples. Residuals up to
-// the threshold, in sigmas, are inliers. Empty where no pose is found; the caller judges whether the inliers are
+// the threshold, in sigmas, are inliers. Empty where no pose is found; the caller decides whether the inliers are
 // enough.
 std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed);
 

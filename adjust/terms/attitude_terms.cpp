@@ -1,8 +1,8 @@
-// Attitudes of frames: r = Log(R R_0') / sigma, about the rig's axes, radians.
+// The attitudes of frames: r = Log(R R_0') / sigma, about the axes of the rig, radians.
 //
 //   Log(R Exp(w) R_0') = Log(E Exp(R_0 w)),  E = R R_0':   by w: J_r^-1(Log E) R_0
 //
-// Owned by the tile of the frame. A held attitude (io/block/held_priors.h) has no loss, which would let it go.
+// The tile of the frame owns them. A held attitude (io/block/held_priors.h) has no loss, which would release it.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/prior_loss.h"

@@ -1,4 +1,4 @@
-// A residual of ceres_residuals.h as a cost function of Ceres, by automatic differentiation.
+// Makes a cost function of Ceres from a residual of ceres_residuals.h, by automatic differentiation.
 #pragma once
 
 #include <ceres/autodiff_cost_function.h>
@@ -11,13 +11,13 @@
 
 namespace megablock {
 
-// The number of residuals, then the sizes of the blocks.
+// The template parameters are the number of residuals, then the sizes of the blocks.
 template <int kResiduals, int... kBlocks, typename Functor>
 ceres::CostFunction* automatic_term(Functor functor) {
   return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlocks...>(new Functor(std::move(functor)));
 }
 
-// Sizes that are known when the program runs; the functor takes an array of blocks.
+// For sizes that are known at run time; the functor takes an array of blocks.
 template <typename Functor>
 ceres::CostFunction* automatic_dynamic_term(Functor functor, int residuals, const std::vector<int>& blocks) {
   auto* cost = new ceres::DynamicAutoDiffCostFunction<Functor, 8>(new Functor(std::move(functor)));

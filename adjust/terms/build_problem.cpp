@@ -13,7 +13,7 @@ namespace megablock {
 
 namespace {
 
-// A prior on half of a mount (only its rotation or only its position) holds the other half by these sigmas.
+// If a prior concerns half of a mount (only its rotation or only its position), the other half is held by these sigmas.
 constexpr double kHeldRotationRad = 1e-7;
 constexpr double kHeldPositionM = 1e-6;
 
@@ -21,10 +21,10 @@ template <typename Value>
 void make_distinct(std::vector<Value>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
-  values.shrink_to_fit();  // tables of frames, cameras and mounts begin with an entry per image
+  values.shrink_to_fit();  // tables of frames, cameras and mounts begin with one entry for each image
 }
 
-// Row of `value` in an ascending table, -1 when it is not there.
+// The row of `value` in an ascending table; -1 when it is not there.
 template <typename Value>
 std::int32_t row_of(const std::vector<Value>& table, const Value& value) {
   const auto it = std::lower_bound(table.begin(), table.end(), value);
@@ -301,7 +301,7 @@ void find_first_users(const Block& block, const BlockState& state, const Tiles& 
     if (!state.oriented[frame] || !home.valid()) continue;
     const MountId id{block.frames[frame].rig, block.images[image].mount};
     auto& mount_flag = mount_seen[static_cast<std::size_t>(id.rig.value)][static_cast<std::size_t>(id.mount)];
-    if (mount_flag) continue;  // then its camera has been seen as well
+    if (mount_flag) continue;  // its camera has been seen as well then
     mount_flag = 1;
     --open;
     RowsOfTile& tile = rows[static_cast<std::size_t>(home.value)];

@@ -10,28 +10,29 @@
 
 namespace megablock {
 
-// Builds a tile's problem: all rows of `owned` (the tile's track file) whose images belong to oriented frames, the
-// control points, priors and relative poses that the tile owns (a frame's priors: the frame's tile; a camera's prior:
-// the tile of the first oriented image that uses it; a relative pose: as a track of its two frames).
-// Every observation starts kept. Observations of images without pose are left out of `kept` (0), not out of the rows,
-// so that rows stay aligned with the track file; then the control points' measurements follow.
+// Builds the problem of a tile: all rows of `owned` (the track file of the tile) whose images belong to oriented
+// frames, and the control points, priors and relative poses that the tile owns. The priors of a frame belong to the
+// tile of the frame, the prior of a camera to the tile of the first oriented image that uses it, and a relative pose to
+// the tile that would own a track of its two frames. Every observation starts as kept. Observations of images without
+// pose are not kept, but their rows stay, so that rows correspond to the track file. The image observations of control
+// points follow them.
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options);
 
-// What the block's tables hold of each tile, found in one pass over them for all tiles: a tile then asks for its own
-// rows alone, however large the block is.
+// The rows of the block's tables that belong to each tile, found for all tiles at the same time. A tile then reads its
+// own rows alone, however large the block is.
 struct RowsOfTile {
-  std::vector<FrameIndex> frames;           // oriented and with a prior of any kind, ascending
-  std::vector<std::size_t> relative_poses;  // that the tile owns, between oriented frames, ascending
-  // By the key of their type; that the tile owns, between oriented frames of one part of the block, ascending.
+  std::vector<FrameIndex> frames;           // oriented frames with a prior of any kind, ascending
+  std::vector<std::size_t> relative_poses;  // relative poses that the tile owns, between oriented frames, ascending
+  // By the key of their type: rows that the tile owns, between oriented frames of one part of the block, ascending.
   std::map<std::string, std::vector<std::size_t>> measured;
   std::vector<std::size_t> verticals;  // of oriented images, ascending
-  std::vector<CameraIndex> cameras;    // whose first oriented image lies in the tile, ascending
-  std::vector<MountId> mounts;         // the same
+  std::vector<CameraIndex> cameras;    // cameras whose first oriented image lies in the tile, ascending
+  std::vector<MountId> mounts;         // mounts, in the same way
 };
 using RowsOfTiles = std::vector<RowsOfTile>;  // [tiles]
 RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles);
-// The same problem; `rows` of the tile, by the same block, state and tiles.
+// The same problem. `rows` are those of the tile, from the same block, state and tiles.
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options, const RowsOfTile& rows);
 

@@ -1,10 +1,10 @@
-// The residuals of a tile for Ceres' automatic differentiation: written from the definitions in tile_problem.h alone,
-// independent of linearise.cpp, so that either can be held against the other.
+// The residuals of a tile for Ceres' automatic differentiation. They are written from the definitions in tile_problem.h
+// alone, independently of linearise.cpp, so that each can be checked against the other.
 //
-// Parameter blocks: frame and mount 7 (quaternion w, x, y, z, then centre), camera as many as its model
-// has (Intrinsics), point 3.
-// PoseManifold gives a pose the project's tangent increment (PoseIncrement, right perturbation): Jacobians, gradients
-// and steps that Ceres reports in tangent space have the six columns of a frame in our order and sign.
+// A frame or mount has a parameter block of 7 numbers (quaternion w, x, y, z, then centre), a camera as many as its
+// model has parameters (Intrinsics), and a point 3. PoseManifold gives a pose the tangent increment of this project
+// (PoseIncrement, right perturbation). Jacobians, gradients and steps that Ceres reports in tangent space therefore
+// have the six columns of a frame in our order and sign.
 #pragma once
 
 #include <ceres/jet.h>
@@ -28,8 +28,8 @@ class PoseManifold : public ceres::Manifold {
   bool MinusJacobian(const double* x, double* jacobian) const override;
 };
 
-// Rows: the derivatives of the quaternion (w, x, y, z) by the right perturbation are this matrix / 4, transposed;
-// the derivative of the perturbation by the quaternion is the matrix itself.
+// The derivatives of the quaternion (w, x, y, z) by the right perturbation are this matrix / 4, transposed. The
+// derivative of the perturbation by the quaternion is the matrix itself.
 Eigen::Matrix<double, 3, 4> quaternion_to_tangent(const double* quaternion_wxyz);
 
 void to_block(const Pose& pose, double* block);
@@ -55,8 +55,9 @@ double value_of(const ceres::Jet<T, kSize>& x) {
   return x.a;
 }
 
-// The pixel m with m + d(m) = `straight`: from its value, Newton steps with the derivative of d by automatic
-// differentiation; the first gives m its derivatives, the second shows that the value was one.
+// Finds the pixel m with m + d(m) = `straight`. Starting from its value, it takes Newton steps with the derivative of d
+// by automatic differentiation: the first step gives m its derivatives, and the second shows that the value was a
+// solution.
 template <typename Model, typename Scalar>
 Eigen::Matrix<Scalar, 2, 1> corrected_pixel(int order, const Intrinsics& plain, const Scalar* camera,
                                             const Eigen::Vector2d& value, const Eigen::Matrix<Scalar, 2, 1>& straight) {
@@ -93,7 +94,7 @@ struct ImageMeasured {
     return true;
   }
 
-  // False where the model has no pixel for the point.
+  // Returns false where the model has no pixel for the point.
   template <typename Scalar>
   bool project_point(const Scalar* camera, const Vector3<Scalar>& point, Eigen::Matrix<Scalar, 2, 1>& pixel) const {
     if (model == CameraModel()) {
@@ -154,7 +155,7 @@ struct RelativeMeasured {
   }
 };
 
-// line_terms.h. Both are zero where linearise_line says that nothing is observed.
+// The residual of line_terms.h. Both parts are zero where nothing is observed (linearise_line).
 template <typename Scalar>
 Scalar off_direction(const TileProblem::LineTerm& term, const Vector3<Scalar>& direction) {
   const Vector3<Scalar> normal = term.middle.cast<Scalar>().cross(direction);
@@ -191,7 +192,7 @@ struct HorizontalLine {
   }
 };
 
-// vertical_terms.h.
+// The residual of vertical_terms.h.
 struct VerticalSeen {
   TileProblem::VerticalTerm term;
   template <typename Scalar>

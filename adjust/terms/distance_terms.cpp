@@ -1,10 +1,10 @@
-// Known distances of two frames, scale bars: a rod between two cameras, or the length of a GNSS baseline.
+// The known distances of two frames, scale bars: a rod between two cameras, or the length of a GNSS baseline.
 //
 //   r = (|b| - d) / sigma,   b = C_to - C_from,   metres between the origins of the frames' rigs;
 //   by d_to: b'/|b| / sigma,   by d_from: the negative of it,   by rotations: 0
 //
-// Owned as a track of its two frames is. It observes the scale of a block and nothing else of its datum. No loss: a bar
-// that contradicts the block is to be looked at, not to be forgotten.
+// The tile that would own a track of the two frames owns them. A distance observes the scale of a block and nothing
+// else of its datum. It has no loss, because a bar that contradicts the block must be looked at, not ignored.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/terms.h"
 

@@ -1,6 +1,7 @@
-// Prior values of cameras: r = (k - k_0) / sigma for each parameter with a finite positive sigma, each by itself.
+// The priors of camera parameters: r = (k - k_0) / sigma for each parameter with a finite positive sigma, each
+// independent of the others.
 //
-// Owned by the tile of the first oriented image of the camera.
+// The tile of the first oriented image of the camera owns them.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/terms.h"
@@ -9,7 +10,7 @@ namespace megablock {
 
 namespace {
 
-// A prior has as many residuals as its camera has parameters.
+// The prior of a camera has as many residuals as the camera has parameters.
 struct DynamicIntrinsicsKnown {
   residual::IntrinsicsKnown known;
   template <typename Scalar>

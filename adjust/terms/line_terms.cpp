@@ -94,8 +94,8 @@ std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& stat
   return terms;
 }
 
-// By R Exp(w): v = R d changes by -R [d]x w. By R_o Exp(w): N = R_o' n changes by [N]x w, u = N x z by -[z]x [N]x w,
-// and d = u / |u| by (I - d d') / |u| of that.
+// With R Exp(w), v = R d changes by -R [d]x w. With R_o Exp(w), N = R_o' n changes by [N]x w, u = N x z by -[z]x [N]x
+// w, and d = u / |u| by (I - d d') / |u| times that.
 LineResidual linearise_line(const Pose& frame, const Pose& other, const TileProblem::LineTerm& term) {
   const Eigen::Vector3d& up = term.up;
   const Eigen::Matrix3d rotation = frame.rotation.toRotationMatrix();
@@ -141,7 +141,7 @@ class KnownLines final : public ObservationType {
     out.loss = problem.line_loss;
     visit(out);
   }
-  // Lines look at rotations alone, and a similarity turns both frames alike.
+  // Lines depend on rotations alone, and a similarity turns both frames in the same way.
   TermDatum datum(const TileProblem& problem, const TileState& state, std::size_t row) const override {
     const TileProblem::LineTerm& term = problem.lines[row];
     const LineResidual r = linearise_line(state.frames[term.frame.value], state.frames[term.seen_by().value], term);

@@ -1,27 +1,29 @@
-// Lines known to be vertical or horizontal, as observations of the attitudes of the frames that see them.
+// Takes lines known to be vertical or horizontal as observations of the attitudes of the frames that see them.
 //
-// An image sees a line in its interpretation plane. Of a measured segment with rays a, b to its ends (unit, rig axes)
-// and m to its middle, and a direction v of space (rig axes), the plane through m and v leaves the ends on either side
-// by
+// An image sees a line in its interpretation plane. A measured segment has the unit rays a, b to its ends and m to its
+// middle, in the axes of the rig, and v is a direction of space in the same axes. The plane through m and v passes the
+// two ends on opposite sides, at the distance
 //
 //     r = w (a - b)'n / 2,   n = m x v / |m x v|,   equivalently   r = w v'c / |m x v|,   c = (a - b) x m / 2,
 //
-// w from radians to sigmas: the ends' distance from the image line through the middle and the vanishing point of v.
+// where w goes from radians to sigmas. It is the distance of the ends from the image line through the middle and the
+// vanishing point of v. The direction is
 //   vertical:    v = R z, z up at the frame;
 //   horizontal:  v = R d with d the horizontal direction in the plane in which the other frame sees the line,
 //                d = N x z / |N x z|, N = R_o' n_o (ground); one observation for successive measurements of the line.
-// "Up" is the ellipsoid's normal at the frame, where it stands when the terms are made, in a georeferenced block (10 km
-// from the origin that is 0.09 degrees off the ground's axis; a line 100 m from the frame is 0.001 degrees off it),
-// else the ground's axis. The rays are those of the given cameras and mounts (start values, where these are estimated):
-// they turn a line by less than its measurement can tell, as long as the focal length is good to some per cent.
+// In a georeferenced block, "up" is the normal of the ellipsoid at the place of the frame when the problem is made (10
+// km from the origin it is 0.09 degrees off the axis of the ground frame; at a line 100 m from the frame it differs by
+// 0.001 degrees). In other blocks it is the axis of the ground frame. The rays are those of the given cameras and
+// mounts, or of their start values where these are estimated. Their errors turn a line by less than the error of its
+// measurement, as long as the focal length is good to a few per cent.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"
 
 namespace megablock {
 
-// Terms of the lines whose frames have poses and that `tile` owns (owner_tile of their frames). Frames are global
-// indices here.
+// Gives the observations of the lines whose frames have poses and that `tile` owns (owner_tile of their frames). Frames
+// are indices of the block here.
 struct BlockLineTerm {
   FrameIndex frame, other;  // other: invalid for vertical lines
   TileProblem::LineTerm term;
@@ -32,8 +34,8 @@ struct LineResidual {
   double residual = 0;
   Eigen::Matrix<double, 1, 6> by_frame, by_other;  // by_other: zero for vertical lines
 };
-// `other`: anything for vertical lines. All zero where the line points at the camera, or the other frame sees it at the
-// height of its own eye: nothing is observed there.
+// `other` is not used for vertical lines. All is zero where nothing is observed: where the line points at the camera,
+// or where it is at the height of the other frame's camera.
 LineResidual linearise_line(const Pose& frame, const Pose& other, const TileProblem::LineTerm& term);
 
 }  // namespace megablock

@@ -1,12 +1,12 @@
-// Analytic linearisation of single residuals: what merge/ condenses and what the tests hold against automatic
-// differentiation. All residuals and Jacobians are already divided by sigma; robust weighting is the caller's.
+// Linearises single residuals analytically. merge/ condenses them, and tests compare them with automatic
+// differentiation. All residuals and Jacobians are divided by sigma; the caller applies the robust weights.
 //
 // Derivatives by the right perturbation R Exp(w) (geometry/transform/rotation.h), C + d:
 //
 //   X_rig = R (X - C):          by w: -R [X - C]x,   by d: -R,          by X: R
 //   X_cam = R_m (X_rig - C_m):  by w_m: -R_m [X_rig - C_m]x,  by d_m: -R_m,  by X_rig: R_m
 //
-// so that a residual's derivative by X_cam gives all those by poses and point.
+// The derivative of a residual by X_cam therefore gives all those by poses and point.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"
@@ -14,8 +14,8 @@
 
 namespace megablock {
 
-// What the observations of an image share: X_cam = R (X - C) - t with R = R_m R_f, t = R_m C_m.
-// Aligned, so that an observation with a held mount reads two lines of the cache.
+// The values that all observations of an image share: X_cam = R (X - C) - t with R = R_m R_f, t = R_m C_m. The struct
+// is aligned, so that an observation with a held mount reads two cache lines.
 struct alignas(64) ImageView {
   Eigen::Matrix3d rotation;        // ground -> camera
   Eigen::Vector3d centre;          // of the frame
@@ -35,14 +35,14 @@ struct alignas(64) ImageView {
 };
 std::vector<ImageView> image_views(const TileProblem& problem, const TileState& state);  // [images]
 
-// Residual of an image observation with the derivatives that the others are made of.
+// The residual of an image observation, with the derivatives from which all others follow.
 struct CameraResidual {
   Eigen::Vector3d from_frame, in_camera;  // X - C, X_cam
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 3> by_camera;  // by X_cam
-  IntrinsicJacobian by_intrinsics;        // where asked for
+  IntrinsicJacobian by_intrinsics;        // if asked for
 };
-// False where the camera cannot project the point; then the result is undefined.
+// Returns false where the camera cannot project the point; the result is then undefined.
 inline bool linearise_in_camera(const ImageView& view, const Eigen::Vector3d& point, const Eigen::Vector2d& measured,
                                 double inverse_sigma, bool with_intrinsics, CameraResidual& result) {
   const Intrinsics& k = *view.intrinsics;
@@ -64,7 +64,7 @@ inline bool linearise_in_camera(const ImageView& view, const Eigen::Vector3d& po
   }
   return true;
 }
-// Derivative by a pose (rotation, centre) from that by X, at u = X - C: -J [u]x = (u x rows of J), -J.
+// The derivative by a pose (rotation, centre) from that by X, with u = X - C: -J [u]x = (u x rows of J), -J.
 inline Eigen::Matrix<double, 2, 6> by_pose(const Eigen::Matrix<double, 2, 3>& by_point, const Eigen::Vector3d& u) {
   Eigen::Matrix<double, 2, 6> result;
   for (int i = 0; i < 2; ++i) result.row(i) << u.cross(by_point.row(i).transpose()).transpose(), -by_point.row(i);
@@ -80,13 +80,13 @@ struct ImageResidual {
   Eigen::Matrix<double, 2, 6> by_mount;
   IntrinsicJacobian by_intrinsics;
   Eigen::Matrix<double, 2, 3> by_point;
-  // The camera can project the point; otherwise the rest is undefined and the observation must not take part.
+  // Whether the camera can project the point. Otherwise the rest is undefined, and the observation must not take part.
   bool in_front = false;
 };
 ImageResidual linearise_image(const Pose& frame, const Pose& mount, const Intrinsics& intrinsics,
                               const Eigen::Vector3d& point, const Eigen::Vector2d& measured, double inverse_sigma);
 
-// Adjusted minus measured position of one observation (a row of the problem) of a point, pixels; NaN where the camera
+// Adjusted minus measured position of an observation (a row of the problem) of a point, pixels; NaN where the camera
 // cannot project the point.
 Eigen::Vector2d image_difference_px(const TileProblem& problem, const TileState& state, std::int64_t point,
                                     std::int64_t row);
@@ -110,8 +110,8 @@ struct MountResidual {
 };
 MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& term);
 
-// Priors that are linear in their unknowns; their derivative is the inverse sigma. Axes with infinite sigma and
-// parameters without a finite positive sigma give zero.
+// The residuals of priors that are linear in their unknowns; their derivative is the inverse sigma. Axes with infinite
+// sigma and parameters without a finite positive sigma give zero.
 inline Eigen::Vector3d point_prior_residual(const Eigen::Vector3d& point, const TileProblem::PointTerm& term) {
   return (point - term.position).cwiseQuotient(term.sigma);
 }

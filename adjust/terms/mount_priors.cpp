@@ -1,7 +1,8 @@
-// Prior values of mounts: r = Log(R R_0') / sigma (radians), (C - C_0) / sigma (metres, in the rig).
+// The priors of mounts: r = Log(R R_0') / sigma (radians), (C - C_0) / sigma (metres, in the rig).
 //
-// Owned by the tile of the first oriented image with the mount. What it says of the scale the datum asks of the rig
-// (merge/datum, adjust/tile/datum.h), as it depends on the rig's other mounts.
+// The tile of the first oriented image with the mount owns them. Their information about the scale is not given here:
+// it depends on the other mounts of the rig, so that the datum takes it from the rig (merge/datum,
+// adjust/tile/datum.h).
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/rotation_difference.h"

@@ -1,7 +1,7 @@
-// Given coordinates of control points: r = (X - X_0) / sigma, metres; an axis of infinite sigma is free.
+// The given coordinates of control points: r = (X - X_0) / sigma, metres; an axis of infinite sigma is free.
 //
-// Owned by the tile of the point, and eliminated with it there (merge/tile/point_equations.h): normal equations and
-// datum take it from the point. Points that take no part leave their prior out.
+// The tile of the point owns the prior, and eliminates it with the point (merge/tile/point_equations.h): normal
+// equations and datum take it from the point. The prior of a point that takes no part does not count.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/terms.h"

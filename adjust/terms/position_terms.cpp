@@ -1,8 +1,9 @@
-// Positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, l the lever arm in the rig's axes, metres.
+// The positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, with l the lever arm in the axes of the
+// rig, metres.
 //
 //   C + R' l:   by w: [R' l]x (as Exp(-w) R' l),   by d: I
 //
-// Owned by the tile of the frame. A held position (io/block/held_priors.h) has no loss, which would let it go.
+// The tile of the frame owns them. A held position (io/block/held_priors.h) has no loss, which would release it.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/prior_loss.h"

@@ -1,9 +1,10 @@
-// Relative poses of two frames: r = Log(R_to R_from' R_m') / sigma (radians), and (R_from (C_to - C_from) - T_m) /
+// The relative poses of two frames: r = Log(R_to R_from' R_m') / sigma (radians), and (R_from (C_to - C_from) - T_m) /
 // sigma (metres, in the axes of the frame `from`).
 //
 //   E = R_to R_from' R_m':   by w_to: J_r^-1(Log E) R_m R_from,   by w_from: the negative of it
 //
-// Owned as a track of its two frames is. A similarity of both frames changes the length of the base alone.
+// The tile that would own a track of the two frames owns them. A similarity of both frames changes the length of the
+// base alone.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/terms.h"

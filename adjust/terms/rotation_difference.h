@@ -1,4 +1,4 @@
-// Log(R R_0') and its derivative by the right perturbation of R, as observed rotations need it:
+// Gives Log(R R_0') and its derivative by the right perturbation of R, for observed rotations:
 //
 //   Log(R Exp(w) R_0') = Log(E Exp(R_0 w)),  E = R R_0':   by w: J_r^-1(Log E) R_0
 #pragma once

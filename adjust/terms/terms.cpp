@@ -5,7 +5,7 @@
 
 namespace megablock {
 
-// Each in the file of its type.
+// Each of these functions is in the file of its type.
 const ObservationType& position_observations();
 const ObservationType& attitude_observations();
 const ObservationType& line_observations();
@@ -25,7 +25,7 @@ const Types& table() {
       &position_observations(),       // of frames
       &attitude_observations(),       // of frames
       &line_observations(),           // known to be vertical or horizontal
-      &vertical_observations(),       // where images see down
+      &vertical_observations(),       // the direction in which images see down
       &relative_pose_observations(),  // of two frames
       &point_priors(),                // of control points
       &intrinsic_priors(),            // of cameras

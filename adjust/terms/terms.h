@@ -1,10 +1,10 @@
-// The table of observation types: what every loop over the observations of a tile asks, whatever their type is.
+// The table of observation types. Every loop over the observations of a tile uses it, whatever their types are.
 //
-// A row of a type (one position, one line ...) tells here which unknowns it touches, its residual r (divided by its
-// sigma, no unit) with derivatives by them, its robust loss, and what it says of the datum. Costs, plans of tiles,
-// normal equations, covariances, redundancies, datum, sigma scales and the Ceres reference are loops over the table.
-// Image measurements are not in it: there are a thousand of them to a row of anything else, and the kernels of
-// adjust/lanes and merge/tile are made for them.
+// A row of a type (one position, one line ...) gives the unknowns that it touches, its residual r (divided by its
+// sigma, no unit) with derivatives by them, its robust loss, and its information about the datum. Costs, plans of
+// tiles, normal equations, covariances, redundancies, datum, sigma scales and the Ceres reference are loops over the
+// table. Image observations are not in it: there are a thousand of them for each row of any other type, and the kernels
+// of adjust/lanes and merge/tile are made for them.
 //
 // To add a type (docs/developer/add-observation.md):
 //   1. write a source file in adjust/terms: the mathematics at its head, a class derived from ObservationType, and a
@@ -32,26 +32,26 @@ class CostFunction;
 
 namespace megablock {
 
-// Rows of the problem's tables that a residual depends on, whether they are held or not.
+// The rows of the problem's tables on which a residual depends, whether they are held or not.
 struct TermUnknowns {
   std::array<std::int32_t, 2> frame{-1, -1};
   int frame_count = 0;
   std::int32_t mount = -1, camera = -1;  // -1: none
-  std::int64_t point = -1;               // a row with a point goes where the point goes
+  std::int64_t point = -1;               // the tile or cell that owns the point owns the row
 };
 
-// A linearised row, or a part of it that has a loss of its own. All is divided by sigma; no loss is applied.
+// A linearised row, or a part of it that has a loss of its own. Everything is divided by sigma; no loss is applied.
 struct LinearTerm {
   using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxIntrinsics>;
   enum class By : std::uint8_t { kFrame, kMount, kCamera };
   struct Block {
     By by = By::kFrame;
-    std::int32_t row = -1;  // of the problem's table
+    std::int32_t row = -1;  // row of the problem's table
     Jacobian jacobian;      // by the 6 of a pose, or by all parameters of a camera
   };
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> residual;
-  double squares = 0;  // |r|^2, in the order of the type's own arithmetic
-  int number = 0;      // of scalar observations; axes without a sigma are none
+  double squares = 0;  // |r|^2, summed in the order of the type
+  int number = 0;      // number of scalar observations; an axis without a sigma is none
   std::array<Block, 3> blocks;
   int block_count = 0;
   std::array<ObservationKind, 6> kinds{};  // [residual]
@@ -73,51 +73,53 @@ struct LinearTerm {
 };
 using TermVisit = std::function<void(const LinearTerm&)>;
 
-// What a row says of the place, the direction and the scale of the frames that hang together with `frame`.
+// The information of a row about the place, direction and scale of the part of the block that holds `frame`.
 struct TermDatum {
-  std::int32_t frame = -1;  // -1: nothing
-  // By the pose of `frame`, where all frames of the row move as one body. Held priors say no more than firm ones.
+  std::int32_t frame = -1;  // -1: none
+  // The derivative by the pose of `frame`, where all frames of the row move as one body. A held prior counts with a
+  // firm sigma (comparable() in io/block/held_priors.h), so that it does not hide all others.
   std::variant<std::monostate, Eigen::Matrix<double, 1, 6>, Eigen::Matrix<double, 2, 6>, Eigen::Matrix<double, 3, 6>>
       by_frame;
   bool holds_place = false;
-  // The row observes the length of the base from `frame` to this one, and with it nothing but the scale. Written out,
-  // as the other directions cancel by rounding alone.
+  // The row observes the length of the base from `frame` to this frame, and thus only the scale. It is stored
+  // separately, because the other directions would cancel only up to rounding.
   std::int32_t base_to = -1;
   double base_sigma_m = 0;
 };
 
-// Factor of the sigmas of each kind of observation.
+// A factor for the sigmas of each kind of observation.
 struct SigmaScales {
   std::array<double, kObservationKinds> of;
   SigmaScales() { of.fill(1); }
   double& operator[](ObservationKind kind) { return of[static_cast<std::size_t>(kind)]; }
   double operator[](ObservationKind kind) const { return of[static_cast<std::size_t>(kind)]; }
-  // Whether a factor is more than 2 % off 1.
+  // Whether a factor differs from 1 by more than 2 %.
   bool matter() const;
 };
 
 class ObservationType {
  public:
   virtual ~ObservationType() = default;
-  virtual std::size_t count(const TileProblem& problem) const = 0;  // of rows
+  virtual std::size_t count(const TileProblem& problem) const = 0;  // number of rows
   virtual TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const = 0;
-  // Calls visit once, or once for each part; not at all for a row that takes no part.
+  // Calls `visit` once, or once for each part; not at all for a row that takes no part.
   virtual void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
                          const TermVisit& visit) const = 0;
   virtual TermDatum datum(const TileProblem&, const TileState&, std::size_t) const { return {}; }
   virtual RobustLoss loss(const TileProblem&, std::size_t) const { return {}; }
-  // Multiplies the sigmas of all rows, where they may be estimated (observation_statistics.h says which are).
+  // Multiplies the sigmas of all rows, if they may be estimated (observation_statistics.h says which).
   virtual void scale_sigmas(TileProblem&, const SigmaScales&) const {}
-  // For Ceres, by automatic differentiation, of the blocks of unknowns(): frames, mount, camera, point; the caller's.
+  // A cost function for Ceres by automatic differentiation. Its blocks are those of unknowns(): frames, mount, camera,
+  // point. The caller owns it.
   virtual ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const = 0;
 };
 
 // Normal equations, sums of squares and Ceres add their observations in this order, on which the bits of a sum depend.
 std::span<const ObservationType* const> observation_types();
-// The order of costs: relative poses come before lines and verticals there.
+// The order in which costs are summed: relative poses come before lines and verticals there.
 std::span<const ObservationType* const> observation_types_of_cost();
 
-// A row of the table's type.
+// A row of a type in the table.
 struct TermRow {
   std::int32_t type = 0, row = 0;
 };

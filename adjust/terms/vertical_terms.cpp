@@ -74,7 +74,7 @@ VerticalResidual linearise_vertical(const TileProblem& problem, const TileState&
 
 namespace {
 
-// Of a camera of any model, or of none.
+// For a camera of any model, or for none.
 struct DynamicVertical {
   residual::VerticalSeen vertical;
   template <typename Scalar>

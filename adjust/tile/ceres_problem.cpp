@@ -23,8 +23,8 @@ Pose from_block(const double* block) {
   return {Eigen::Quaterniond(block[0], block[1], block[2], block[3]), Eigen::Map<const Eigen::Vector3d>(block + 4)};
 }
 
-// q Exp(w) = q (1, w/2) to first order, so dq/dw_i = q e_i / 2 for the imaginary units e_i. The q e_i are
-// orthonormal, so dw_i/dq = 2 (q e_i)'.
+// To first order q Exp(w) = q (1, w/2), so that dq/dw_i = q e_i / 2 for the imaginary units e_i. The q e_i are
+// orthonormal, so that dw_i/dq = 2 (q e_i)'.
 Eigen::Matrix<double, 3, 4> quaternion_to_tangent(const double* q) {
   Eigen::Matrix<double, 3, 4> result;
   result << -q[1], q[0], q[3], -q[2],  //
@@ -63,7 +63,7 @@ bool PoseManifold::MinusJacobian(const double* x, double* jacobian) const {
 
 namespace {
 
-// linearise_image for Ceres. Ceres multiplies a pose's Jacobian by dq/dw; dw/dq is its left inverse.
+// linearise_image() for Ceres. Ceres multiplies the Jacobian of a pose by dq/dw; dw/dq is its left inverse.
 class AnalyticImage : public ceres::CostFunction {
  public:
   AnalyticImage(const CameraModel& model, const Eigen::Vector2d& measured, double inverse_sigma)
@@ -110,7 +110,7 @@ class AnalyticImage : public ceres::CostFunction {
   double inverse_sigma_;
 };
 
-// Cauchy's tail, which Ceres does not have; up to it Ceres' Huber.
+// The loss with Cauchy's tail, which Ceres does not have. Up to the tail it is Huber's loss of Ceres.
 class CauchyTail final : public ceres::LossFunction {
  public:
   explicit CauchyTail(double scale) : huber_(scale), square_(scale * scale) {}
@@ -230,7 +230,7 @@ void CeresTile::add_others(const TileProblem& problem) {
   }
 }
 
-// One object for all residuals of the same loss.
+// Returns the same object for all residuals of the same loss.
 ceres::LossFunction* CeresTile::loss(const RobustLoss& loss) {
   if (loss.kind == RobustLoss::Kind::kNone) return nullptr;
   for (const auto& [known, function] : losses_)
@@ -291,7 +291,7 @@ std::vector<double*> CeresTile::unknown_blocks() {
 }
 
 void CeresTile::store(TileState& state) {
-  // As Plus left them: already unit, and held blocks keep their bits.
+  // The values as Plus() has left them: quaternions are unit already, and held blocks keep their bits.
   for (std::int64_t f = 0; f < frame_count_; ++f) state.frames[f] = from_block(frame(f));
   for (std::int64_t m = 0; m < mount_count_; ++m) state.mounts[m] = from_block(mount(m));
   for (std::int64_t c = 0; c < camera_count_; ++c)

@@ -1,5 +1,6 @@
-// A tile's observations and unknowns as a ceres::Problem: shared by the tile adjustment (analytic derivatives, fast)
-// and by the monolithic reference of merge/ (automatic derivatives, none of our linearisation code).
+// Sets up the observations and unknowns of a tile as a ceres::Problem. The tile adjustment uses it with analytic
+// derivatives, which are fast. The monolithic reference of merge/ uses it with automatic derivatives, and thus none of
+// our linearisation code.
 #pragma once
 
 #include <ceres/problem.h>
@@ -15,13 +16,14 @@ namespace megablock {
 
 struct CeresOptions {
   enum class Derivatives { kAutomatic, kAnalytic } derivatives = Derivatives::kAutomatic;
-  // Estimated intrinsics, one mask per camera of the problem; empty = problem.camera_free.
+  // Masks of the estimated intrinsics, one per camera of the problem; empty = problem.camera_free.
   std::vector<ParameterMask> camera_free;
 };
 
-// Builds and owns the ceres::Problem and the parameter blocks. Holds the active points and their kept observations
-// only; frames and cameras without any residual are not in the Ceres problem. Held parameters: whole blocks constant,
-// single intrinsics by a SubsetManifold. The datum is left as the observations give it (see datum.h).
+// Builds and owns the ceres::Problem and the parameter blocks. It holds only the active points and their kept
+// observations; frames and cameras without any residual are not in the Ceres problem. Held parameters are constant as
+// whole blocks, or as single intrinsics by a SubsetManifold. The datum is left as the observations give it (see
+// datum.h).
 class CeresTile {
  public:
   CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options = {});
@@ -37,25 +39,25 @@ class CeresTile {
 
   bool is_point(const double* block) const;
 
-  // The blocks with unknowns: frames, cameras, mounts, points, each in the order of its table. Given to
-  // ceres::Problem::EvaluateOptions they fix the order of the columns (tangent sizes: 6, free intrinsics, 6, 3).
+  // The blocks with unknowns: frames, cameras, mounts and points, each in the order of its table. As parameter blocks
+  // of ceres::Problem::EvaluateOptions they fix the order of the columns (tangent sizes: 6, free intrinsics, 6, 3).
   std::vector<double*> unknown_blocks();
   // The same without points.
   std::vector<double*> unknown_blocks_without_points();
 
-  // Writes the blocks' values back (points that take no part keep their value).
+  // Writes the values of the blocks to `state`. Points that take no part keep their values.
   void store(TileState& state);
 
  private:
   void add_images(const TileProblem& problem, const TileState& state, CeresOptions::Derivatives derivatives);
   void add_others(const TileProblem& problem);
-  ceres::LossFunction* loss(const RobustLoss& loss);  // nullptr: none
+  ceres::LossFunction* loss(const RobustLoss& loss);  // nullptr: no loss
   void hold_parameters(const TileProblem& problem, const TileState& state,
                        const std::vector<ParameterMask>& camera_free);
   bool unknown(const double* block) const;
 
-  // Ceres orders blocks by their addresses: one allocation, so that the order, and with it the bits of the result, are
-  // the same every time. Frames, mounts, cameras, points.
+  // Ceres orders blocks by their addresses. One allocation for all of them keeps the order, and with it the bits of the
+  // result, the same every time: frames, mounts, cameras, points.
   std::int64_t frame_count_, mount_count_, camera_count_, point_count_;
   std::int64_t mounts_begin_;
   std::vector<std::int64_t> camera_begin_;  // [cameras]

@@ -12,9 +12,10 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kMaxPairs = 36;  // all pairs of nine rays
-constexpr double kTwoRayFactor = 1.5;  // times the threshold: for points of two rays, less exact than those of all
+// Times the threshold, because a point of two rays is less exact than one of all rays.
+constexpr double kTwoRayFactor = 1.5;
 
-// All pairs of rays; of many a fixed number.
+// All pairs of rays, or a fixed number of them where there are many.
 std::vector<std::pair<std::size_t, std::size_t>> pairs_of(std::size_t rays, std::uint64_t seed) {
   std::vector<std::pair<std::size_t, std::size_t>> result;
   if (rays * (rays - 1) / 2 <= kMaxPairs) {
@@ -40,7 +41,7 @@ double truncated_cost(std::span<const PointView> views, const Eigen::Vector3d& p
   return sum;
 }
 
-// Refines with the rays that pass until they no longer change.
+// Refines the point with the rays that pass, until these rays no longer change.
 std::optional<ConsistentRays> refine_part(std::span<const PointView> views, Eigen::Vector3d point, double threshold) {
   constexpr int kRounds = 4;
   std::vector<std::uint8_t> passing(views.size()), before;

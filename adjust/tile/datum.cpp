@@ -19,7 +19,7 @@ using Similarity6 = Eigen::Matrix<double, 6, 7>;  // columns: phi, t, s
 using Similarity3 = Eigen::Matrix<double, 3, 7>;
 using Normal7 = Eigen::Matrix<double, 7, 7>;
 
-// Components of the frames, joined by active points and observations between frames; the lowest frame names its
+// The components of the frames, joined by active points and by observations between frames. The lowest frame names its
 // component.
 class Components {
  public:
@@ -82,7 +82,7 @@ struct Component {
 
 void add_mounts(const TileProblem& problem, const TileState& state, Components& components,
                 std::vector<Component>& all) {
-  // Which components see which mounts.
+  // Pairs of a component and a mount that it sees.
   std::vector<std::pair<std::int32_t, std::int32_t>> seen;
   for (const TileImage& image : problem.images) seen.emplace_back(components.of(image.frame.value), image.mount);
   std::sort(seen.begin(), seen.end());
@@ -130,7 +130,7 @@ void add_priors(const TileProblem& problem, const TileState& state, Components& 
 }
 
 std::vector<Component> find_components(const TileProblem& problem, const TileState& state, Components& components) {
-  std::vector<Component> all(problem.frames.size());  // by lowest frame; the others stay empty
+  std::vector<Component> all(problem.frames.size());  // at the lowest frame of each component; the others stay empty
   for (std::size_t f = 0; f < problem.frames.size(); ++f)
     all[components.of(static_cast<std::int32_t>(f))].frames.push_back(static_cast<std::int32_t>(f));
   for (Component& c : all) {
@@ -143,11 +143,11 @@ std::vector<Component> find_components(const TileProblem& problem, const TileSta
   return all;
 }
 
-// The two frames' increments along the free directions, in units of 1e-3 of the extent or 1e-3 rad.
+// The increments of the two frames along the free directions, in units of 1e-3 of the extent or 1e-3 rad.
 DatumDefect defect_of(const Component& c, const TileState& state) {
   DatumDefect defect;
   const SymmetricEigen eigen = symmetric_eigen(c.normal);
-  constexpr double kNull = 1e-11;  // of the largest eigenvalue; the matrix itself carries errors of 1e-15
+  constexpr double kNull = 1e-11;  // share of the largest eigenvalue; the matrix itself has errors of 1e-15
   const double threshold = kNull * eigen.values(6);
   while (defect.dimension < 7 && eigen.values(defect.dimension) <= threshold) ++defect.dimension;
   if (defect.dimension == 0) return defect;

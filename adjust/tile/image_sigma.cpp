@@ -9,7 +9,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kFinestPx = 0.02;               // nobody measures tie points more exactly
+constexpr double kFinestPx = 0.02;               // tie points are never observed more precisely
 constexpr std::int64_t kFewestRedundancy = 100;  // the estimate is then good to 7 %
 
 std::int64_t unknowns_of(const TileProblem& problem) {
@@ -19,7 +19,7 @@ std::int64_t unknowns_of(const TileProblem& problem) {
   return count;
 }
 
-// Of the kept measurements of tie points.
+// The squared residuals of the kept tie point observations.
 struct SquaredResiduals {
   std::vector<double> values;  // px^2
   std::int64_t points = 0;

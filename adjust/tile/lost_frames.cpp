@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kMinAgreeing = 12;
 constexpr double kMinShare = 0.3;
 
-// Rows of each frame whose points stand without it.
+// For each frame, the rows of its observations of points that two or more other frames keep.
 std::vector<std::vector<std::int64_t>> rows_of_frames(const TileProblem& problem,
                                                       std::vector<std::int64_t>& point_of_row) {
   std::vector<std::vector<std::int64_t>> result(problem.frames.size());

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kFewestOfPart = 3, kFewestAgreeing = 30;
 constexpr double kAgreeingShare = 0.3;
 
-// Tracks that two frames, or two sets of them, both observe, and those kept by both.
+// The number of tracks that two frames, or two sets of frames, both observe, and of those that both keep.
 struct Agreement {
   std::int64_t shared = 0, kept = 0;
   bool hangs_together() const {
@@ -29,13 +29,14 @@ std::int32_t frame_of(const TileProblem& problem, std::int64_t row) {
   return problem.images[problem.image[row].value].frame.value;
 }
 
-// Of every n-th track, which are enough, and of each between neighbouring frames and from its first to its last: a long
-// track is not worth more than a short one. Tracks of which nothing is kept, too narrow ones say, tell nothing.
+// Uses every n-th track, which is enough. Of a track it uses the pairs of neighbouring frames and that of its first and
+// last frame, so that a long track does not count more than a short one. Tracks without a kept observation, too narrow
+// ones for example, do not count.
 Agreements agreements_of_frames(const TileProblem& problem) {
   const std::int64_t enough = std::max<std::int64_t>(20'000, 40 * std::ssize(problem.frames));
   const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / enough);
   std::vector<std::pair<FramePair, bool>> pairs;
-  std::map<std::int64_t, bool> frames;  // of a track: whether one of its observations there is kept
+  std::map<std::int64_t, bool> frames;  // frames of a track, and whether one of its observations there is kept
   for (std::int64_t p = 0; p < problem.point_count(); p += stride) {
     frames.clear();
     for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row)
@@ -56,14 +57,14 @@ Agreements agreements_of_frames(const TileProblem& problem) {
   return sums;
 }
 
-// Sets of frames that hang together, the largest first (ties: that of the lowest frame).
+// The sets of connected frames, the largest first; of equal ones, that with the lowest frame.
 std::vector<std::vector<std::int64_t>> parts_of(const TileProblem& problem) {
   const auto count = static_cast<std::int64_t>(problem.frames.size());
   DisjointSets sets(count);
   Agreements open = agreements_of_frames(problem);
   for (bool changed = true; changed;) {
     changed = false;
-    Agreements between;  // the sets so far
+    Agreements between;  // between the present sets
     for (const auto& [pair, agreement] : open)
       if (agreement.hangs_together()) changed = sets.unite(pair.first, pair.second) || changed;
     for (const auto& [pair, agreement] : open) {
@@ -92,7 +93,7 @@ class PartFinder {
     for (const std::int64_t f : frames) stands_[static_cast<std::size_t>(f)] = 1;
   }
 
-  // Moves the part and lets it stand, where its place is found.
+  // Moves the part and lets it stand, if its place is found.
   bool find(const std::vector<std::int64_t>& frames) {
     mark(frames);
     const std::vector<RigSight> sights = sights_of_part();
@@ -111,7 +112,7 @@ class PartFinder {
   }
   bool of_part(std::int64_t row) const { return in_part_[static_cast<std::size_t>(frame_of(problem_, row))] != 0; }
 
-  // Whether frames that stand keep the point, two or more of them, and nobody else does but the part itself.
+  // Whether two or more standing frames keep the point, and apart from them only the part itself.
   bool stands(std::int64_t p) const {
     std::int32_t first = -1;
     bool several = false;
@@ -126,7 +127,7 @@ class PartFinder {
     return several;
   }
 
-  // What the part sees of points that stand, as one rig in ground axes.
+  // The observations that the part has of standing points, as those of one rig in ground axes.
   std::vector<RigSight> sights_of_part() const {
     std::vector<RigSight> sights;
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
@@ -151,8 +152,8 @@ class PartFinder {
     }));
   }
 
-  // From ground axes as they should be to those in which the part stands now; empty where enough agree now, or too few
-  // anywhere.
+  // The pose from the correct ground axes to those in which the part is now. Empty where enough observations agree
+  // already, or where too few agree with any pose.
   std::optional<Pose> place(const std::vector<RigSight>& sights, std::uint64_t seed) const {
     constexpr std::size_t kMostSights = 500;
     const auto enough = [&](std::size_t agree) {
@@ -166,7 +167,7 @@ class PartFinder {
     return found && enough(agreeing(sights, *found)) ? found : std::nullopt;
   }
 
-  // X_now = R (X - C) of the ground; the part's frames and what it alone keeps go to their X.
+  // X_now = R (X - C) for the correct X. Moves the frames of the part, and the points that it alone keeps, to X.
   void move(const std::vector<std::int64_t>& frames, const Pose& pose) {
     const auto moved = [&](const Eigen::Vector3d& now) -> Eigen::Vector3d {
       return pose.rotation.conjugate() * now + pose.centre;
@@ -176,7 +177,8 @@ class PartFinder {
       frame = {(frame.rotation * pose.rotation).normalized(), moved(frame.centre)};
     }
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
-      if (problem_.points[static_cast<std::size_t>(p)].role != PointRole::kTie) continue;  // control has its place
+      // Control points have known positions and stay.
+      if (problem_.points[static_cast<std::size_t>(p)].role != PointRole::kTie) continue;
       bool own = false, others = false;
       for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row)
         if (problem_.kept[row]) (of_part(row) ? own : others) = true;

@@ -1,21 +1,22 @@
-// Parts of a tile that agree within themselves and stand beside the rest, found again as a whole.
+// Finds parts of a tile that are consistent in themselves but do not fit the rest, and moves them as a whole.
 //
-// Two passes along one street start metres apart. What one sees of the other's points is then rejected as a gross
-// error, each of them fits by itself, and the adjustment ends with the tile in two. To find the frames of a part one by
-// one (lost_frames.h) would tear them from their neighbours; the part as a whole is one large rig with known places of
-// its cameras, whose pose follows from the points that stand without it.
+// Two passes along one street start metres apart. The observations of one pass of the points of the other are then
+// rejected as gross errors, each pass fits by itself, and the adjustment ends with the tile in two. To find the frames
+// of a part one by one (lost_frames.h) would tear them from their neighbours. The part as a whole is one large rig with
+// known positions of its cameras, and its pose follows from the points of the other frames.
 #pragma once
 
 #include "adjust/problem/tile_problem.h"
 
 namespace megablock {
 
-// Frames hang together where half or more of the tracks that both observe are kept by both, and so do sets of frames
-// by the sums over their pairs. Of the sets the largest stands. Another one of three frames or more is lost when fewer
-// than thirty, or three tenths, of its observations agree with points that standing frames keep, and nobody else but
-// the set itself (residuals up to `threshold_sigmas`). It is moved, with the tie points that it alone keeps, to where
-// enough of them agree (RANSAC), and then stands, too; larger sets come first. Observations are not touched: screen
-// again afterwards. Returns the frames moved. Deterministic: seeded by a set's lowest global frame.
+// Two frames are connected when both keep half or more of the tracks that both observe. Sets of frames are connected by
+// the sums over their pairs of frames. The largest set stands. Another set of three frames or more is lost when too few
+// of its observations agree with points that only standing frames, two or more, and perhaps the set itself keep: fewer
+// than thirty, or than three tenths (residuals up to `threshold_sigmas`). It is moved, with the tie points that it
+// alone keeps, to where enough of its observations agree (RANSAC), and then stands too. Larger sets come first.
+// Observations stay as they are: screen them again afterwards. Returns the frames that were moved. Deterministic: the
+// seed is the index of the lowest frame of a set.
 std::vector<LocalFrame> recover_lost_parts(const TileProblem& problem, TileState& state, double threshold_sigmas);
 
 }  // namespace megablock

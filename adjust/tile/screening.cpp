@@ -1,7 +1,7 @@
-// Intersection and screening of single points at held poses.
+// Intersects and screens single points at held poses.
 //
-// A point is settled as follows. When all kept rays pass the test at the current point, only rejected rays that pass
-// as well come back. Otherwise the largest consistent part of its rays is kept (consistent_rays.h).
+// When all kept rays of a point pass the test at the current point, only rejected rays that pass as well come back.
+// Otherwise the largest consistent set of its rays is kept (consistent_rays.h).
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,8 +19,8 @@ namespace megablock {
 
 namespace {
 
-constexpr double kGenerous = 1.5;  // times the threshold: for a point that may stay where the adjustment put it
-constexpr double kSettled = 1e-3;  // sigmas: an adjustment follows
+constexpr double kGenerous = 1.5;  // times the threshold: limit for a point that stays where the adjustment put it
+constexpr double kSettled = 1e-3;  // sigmas: this is exact enough, because an adjustment follows
 const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 class PointSettler {
@@ -36,7 +36,7 @@ class PointSettler {
     for (const auto& term : problem.point_priors) prior_[term.point.value] = &term;
   }
 
-  // Intersects the kept rays, or the largest consistent part when they do not meet within the threshold.
+  // Intersects the kept rays, or the largest consistent set when they do not meet within the threshold.
   void intersect(std::int64_t p, double threshold) {
     load(p);
     const std::optional<Eigen::Vector3d> start = intersect_kept();
@@ -54,7 +54,7 @@ class PointSettler {
     const Eigen::Vector3d before = state_.points[p];
     const auto kept = std::count(kept_.begin(), kept_.end(), 1);
     const bool enough = kept >= (prior_[p] ? 1 : 2);
-    double longest = 0;  // of the kept rays, before
+    double longest = 0;  // longest residual of the rays kept before
     residuals_.clear();
     for (std::size_t i = 0; i < views_.size(); ++i) {
       residuals_.push_back(residual(i, before));
@@ -69,13 +69,14 @@ class PointSettler {
         std::fill(kept_.begin(), kept_.end(), 0);
     }
     hold_out_narrow(p);
-    // The same verdicts at a point a little aside (without the robust weights): it stays where the adjustment put it.
+    // If the same observations are kept, the point stays where the adjustment put it. The new point only lacks the
+    // robust weights.
     if (before.allFinite() && same_verdicts() && longest <= kGenerous * threshold) state_.points[p] = before;
     store_kept();
   }
 
  private:
-  // The usable rows of a point (their images have poses).
+  // Loads the usable rows of a point, whose images have poses.
   void load(std::int64_t p) {
     rows_.clear();
     views_.clear();
@@ -98,7 +99,7 @@ class PointSettler {
   void store_kept() {
     for (std::size_t i = 0; i < rows_.size(); ++i) problem_.kept[rows_[i]] = kept_[i];
   }
-  // A point whose rays do not meet: a control point starts where it is known to be, others have no place.
+  // Handles a point whose rays do not meet. A control point starts at its known position; others get no position.
   void place_at_prior(std::int64_t p) {
     const bool known = prior_[p] != nullptr && prior_[p]->sigma.allFinite();
     state_.points[p] = known ? prior_[p]->position : kNowhere;
@@ -130,7 +131,7 @@ class PointSettler {
     return true;
   }
 
-  // Rays that meet at too small an angle do not fix the distance of the point: it is held out.
+  // Rejects rays that meet at too small an angle, because they do not fix the distance of the point.
   void hold_out_narrow(std::int64_t p) {
     if (prior_[p] == nullptr && !meet_wider_than(views_, kept_, state_.points[p], cos_min_angle_))
       std::fill(kept_.begin(), kept_.end(), 0);
@@ -141,15 +142,15 @@ class PointSettler {
   double cos_min_angle_;
   std::vector<const TileProblem::PointTerm*> prior_;  // [points], null for most
   std::vector<Pose> cameras_;
-  // Of the point at hand:
+  // These belong to the present point.
   std::vector<std::int64_t> rows_;
   std::vector<PointView> views_;
   std::vector<std::uint8_t> kept_;
   std::vector<double> residuals_;  // sigmas
 };
 
-// How far the rays of frames with held positions may miss for the errors that their attitude priors allow, in sigmas of
-// the images: such poses are the priors themselves.
+// The residuals, in sigmas of the images, that the attitude priors of frames with held positions allow. The poses of
+// such frames are the priors themselves.
 double allowed_by_attitudes(const TileProblem& problem, const TileState& state) {
   constexpr double kWide = 4;  // sigmas of the attitudes
   std::vector<std::uint8_t> placed(problem.frames.size(), 0);
@@ -165,7 +166,7 @@ double allowed_by_attitudes(const TileProblem& problem, const TileState& state) 
 
 namespace {
 
-// Points are settled each by itself. settle(PointSettler&, point)
+// Calls settle(PointSettler&, point) for each point. Points do not depend on each other.
 template <typename Settle>
 void settle_points(TileProblem& problem, TileState& state, const AdjustOptions& options, const Settle& settle) {
   constexpr std::int64_t kAtOnce = 1024;
@@ -186,7 +187,7 @@ void triangulate_points(TileProblem& problem, TileState& state, const AdjustOpti
 void triangulate_points(TileProblem& problem, TileState& state, const AdjustOptions& options,
                         const std::vector<std::uint8_t>& which) {
   state.points.resize(problem.points.size(), kNowhere);
-  constexpr double kAnything = 1e3;  // sigmas: only rays that have nothing to do with the others are left out
+  constexpr double kAnything = 1e3;  // sigmas: only rays far away from the others are left out
   const double anything = std::max(kAnything, allowed_by_attitudes(problem, state));
   settle_points(problem, state, options, [&](PointSettler& settler, std::int64_t p) {
     if (which[p] && problem.active(p)) settler.intersect(p, anything);

@@ -1,18 +1,20 @@
-// Variance components of everything but image measurements (those: image_sigma.h), where stated sigmas are not to be
-// trusted: sigmas of positions, attitudes, relative poses and verticals are multiplied by what their residuals show.
+// Estimates variance components of positions, attitudes, relative poses and verticals, where stated sigmas are not to
+// be trusted: their sigmas are multiplied by factors that follow from their residuals. image_sigma.h does so for image
+// observations.
 #pragma once
 
 #include "adjust/terms/terms.h"
 
 namespace megablock {
 
-// What to multiply the sigmas with that a block was adjusted with (`now` times the stated ones). Kinds with a
-// redundancy below 30 (the factor would not be good to 13 %) and those whose sigmas are not estimated: 1. No sigma
-// falls below the stated one: an error that neighbouring frames share, as those of trajectories are, hardly shows in
+// The factors by which the sigmas of a block must be multiplied; it was adjusted with `now` times the stated sigmas.
+// The factor is 1 for kinds whose sigmas are not estimated, and for a redundancy below 30, where it would not be good
+// to 13 %. No sigma falls below the stated one, because an error that neighbouring frames share, as in trajectories,
+// hardly shows in residuals.
 // residuals.
 SigmaScales next_sigma_scales(const SigmaScales& now, const ObservationTable& table);
 
-// Multiplies the sigmas of the problem's terms.
+// Multiplies the sigmas of the observations of the problem.
 void scale_sigmas(TileProblem& problem, const SigmaScales& scales);
 
 }  // namespace megablock

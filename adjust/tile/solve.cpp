@@ -14,8 +14,9 @@ namespace megablock {
 
 namespace {
 
-// Weighted squares and number of the residuals that take part. Image residuals count in full (they have been
-// screened); priors under a robust loss count by their robust weight (a wrong GNSS position must not decide sigma0).
+// The weighted squares and the number of the residuals that take part. Image residuals count in full, because they have
+// been screened. Priors under a robust loss count with their robust weight, because a wrong GNSS position must not
+// decide sigma0.
 struct ResidualSum {
   double squares = 0;
   std::int64_t residuals = 0, observations = 0, points = 0;
@@ -44,7 +45,7 @@ void add_others(const TileProblem& problem, const TileState& state, ResidualSum&
 
 ceres::Solver::Options solver_options(CeresTile& tile, std::size_t frames, const SolveOptions& options) {
   ceres::Solver::Options result;
-  constexpr std::size_t kDenseFrames = 150;  // below, dense is faster (measured)
+  constexpr std::size_t kDenseFrames = 150;  // up to this number a dense solver is faster (measured)
   result.linear_solver_type = frames <= kDenseFrames ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   result.dense_linear_algebra_library_type = ceres::LAPACK;
   result.num_threads = 1;
@@ -53,7 +54,7 @@ ceres::Solver::Options solver_options(CeresTile& tile, std::size_t frames, const
   result.gradient_tolerance = 0;
   result.parameter_tolerance = 1e-14;
   result.max_num_consecutive_invalid_steps = 20;
-  result.initial_trust_region_radius = 1e6;  // start values are good; weak directions need the length
+  result.initial_trust_region_radius = 1e6;  // start values are good, and weak directions need long steps
   result.logging_type = ceres::SILENT;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   std::vector<double*> all;

@@ -27,7 +27,7 @@ void AdjustOptions::check() const {
 
 namespace {
 
-// Lengths of kept image residuals, in a-priori sigmas; of many points every n-th will do.
+// The lengths of kept image residuals, in a-priori sigmas. Of many points only every n-th is used.
 std::vector<double> residual_lengths(const TileProblem& problem, const TileState& state) {
   constexpr std::int64_t kEnough = 20'000;  // points
   const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / kEnough);
@@ -46,8 +46,8 @@ std::vector<double> residual_lengths(const TileProblem& problem, const TileState
   return lengths;
 }
 
-// Sigma of the kept image residuals from their median (1.1774 is the median of a Rayleigh distribution), in a-priori
-// sigmas: untouched by outliers.
+// The sigma of the kept image residuals, in a-priori sigmas. It comes from their median (1.1774 is the median of a
+// Rayleigh distribution), so that outliers do not affect it.
 double robust_sigma(std::vector<double> lengths, const AdjustOptions& options) {
   if (lengths.empty())
     throw ComputeError(
@@ -64,7 +64,7 @@ double robust_sigma(const TileProblem& problem, const TileState& state, const Ad
   return robust_sigma(residual_lengths(problem, state), options);
 }
 
-// Mean redundancy of an image residual: least squares shortens residuals by its root.
+// The mean redundancy of an image residual. Least squares shortens residuals by its square root.
 double redundancy(const TileProblem& problem) {
   std::int64_t observations = 0, points = 0;
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
@@ -76,7 +76,7 @@ double redundancy(const TileProblem& problem) {
   return std::clamp(1 - unknowns / static_cast<double>(2 * std::max<std::int64_t>(1, observations)), 0.25, 1.0);
 }
 
-// The a-priori sigma may be too small for the images at hand: thresholds follow the residuals upwards.
+// The a-priori sigma may be too small for these images. The thresholds then grow with the residuals.
 double threshold_factor(const TileProblem& problem, double robust_sigma) {
   return std::max(1.0, robust_sigma / std::sqrt(redundancy(problem)));
 }
@@ -95,7 +95,7 @@ class TileAdjuster {
     approach();
     recover();
     for (int round = 0; round + 1 < options_.screening_rounds; ++round) {
-      // From 8 x to 1 x of the final threshold.
+      // From 8 times to once the final threshold.
       const double left = 1 - static_cast<double>(round) / (options_.screening_rounds - 1);
       screen(options_.max_residual_sigmas * std::pow(8, left));
       if (fits()) break;
@@ -105,7 +105,7 @@ class TileAdjuster {
     adopt_image_sigma();
     screen(options_.max_residual_sigmas);
     AdjustSummary summary = solve_fine();
-    // What the last solve moved across the threshold, or weighs otherwise.
+    // Observations that the last solution has moved across the threshold, or that now have another weight.
     const bool reweighted = adopt_image_sigma();
     if (screen(options_.max_residual_sigmas) > problem_.observation_count() / (options_.only_start ? 1000 : 10000) ||
         reweighted)
@@ -115,17 +115,18 @@ class TileAdjuster {
 
  private:
   enum class Stage { kFocal, kAll };
-  static constexpr double kApart = 3;  // times the widest limit: of passes that start apart
+  static constexpr double kApart = 3;  // times the widest limit, for passes that start apart
 
-  // From rough start values to residuals of a few pixels: gross errors are left out, only focal length and k1 are
-  // estimated, and of dense tiles only the longest tracks take part, until they are of one mind.
+  // Goes from rough start values to residuals of a few pixels. Gross errors are left out, and only focal length and k1
+  // are estimated. In a dense tile only the longest tracks take part, until they are consistent.
   void approach() {
     constexpr int kMaxRounds = 6;
     constexpr double kWide = 4;
-    constexpr int kFew = 6;  // iterations: to test again which rays belong together helps more than others
+    constexpr int kFew = 6;  // iterations: testing the rays again helps more than further iterations
     const std::vector<std::uint8_t> all = problem_.kept;
     const bool dense = select_long_tracks();
-    // Dense: wide enough for what ties passes that start apart; of a few tracks that would hold too many gross errors.
+    // In a dense tile the limit must include the observations that connect passes which start apart. With few tracks it
+    // would then include too many gross errors.
     const double widest = 8 * options_.max_residual_sigmas * (dense ? kApart : 1);
     triangulate_points(problem_, state_, options_);
     chosen_ = active_points();
@@ -139,7 +140,7 @@ class TileAdjuster {
       solve_rough(Stage::kFocal, dense ? kFew : kMany);
       const double next = robust_sigma(problem_, state_, options_);
       falling = next >= 2 && next <= 0.7 * sigma;
-      if (!dense && !falling) break;  // the later rounds take the same tracks
+      if (!dense && !falling) break;  // the later rounds use the same tracks
     }
     std::vector<std::uint8_t> others(chosen_.size());
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
@@ -152,8 +153,8 @@ class TileAdjuster {
     triangulate_points(problem_, state_, options_, others);
   }
 
-  // What none of it has brought to the rest: parts of the tile as a whole, then single frames; a few rounds, as they
-  // may hang on one another.
+  // Recovers what is still lost: parts of the tile as a whole, then single frames. It takes a few rounds, because they
+  // may depend on one another.
   void recover() {
     constexpr int kMaxRounds = 3;
     const double limit = 8 * options_.max_residual_sigmas, apart = kApart * limit;
@@ -168,7 +169,7 @@ class TileAdjuster {
     }
   }
 
-  // Adjusts frames that were found with what they see now; false: there are none.
+  // Adjusts recovered frames with the observations that they keep now. Returns false when there are none.
   bool take_up(const std::vector<LocalFrame>& found, double limit) {
     if (found.empty()) return false;
     screen(limit);
@@ -185,7 +186,7 @@ class TileAdjuster {
         chosen_[p] = problem_.image[row].valid() && wanted[problem_.images[problem_.image[row].value].frame.value];
   }
 
-  // Whether rough solutions have done their work: hardly any residual is beyond the final threshold.
+  // Whether the rough solutions are good enough: hardly any residual is beyond the final threshold.
   bool fits() const {
     constexpr double kHardlyAny = 0.01;
     const std::vector<double> lengths = residual_lengths(problem_, state_);
@@ -194,9 +195,10 @@ class TileAdjuster {
     return static_cast<double>(beyond) <= kHardlyAny * static_cast<double>(lengths.size());
   }
 
-  // Enough tracks for each frame, the longest first, shared out among its images. Whether there are more.
+  // Selects enough tracks for each frame, the longest first, distributed over its images. Returns whether there are
+  // more.
   bool select_long_tracks() {
-    constexpr std::int64_t kEnough = 200, kFewest = 20;  // of a frame, of an image
+    constexpr std::int64_t kEnough = 200, kFewest = 20;  // tracks of a frame, tracks of an image
     std::vector<std::int64_t> images(problem_.frames.size(), 0);
     for (const TileImage& image : problem_.images) ++images[image.frame.value];
     std::vector<std::int64_t> enough;  // [images]
@@ -225,7 +227,7 @@ class TileAdjuster {
     return true;
   }
 
-  // Whether the weights have changed enough to matter.
+  // Estimates the sigma of the observations. Returns whether the weights have changed enough to matter.
   bool adopt_image_sigma() {
     const double settled = options_.only_start ? 0.05 : 0.02;
     const double before = problem_.image_sigma_px;
@@ -251,8 +253,9 @@ class TileAdjuster {
     return changed;
   }
 
-  // A few iterations of the chosen points with a loss that forgets gross errors and is as wide as the residuals are.
-  // Attitudes, which may be the only ones to know how the whole is turned, pull from anywhere.
+  // Runs a few iterations with the chosen points. The loss ignores gross errors and is as wide as the residuals. The
+  // loss of the attitudes must not ignore large residuals, because attitudes may be the only observations that show how
+  // the whole tile is turned.
   static constexpr int kMany = 10;
   void solve_rough(Stage stage, int iterations = kMany) {
     constexpr double kNear = 0.5, kFlat = 1e-3;  // sigmas of the frames, share of the cost
@@ -270,8 +273,8 @@ class TileAdjuster {
     problem_.kept = all;
   }
 
-  // To where another iteration would lower the cost by a small fraction of a sigma; or, where the tile is only a
-  // start, move its frames by less than a tenth of theirs.
+  // Iterates until a further iteration would lower the cost by a small fraction of a sigma only. Where the tile is only
+  // a start, it iterates until a step would move the frames by less than a tenth of their sigmas.
   AdjustSummary solve_fine() {
     constexpr double kResolved = 0.01, kNear = 0.1;
     const double cost = static_cast<double>(std::max<std::int64_t>(1, problem_.observation_count()));
@@ -288,7 +291,7 @@ class TileAdjuster {
     return summary;
   }
 
-  // Parameters estimated here: those of the stage that have a prior or enough images.
+  // The parameters that are estimated here: those of the stage that have a prior or enough images.
   std::vector<ParameterMask> camera_free(Stage stage) const {
     std::vector<ParameterMask> result = problem_.camera_free;
     for (std::size_t c = 0; c < result.size(); ++c) {
@@ -322,7 +325,7 @@ class TileAdjuster {
   TileState& state_;
   const AdjustOptions& options_;
   const TileSolver& solver_;
-  std::vector<std::int64_t> images_;  // of each camera
+  std::vector<std::int64_t> images_;  // number of images of each camera
   std::vector<std::uint8_t> chosen_;  // [points] that take part in rough solutions
   std::int64_t restored_ = 0;
 };

@@ -11,7 +11,7 @@ namespace megablock {
 
 namespace {
 
-constexpr std::uint8_t kMostParts = 4;  // of a track, besides its own
+constexpr std::uint8_t kMostParts = 4;  // further parts of a track
 
 class TrackPartFinder {
  public:
@@ -26,7 +26,7 @@ class TrackPartFinder {
 
   void find(std::int64_t p, TrackParts& parts) {
     if (std::count(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0) < 2)
-      return;  // most points
+      return;  // the usual case
     split(p);
     for (std::uint8_t part = 1; part <= kMostParts && rest_.size() >= 2; ++part) {
       const auto found = find_consistent_rays(rest_, threshold_, static_cast<std::uint64_t>(problem_.points[p].index));
@@ -49,7 +49,7 @@ class TrackPartFinder {
   }
 
  private:
-  // The views of a point: kept and rejected ones.
+  // Splits a point by all its observations, kept and rejected ones.
   void split(std::int64_t p) {
     taken_.clear();
     rest_.clear();
@@ -81,7 +81,7 @@ class TrackPartFinder {
   const TileState& state_;
   const double threshold_, cos_min_angle_;
   std::vector<Pose> cameras_;
-  // Of the point at hand: views of the parts found, and the others.
+  // Of the present point: the observations of the parts found so far, and the other ones.
   std::vector<PointView> taken_, rest_;
   std::vector<std::int64_t> rest_rows_;
 };

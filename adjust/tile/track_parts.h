@@ -1,9 +1,9 @@
-// Tracks that join two or more ground points, as wrong matches make them: the screening keeps the largest part of the
-// observations; here the rest is split into consistent parts, which become tracks of their own.
+// Splits tracks that join two or more ground points, as wrong matches make them. The screening keeps the largest part
+// of the observations of a track. This file splits the rest into consistent parts, which become tracks of their own.
 //
-// A further part has two or more observations of the track, within the screening threshold of their own intersection,
-// meeting at no less than min_intersection_deg; and its point is another one: most of the observations of the parts
-// before do not pass at it.
+// A further part has two or more observations of the track. They lie within the screening threshold of their own
+// intersection, and meet at an angle of min_intersection_deg or more. Its point must be a different one: most of the
+// observations of the earlier parts do not fit it.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,17 @@
 
 namespace megablock {
 
-// Number of the part of every observation of a tie point (rows of the problem, control points left out); 0 = the
-// track's own, to which observations that fit nowhere belong.
+// The number of the part of every observation of a tie point (rows of the problem without control points). 0 is the
+// track's own part; observations that fit nowhere belong to it too.
 using TrackParts = std::vector<std::uint8_t>;
 TrackParts find_track_parts(const TileProblem& problem, const TileState& state, double threshold_sigmas,
                             const AdjustOptions& options);
 
-// A track per part, with the id of the whole one and behind it; observations in the order of their images.
+// A track for each part. The parts follow the track itself and have its id; observations are in the order of their
+// images.
 TrackSet split_tracks(const TrackSet& tracks, const TrackParts& parts);
 
-// Rows of `tracks` in the order of split_tracks(tracks, parts).
+// The rows of `tracks` in the order of split_tracks(tracks, parts).
 std::vector<std::int64_t> rows_of_split(const TrackSet& tracks, const TrackParts& parts);
 
 }  // namespace megablock

@@ -33,7 +33,7 @@ class FoundVerticals {
   std::size_t count() const;  // number of images that are done
   bool has(std::size_t picture) const { return pictures_[picture].has_value(); }
   std::vector<PictureVertical> pictures() const;  // when all are done
-  // One thread at a time.
+  // Only one thread at a time may call it.
   void add(std::size_t picture, PictureVertical vertical);
   void save_now_and_then();
   void save();

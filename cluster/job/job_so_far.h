@@ -13,7 +13,7 @@ namespace megablock {
 struct JobSoFar {
   Block block;
   BlockState state;
-  // origin of the poses: "the initial orientation", "the given poses" (or position and attitude priors)
+  // The origin of the poses: "the initial orientation", "the given poses" (or position and attitude priors).
   std::string source;
 };
 // Throws InputError for a job without a block.

@@ -47,7 +47,7 @@ struct Stage {
   }
 };
 
-// In the order in which they run.
+// All stages, in the order in which they run.
 std::span<const Stage> all_stages();
 
 // The stages that a job runs, for stage_status().

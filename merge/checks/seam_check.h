@@ -22,7 +22,7 @@
 
 namespace megablock {
 
-// probability of a false alarm in the whole block; it is divided by the number of seams
+// The probability of a false alarm in the whole block. It is divided by the number of seams.
 inline constexpr double kSeamAlarmProbability = 1e-3;
 
 struct SeamReport {

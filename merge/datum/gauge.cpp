@@ -117,7 +117,8 @@ BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   c.pivot = c.centre;
   if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
   freedom = freedom_of(normal);
-  // a single frame that is known by its position only, for example: a scale moves no frame
+  // A scale moves no frame where all frames are at one place: a single frame that is known by its position only, for
+  // example.
   freedom.has_scale = !one_place;
   return c;
 }

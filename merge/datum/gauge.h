@@ -87,7 +87,7 @@ struct BlockComponent {
   // The projection on the combinations that move no held position. A step may move the component along them as a whole
   // (block_motion.h).
   Matrix77 movable = Matrix77::Identity();
-  // of these movements: the centroid of the held positions, else the centre
+  // The centre of these movements: the centroid of the held positions, else the centre.
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   // N restricted to the free directions, with a column for each of `columns`.
   using FreeMoves = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;

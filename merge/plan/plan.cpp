@@ -50,7 +50,7 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
       if (leaves_of[row]++ == 0) owned[leaf].push_back(u);
     }
   }
-  // never eliminated
+  // Kept unknowns are never eliminated, because no node has a negative number of leaves.
   for (const Unknown& u : kept) leaves_of[static_cast<std::size_t>(find_unknown(table, u.id))] = -1;
 
   EliminationPlan plan;

@@ -103,7 +103,7 @@ FrameGraph graph_of(const TileProblem& problem) {
       if (term.frame_count == 2 && a != b) visit(std::min(a, b), std::max(a, b));
     });
   };
-  // of the pairs of each lower frame; at first the beginning of these pairs
+  // The end of the pairs of each lower frame; at first it holds their beginning.
   std::vector<std::size_t> end(frame_count + 1, 0);
   visit_pairs([&](std::int32_t a, std::int32_t) { ++end[static_cast<std::size_t>(a) + 1]; });
   std::partial_sum(end.begin(), end.end(), end.begin());

@@ -155,7 +155,8 @@ class RigCalibrator {
     adjust_globally(runner, global, progress);
     if (progress.outcome != GlobalOutcome::kConverged && progress.outcome != GlobalOutcome::kRoundingFloor)
       warn("the adjustment has not converged (" + describe(progress) +
-           "): too little determines it; hold the cameras (--hold-intrinsics), state sigmas of the mounts, or measure "
+           "): too few observations determine it; hold the cameras (--hold-intrinsics), state sigmas of the mounts, or "
+           "measure "
            "more");
     const SubtreeSums sums = runner.final_up().sums;
     whole.state = runner.states().front();
@@ -275,14 +276,14 @@ class RigCalibrator {
            "; drive so that the camera sees points all over its image");
     if (mount.held || mount.field.observations == 0) return;
     if (!mount.position_determined || !mount.rotation_determined) {
-      warn(
-          fmt::format("{}: the measurements do not determine the {} of its mount; it hangs on its start. Drive curves "
-                      "(an S or a loop), so that several cameras see the same points in turn, or measure targets that "
-                      "it sees",
-                      mount.name,
-                      !mount.position_determined && !mount.rotation_determined ? "position and the rotation"
-                      : mount.position_determined                              ? "rotation"
-                                                                               : "position"));
+      warn(fmt::format(
+          "{}: the measurements do not determine the {} of its mount; it follows from its start. Drive curves "
+          "(an S or a loop), so that several cameras see the same points in turn, or measure targets that "
+          "it sees",
+          mount.name,
+          !mount.position_determined && !mount.rotation_determined ? "position and the rotation"
+          : mount.position_determined                              ? "rotation"
+                                                                   : "position"));
       return;
     }
     std::string weak;

@@ -20,7 +20,7 @@
 
 namespace megablock {
 
-// Not thread-safe: one thread at a time may call it.
+// Only one thread at a time may use it.
 class ScratchSpace {
  public:
   ScratchSpace() = default;  // no directory: every write fails

@@ -71,7 +71,7 @@ class TileStore {
     RankTile tile;
     TileState trial;
     bool in_scratch = false;
-    // the points of a tile in scratch are in memory, because they did not fit there
+    // The points of a tile in scratch are in memory, because they did not fit there.
     bool points_here = false, trial_here = false;
     int points_file = 0;  // number of the file with the present points; the other of the two files holds the trial's
   };

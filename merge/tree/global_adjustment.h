@@ -27,7 +27,7 @@ namespace megablock {
 struct GlobalOptions {
   double initial_lambda = 1e-10;
   double max_decrement = 1e-4;  // posterior sigmas; exactness tests use 1e-7
-  // a sweep with lambda = 0 must confirm the limit; if false, a sweep that is hardly damped suffices
+  // A sweep with lambda = 0 must confirm the limit. If false, a sweep that is hardly damped suffices.
   bool confirm = true;
   int max_iterations = 50;  // accepted and rejected steps
   // Above 0, the iterations also stop when a hardly damped step changes the cost by less than this share of it, or is
@@ -70,7 +70,7 @@ struct GlobalState {
   double pass_lambda = 1e-10;  // of the current sweep: lambda, or 0 for a confirming sweep
   double cost = 0, initial_cost = -1;
   double decrement_squared = 0;  // of the last sweep up
-  // decrement before a step that the cost could not resolve; -1: it resolved the last step
+  // The decrement before a step that the cost could not resolve; -1: it resolved the last step.
   double floor_decrement = -1;
   double predicted = 0, trial_cost = 0;
   std::int32_t iterations = 0;  // steps tried

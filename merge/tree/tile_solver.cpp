@@ -16,7 +16,7 @@ namespace megablock {
 
 namespace {
 
-// sigmas: a point nearer to its optimum at held poses is left there, because the next step moves the poses on
+// Sigmas. A point that is nearer to its optimum at held poses is left there, because the next step moves the poses on.
 constexpr double kSettled = 1e-2;
 
 // The sweeps over a tree of one leaf.

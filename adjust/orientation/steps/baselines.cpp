@@ -94,7 +94,7 @@ std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>
 
   int forward = 0, backward = 0;
   for (const auto& c : common) {
-    // d_a a - d_b b = t  =>  d_a ~ (t x b).(a x b), d_b ~ (t x a).(a x b)
+    // From d_a a - d_b b = t follow d_a ~ (t x b).(a x b) and d_b ~ (t x a).(a x b).
     const Eigen::Vector3d n = c.a.cross(c.b);
     const double da = best.cross(c.b).dot(n), db = best.cross(c.a).dot(n);
     if (da > 0 && db > 0) ++forward;

@@ -78,7 +78,7 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
   }
   if (known.to.empty()) return known;
   known.stated_sigma /= static_cast<double>(known.to.size());
-  // First centres are bent over the block; the sigmas allow for a twentieth of its (robust) extent.
+  // First centres are bent over the block. The sigmas allow for a twentieth of its (robust) extent.
   Eigen::Vector3d middle;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> coordinates;
@@ -128,7 +128,7 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   auto similarity = fit_similarity_robust(known.from, known.to, known.sigma);
   if (!similarity) return std::nullopt;
 
-  // Spread of the positions that agree; a line when nothing across it exceeds its noise.
+  // The spread of the positions that agree. They lie on a line when nothing across it exceeds their noise.
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   double count = 0;
@@ -154,14 +154,14 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
     rotation = line ? turn_about(up, similarity->rotation.conjugate() * axis, axis)
                     : without_twist(similarity->rotation, up).conjugate() * similarity->rotation;
   } else if (known_angles == GroundAngles::kAll) {
-    // Left factor about the axis is what the positions leave open: take it out of the rotation.
+    // The left factor about the axis is the rotation that the positions leave open. It is removed from the rotation.
     rotation = without_twist(similarity->rotation, similarity->rotation.conjugate() * axis);
   } else {
     const double distance = similarity->scale * median_distance;
     const Eigen::Vector3d down = which_points_down(graph, values, *similarity, axis, distance);
     rotation = turn_about(axis, down, -Eigen::Vector3d::UnitZ()) * similarity->rotation;
   }
-  const Eigen::Vector3d centre = mean / count;  // on the line: stays where it is
+  const Eigen::Vector3d centre = mean / count;  // on the line, so that it stays in place
   const Eigen::Vector3d before = similarity->inverse()(centre);
   similarity->rotation = rotation.normalized();
   similarity->translation = centre - similarity->scale * (similarity->rotation * before);
@@ -210,7 +210,7 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
       up = Eigen::Vector3d::UnitZ();
       east = (farthest - up * farthest.z()).normalized();
     }
-    if (up.allFinite() && east.norm() > 0.5) {  // not of centres one above the other
+    if (up.allFinite() && east.norm() > 0.5) {  // not for centres one above the other
       Eigen::Matrix3d rotation;
       rotation << east.transpose(), up.cross(east).transpose(), up.transpose();
       result.rotation = Eigen::Quaterniond(rotation).normalized();

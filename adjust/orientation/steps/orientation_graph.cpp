@@ -74,7 +74,7 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
   return rows;
 }
 
-// Empty where it is not a rotation, or not a number. `turned`: of a with respect to b.
+// Empty where the stored matrix is not a rotation or not a number. `turned`: of a with respect to b.
 std::optional<OrientationGraph::Relative> relative_of(const PairOrientation& stored, bool turned) {
   const auto& wxyz = stored.rotation_wxyz;
   const auto &of_rotation = stored.rotation_covariance, &of_base = stored.base_covariance;
@@ -148,7 +148,7 @@ void add_tracks(const TrackSet& tracks, const Rows& rows, std::int64_t tracks_pe
             static_cast<std::uint64_t>(track.rows[i][0]) << 32 | static_cast<std::uint64_t>(track.rows[j][0]);
         if (used[key]++ < tracks_per_pair) wanted = true;
       }
-    constexpr std::size_t kFewTracks = 20000;  // a block of few pairs can afford more of each
+    constexpr std::size_t kFewTracks = 20000;  // a block of few pairs can afford more tracks of each pair
     if (!wanted && graph.begin.size() > kFewTracks) continue;
     for (const auto& [image, x, y] : track.rows)
       graph.observations.push_back({image, {from_fixed_pixel(x), from_fixed_pixel(y)}});

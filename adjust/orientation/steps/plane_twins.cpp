@@ -14,9 +14,9 @@ namespace megablock {
 
 namespace {
 
-using Normals = std::array<Eigen::Vector3d, 2>;  // of an edge's orientation and of its twin
+using Normals = std::array<Eigen::Vector3d, 2>;  // by the orientation of an edge, and by its twin
 
-// In image a; empty where bases are alike.
+// The two normals in the axes of image a. Empty where the two base directions are alike.
 std::optional<Normals> normals_of(const OrientationGraph::PairEdge& edge) {
   const Eigen::Matrix3d r = edge.rotation.toRotationMatrix(), s = edge.twin.rotation.toRotationMatrix();
   const Eigen::Vector3d t = -(r * edge.baseline), u = -(s * edge.twin.baseline);
@@ -38,7 +38,7 @@ constexpr int kRounds = 10;
 // witnesses. Where hills leave few pairs a twin, a single witness may agree by chance.
 constexpr double kClearly = 1.5, kWitnesses = 0.75;
 
-// From 0 to 1.
+// The agreement of two normals, from 0 to 1.
 double agreement(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   constexpr double kReach = 8 * kDegree;
   return 1 / (1 + (a - b).squaredNorm() / (kReach * kReach));

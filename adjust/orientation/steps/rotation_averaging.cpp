@@ -223,7 +223,7 @@ void turn_to_priors(const Priors& priors, const std::vector<std::uint8_t>& activ
   for (auto& r : rotation) r = (r * best).normalized();
 }
 
-// Down as most nodes see it, turned to down in the world by the least rotation of all.
+// Turns the direction of down as most nodes see it to that of the world, by the smallest rotation.
 void turn_to_verticals(const Verticals& verticals, const std::vector<std::uint8_t>& active,
                        std::vector<Eigen::Quaterniond>& rotation) {
   struct Seen {
@@ -249,7 +249,7 @@ void turn_to_verticals(const Verticals& verticals, const std::vector<std::uint8_
 }
 
 // The reweighted iterations over the active nodes. Increments about x and y are solved for with the verticals, those
-// about z without; where there are none all three are one system.
+// about z without them. Where there are no verticals, all three are one system.
 class Averager {
  public:
   Averager(const Edges& edges, const std::vector<std::uint8_t>& kept, const Priors& priors, const Verticals& verticals,
@@ -302,8 +302,8 @@ class Averager {
     }
   }
 
-  // One weighted solution; returns the largest increment. Verticals are good to tenths of a degree or wrong: their
-  // weights fall off from the start, at first slowly (power 1), so that they reach what has wandered off.
+  // One weighted solution; returns the largest increment. Verticals are good to tenths of a degree, or wrong. Their
+  // weights fall off from the start, at first slowly (power 1), so that they also reach nodes that have drifted away.
   template <typename Weight>
   double iterate(Weight robust, int vertical_power) {
     std::vector<Equation> equations;
@@ -328,7 +328,7 @@ class Averager {
         const Eigen::Vector3d now = rotation_[row(v.node)].conjugate() * v.seen, cross = v.ground.cross(now);
         const double angle = std::atan2(cross.norm(), v.ground.dot(now));
         const Eigen::Vector3d e = cross.norm() > 0 ? Eigen::Vector3d(angle / cross.norm() * cross) : cross;
-        constexpr double kPlumb = 0.1 * kDegree;  // what upright edges are good for
+        constexpr double kPlumb = 0.1 * kDegree;  // accuracy of upright edges
         equations.push_back({-1, v.node,
                              std::pow(1 + angle * angle / (kScale * kScale), -vertical_power) /
                                  (v.sigma_rad * v.sigma_rad + kPlumb * kPlumb),

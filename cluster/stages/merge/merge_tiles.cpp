@@ -111,7 +111,7 @@ std::int64_t screen(Job& job, TileStore& tiles) {
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change(row, [&](RankTile& tile) {
       const TileProblem& problem = tile.problem;
-      // a tile whose own adjustment failed keeps no observations, and has no residuals for a judgement
+      // A tile whose own adjustment failed keeps no observations, and has no residuals for a judgement.
       bool any = false;
       for (std::int64_t p = 0; p < problem.point_count() && !any; ++p) any = problem.active(p);
       if (!any) return;

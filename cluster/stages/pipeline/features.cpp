@@ -76,7 +76,7 @@ class GrowingShard {
   std::int64_t kept() const { return static_cast<std::int64_t>(saved_); }
   const std::vector<ImageFeatures>& images() const { return images_; }
 
-  // One thread at a time; others may work on later images.
+  // Only one thread at a time may call it; others may work on later images.
   void add(std::int64_t image, ImageFeatures features) {
     images_[static_cast<std::size_t>(image)] = std::move(features);
     done_[static_cast<std::size_t>(image)] = 1;

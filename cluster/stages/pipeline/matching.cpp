@@ -45,7 +45,7 @@ struct CellPair {
   bool by_verticals = false;
 };
 
-// What is known of pairs before they are matched: the trajectory, and the verticals of the images.
+// The knowledge about pairs before they are matched: the trajectory, and the verticals of the images.
 struct Knowledge {
   explicit Knowledge(const Job& job)
       : trajectory(job.block, job.settings.matching.trust),

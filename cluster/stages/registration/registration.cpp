@@ -325,7 +325,8 @@ void note_free_position(const JointInput& input, const RegisteredTrajectory& reg
       settings.joint.use_positions && std::find(input.located.begin(), input.located.end(), 1) != input.located.end();
   if (!control && !positions && registered.resections == 0)
     notes.push_back(
-        "neither positions nor control take part: the block as a whole lies about where the trajectory had it");
+        "neither positions nor control points take part: the place of the whole block is that of the trajectory; give "
+        "either");
 }
 
 RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, const std::vector<RegisteredPlace>& rows,

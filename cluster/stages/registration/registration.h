@@ -34,7 +34,7 @@ struct TrackSource {
   std::string file;  // file of given tracks; empty: tracks of the job
   std::uint64_t fingerprint = 0;
   std::function<TrackSet()> read;
-  // units of the verified pairs from which the tracks were built; empty for given tracks
+  // Units of the verified pairs from which the tracks were built; empty for given tracks.
   std::vector<std::string> matches;
 };
 
