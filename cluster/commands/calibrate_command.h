@@ -1,4 +1,4 @@
-// The command `calibrate`: the calibration of rigs, and its modes for single cameras.
+// The command `calibrate` calibrates rigs and, in its other modes, single cameras.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// The modes of `calibrate` for single cameras: --panoramic and --compare-models.
+// Adds the modes of `calibrate` for single cameras: --panoramic and --compare-models.
 #pragma once
 
 #include "cluster/commands/calibrate_command.h"

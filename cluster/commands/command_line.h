@@ -1,4 +1,4 @@
-// The command line of the program.
+// Runs the program from its command line.
 #pragma once
 
 namespace megablock {

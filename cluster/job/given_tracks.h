@@ -1,4 +1,5 @@
-// Tie points that are given with a job: checks them against the block and gives them to the tiles that own them.
+// Reads the tie points that are given with a job, checks them against the block, and gives them to the tiles that own
+// them.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-// The options of all stages. They are read from the sections of the project file and hashed into the fingerprints of
-// the units.
+// Gives the options of all stages. They are read from the sections of the project file and hashed into the fingerprints
+// of the units.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Exit codes of the program.
+// Names the exit codes of the program.
 #pragma once
 
 namespace megablock {

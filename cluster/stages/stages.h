@@ -1,4 +1,4 @@
-// The table of the stages of a job.
+// Lists the stages of a job in one table.
 //
 // To add a stage, write one file in cluster/stages/pipeline/ that brings the units of the stage up to date, and add one
 // line to the table in stages.cpp. run_stage() in cluster/job/work_queue.h runs the units over all ranks, skips those

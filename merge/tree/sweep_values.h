@@ -1,5 +1,6 @@
 // Sends values down the merge tree: each child gets from its parent the steps or covariances of its separator unknowns.
-// These are the unknowns that the sweep up left uneliminated in the child and sent to the parent as its update.
+// These are the unknowns that the sweep up has not eliminated in the subtree of the child; their condensed normal
+// equations went to the parent as an update.
 // Internal to merge/tree/.
 #pragma once
 
