@@ -33,7 +33,7 @@ IndexedVector<FrameIndex, const Mount*> single_mounts(const Block& block) {
     const FrameIndex frame = block.images[i].frame;
     if (mounts[frame])
       throw InputError("coplanarity: frame '" + block.frames[frame].name +
-                       "' has several images; the determinant method knows single cameras alone");
+                       "' has several images; the determinant method takes single cameras only");
     mounts[frame] = &block.mount_of(i);
   }
   return mounts;

@@ -147,7 +147,7 @@ class PartwiseOrientation {
  private:
   OrientationResult whole() const {
     OrientationResult found = orient_component(block_, start_, frames_, pairs_, tracks_, options_);
-    found.summary += ", as a whole, as parts did not fit together";
+    found.summary += ", as a whole, because parts did not fit together";
     return found;
   }
 
@@ -277,8 +277,7 @@ class PartwiseOrientation {
         std::count_if(assembled_.links.begin(), assembled_.links.end(), [](const auto& l) { return l.kept; });
     result.summary = fmt::format("{} of {} frames oriented in {} parts, {} of {} links between them kept, free block",
                                  count, frames_.size(), parts_.size(), kept, assembled_.links.size());
-    if (!assembled_.lost.empty())
-      result.summary += fmt::format(", {} parts agree with no other", assembled_.lost.size());
+    if (!assembled_.lost.empty()) result.summary += fmt::format(", {} parts fit no other one", assembled_.lost.size());
     if (!assembled_.converged)
       result.summary += fmt::format(", joined in {} iterations without converging", assembled_.iterations);
     return result;

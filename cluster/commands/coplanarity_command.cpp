@@ -51,7 +51,8 @@ CoplanarityOptions options_of(const CoplanarityCommand& command, const JobOption
       command.image_sigma_px > 0 ? command.image_sigma_px : job.adjustment.observations.image_sigma_px;
   options.angle_sigma_rad = command.angle_sigma_deg > 0 ? command.angle_sigma_deg * kDegree : block.angle_sigma_rad;
   if (!(options.angle_sigma_rad > 0))
-    throw InputError("coplanarity: no attitudes were observed; say how good those of the start are: --angle-sigma");
+    throw InputError(
+        "coplanarity: no attitudes were observed; give the sigma of the start attitudes with --angle-sigma");
   return options;
 }
 

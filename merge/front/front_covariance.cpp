@@ -74,7 +74,8 @@ CovarianceMatrix CovarianceMatrix::from_bytes(const Bytes& bytes) {
 }
 
 FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix given) {
-  if (given.unknowns != factor.passed) throw ComputeError("merge: a covariance is not of what a front passes on");
+  if (given.unknowns != factor.passed)
+    throw ComputeError("merge: a covariance is not that of the separator unknowns of a front");
   const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
   FrontCovariance covariance{factor.eliminated, factor.passed, {}, {}, std::move(given.matrix)};
   if (e == 0) return covariance;
