@@ -12,7 +12,7 @@ namespace megablock {
 
 namespace {
 
-// Union of two lists of named items: where each item of `now` comes to stand.
+// Appends both lists of named items to `merged`, each name once. Returns the index in `merged` of each item of `now`.
 template <typename Index, typename Item>
 IndexedVector<Index, Index> places_by_name(const IndexedVector<Index, Item>& previous,
                                            const IndexedVector<Index, Item>& now, IndexedVector<Index, Item>& merged) {
@@ -53,8 +53,8 @@ void move(const GroundChange& change, Block& block) {
     if (point.position.allFinite()) point.position = change.position(point.position);
 }
 
-// Turning a frame into another one and back rounds: what agrees with the former value to a fraction of a micrometre
-// keeps its former bits, so that nothing computed from it becomes stale.
+// The transformation into another ground frame and back rounds. A value that agrees with the former one to a fraction
+// of a micrometre therefore keeps the former bits. Otherwise everything computed from it would count as out of date.
 bool agrees(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return (a - b).norm() < 1e-6; }
 bool agrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) { return rotation_angle(a, b) < 1e-9; }
 
@@ -98,7 +98,7 @@ bool same_image_names(const Block& a, const Block& b) {
   return true;
 }
 
-// Every item has its place already, which is what a job that is resumed finds.
+// Whether every item has its index already. This is the usual case: a job is resumed without new images.
 bool same_places(const Block& a, const Block& b, const std::function<void()>& after_table) {
   if (!same_names(a.cameras, b.cameras) || !same_names(a.rigs, b.rigs) || !same_names(a.frames, b.frames)) return false;
   after_table();
@@ -135,7 +135,7 @@ Block append_to(const Block& previous, Block moved, const std::function<void()>&
   }
   Block merged;
   merged.ground = moved.ground;
-  merged.image_folder = moved.image_folder;  // the job's may have been moved
+  merged.image_folder = moved.image_folder;  // the folder may have been moved since the job began
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
   const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
   const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);

@@ -1,4 +1,5 @@
-// A block that has grown: the images of a job that runs and those that were added since.
+// Adds new images to the block of a job, without changing the indices of the old ones. The units of the job that refer
+// to these indices thus remain valid.
 #pragma once
 
 #include <functional>
@@ -7,14 +8,14 @@
 
 namespace megablock {
 
-// The block of a job that has grown: cameras, rigs, frames and images of `previous` keep their indices (matched by
-// name), those only in `now` follow in their order; contents are those of `now` where it has the item. Images of
-// `previous` that are gone stay. The ground frame stays the previous one: positions, attitudes and control of `now` are
-// turned into it when it has another origin.
-// `after_table` is called behind a table of both that was gone through: it may leave memory.
+// Returns the block of a job that has grown. Cameras, rigs, frames and images of `previous` keep their indices; items
+// that only `now` has follow in their order. Items are matched by name, and their contents are those of `now` where it
+// has them. Images that only `previous` has remain. The ground frame remains the previous one: positions, attitudes and
+// control of `now` are transformed into it if `now` has another origin.
+// `after_table` is called after tables of both blocks were read; their memory may then be released.
 Block append_to(
     const Block& previous, Block now, const std::function<void()>& after_table = [] {});
-// By name.
+// Whether `now` has all images of `previous`, compared by name.
 bool has_all_images_of(const Block& previous, const Block& now);
 
 }  // namespace megablock

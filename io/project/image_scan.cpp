@@ -140,7 +140,7 @@ std::string text_of(const Geodetic& p) {
   return text;
 }
 
-// Metres about a reference position, good enough to tell an outlier.
+// Position in metres (east, north) relative to a reference. The approximation is good enough to find outliers.
 Eigen::Vector2d flat_metres(const Geodetic& p, const Geodetic& reference) {
   constexpr double kMetresPerDegree = 111320;
   double east = std::remainder(p.longitude_deg - reference.longitude_deg, 360.0);
@@ -148,7 +148,7 @@ Eigen::Vector2d flat_metres(const Geodetic& p, const Geodetic& reference) {
   return {east, (p.latitude_deg - reference.latitude_deg) * kMetresPerDegree};
 }
 
-// Why a position alone cannot be right; empty when it may be.
+// The reason why a position is wrong, whatever the other positions are; empty if it is plausible.
 std::string implausible(const Geodetic& p) {
   if (!std::isfinite(p.latitude_deg) || !std::isfinite(p.longitude_deg)) return "is not a number";
   if (std::abs(p.latitude_deg) < 1e-6 && std::abs(p.longitude_deg) < 1e-6) return "is 0, 0 (receiver without a fix)";
@@ -158,8 +158,8 @@ std::string implausible(const Geodetic& p) {
   return "";
 }
 
-constexpr double kOutlierSpreads = 10;   // of the median distance from the median
-constexpr double kOutlierMetres = 1000;  // and at least so far
+constexpr double kOutlierSpreads = 10;   // an outlier is farther away than so many median distances from the median
+constexpr double kOutlierMetres = 1000;  // and farther away than this
 
 }  // namespace
 

@@ -1,4 +1,5 @@
-// From a folder of images to cameras and frames: scanning, grouping, GNSS screening. Internal to io/ (project.cpp).
+// Finds the images of a folder, groups them into cameras and frames, and rejects implausible GNSS positions. Internal
+// to io/ (project.cpp).
 #pragma once
 
 #include <string>
@@ -17,22 +18,25 @@ struct ScannedImage {
   std::uint64_t hash = 0;  // XXH3 of the file
 };
 
-// All jpg, jpeg, png, tif, tiff files below `folder` (letter case ignored), names sorted as bytes. Files that cannot be
-// read go to project.unreadable, copies of an earlier file (same bytes) and unreadable sub-folders to project.warnings.
+// Returns all jpg, jpeg, png, tif and tiff files below `folder` (in upper or lower case), sorted by the bytes of their
+// names. Files that cannot be read go to project.unreadable. Copies of an earlier file (same bytes) go to
+// project.copies and, like unreadable sub-folders, to project.warnings.
 std::vector<ScannedImage> scan_images(const std::string& folder, Project& project);
 
 enum class CameraGrouping { kExif, kFolder, kOne };
 
-// Fills block.cameras, one rig per camera with the identity mount, a frame and an image per scanned image. Images of
-// different size never share a camera. Priors of position and attitude are not set here.
+// Adds cameras, one rig per camera with the identity as its mount, and a frame and an image for each scanned image.
+// Images of different sizes never share a camera. Priors of position and attitude are not set here.
 void add_images(const std::vector<ScannedImage>& scanned, CameraGrouping grouping, Block& block);
 
-// Verdict on the GNSS positions of the images: dropped when at 0,0, out of range, or more than 10 times the median
-// distance and 1 km from the median of all (a warning names each image). Heights far off only are set to NaN.
+// Returns the plausible GNSS positions of the images. A position is dropped if it is 0, 0 or out of range, or if its
+// distance from the median of all is above 1 km and above 10 times the median distance; a warning names each such
+// image. If only the height is far off, it is set to NaN.
 std::vector<std::optional<Geodetic>> screen_positions(const std::vector<ScannedImage>& scanned,
                                                       std::vector<std::string>& warnings);
 
-// Median position, rounded (0.001 degrees, 10 m) so that it is easy to write and seldom moves; NaN heights left out.
+// The median position, rounded to 0.001 degrees and 10 m: it is then short to write and seldom changes with more
+// images. Heights that are NaN do not count.
 Geodetic rounded_median(const std::vector<Geodetic>& positions);
 
 }  // namespace megablock

@@ -8,7 +8,8 @@ namespace megablock {
 
 namespace {
 
-// Any value may name a file: what each key means is known where it is read.
+// Collects every value that is the path of an existing file. The meaning of the keys is known only where they are read,
+// so any value may name a file.
 void collect(const YAML::Node& node, const YamlReader& project, const std::string& made,
              std::vector<std::string>& files) {
   if (node.IsScalar() && !node.Scalar().empty()) {

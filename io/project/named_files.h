@@ -1,4 +1,4 @@
-// The files that a project file names: what no output may be written over.
+// Lists the files that a project file names, so that commands refuse to overwrite them with their output.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace megablock {
 
-// Of the files and folders that are there, absolute. `made`: a key (of any section) that is passed over, because its
-// file is what the command makes anew. InputError when the project file cannot be read.
+// Returns the absolute paths of those that exist, files and folders. `made` is a key (of any section) that is skipped,
+// because the command writes the file of this key itself. Throws InputError if the project file cannot be read.
 std::vector<std::string> files_named_in(const std::string& project, const std::string& made);
 
 }  // namespace megablock

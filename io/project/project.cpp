@@ -1,4 +1,5 @@
-// The project file, section by section. What the images say comes first, what the file says overrides it.
+// Reads the project file section by section. Values from the image headers are set first; those of the project file
+// override them.
 #include "io/project/project.h"
 
 #include <yaml-cpp/yaml.h>
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// "true", "[0, 0.1, -0.2]": whatever is wrong with it is said where the block is read.
+// A value as text: "true", "[0, 0.1, -0.2]". It is not checked here, but where the block is read.
 std::string text_of(const YAML::Node& node) {
   if (!node.IsSequence()) return node.IsScalar() ? node.Scalar() : "";
   std::string list;
@@ -32,7 +33,7 @@ std::string text_of(const YAML::Node& node) {
   return "[" + list + "]";
 }
 
-// The options of the stages, and those of the block's priors, which are kept for the report alone.
+// Returns the options of the stages. Those of the sections gps and attitude are added for the report only.
 StageSettings read_stage_settings(YamlReader& top) {
   StageSettings settings;
   for (const char* section : {"gps", "attitude"})
@@ -51,7 +52,8 @@ StageSettings read_stage_settings(YamlReader& top) {
   return settings;
 }
 
-// What is wrong with a file that the project names: nothing that running again would make anew.
+// Turns the error of a store file into that of a file that the user named. To delete it and run again, as the store
+// advises, does not help here, because the job does not make this file.
 InputError refusal(YamlReader& top, const std::string& key, const StoreError& error) {
   std::string reason = error.what();
   if (const auto remedy = reason.find("; delete it"); remedy != std::string::npos)
@@ -67,7 +69,7 @@ void read_simulated_block(YamlReader& top, Project& project, const std::string& 
   }
 }
 
-// The tracks themselves are read when they are needed.
+// Throws InputError if the file holds no tracks. The tracks themselves are read later, when a stage needs them.
 void check_tie_points(YamlReader& top, const std::string& file) {
   try {
     Hdf5Reader(file, "tracks");
@@ -76,14 +78,14 @@ void check_tie_points(YamlReader& top, const std::string& file) {
   }
 }
 
-// Sections of stages that have nothing to do.
+// Throws InputError for sections of stages that do not run with given tie points.
 void refuse_unused_stages(const YamlReader& top) {
   for (const std::string& key : top.keys())
     if (key == "features" || key == "candidates" || key == "matching")
       refuse_unused(top, key, "with 'tie_points', which are measured and matched already");
 }
 
-// Images that are not in the block for a reason that was told: files that refer to them are not wrong.
+// The images that are not in the block for a reason that was reported. Files that refer to them are therefore accepted.
 std::vector<std::string> names_left_out(const Project& project) {
   std::vector<std::string> names = project.copies;
   names.insert(names.end(), project.missing.begin(), project.missing.end());
@@ -91,7 +93,7 @@ std::vector<std::string> names_left_out(const Project& project) {
   return names;
 }
 
-// Keys in which files are named or the block is changed, in the order in which they build on one another.
+// Reads the keys that name files or change the block, in the order in which they depend on each other.
 void read_block_sections(YamlReader& top, Project& project, const std::optional<GroundFrame>& ground) {
   const auto images = top.existing_folder("images");
   const auto block_file = top.existing_file("block");
@@ -121,7 +123,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
 
   auto cameras = top.mapping("cameras");
   if (cameras && block_file && cameras->node("grouping"))
-    refuse_unused(*cameras, "grouping", "with 'block', which says what its cameras are");
+    refuse_unused(*cameras, "grouping", "with 'block', whose file defines the cameras");
   const CameraGrouping grouping = cameras ? read_camera_grouping(*cameras) : CameraGrouping::kExif;
   if (images) {
     project.block.image_folder = (fs::path(*images) / "").string();

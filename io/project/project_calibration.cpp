@@ -1,5 +1,5 @@
-// calibration: cameras and mounts that `megablock calibrate` found, of this block or of another one that the same rig
-// recorded.
+// Reads the section `calibration`: cameras and mounts from a file of `megablock calibrate`, of this block or of another
+// block of the same rig.
 #include <algorithm>
 
 #include "geometry/numbers/angles.h"
@@ -21,13 +21,13 @@ std::string listed(const std::vector<std::string>& names) {
 [[noreturn]] void unknown_name(const YamlReader& section, const std::string& name, const std::string& what,
                                const std::vector<std::string>& known) {
   throw InputError(section.where(name) + ": the block has no " + what + " '" + name + "'; it has " + listed(known) +
-                   ". Take the entry out of the file, or check the names of the cameras");
+                   ". Remove the entry from the file, or correct its name");
 }
 
 void read_sigmas(YamlReader& camera, CameraCalibration& result) {
   auto sigma = camera.mapping("sigma");
   if (!sigma) return;
-  constexpr Limits kSigma{1e-60, 1e12};  // terms of high order of a correction in pixels are that small
+  constexpr Limits kSigma{1e-60, 1e12};  // coefficients of high order of a correction in pixels are this small
   const CameraModel& model = result.intrinsics.model();
   for (int p = 0; p < result.intrinsics.size(); ++p)
     if (const auto value = sigma->number(parameter_name(model, p), kSigma))
@@ -91,8 +91,7 @@ void read_calibrated_mounts(YamlReader& top, const Block& block, RigCalibration&
   }
   for (const std::string& name : known)
     if (std::find(given.begin(), given.end(), name) == given.end() && !given.empty())
-      warnings.push_back("rig camera '" + name + "' is not in '" + section->file() +
-                         "' and keeps the mount that it had");
+      warnings.push_back("rig camera '" + name + "' is not in '" + section->file() + "' and keeps its previous mount");
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// Reads the section `cameras` of the project file (grouping, models, parameters, what to calibrate) and the masks.
 #include <algorithm>
 #include <filesystem>
 
@@ -12,14 +13,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Names of `calibrate: [...]`: the parameters and two words for groups of them.
+// The parameters that a name in `calibrate: [...]` stands for: one parameter, or one of two groups.
 std::vector<int> parameters_named(const CameraModel& model, const std::string& name, const std::string& where) {
   if (name == "focal") return {kFocal};
   if (name == "principal_point") return {kPrincipalX, kPrincipalY};
   if (const auto parameter = find_parameter(model, name)) return {*parameter};
   std::string list = "focal, principal_point";
   for (int p = 0; p < parameter_count(model); ++p) list += ", " + parameter_name(model, p);
-  throw InputError(where + ": calibrate: '" + name + "' is no camera parameter; they are " + list);
+  throw InputError(where + ": calibrate: '" + name + "' is not a camera parameter; the parameters are " + list);
 }
 
 void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
@@ -30,20 +31,21 @@ void hold_except(const YAML::Node& list, const std::string& where, Camera& camer
       if (is_fixed(model, p))
         throw InputError(where + ": calibrate: '" + parameter_name(model, p) + "' of the model " + model_name(model) +
                          " follows from the size of the image and cannot be estimated");
-      // A panorama's cx is held by default: its sigma is that of cy.
+      // The cx of a panorama is held by default and has no sigma. If it is to be estimated, it gets the sigma of cy.
       const int like = camera.prior_sigma[static_cast<std::size_t>(p)] > 0 ? p : static_cast<int>(kPrincipalY);
       sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(like)];
     }
   camera.prior_sigma = sigma;
 }
 
-// The camera's focal length and principal point stay.
+// Sets the camera model. The focal length and the principal point of the camera remain.
 void read_model(YamlReader& reader, Camera& camera) {
   const auto name = reader.text("model");
   if (!name) return;
   const auto model = find_model(*name);
   if (!model)
-    throw InputError(reader.where("model") + ": model: '" + *name + "' is no camera model; they are " + model_list());
+    throw InputError(reader.where("model") + ": model: '" + *name + "' is not a camera model; the models are " +
+                     model_list());
   if (*model == camera.intrinsics.model()) return;
   const Intrinsics before = camera.intrinsics;
   camera.intrinsics = start_intrinsics(*model, before[kFocal], camera.width, camera.height);
@@ -58,11 +60,13 @@ void read_focal(YamlReader& reader, Camera& camera) {
   if (pixels && millimetres)
     throw InputError(reader.where("focal_mm") + ": give focal_px, or focal_mm with sensor_mm, not both");
   if (millimetres.has_value() != sensor.has_value())
-    throw InputError(reader.where() + ": focal_mm and sensor_mm (width along the larger side) belong together");
+    throw InputError(reader.where() +
+                     ": focal_mm needs sensor_mm (length of the larger side of the sensor), and sensor_mm needs "
+                     "focal_mm; give both");
   if (!pixels && !millimetres) return;
   if (is_fixed(camera.intrinsics.model(), kFocal))
     throw InputError(reader.where(pixels ? "focal_px" : "focal_mm") +
-                     ": the focal length of an equirectangular camera is its width / 2 pi and cannot be given");
+                     ": the focal length of an equirectangular camera is its width / 2 pi; remove this key");
   camera.intrinsics[kFocal] = pixels ? *pixels : *millimetres / *sensor * std::max(camera.width, camera.height);
   if (millimetres) check_within(camera.intrinsics[kFocal], kFocalPx, "focal_mm in pixels", reader.where("focal_mm"));
   camera.focal_known = true;
@@ -130,7 +134,8 @@ void check_mask(const Camera& camera, const std::string& where) {
   if (header.width == camera.width && header.height == camera.height) return;
   throw InputError(where + ": mask '" + camera.mask_path + "' has " + std::to_string(header.width) + " x " +
                    std::to_string(header.height) + " pixels, camera '" + camera.name + "' has " +
-                   std::to_string(camera.width) + " x " + std::to_string(camera.height));
+                   std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                   "; a mask must have the size of the images");
 }
 
 }  // namespace
@@ -174,7 +179,8 @@ void read_masks(const std::string& folder, Project& project) {
   }
   for (const auto& item : fs::directory_iterator(folder))
     if (item.path().extension() == ".png" && std::find(used.begin(), used.end(), item.path().string()) == used.end())
-      project.warnings.push_back("mask '" + item.path().string() + "' is named after no camera; the cameras are " +
+      project.warnings.push_back("mask '" + item.path().string() +
+                                 "' is not used, because its name is not that of a camera; the cameras are " +
                                  names_of(project.block));
 }
 

@@ -1,3 +1,4 @@
+// Reads the section `control` of the project file: the file of control points, and settings that override its values.
 #include <algorithm>
 
 #include "io/base/error.h"

@@ -1,4 +1,5 @@
-// `megablock init`: scans the images once and writes a project file that says what was found.
+// Writes the project file of `megablock init`. The images are scanned once, and comments of the file tell what was
+// found.
 #include "io/project/project_init.h"
 
 #include <cerrno>
@@ -16,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Relative to the project file's folder when the path lies below it, else absolute.
+// The path relative to the folder of the project file if it lies below this folder, otherwise the absolute path.
 std::string path_for(const std::string& path, const fs::path& project_folder) {
   const fs::path absolute = fs::absolute(path).lexically_normal();
   const fs::path relative = absolute.lexically_relative(project_folder);
@@ -37,8 +38,10 @@ std::string quoted(const std::string& text) {
 }
 
 std::string head(const InitOptions& options, const fs::path& folder) {
-  std::string text = "# Project of an image block; keys: docs/reference/project-file.md\nimages: " +
-                     quoted(path_for(options.images, folder)) + "\n";
+  std::string text =
+      "# Project of an image block. The installed manual explains all keys: "
+      "share/doc/megablock/docs/reference/project-file.md\nimages: " +
+      quoted(path_for(options.images, folder)) + "\n";
   if (!options.mask_folder.empty()) text += "masks: " + quoted(path_for(options.mask_folder, folder)) + "\n";
   if (!options.gcp_file.empty()) text += "control: " + quoted(path_for(options.gcp_file, folder)) + "\n";
   return text + "cameras:\n  grouping: " + options.camera_grouping + "\n";
@@ -96,7 +99,7 @@ std::string init_project(const InitOptions& options) {
   const fs::path output = fs::absolute(options.output).lexically_normal();
   if (fs::exists(output, error))
     throw InputError("'" + options.output + "' exists already; remove it or choose another name with -o");
-  // Read through the reader of project files, so that what is written is what will be read.
+  // The draft is read by the reader of project files, so `run` will later understand the file in the same way.
   const fs::path draft = output.string() + ".draft";
   const std::string text = head(options, output.parent_path());
   write_file(draft, text);
@@ -107,7 +110,8 @@ std::string init_project(const InitOptions& options) {
     return summary(project, options.output);
   } catch (const InputError& wrong) {
     fs::remove(draft, error);
-    const std::string message = wrong.what(), place = draft.string() + ":";  // a line of a file nobody has seen
+    // A place in the draft says nothing to the user, who has never seen this file.
+    const std::string message = wrong.what(), place = draft.string() + ":";
     const std::size_t end = message.find(": ");
     throw InputError(message.starts_with(place) && end != std::string::npos ? message.substr(end + 2) : message);
   } catch (...) {

@@ -1,4 +1,5 @@
-// What is too far away to be meant: exchanged coordinates, another zone, another country.
+// Warns of places that are too far from the images to be right: coordinates were exchanged, or belong to another
+// coordinate system.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -16,15 +17,16 @@ constexpr double kFar_m = 50e3;
 
 std::string kilometres(double metres) { return std::to_string(std::lround(metres / 1000)) + " km"; }
 
-// Given poses far from the positions of the same frames. The adjustment comes from some hundred metres to the optimum;
-// farther off a block of several tiles may find none, and then seems to have no datum: the loss gives positions that
-// are thousands of their sigmas off hardly any weight. Integrated poses that drift are nearer.
+// Warns of given poses that are far from the observed positions of the same frames. From start values that are some
+// hundred metres off, the adjustment still reaches the optimum. From farther away, a block of several tiles may fail
+// and then seem to have no datum, because the robust loss gives hardly any weight to positions with residuals of
+// thousands of sigmas. Poses that were integrated and have drifted are nearer than this limit.
 void warn_of_distant_poses(Project& project) {
   constexpr double kFarOff_m = 300, kFarOffSigmas = 30;
   std::vector<double> distances, sigmas;
   for (const Frame& frame : project.block.frames) {
     if (!frame.position_prior || !frame.given_pose) continue;
-    const Eigen::Array3d sigma = frame.position_prior->sigma.array();  // an unknown height's is large
+    const Eigen::Array3d sigma = frame.position_prior->sigma.array();  // large for an unknown height
     const Eigen::Array3d off = difference(*frame.given_pose, *frame.position_prior).array();
     distances.push_back((sigma < kFarOff_m).select(off, 0).matrix().norm());
     sigmas.push_back(sigma.minCoeff());
@@ -35,8 +37,8 @@ void warn_of_distant_poses(Project& project) {
   project.warnings.push_back(
       "given poses lie " + std::to_string(std::lround(distance)) + " m (median) from the positions of the same " +
       std::to_string(distances.size()) +
-      " frames: as start values they are too far off for some blocks; are both in one coordinate system (origin, axes, "
-      "zone)? correct the poses, or leave them out where there are images to start from");
+      " frames, which is too far for good start values; check that both are in the same coordinate system (origin, "
+      "axes, zone), and correct the poses or leave out 'poses' if the block has images");
 }
 
 }  // namespace
@@ -55,7 +57,7 @@ void warn_of_distant_places(Project& project) {
   double extent = kFar_m;
   for (std::size_t i = 0; i < x.size(); ++i)
     extent = std::max(extent, 0.1 * (Eigen::Vector3d(x[i], y[i], z[i]) - images).norm());
-  const std::string remedy = "; are latitude and longitude exchanged, or is it another coordinate system?";
+  const std::string remedy = "; check whether latitude and longitude are exchanged, and check the coordinate system";
   if (images.norm() > extent)
     project.warnings.push_back("the origin lies " + kilometres(images.norm()) + " from the images" + remedy);
   for (const ControlPoint& point : project.block.control_points) {

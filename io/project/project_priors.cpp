@@ -1,4 +1,5 @@
-// Position and attitude priors: what the images say (EXIF, XMP), the options `gps`, `attitude`, `origin`.
+// Sets the position and attitude priors of frames from the image headers (EXIF, XMP) and from the sections `gps`,
+// `attitude` and `origin` of the project file, and chooses the ground frame.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -16,20 +17,20 @@ namespace megablock {
 namespace {
 
 constexpr double kDefaultHorizontalSigma = 3, kDefaultVerticalSigma = 6;  // metres
-constexpr double kTiltSigmaDeg = 3, kYawSigmaDeg = 10;                    // of a gimbal
+constexpr double kTiltSigmaDeg = 3, kYawSigmaDeg = 10;                    // of the angles of a gimbal
 
 struct GpsOptions {
-  bool given = false, use = true;  // given: there is such a section
+  bool given = false, use = true;  // given: the project file has this section
   std::optional<double> sigma_horizontal, sigma_vertical;
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
 };
 
-// A sigma, of which 0 means: held.
+// Reads a sigma. The value 0 means that the observed value is held; it is replaced by `held`.
 std::optional<double> read_sigma(YamlReader& reader, const std::string& key, const Limits& limits, double held) {
   const auto sigma = reader.number(key);
   if (!sigma) return std::nullopt;
   if (*sigma == 0) return held;
-  check_within(*sigma, limits, key, reader.where(key), ", or be 0 for what is held");
+  check_within(*sigma, limits, key, reader.where(key), ", or be 0 to hold the observed value");
   return sigma;
 }
 
@@ -42,7 +43,7 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kSigmaMetres, kHeldPositionSigma);
   options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kSigmaMetres, kHeldPositionSigma);
   if (!from_images && reader->node("lever_arm_m"))
-    refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have theirs");
+    refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have their own lever arms");
   if (const auto arm = reader->numbers("lever_arm_m", 3)) {
     options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
     check_on_vehicle(options.lever_arm, "gps.lever_arm_m", reader->where("lever_arm_m"));
@@ -51,8 +52,8 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   return options;
 }
 
-// The file's figures, else the image's own accuracy, else the defaults; a DOP can only widen the default (taken as
-// metres per unit, as phones write their accuracy there).
+// The sigmas of a position: those of the project file, else the accuracy in the image header, else the defaults. A DOP
+// can only enlarge the default; it is taken as metres, because phones write their accuracy there.
 Eigen::Vector3d position_sigma(const ImageHeader& header, const GpsOptions& options) {
   const double own = header.position_sigma_horizontal_m;
   double horizontal = own > 0 ? own : kDefaultHorizontalSigma;
@@ -80,11 +81,12 @@ void set_position_priors(const std::vector<ScannedImage>& scanned,
     prior.sigma = position_sigma(header, options);
     prior.lever_arm = options.lever_arm;
     Frame& frame = block.frames[block.images[ImageIndex(static_cast<std::int64_t>(i))].frame];
-    if (!frame.position_prior) frame.position_prior = prior;  // of a rig: its first camera's
+    if (!frame.position_prior) frame.position_prior = prior;  // in a rig, the first image with a position counts
   }
 }
 
-// A section that acts on nothing: refused with a block, which stays what it is; told of images, which may be others.
+// Complains of a section that has no effect. With a given block, which never changes, it is an error. With images, it
+// is a warning, because other images may be added later.
 void check_effect(const YamlReader& top, const std::string& section, const std::string& what, bool from_images,
                   bool has_effect, std::vector<std::string>& warnings) {
   if (has_effect) return;
@@ -115,7 +117,7 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
 void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
                     const std::optional<GroundFrame>& ground, Project& project) {
   Block& block = project.block;
-  const bool from_images = !scanned.empty();  // else a given block with a frame of its own
+  const bool from_images = !scanned.empty();  // otherwise a given block, which has its own ground frame
   const GpsOptions options = read_gps_options(top, from_images);
   const auto origin = read_origin(top);
   if (!options.use)
@@ -135,7 +137,8 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
     if (options.sigma_vertical) frame.position_prior->sigma.z() = *options.sigma_vertical;
   }
   if (origin && !from_images)
-    throw InputError(top.where("origin") + ": 'origin' cannot be given with 'block', which has its own ground frame");
+    throw InputError(top.where("origin") +
+                     ": 'origin' cannot be given with 'block', which has its own ground frame; remove it");
   if (ground && from_images)
     block.ground = *ground;
   else if (origin)
@@ -145,7 +148,8 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   else if (!others.empty() && !block.ground.georeferenced)
     block.ground = ground_at(rounded_median(others));
   if (!known.empty() && !block.ground.georeferenced) {
-    project.warnings.push_back("GPS positions are not used: the job's block is not georeferenced");
+    project.warnings.push_back(
+        "GPS positions are not used, because the block of this job is not georeferenced; start a new job to use them");
     return;
   }
   if (!known.empty()) set_position_priors(scanned, positions, options, block);
@@ -190,7 +194,8 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
           (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))
               .normalized();
     prior.rotation_cw = (block.mount_of(image).pose.rotation.conjugate() * prior.rotation_cw).normalized();
-    // Heading is worse than the vertical: the ground's (tilt, tilt, yaw) seen about the rig's axes.
+    // The heading is less accurate than the vertical. The variances about the ground axes (tilt, tilt, yaw) are
+    // therefore turned to the axes of the rig.
     const Eigen::Matrix3d r = prior.rotation_cw.toRotationMatrix();
     const Eigen::Vector3d variance(tilt * tilt, tilt * tilt, yaw * yaw);
     prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();

@@ -1,6 +1,7 @@
-// OpenSfM's rig files. A rig camera's pose there is X_cam = R X_rig + t, R by its rotation vector, so that our mount
-// has the rotation R and the centre -R' t. All instances are exposures of one rig, whose mounts are the rig cameras
-// that are used, in the order of the file; the first of them is the rig's reference and held.
+// Reads OpenSfM's rig files and joins the images of each exposure into a frame. The pose of a rig camera in these files
+// is X_cam = R X_rig + t, with R as a rotation vector; our mount thus has the rotation R and the centre -R' t. All
+// exposures belong to one rig. Its mounts are the rig cameras with images, in the order of the file; the first of them
+// is the reference of the rig and is held.
 #include <algorithm>
 #include <fstream>
 #include <map>
@@ -17,7 +18,7 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;  // keeps the order of the file
 
-constexpr double kPositionSigma = 0.05, kRotationSigmaDeg = 1;  // of a mount, unless the project file says otherwise
+constexpr double kPositionSigma = 0.05, kRotationSigmaDeg = 1;  // defaults for a mount
 
 struct RigCamera {
   std::string name;
@@ -25,7 +26,7 @@ struct RigCamera {
 };
 
 struct Exposure {
-  std::string name;                                         // empty: the first image's
+  std::string name;                                         // empty: the frame has the name of its first image
   std::vector<std::pair<std::string, std::string>> images;  // image, rig camera
 };
 
@@ -77,7 +78,7 @@ Exposure read_exposure(const OrderedJson& list, const std::string& name, const s
   return exposure;
 }
 
-// A list of exposures, or an object of them by name.
+// Reads the exposures: a JSON list, or an object that gives each exposure a name.
 std::vector<Exposure> read_exposures(const std::string& path) {
   const OrderedJson json = read_json(path);
   if (!json.is_array() && !json.is_object()) throw InputError(path + ": expected a list of rig exposures");
@@ -104,7 +105,7 @@ class RigBuilder {
     left_out_.insert(left_out_.end(), project.copies.begin(), project.copies.end());
   }
 
-  // After build(): images that are assigned and not there, and named exposures of which none is.
+  // To be called after build(): assigned images that do not exist, and named exposures all of whose images are missing.
   std::vector<std::string> missing() const {
     std::vector<std::string> names = missing_;
     for (const Exposure& exposure : exposures_)
@@ -118,11 +119,11 @@ class RigBuilder {
     std::size_t images = 0;
     for (const Exposure& exposure : exposures_) images += exposure.images.size();
     return assignments_file_ + ": " + std::to_string(missing_.size()) + " of " + std::to_string(images) +
-           " images are not in the images folder, '" + missing_.front() +
-           "' for example; their frames do without them. Restore them, or take them out of the file";
+           " images are not in the folder of images, '" + missing_.front() +
+           "' for example; their frames are built without them. Restore them, or remove them from the file";
   }
 
-  // The block with one frame per exposure; images keep their order, frames that of their first image.
+  // Returns the block with one frame per exposure. Images keep their order; frames are ordered by their first images.
   Block build(double position_sigma_m, double rotation_sigma_rad) {
     assign();
     Block block = old_;
@@ -167,7 +168,8 @@ class RigBuilder {
           missing_.push_back(name);
           continue;
         }
-        if (!places_.emplace(image->second, Place{e, camera}).second) fail("image '" + name + "' is assigned twice");
+        if (!places_.emplace(image->second, Place{e, camera}).second)
+          fail("image '" + name + "' is assigned twice; keep one of the assignments");
         const auto [known, inserted] = camera_of_.emplace(camera, old_.camera_of(image->second));
         if (known->second != old_.camera_of(image->second))
           fail("rig camera '" + rig_camera + "' has images of two cameras ('" + old_.cameras[known->second].name +
@@ -176,13 +178,14 @@ class RigBuilder {
         if (inserted) used_.push_back(camera);
       }
     if (places_.empty())
-      fail("assigns no image of the block" +
-           (missing_.empty() ? std::string() : "; '" + missing_.front() + "' for example is not there"));
+      fail("no image of the block is assigned" +
+           (missing_.empty() ? std::string()
+                             : "; '" + missing_.front() + "', for example, is not in the folder of images"));
   }
 
   void add_frames(const std::map<int, int>& mount_of_camera, Block& block) const {
     std::map<std::size_t, FrameIndex> frame_of_exposure;
-    std::map<CameraIndex, RigIndex> single;  // rigs of images that belong to no exposure
+    std::map<CameraIndex, RigIndex> single;  // rigs of the images that belong to no exposure
     for (std::size_t i = 0; i < block.images.size(); ++i) {
       const ImageIndex index(static_cast<std::int64_t>(i));
       Image& image = block.images[index];
@@ -215,7 +218,7 @@ class RigBuilder {
   std::map<std::string, ImageIndex> images_;
   std::vector<std::string> left_out_, missing_;
   std::map<ImageIndex, Place> places_;
-  std::map<int, CameraIndex> camera_of_;  // of each rig camera used
+  std::map<int, CameraIndex> camera_of_;  // [rig cameras with images]
   std::vector<int> used_;
 };
 

@@ -1,4 +1,4 @@
-// The sections of the project file that change the block. Internal to io/ (project.cpp).
+// Readers of those sections of the project file that change the block. Internal to io/ (project.cpp).
 #pragma once
 
 #include "io/project/image_scan.h"
@@ -8,18 +8,18 @@
 
 namespace megablock {
 
-// InputError for what would be passed over in silence: "block.yaml:4: 'masks' is not used with 'block', ...; take it
-// out".
-inline constexpr const char* kNoPictures = "with a 'block' without pictures";
+// Throws InputError for a key that would otherwise be ignored without a word: "block.yaml:4: 'masks' is not used with
+// 'block', ...; take it out".
+inline constexpr const char* kNoPictures = "with a 'block' without image files";
 [[noreturn]] void refuse_unused(const YamlReader& reader, const std::string& key, const std::string& why);
 
-// cameras: grouping and overrides by camera name ("default" for all of them).
+// cameras: the grouping, and values by camera name ("default" for all cameras).
 CameraGrouping read_camera_grouping(YamlReader& cameras);
 void read_cameras(YamlReader& cameras, Block& block);
-// model, focal length, principal point and distortion of one camera; its prior sigmas are left as they are.
+// Reads model, focal length, principal point and distortion of one camera. Its prior sigmas do not change.
 void read_intrinsics(YamlReader& reader, Camera& camera);
 
-// calibration: cameras and mounts as calibrated, in place of those that the block has.
+// calibration: replaces cameras and mounts of the block by calibrated ones.
 void read_calibration(YamlReader& top, Project& project);
 
 // masks: a folder with one PNG per camera, "<camera name>.png" ('/' in a name written as '_').
@@ -34,15 +34,15 @@ std::optional<ApproximatePoses> read_poses(YamlReader& top);
 // control: a file, or a mapping with the file and settings that override it.
 std::optional<ControlTable> read_control(YamlReader& top);
 
-// gps, origin: position priors in the ground frame; fixes the ground frame: `ground` (a running job's), else `origin`,
-// else about the images' positions, else about the `others` (of poses and control).
+// gps, origin: sets the position priors and chooses the ground frame. This is `ground` (that of a running job), else
+// that of `origin`, else one about the positions of the images, else one about the `others` (of poses and control).
 void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
                     const std::optional<GroundFrame>& ground, Project& project);
 
-// attitude: attitude priors from the images' angles, turned to the block's vertical.
+// attitude: sets the attitude priors from the angles of the images, turned to the vertical of the block's origin.
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);
 
-// A warning for the origin and for each control point more than 50 km (or a tenth of the block's extent) from the
+// Warns if the origin or a control point is more than 50 km (and more than a tenth of the block's extent) away from the
 // images.
 void warn_of_distant_places(Project& project);
 

@@ -191,8 +191,8 @@ class BadInput(CopyOfTheBlock):
         gcp = self.folder / "gcp_list.txt"
         gcp.write_text(f"EPSG:4326\n2.35 48.85 100 200 150 {image} right\n48.85 2.35 100 200 150 {image} swapped\n")
         said = megablock("init", self.images, "-o", self.folder / "new.yaml", "--control", gcp)
-        self.assertRegex(said, "warning: control point 'swapped' lies [0-9]+ km from the images; are latitude and "
-                               "longitude exchanged")
+        self.assertRegex(said, "warning: control point 'swapped' lies [0-9]+ km from the images; check whether "
+                               "latitude and longitude are exchanged")
         self.assertNotIn("'right' lies", said)
 
     def test_missing_units_and_older_results_are_said(self):
@@ -377,8 +377,8 @@ class BadInput(CopyOfTheBlock):
         megablock("match", folder / "block.yaml", "-j", self.job, "-q")
         warnings = json.loads((self.job / "job.json").read_text())["warnings"]
         self.assertEqual(len(warnings), 1, warnings)
-        self.assertIn("rig_assignments.json: 1 of 6 images are not in the images folder, 'f000001_c22.jpg' for example; "
-                      "their frames do without them", warnings[0])
+        self.assertIn("rig_assignments.json: 1 of 6 images are not in the folder of images, 'f000001_c22.jpg' for "
+                      "example; their frames are built without them", warnings[0])
 
     def test_mask_of_the_wrong_size(self):
         folder = self.rig_block()
@@ -398,7 +398,7 @@ class BadInput(CopyOfTheBlock):
             values[5] = wrong
             (folder / "poses.csv").write_text("\n".join([*rows[:-1], ",".join(values)]) + "\n")
             line = self.refused(folder)
-            self.assertIn(f"poses.csv:{len(rows)}: x: '{wrong}' is not a number; take the line out", line)
+            self.assertIn(f"poses.csv:{len(rows)}: x: '{wrong}' is not a number; delete the line", line)
         (folder / "poses.csv").write_text("\n".join([*rows, rows[-1]]) + "\n")
         self.assertRegex(self.refused(folder), f"poses.csv:{len(rows) + 1}: frame '.*' appears twice")
 

@@ -109,7 +109,7 @@ def against_given_poses(folder):
     with h5py.File(folder / "job/result/block.h5") as result:  # nor in what the result says was observed
         assert len(result["verticals/image"]) == 10
     said = run("turned", lambda name, rotation: by_quaternion(rotation, [0, 0.8, -0.6]))
-    assert "12 of 12 verticals take no part: 12 that show one direction, but not down by the given poses" in said, said
+    assert "12 of 12 verticals take no part: 12 that agree with each other, but not with the given poses" in said, said
 
 
 def main():

@@ -17,7 +17,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kGimbalDoubt = 20 * kDegree;  // of pitch -90: an aircraft does not stand on its nose
+constexpr double kGimbalDoubt = 20 * kDegree;  // a pitch so near to -90 is no aircraft's, which would dive vertically
 
 // The three ways in which a file gives attitudes.
 enum class Angles { kPhotogrammetric, kGimbal, kBody };
@@ -46,15 +46,16 @@ Eigen::Quaterniond rotation_of(const CsvTable& csv, std::size_t row, Angles angl
     return rotation_from(YawPitchRoll{angle("gimbal_yaw_deg"), angle("gimbal_pitch_deg"), angle("gimbal_roll_deg")});
   if (std::abs(angle("pitch_deg") + std::numbers::pi / 2) < kGimbalDoubt)
     throw InputError(csv.where(row) +
-                     ": pitch_deg near -90 looks like a gimbal's angles (-90 = nadir); name the columns "
-                     "gimbal_yaw_deg, gimbal_pitch_deg, gimbal_roll_deg (pitch_deg is 0 at nadir)");
+                     ": pitch_deg is near -90, as in the angles of a gimbal that points down; pitch_deg of an aircraft "
+                     "is 0 then. For gimbal angles, name the columns gimbal_yaw_deg, gimbal_pitch_deg, "
+                     "gimbal_roll_deg");
   return rotation_from(BodyAttitude{angle("yaw_deg"), angle("pitch_deg"), angle("roll_deg")});
 }
 
 std::optional<std::int64_t> pass_of(const CsvTable& csv, std::size_t row) {
   if (!csv.has("pass")) return std::nullopt;
   const double pass = csv.needed_number(row, "pass");
-  if (pass != std::floor(pass)) throw InputError(csv.where(row) + ": pass: not a whole number");
+  if (pass != std::floor(pass)) throw InputError(csv.where(row) + ": pass must be a whole number");
   return static_cast<std::int64_t>(pass);
 }
 
@@ -72,7 +73,8 @@ ApproximatePoses read_angles(const CsvTable& csv, const std::string& name_column
     ApproximatePoses::Row entry;
     entry.name = csv.text(row, name_column);
     entry.where = csv.where(row);
-    if (!seen.insert(entry.name).second) throw InputError(entry.where + ": '" + entry.name + "' appears twice");
+    if (!seen.insert(entry.name).second)
+      throw InputError(entry.where + ": '" + entry.name + "' appears twice; delete one of its lines");
     entry.geodetic = geodetic;
     if (geodetic)
       entry.position = {csv.needed_number(row, "latitude_deg"), csv.needed_number(row, "longitude_deg"),
@@ -100,7 +102,7 @@ ApproximatePoses read_quaternions(const std::string& path) {
   return poses;
 }
 
-// Poses of the file in the block's frame.
+// Transforms poses of the file into the ground frame of the block.
 class ToBlock {
  public:
   ToBlock(const ApproximatePoses& poses, const GroundFrame& ground) : ground_(ground) {
@@ -112,7 +114,7 @@ class ToBlock {
   Pose operator()(const ApproximatePoses::Row& row) const {
     if (!row.geodetic) return change_ ? change_->pose(row.pose) : row.pose;
     if (!reference_)
-      throw InputError(row.where + ": WGS84 poses need a georeferenced block; give 'origin' in the project file");
+      throw InputError(row.where + ": poses in WGS84 need a georeferenced block; add 'origin' to the project file");
     try {
       return {(row.pose.rotation * reference_->own_from_block(row.position)).normalized(),
               reference_->to_local(row.position)};
@@ -144,8 +146,8 @@ ApproximatePoses read_approximate_poses(const std::string& path) {
   csv.require({name_column});
   if (!csv.has("latitude_deg") && !csv.has("x_m"))
     throw InputError(path +
-                     ": no columns of poses: latitude_deg,longitude_deg,height_m or x_m,y_m,z_m with angles, or "
-                     "qw,qx,qy,qz,x,y,z");
+                     ": the header has no columns of poses; expected latitude_deg,longitude_deg,height_m or "
+                     "x_m,y_m,z_m with angles, or qw,qx,qy,qz,x,y,z");
   return read_angles(csv, name_column);
 }
 
@@ -159,14 +161,15 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
                    FrameIndex(static_cast<std::int64_t>(f)));
   for (std::size_t i = 0; i < block.images.size(); ++i)
     images.emplace(block.name_of(ImageIndex(static_cast<std::int64_t>(i))), ImageIndex(static_cast<std::int64_t>(i)));
-  std::set<FrameIndex> placed;  // by an earlier row; what the block had before gives way
+  std::set<FrameIndex> placed;  // frames with a pose from an earlier row; a pose that the block had is replaced
   for (const ApproximatePoses::Row& row : poses.rows) {
     const auto image = images.find(row.name);
     const auto frame = frames.find(row.name);
     if (std::find(left_out.begin(), left_out.end(), row.name) != left_out.end()) {
-      warnings.push_back(row.where + ": pose of '" + row.name + "', which was left out; not used");
+      warnings.push_back(row.where + ": the pose of '" + row.name + "' is not used, because '" + row.name +
+                         "' was left out of the block");
     } else if (image != images.end()) {
-      // X_cam = R_m (R_f (X - C_f) - C_m): the frame's pose from the camera's.
+      // The pose of the frame follows from that of the camera: X_cam = R_m (R_f (X - C_f) - C_m).
       const Pose camera = to_block(row);
       const Pose& mount = block.mount_of(image->second).pose;
       const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
@@ -181,7 +184,8 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
       target.given_pose = to_block(row);
       placed.insert(frame->second);
     } else {
-      throw InputError(row.where + ": pose of '" + row.name + "', which is no image or frame of the block");
+      throw InputError(row.where + ": the block has no image and no frame '" + row.name +
+                       "'; correct the name or delete the line");
     }
   }
 }

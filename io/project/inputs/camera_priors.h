@@ -1,4 +1,4 @@
-// Prior standard deviations for cameras of which only an initial value is known.
+// Gives prior standard deviations to cameras for which only initial values are known.
 #pragma once
 
 #include "io/block/block.h"

@@ -1,4 +1,4 @@
-// Readers of the three formats of control files.
+// Reads the three formats of control files into a ControlTable.
 #include "io/project/inputs/control_file.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ using Json = nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// A height may be unknown.
+// Throws InputError for impossible coordinates. The height may be NaN (unknown).
 void check_coordinates(const Eigen::Vector3d& coordinates, const std::string& where) {
   check_on_earth(coordinates.x(), "x", where);
   check_on_earth(coordinates.y(), "y", where);
@@ -34,7 +34,7 @@ void check_coordinates(const Eigen::Vector3d& coordinates, const std::string& wh
 
 // -- gcp_list.txt --
 
-// Between tabs when the line has any (image names may then hold blanks), else between blanks.
+// Splits a line at tabs if it has any (image names may then contain blanks), otherwise at blanks.
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields;
   const char* separators = line.find('\t') != std::string::npos ? "\t\r" : " \r";
@@ -69,7 +69,7 @@ ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
     const std::vector<std::string> fields = fields_of(line);
     if (fields.size() < 6)
       throw InputError(where + ": " + std::to_string(fields.size()) +
-                       " fields; expected x y z column row image [name]");
+                       " fields in this line; expected x y z column row image [name]");
     const std::string key = fields.size() > 6 ? fields[6] : fields[0] + " " + fields[1] + " " + fields[2];
     const Eigen::Vector3d coordinates(parse_number(fields[0], "x", where), parse_number(fields[1], "y", where),
                                       number_or_nan(fields[2], "z", where));
@@ -86,22 +86,28 @@ ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
     const bool same_height =
         coordinates.z() == point.coordinates.z() || (std::isnan(coordinates.z()) && std::isnan(point.coordinates.z()));
     if (coordinates.head<2>() != point.coordinates.head<2>() || !same_height)
-      throw InputError(where + ": point '" + point.name + "' has other coordinates than in " + point.where);
+      throw InputError(where + ": point '" + point.name + "' has other coordinates than in " + point.where +
+                       "; correct one of the lines, or give the points different names");
     point.measurements.push_back(
         {fields[5], {parse_number(fields[3], "column", where), parse_number(fields[4], "row", where)}, 0.5, where});
   }
-  if (table.crs.empty()) throw InputError(path + ": is empty; the first line names the coordinate reference system");
+  if (table.crs.empty())
+    throw InputError(path +
+                     ": the file is empty; its first line must name the coordinate reference system (EPSG:25832, for "
+                     "example)");
   return table;
 }
 
 // -- ground_control_points.json --
 
-// JSON values carry no marks: lines are found by searching the text for the values, point after point.
+// Finds the line of a value for messages. The JSON parser does not keep the lines of its values, so this class searches
+// the text for the values, point after point.
 class JsonLines {
  public:
   JsonLines(const std::string& text, const std::string& path) : text_(text), path_(path) {}
 
-  // file:line of the next place where `value` stands between quotes, behind the one found last; `advance` moves on.
+  // Returns file:line of the next `value` in quotes after the current position. If `advance` is set, this place becomes
+  // the current position.
   std::string find(const std::string& value, bool advance) {
     const std::size_t at = text_.find("\"" + value + "\"", at_);
     const std::size_t place = at == std::string::npos ? at_ : at;
@@ -126,7 +132,7 @@ double json_number(const Json& object, const char* key, const std::string& where
 ControlTable::Point json_point(const Json& entry, JsonLines& lines) {
   ControlTable::Point point;
   if (!entry.is_object() || !entry.contains("id"))
-    throw InputError(lines.find("points", false) + ": a point has no 'id'");
+    throw InputError(lines.find("points", false) + ": a point has no 'id'; give every point one");
   point.name = entry["id"].is_string() ? entry["id"].get<std::string>() : entry["id"].dump();
   point.where = lines.find(point.name, true);
   const std::string role = entry.contains("role") ? entry["role"].dump() : "";
@@ -173,7 +179,7 @@ ControlTable read_json(const std::string& text, const std::string& path) {
   for (const Json& entry : json["points"]) {
     ControlTable::Point point = json_point(entry, lines);
     if (std::isnan(point.coordinates.x()))
-      table.warnings.push_back(point.where + ": point '" + point.name + "' has no position; left out");
+      table.warnings.push_back(point.where + ": point '" + point.name + "' is left out, because it has no 'position'");
     else
       table.points.push_back(std::move(point));
   }
@@ -188,7 +194,7 @@ PointRole role_of(const std::string& text, const std::string& where) {
   throw InputError(where + ": role: '" + text + "' is none of: control, check");
 }
 
-// The first line of a point gives its coordinates; later ones may leave them empty or repeat them.
+// Reads the first line of a point, which gives its coordinates. Later lines may repeat them or leave them empty.
 ControlTable::Point csv_point(const CsvTable& csv, std::size_t row) {
   ControlTable::Point point;
   point.name = csv.text(row, "name");
@@ -207,7 +213,7 @@ void check_repeated(const CsvTable& csv, std::size_t row, const ControlTable::Po
     const auto value = csv.number(row, columns[a]);
     if (value && *value != point.coordinates[a])
       throw InputError(csv.where(row) + ": point '" + point.name + "' has another " + columns[a] + " than in " +
-                       point.where);
+                       point.where + "; correct one of the lines, or give the points different names");
   }
 }
 
@@ -222,12 +228,12 @@ ControlTable read_csv(const std::string& path) {
   std::map<std::string, std::size_t> point_of_name;
   for (std::size_t row = 0; row < csv.row_count(); ++row) {
     const std::string name = csv.text(row, "name"), where = csv.where(row);
-    if (name.empty()) throw InputError(where + ": name is empty");
+    if (name.empty()) throw InputError(where + ": name is empty; give every point a name");
     const auto [found, inserted] = point_of_name.emplace(name, table.points.size());
     if (inserted) table.points.push_back(csv_point(csv, row));
     ControlTable::Point& point = table.points[found->second];
     if (!inserted) check_repeated(csv, row, point);
-    if (csv.text(row, "image").empty()) continue;  // a point that is not measured
+    if (csv.text(row, "image").empty()) continue;  // this line has no image measurement
     point.measurements.push_back({csv.text(row, "image"),
                                   {csv.needed_number(row, "column_px"), csv.needed_number(row, "row_px")},
                                   csv.number(row, "sigma_px", kSigmaPx).value_or(0.5),

@@ -1,18 +1,16 @@
-// Files of control and check points, three formats told apart by their content and name:
+// Reads files of control and check points, and adds the points to a block. The ending of the name tells the format:
 //
-// * gcp_list.txt of ODM and OpenSfM: a first line with the coordinate reference system ("WGS84", "WGS84 UTM 32N",
-//   "EPSG:25832", a PROJ string), then lines "x y z column row image [name ...]" between tabs or blanks (x = longitude
-//   or easting; z may be NaN). Lines of the same name, or without one of the same coordinates, are one point. Columns
-//   and rows count from 0 at the centre of the first pixel; we add 0.5.
-// * ground_control_points.json of OpenSfM: latitude, longitude, altitude (WGS84, ellipsoidal, metres); image
-// coordinates
-//   about the image centre divided by max(width, height).
-// * CSV (name ends in .csv): optional comment "# crs: EPSG:25832" ("local", the default, = the block's frame), a
-// header,
-//   and a line per measurement with the columns
-//     name,x,y,z,image,column_px,row_px                       needed (z may be empty or NaN; x = easting or longitude)
+// * .csv: our own format. An optional comment "# crs: EPSG:25832" names the coordinate reference system; the default
+//   "local" is the block's ground frame. Then follow a header and a line per measurement, with the columns
+//     name,x,y,z,image,column_px,row_px       required (x = easting or longitude; z may be empty or NaN)
 //     role (control | check), sigma_horizontal_m, sigma_vertical_m, sigma_px    optional
-//   Coordinates, role and sigmas may be left empty in later lines of a point. Pixel centres are at +0.5.
+//   Later lines of a point may leave coordinates, role and sigmas empty. Pixel centres are at +0.5.
+// * .json: ground_control_points.json of OpenSfM. Positions are latitude, longitude and altitude (WGS84, ellipsoidal
+//   height, metres). Image coordinates refer to the image centre and are divided by max(width, height).
+// * any other name: gcp_list.txt of ODM and OpenSfM. The first line names the coordinate reference system ("WGS84",
+//   "WGS84 UTM 32N", "EPSG:25832", a PROJ string). The other lines are "x y z column row image [name ...]", separated
+//   by tabs or blanks (x = easting or longitude; z may be NaN). Lines with the same name, or without names but with the
+//   same coordinates, belong to one point. Columns and rows count from 0 at the centre of the first pixel; we add 0.5.
 #pragma once
 
 #include <string>
@@ -23,13 +21,13 @@
 
 namespace megablock {
 
-inline constexpr double kUnknownHeightSigma = 1000;  // metres: as good as free
+inline constexpr double kUnknownHeightSigma = 1000;  // metres; so large that the height is practically free
 
-// As read: coordinates in `crs`, images by name.
+// The contents of a file: coordinates in the system `crs`, images by name.
 struct ControlTable {
   struct Measurement {
     std::string image;
-    Eigen::Vector2d position;  // in the file's image coordinates
+    Eigen::Vector2d position;  // in the image coordinates of the file (`pixels`)
     double sigma_px = 0.5;
     std::string where;  // file:line
   };
@@ -42,24 +40,25 @@ struct ControlTable {
     std::string where;
   };
   enum class Pixels { kCentresAtHalf, kCentresAtInteger, kNormalised } pixels = Pixels::kCentresAtHalf;
-  std::string crs = "local", crs_where;  // crs_where: file, and line where it is named
+  std::string crs = "local", crs_where;  // crs_where: the file, with the line if a line names the system
   std::vector<Point> points;
-  std::vector<std::string> warnings;  // points left out
+  std::vector<std::string> warnings;  // about points that were left out
 };
 
-// InputError with file:line for malformed lines.
+// Reads a file. Throws InputError with file:line for malformed lines.
 ControlTable read_control_table(const std::string& path);
 
-// WGS84 positions of the points (unknown heights NaN), for choosing an origin; empty for local coordinates.
+// The WGS84 positions of the points (unknown heights are NaN), to choose an origin. Empty for local coordinates.
 std::vector<Geodetic> geodetic_positions(const ControlTable& table);
 
-// Adds the points to the block, in its ground frame. InputError with file:line for a measurement in an image that the
-// block does not have, outside its image, two in one image, or coordinates that do not fit the block's frame. Images in
-// `left_out` (unreadable or copies) lose their measurements with a warning.
+// Adds the points to the block, in its ground frame. Throws InputError with file:line for a measurement in an image
+// that the block does not have, for one outside its image, for two of one point in one image, and for coordinates that
+// do not fit the block's frame. Measurements in images of `left_out` (unreadable files or copies) are dropped with a
+// warning.
 void add_control(const ControlTable& table, const std::vector<std::string>& left_out, Block& block,
                  std::vector<std::string>& warnings);
 
-// The CSV format above, coordinates in the block's frame ("local").
+// Writes the CSV format above, with coordinates in the block's ground frame ("local").
 void write_control_csv(const std::string& path, const Block& block);
 
 }  // namespace megablock

@@ -1,4 +1,5 @@
-// From a table of control points to the block: images by name, pixels, the ground frame.
+// Adds the control points of a table to the block: finds their images by name, and converts image coordinates to pixels
+// and positions to the ground frame.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,7 +13,7 @@ namespace megablock {
 
 namespace {
 
-// Also by the last part of the name, where that is unique: control files often leave folders out.
+// The images by their name, and also by its last part where that is unique: control files often leave folders out.
 std::map<std::string, ImageIndex> images_by_name(const Block& block) {
   std::map<std::string, ImageIndex> by_name, by_last;
   for (std::size_t i = 0; i < block.images.size(); ++i) {
@@ -39,7 +40,7 @@ void check_pixel(const ControlTable::Measurement& m, const Eigen::Vector2d& pixe
   char text[96];
   std::snprintf(text, sizeof text, "(%.1f, %.1f) lies outside", pixel.x(), pixel.y());
   throw InputError(m.where + ": the measurement " + text + " image '" + m.image + "' (" + std::to_string(camera.width) +
-                   " x " + std::to_string(camera.height) + " pixels)");
+                   " x " + std::to_string(camera.height) + " pixels); correct its image coordinates");
 }
 
 CrsToWgs84 crs_of(const ControlTable& table) {
@@ -50,7 +51,7 @@ CrsToWgs84 crs_of(const ControlTable& table) {
   }
 }
 
-// Coordinates of the file's system in the ground frame of the block.
+// Transforms coordinates from the system of the file into the ground frame of the block.
 class ToGround {
  public:
   ToGround(const ControlTable& table, const GroundFrame& ground) : ground_(ground) {
@@ -58,7 +59,7 @@ class ToGround {
     crs_.emplace(crs_of(table));
     if (!ground.georeferenced)
       throw InputError((table.points.empty() ? "control" : table.points[0].where) + ": control in '" + table.crs +
-                       "' needs a georeferenced block; give 'origin' in the project file");
+                       "' needs a georeferenced block; add 'origin' to the project file");
     reference_.emplace(ground);
   }
 
@@ -114,16 +115,17 @@ void add_control(const ControlTable& table, const std::vector<std::string>& left
     std::set<ImageIndex> seen;
     for (const ControlTable::Measurement& m : entry.measurements) {
       if (known_bad.contains(m.image)) {
-        warnings.push_back(m.where + ": point '" + entry.name + "' is measured in '" + m.image +
-                           "', which was left out; the measurement is not used");
+        warnings.push_back(m.where + ": the measurement of point '" + entry.name + "' is not used, because image '" +
+                           m.image + "' was left out of the block");
         continue;
       }
       const auto found = images.find(m.image);
       if (found == images.end())
         throw InputError(m.where + ": point '" + entry.name + "' is measured in image '" + m.image +
-                         "', which the block does not have");
+                         "', which the block does not have; correct the name or delete the measurement");
       if (!seen.insert(found->second).second)
-        throw InputError(m.where + ": point '" + entry.name + "' is measured twice in image '" + m.image + "'");
+        throw InputError(m.where + ": point '" + entry.name + "' is measured twice in image '" + m.image +
+                         "'; delete one of the measurements");
       const Camera& camera = block.cameras[block.camera_of(found->second)];
       const Eigen::Vector2d pixel = pixel_of(m, table.pixels, camera);
       check_pixel(m, pixel, camera);

@@ -41,17 +41,19 @@ void read_frame_measurements(const FrameMeasurementType& type, const std::string
     for (const char* end : {"from", "to"}) {
       const std::string name = csv.text(row, end);
       if (std::ranges::find(left_out, name) != left_out.end()) {
-        warnings.push_back(csv.where(row) + ": '" + name + "' was left out; the row is not used");
+        warnings.push_back(csv.where(row) + ": the line is not used, because '" + name + "' was left out of the block");
         used = false;
         continue;
       }
       const auto found = frames.find(name);
       if (found == frames.end())
-        throw InputError(csv.where(row) + ": " + end + ": the block has no image and no frame '" + name + "'");
+        throw InputError(csv.where(row) + ": " + end + ": the block has no image and no frame '" + name +
+                         "'; correct the name or delete the line");
       (end[0] == 'f' ? measured.from : measured.to) = found->second;
     }
     if (!used) continue;
-    if (measured.from == measured.to) throw InputError(csv.where(row) + ": from and to are of the same frame");
+    if (measured.from == measured.to)
+      throw InputError(csv.where(row) + ": 'from' and 'to' belong to the same frame; name two different frames");
     block.frame_measurements[type.key].push_back(measured);
   }
 }

@@ -1,6 +1,9 @@
-// The project file's entries of frame_measurement_types(): numbers measured between two frames.
-// CSV, one row a number:   from,to,<value column>,<sigma column>
-// `from` and `to` name an image of the frame, or the frame.
+// Reads numbers that were measured between two frames: the files that the project file names under the keys of
+// frame_measurement_types(). They are CSV files with one measurement per line:
+//
+//     from,to,<value column>,<sigma column>
+//
+// `from` and `to` are names of frames, or of images of these frames.
 #pragma once
 
 #include <string>
@@ -11,8 +14,9 @@
 
 namespace megablock {
 
-// Adds them to the block. Rows of images named in `left_out` are warned of and not used. InputError naming file:line
-// for unknown images, two images of one frame, values and sigmas that are not positive.
+// Adds the measurements to the block. Lines that name an image of `left_out` are not used and give a warning. Throws
+// InputError with file:line for unknown names, for two names of the same frame, and for values and sigmas that are not
+// positive.
 void read_frame_measurements(const FrameMeasurementType& type, const std::string& path,
                              const std::vector<std::string>& left_out, Block& block,
                              std::vector<std::string>& warnings);

@@ -25,7 +25,7 @@ Eigen::Vector2d end_of(const CsvTable& csv, std::size_t row, const char* number,
                               csv.needed_number(row, std::string("row") + number + "_px"));
   if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width && pixel.y() <= camera.height))
     throw InputError(csv.where(row) + ": end " + number + " lies outside the image of " + std::to_string(camera.width) +
-                     " x " + std::to_string(camera.height) + " px");
+                     " x " + std::to_string(camera.height) + " px; correct its coordinates");
   return pixel;
 }
 
@@ -33,7 +33,9 @@ KnownLine::Measurement measurement(const CsvTable& csv, std::size_t row, ImageIn
   KnownLine::Measurement m{image, end_of(csv, row, "1", camera), end_of(csv, row, "2", camera),
                            csv.number(row, "sigma_px", kSigmaPx).value_or(1)};
   if ((m.second - m.first).norm() < kShortestPx)
-    throw InputError(csv.where(row) + ": the ends are less than 10 px apart; a line so short says nothing");
+    throw InputError(csv.where(row) +
+                     ": the ends are less than 10 px apart; measure them farther apart, because so short a line does "
+                     "not determine a direction");
   return m;
 }
 
@@ -58,31 +60,33 @@ void read_lines(const std::string& path, const std::vector<std::string>& left_ou
   std::set<std::pair<std::string, ImageIndex>> seen;
   for (std::size_t row = 0; row < csv.row_count(); ++row) {
     const std::string name = csv.text(row, "name"), where = csv.where(row), image = csv.text(row, "image");
-    if (name.empty()) throw InputError(where + ": name is empty");
+    if (name.empty()) throw InputError(where + ": name is empty; give every line a name");
     const KnownLine::Direction direction = direction_of(csv.text(row, "direction"), where);
     const auto [entry, inserted] = line_of_name.emplace(name, block.lines.size());
     if (inserted) block.lines.push_back({name, direction, {}});
     KnownLine& line = block.lines[entry->second];
     if (line.direction != direction)
-      throw InputError(where + ": line '" + name + "' has another direction than in " + first_place[name]);
+      throw InputError(where + ": line '" + name + "' has another direction than in " + first_place[name] +
+                       "; correct one of the two, or give the lines different names");
     first_place.emplace(name, where);
     if (std::find(left_out.begin(), left_out.end(), image) != left_out.end()) {
-      warnings.push_back(where + ": line '" + name + "' is measured in '" + image +
-                         "', which was left out; the measurement is not used");
+      warnings.push_back(where + ": the measurement of line '" + name + "' is not used, because image '" + image +
+                         "' was left out of the block");
       continue;
     }
     const auto found = images.find(image);
     if (found == images.end())
       throw InputError(where + ": line '" + name + "' is measured in image '" + image +
-                       "', which the block does not have");
+                       "', which the block does not have; correct the name or delete the measurement");
     if (!seen.emplace(name, found->second).second)
-      throw InputError(where + ": line '" + name + "' is measured twice in image '" + image + "'");
+      throw InputError(where + ": line '" + name + "' is measured twice in image '" + image +
+                       "'; delete one of the measurements");
     line.measurements.push_back(measurement(csv, row, found->second, block.cameras[block.camera_of(found->second)]));
   }
   for (const KnownLine& line : block.lines)
     if (line.direction == KnownLine::Direction::kHorizontal && line.measurements.size() < 2)
-      warnings.push_back(path + ": line '" + line.name +
-                         "' is measured in fewer than two images; a horizontal line says " + "nothing then");
+      warnings.push_back(path + ": the horizontal line '" + line.name +
+                         "' is measured in fewer than two images and has no effect; measure it in a second image");
 }
 
 }  // namespace megablock

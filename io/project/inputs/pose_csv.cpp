@@ -49,7 +49,8 @@ class CsvReader {
         read_row(cells_of(line));
       }
     }
-    if (table_.names.empty()) fail("no poses; expected the columns name,qw,qx,qy,qz,x,y,z");
+    if (table_.names.empty())
+      fail("the file has no poses; expected a header with the columns name,qw,qx,qy,qz,x,y,z and a line per frame");
     return std::move(table_);
   }
 
@@ -96,14 +97,15 @@ class CsvReader {
       if (c == 0) continue;
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
       if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
-        fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; take the line out if there is no pose");
+        fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; delete the line if the frame has no pose");
       if (c >= kFirstCoordinate) check_on_earth(value[c], kColumns[c], where());
     }
     Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
-    if (std::abs(rotation.norm() - 1) > 1e-3) fail("qw,qx,qy,qz is not a unit quaternion");
+    if (std::abs(rotation.norm() - 1) > 1e-3)
+      fail("qw,qx,qy,qz is not a unit quaternion; its norm must be 1 to within 0.001");
     rotation.normalize();
     const std::string& name = fields[columns_[0]];
-    if (!seen_.insert(name).second) fail("frame '" + name + "' appears twice");
+    if (!seen_.insert(name).second) fail("frame '" + name + "' appears twice; delete one of its lines");
     table_.names.push_back(name);
     table_.poses.push_back({rotation, {value[5], value[6], value[7]}});
     if (pass_) read_pass(fields);
@@ -112,8 +114,8 @@ class CsvReader {
   std::string path_;
   std::ifstream stream_;
   std::int64_t line_ = 0;
-  std::vector<std::size_t> columns_;  // position of each of kColumns
-  std::optional<std::size_t> pass_;   // its position
+  std::vector<std::size_t> columns_;  // position of each of kColumns in a line
+  std::optional<std::size_t> pass_;   // position of the column 'pass'
   std::unordered_set<std::string> seen_;
   PoseTable table_;
 };

@@ -1,13 +1,14 @@
-// Poses of frames as a CSV file: the truth that `simulate` writes and `evaluate` reads, or any other program's poses.
+// Reads and writes poses of frames as a CSV file. `simulate` writes the true poses in this form, `evaluate` reads them,
+// and other programs can provide poses in it:
 //
 //     # origin: 48.85 2.35 100     (optional: latitude, longitude [deg], ellipsoidal height [m] of the ground frame)
 //     name,qw,qx,qy,qz,x,y,z[,pass]
 //     f000012.jpg,0.707...,...
 //
-// name: the frame's (of a single image: the image's). qw qx qy qz: unit quaternion of the rotation ground -> rig (R_cw;
-// camera x right, y down, looking along +z). x y z: the rig's origin in the ground frame, metres (east, north, up).
-// Columns are found by the names in the header line and may stand in any order; further ones are ignored. Lines that
-// start with '#' are comments.
+// `name` is the name of the frame; the frame of a single image has the name of its image. qw, qx, qy, qz are the unit
+// quaternion of the rotation ground -> rig (R_cw; camera x right, y down, looking along +z). x, y, z are the origin of
+// the rig in the ground frame, metres (east, north, up). Columns are found by their names in the header and may have
+// any order; other columns are ignored. Lines that start with '#' are comments.
 #pragma once
 
 #include <optional>
@@ -19,19 +20,19 @@
 namespace megablock {
 
 struct PoseTable {
-  std::optional<GroundFrame> ground;  // of the file's origin comment
+  std::optional<GroundFrame> ground;  // from the comment "# origin:"
   std::vector<std::string> names;
   std::vector<Pose> poses;           // [names]
-  std::vector<std::int64_t> passes;  // [names] or empty: no such column
+  std::vector<std::int64_t> passes;  // [names]; empty if there is no such column
 };
 
-// Oriented frames of the state, by name.
+// The poses of the oriented frames.
 PoseTable pose_table(const Block& block, const BlockState& state);
 
 void write_pose_csv(const std::string& path, const PoseTable& table);
 
-// InputError with file:line for missing columns, numbers that are none, quaternions that are not unit (1e-3; they are
-// normalised), names that appear twice.
+// Reads a file. Quaternions are normalised. Throws InputError with file:line for missing columns, malformed numbers,
+// quaternions whose norm differs from 1 by more than 1e-3, and repeated names.
 PoseTable read_pose_csv(const std::string& path);
 
 }  // namespace megablock

@@ -27,7 +27,7 @@ std::vector<double> numbers_of(const CsvTable& csv, std::size_t row, const char*
     double value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-      throw InputError(csv.where(row) + ": " + column + ": '" + word + "' is no number");
+      throw InputError(csv.where(row) + ": " + column + ": '" + word + "' is not a number");
     numbers.push_back(value);
   }
   return numbers;
@@ -45,7 +45,7 @@ double needed_sigma(const CsvTable& csv, std::size_t row, const char* column) {
   return sigma * kDegree;
 }
 
-// Of directions, from that of roll and pitch (vertical.h).
+// The covariance of the direction, from sigma_deg or from the sigmas of roll and pitch (geometry/vanishing/vertical.h).
 Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen::Vector3d& down) {
   if (csv.number(row, "sigma_deg")) {
     const double sigma = needed_sigma(csv, row, "sigma_deg");
@@ -56,7 +56,9 @@ Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen:
   if (!(std::abs(correlation) < 1)) throw InputError(csv.where(row) + ": correlation must lie between -1 and 1");
   const double level = std::hypot(down.x(), down.y());
   if (!(level > 1e-6))
-    throw InputError(csv.where(row) + ": an image that looks straight down has no roll; give sigma_deg");
+    throw InputError(csv.where(row) +
+                     ": an image that looks straight up or down has no roll; give sigma_deg instead of sigma_roll_deg "
+                     "and sigma_pitch_deg");
   Eigen::Matrix2d covariance;
   covariance << roll * roll, correlation * roll * pitch, correlation * roll * pitch, pitch * pitch;
   Eigen::Matrix<double, 3, 2> by_angles;
@@ -64,18 +66,18 @@ Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen:
   return by_angles * covariance * by_angles.transpose();
 }
 
-// The direction follows a camera that has been calibrated since, but images of another one are other images, whatever
-// their names.
+// Throws InputError if the vertical was found with another camera. A camera that was calibrated since then is accepted,
+// because the direction can be corrected for it. A camera that differs more has taken other images of the same names.
 void check_camera(const std::vector<double>& values, const Camera& camera, const std::string& where) {
-  constexpr double kFarthest = 3;  // of the sigmas of a camera that is not calibrated
+  constexpr double kFarthest = 3;  // times the prior sigma of a camera that is not calibrated
   const IntrinsicSigmas sigma = default_intrinsic_sigmas(camera);
   for (std::size_t p = 0; p < values.size(); ++p) {
     const double now = camera.intrinsics[p];
     if (!(std::abs(values[p] - now) > kFarthest * sigma[p]) || is_fixed(camera.intrinsics.model(), static_cast<int>(p)))
       continue;
     throw InputError(fmt::format(
-        "{}: the vertical was found with another camera than '{}': {} {:.6g} there, {:.6g} here; "
-        "name the file of these images, or run 'megablock verticals' again",
+        "{}: the vertical was found with another camera than '{}': {} is {:.6g} in the file, but {:.6g} in the block; "
+        "name the file that belongs to these images, or run 'megablock verticals' again",
         where, camera.name, parameter_name(camera.intrinsics.model(), static_cast<int>(p)), values[p], now));
   }
 }
@@ -84,9 +86,9 @@ void read_dependence(const CsvTable& csv, std::size_t row, const Camera& camera,
   const std::vector<double> values = numbers_of(csv, row, "camera"),
                             derivatives = numbers_of(csv, row, "down_by_camera");
   if (derivatives.size() != 3 * values.size())
-    throw InputError(csv.where(row) + ": down_by_camera needs three numbers for each of camera");
+    throw InputError(csv.where(row) + ": 'down_by_camera' must have three numbers for each number of 'camera'");
   if (!values.empty() && std::ssize(values) != camera.intrinsics.size())
-    throw InputError(csv.where(row) + ": the vertical was found with another model of camera '" + camera.name +
+    throw InputError(csv.where(row) + ": the vertical was found with another camera model of '" + camera.name +
                      "'; run 'megablock verticals' again");
   check_camera(values, camera, csv.where(row));
   vertical.camera = Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
@@ -108,18 +110,18 @@ void read_verticals(const std::string& path, const std::vector<std::string>& lef
       continue;
     const auto found = images.find(name);
     if (found == images.end())
-      throw InputError(csv.where(row) + ": image '" + name + "', which the block does not have");
+      throw InputError(csv.where(row) + ": the block has no image '" + name + "'; correct the name or delete the line");
     SeenVertical vertical;
     vertical.image = found->second;
     vertical.down = {csv.needed_number(row, "down_x"), csv.needed_number(row, "down_y"),
                      csv.needed_number(row, "down_z")};
     if (!(std::abs(vertical.down.norm() - 1) < 1e-3))
-      throw InputError(csv.where(row) + ": down_x, down_y, down_z are no unit vector");
+      throw InputError(csv.where(row) + ": down_x, down_y, down_z are not a unit vector; its length must be 1");
     vertical.down.normalize();
     vertical.covariance = covariance_of(csv, row, vertical.down);
     read_dependence(csv, row, block.cameras[block.camera_of(vertical.image)], vertical);
     if (!verticals.emplace(vertical.image, vertical).second)
-      throw InputError(csv.where(row) + ": image '" + name + "' appears twice");
+      throw InputError(csv.where(row) + ": image '" + name + "' appears twice; delete one of its lines");
   }
   block.verticals.clear();
   for (auto& [image, vertical] : verticals) block.verticals.push_back(std::move(vertical));
@@ -167,8 +169,8 @@ std::string set_aside_text(const Block& block, std::span<const SetAsideVertical>
   for (const auto& [verdict, reason] :
        {std::pair(VerticalVerdict::kContradicted, "contradicted by most others"),
         std::pair(VerticalVerdict::kNoConsensus, "that agree with too few others"),
-        std::pair(VerticalVerdict::kAgainstGround, "not down by the positions or attitudes"),
-        std::pair(VerticalVerdict::kAgainstPoses, "that show one direction, but not down by the given poses")}) {
+        std::pair(VerticalVerdict::kAgainstGround, "contradicted by the positions or attitudes"),
+        std::pair(VerticalVerdict::kAgainstPoses, "that agree with each other, but not with the given poses")}) {
     std::string names;
     std::size_t count = 0;
     for (const SetAsideVertical& vertical : aside) {
@@ -180,10 +182,13 @@ std::string set_aside_text(const Block& block, std::span<const SetAsideVertical>
   }
   std::string text =
       fmt::format("{} of {} verticals take{} no part: {}", aside.size(), all, aside.size() == 1 ? "s" : "", reasons);
-  if (2 * aside.size() > all) text += "; pictures from above show no vertical, leave out 'verticals' for them";
+  if (2 * aside.size() > all)
+    text += "; images from above show no vertical edges, remove their lines from the file of 'verticals'";
   if (std::any_of(aside.begin(), aside.end(),
                   [](const auto& a) { return a.verdict == VerticalVerdict::kAgainstPoses; }))
-    text += "; given poses may have axes that are not level: positions or control points say what is down";
+    text +=
+        "; the z axis of the given poses may not be vertical: add positions or control points, which define the "
+        "vertical";
   return text;
 }
 

@@ -1,11 +1,15 @@
-// The project file's `verticals`: where images see down, as `megablock verticals` writes them or an inclinometer says.
-// CSV, one row per image; rows without down_x are images without a vertical.
-//   image,down_x,down_y,down_z         camera axes (x right, y down, z along the view)
-//   sigma_roll_deg,sigma_pitch_deg,correlation    of measuring alone; or
-//   sigma_deg                                     the same across the direction in all azimuths
-//   camera,down_by_camera              optional: the camera's parameters it was found with, and the derivatives of
-//                                      down_x, down_y, down_z by each; numbers separated by spaces
-// Other columns are for the reader of the table.
+// Reads and writes the file that the project file names under `verticals`: the direction of the vertical in images.
+// `megablock verticals` finds these directions in the images; an inclinometer can measure them as well. The file is a
+// CSV file with one line per image; a line without down_x belongs to an image without a vertical. The columns are:
+//
+//     image,down_x,down_y,down_z                    unit vector downwards in camera axes (x right, y down, z along the
+//                                                   view)
+//     sigma_roll_deg,sigma_pitch_deg,correlation    errors of the measurement alone; or
+//     sigma_deg                                     the same for all directions across the vertical
+//     camera,down_by_camera                         optional: the camera parameters that were used, and the derivatives
+//                                                   of down_x, down_y, down_z by each; numbers separated by spaces
+//
+// Other columns are for people and are not read.
 #pragma once
 
 #include <cstdint>
@@ -19,24 +23,27 @@
 
 namespace megablock {
 
-// Replaces those of the block. Images named in `left_out` are passed over. InputError naming file:line for unknown and
-// repeated images, sigmas that are not positive, numbers that are none, a camera that has another model by now, or
-// parameters that lie three sigmas of an uncalibrated one from those in the file.
+// Replaces the verticals of the block. Lines of images in `left_out` are ignored. Throws InputError with file:line for
+// unknown and repeated images, for sigmas that are not positive, for malformed numbers, for a camera that now has
+// another model, and for a camera parameter that differs from the file's by more than three sigmas of an uncalibrated
+// camera.
 void read_verticals(const std::string& path, const std::vector<std::string>& left_out, Block& block);
 
-// The columns that are read, with roll and pitch (degrees); no line ends.
+// The header and a line of the file, without line ends. They also contain roll and pitch (degrees), for people.
 std::string verticals_header();
 std::string verticals_row(const SeenVertical& vertical, const std::string& image);
 
-// Of `down` by each of the camera's parameters, times its prior sigma (parameters without a prior: weak_sigmas).
+// The errors of `down` that come from the camera: for each parameter, the derivative times the prior sigma
+// (weak_sigmas for a parameter without a prior).
 Eigen::Matrix3Xd camera_error(const SeenVertical& vertical, const Camera& camera);
 
-// Down as a camera with these values sees it, with all its errors: of measuring, and what camera_error adds, the
-// same for all its images. For those who do not estimate the camera with it.
+// `down` for a camera with these values, with the covariance of its whole error: that of the measurement and that of
+// camera_error(), which all images of the camera share. It is for callers that do not estimate the camera together with
+// the verticals.
 AxisDirection whole_error(const SeenVertical& vertical, const Camera& camera, const Intrinsics& values);
 
-// "3 of 40 verticals take no part: 3 contradicted by most others (a.jpg, b.jpg, c.jpg)"; empty for none. `all`: with
-// them.
+// "3 of 40 verticals take no part: 3 contradicted by most others (a.jpg, b.jpg, c.jpg)"; empty if there are none. `all`
+// is the number of all verticals, these included.
 std::string set_aside_text(const Block& block, std::span<const SetAsideVertical> aside, std::size_t all);
 
 }  // namespace megablock

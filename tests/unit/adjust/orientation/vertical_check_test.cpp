@@ -284,7 +284,7 @@ TEST(VerticalCheck, GivenPosesInAxesOfTheirOwn) {
   const std::vector<SetAsideVertical> aside = against_given_poses(block);
   EXPECT_EQ(aside.size(), block.verticals.size());
   for (const SetAsideVertical& vertical : aside) EXPECT_EQ(vertical.verdict, VerticalVerdict::kAgainstPoses);
-  EXPECT_NE(set_aside_text(block, aside, aside.size()).find("axes that are not level"), std::string::npos);
+  EXPECT_NE(set_aside_text(block, aside, aside.size()).find("may not be vertical"), std::string::npos);
 
   const auto seen = [&](std::size_t v) {
     const SeenVertical& vertical = block.verticals[v];

@@ -100,7 +100,7 @@ TEST_F(CalibrationFile, UnknownNamesAreRefusedWithTheirPlace) {
   EXPECT_THAT(refusal("mounts:\n  c31: {rotation: [0, 0, 0], translation: [0, 0, 0]}\n"
                       "  c99: {rotation: [0, 0, 0], translation: [0, 0, 0]}\n"),
               AllOf(HasSubstr("calibration.yaml:3: the block has no rig camera 'c99'; it has 'c22'"),
-                    HasSubstr("check the names")));
+                    HasSubstr("correct its name")));
   EXPECT_THAT(refusal("cameras:\n  front: {focal_px: 1400}\n"),
               HasSubstr("calibration.yaml:2: the block has no camera 'front'"));
 }
@@ -123,7 +123,7 @@ TEST_F(CalibrationFile, RigCamerasWithoutEntryAreNamed) {
   write("calibration.yaml", "mounts:\n  c22: {rotation: [0, 0, 0], translation: [0, 0, 0]}\n");
   const Project project = read("calibration: calibration.yaml\n");
   ASSERT_EQ(project.warnings.size(), 2u);
-  EXPECT_THAT(project.warnings[0], HasSubstr("keeps the mount that it had"));
+  EXPECT_THAT(project.warnings[0], HasSubstr("keeps its previous mount"));
 }
 
 TEST_F(CalibrationFile, MountsOfOneCameraAreNumbered) {

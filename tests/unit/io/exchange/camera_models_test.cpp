@@ -101,13 +101,14 @@ TEST_F(CameraModelProject, KnowsEveryModel) {
 }
 
 TEST_F(CameraModelProject, RefusesByLine) {
-  EXPECT_THAT(refusal("    model: ign\n"), HasSubstr("block.yaml:4: model: 'ign' is no camera model; they are brown,"));
+  EXPECT_THAT(refusal("    model: ign\n"),
+              HasSubstr("block.yaml:4: model: 'ign' is not a camera model; the models are brown,"));
   EXPECT_THAT(refusal("    model: odd-radial-12\n"), HasSubstr("odd-radial-N (N = 1 to 9)"));
   EXPECT_THAT(refusal("    model: ign-radial\n    distortion: {k1: 0.1}\n"),
               HasSubstr("block.yaml:5: unknown key 'k1'"));
-  EXPECT_THAT(
-      refusal("    model: pinhole\n    calibrate: [k1]\n"),
-      HasSubstr("block.yaml:5: calibrate: 'k1' is no camera parameter; they are focal, principal_point, f, cx, cy"));
+  EXPECT_THAT(refusal("    model: pinhole\n    calibrate: [k1]\n"),
+              HasSubstr("block.yaml:5: calibrate: 'k1' is not a camera parameter; the parameters are focal, "
+                        "principal_point, f, cx, cy"));
   EXPECT_THAT(refusal("    model: legendre-2\n    calibrate: [width]\n"), HasSubstr("size of the image"));
   EXPECT_THAT(refusal("    model: equirectangular\n    focal_px: 300\n"), HasSubstr("block.yaml:5: the focal length"));
 }

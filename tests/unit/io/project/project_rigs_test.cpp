@@ -108,10 +108,10 @@ TEST_F(ProjectRigs, MissingImagesAreToldAndDoneWithout) {
   EXPECT_TRUE(frame("first")->given_pose);
   EXPECT_EQ(project.block.images.size(), 6u);
   ASSERT_EQ(project.warnings.size(), 3u);
-  EXPECT_THAT(project.warnings[0], HasSubstr("rig_assignments.json: 2 of 5 images are not in the images folder, "
+  EXPECT_THAT(project.warnings[0], HasSubstr("rig_assignments.json: 2 of 5 images are not in the folder of images, "
                                              "'right/9.jpg' for example"));
-  EXPECT_THAT(project.warnings[1], HasSubstr("pose of 'gone', which was left out"));
-  EXPECT_THAT(project.warnings[2], HasSubstr("pose of 'left/9.jpg', which was left out"));
+  EXPECT_THAT(project.warnings[1], HasSubstr("the pose of 'gone' is not used, because 'gone' was left out"));
+  EXPECT_THAT(project.warnings[2], HasSubstr("the pose of 'left/9.jpg' is not used"));
 }
 
 TEST_F(ProjectRigs, Refusals) {
@@ -125,7 +125,7 @@ TEST_F(ProjectRigs, Refusals) {
   EXPECT_THAT(refusal(kCameras, "[[1]]"), HasSubstr("exposure 1 must be a list of [image, rig camera]"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "top"]]])"), HasSubstr("rig camera 'top', which"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/9.jpg", "left"]]])"),
-              HasSubstr("assigns no image of the block; 'left/9.jpg' for example is not there"));
+              HasSubstr("no image of the block is assigned; 'left/9.jpg', for example, is not in the folder"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "left"]], [["left/1.jpg", "left"]]])"),
               HasSubstr("assigned twice"));
   EXPECT_THAT(refusal(kCameras, R"([[["left/1.jpg", "left"]], [["right/1.jpg", "left"]]])"),

@@ -315,7 +315,7 @@ TEST(Project, WarnsOfPosesFarFromThePositions) {
   move(800);
   EXPECT_THAT(project.warnings, ElementsAre(testing::ContainsRegex(
                                     "^given poses lie 1000 m \\(median\\) from the positions of the same 30 "
-                                    "frames: .*correct the poses")));
+                                    "frames, .*correct the poses")));
   for (Frame& frame : block.frames) frame.position_prior->sigma.setConstant(100);  // as good as these are
   move(0);
   EXPECT_THAT(project.warnings, IsEmpty());
@@ -335,8 +335,10 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, "images: nothing\n"), HasSubstr("block.yaml:1: images: no readable image"));
   EXPECT_THAT(refusal(folder, images + "gps:\n  sigma_horizontal_m: 3 m\n"),
               HasSubstr("block.yaml:3: gps.sigma_horizontal_m: '3 m' has text after the number"));
-  EXPECT_THAT(refusal(folder, images + "gps: {sigma_vertical_m: -1}\n"),
-              HasSubstr("block.yaml:2: sigma_vertical_m must lie in [1e-08, 1e+06], or be 0 for what is held, not -1"));
+  EXPECT_THAT(
+      refusal(folder, images + "gps: {sigma_vertical_m: -1}\n"),
+      HasSubstr(
+          "block.yaml:2: sigma_vertical_m must lie in [1e-08, 1e+06], or be 0 to hold the observed value, not -1"));
   for (const char* absurd : {"1e300", "1e-300"}) {
     const auto refused = [&](const std::string& text, const std::string& key) {
       const std::string value = absurd;
@@ -364,7 +366,8 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_mm: 3}}\n"), HasSubstr("belong together"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_px: 3, focal_mm: 3, sensor_mm: 2}}\n"),
               HasSubstr("not both"));
-  EXPECT_THAT(refusal(folder, images + "cameras: {default: {calibrate: [k9]}}\n"), HasSubstr("'k9' is no camera"));
+  EXPECT_THAT(refusal(folder, images + "cameras: {default: {calibrate: [k9]}}\n"),
+              HasSubstr("'k9' is not a camera parameter"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {mask: none.png}}\n"), HasSubstr("does not exist"));
   EXPECT_THAT(refusal(folder, images + "features: {max_features: [1, 2]}\n"), HasSubstr("must be one plain value"));
   EXPECT_THAT(refusal(folder, images + "features:\n  max_features:\n"), HasSubstr("block.yaml:3: "));
@@ -404,20 +407,21 @@ TEST_F(GivenBlock, PosesTakeThePlaceOfItsOwn) {
 }
 
 TEST_F(GivenBlock, KeysWithoutEffectAreRefused) {
-  EXPECT_EQ(refusal_of("gps: {lever_arm_m: [0, 0, 1]}\n"),
-            "block.yaml:3: 'lever_arm_m' is not used with 'block', whose positions have theirs; take it out");
+  EXPECT_EQ(
+      refusal_of("gps: {lever_arm_m: [0, 0, 1]}\n"),
+      "block.yaml:3: 'lever_arm_m' is not used with 'block', whose positions have their own lever arms; take it out");
   EXPECT_THAT(refusal_of("gps: {lever_arm: [0, 0, 1]}\n"),
               testing::AllOf(HasSubstr("lever_arm_m"), testing::Not(HasSubstr("lever_arm_m, lever_arm_m"))));
   EXPECT_EQ(refusal_of("cameras: {grouping: one}\n"),
-            "block.yaml:3: 'grouping' is not used with 'block', which says what its cameras are; take it out");
+            "block.yaml:3: 'grouping' is not used with 'block', whose file defines the cameras; take it out");
   EXPECT_EQ(refusal_of("attitude: {sigma_deg: 1}\n"),
             "block.yaml:3: 'attitude' is not used with a 'block' without attitudes; take it out");
   EXPECT_EQ(refusal_of("attitude: {use: false}\n"), "") << "is what the block is";
   std::filesystem::create_directories(folder_.path("masks"));
   EXPECT_EQ(refusal_of("masks: masks\n"),
-            "block.yaml:3: 'masks' is not used with a 'block' without pictures; take it out");
+            "block.yaml:3: 'masks' is not used with a 'block' without image files; take it out");
   EXPECT_EQ(refusal_of("cameras: {default: {mask: given.h5}}\n"),
-            "block.yaml:3: 'mask' is not used with a 'block' without pictures; take it out");
+            "block.yaml:3: 'mask' is not used with a 'block' without image files; take it out");
   for (const std::string section :
        {"features: {max_features: 10}", "candidates: {neighbours: 3}", "matching: {k_best: 3}"})
     EXPECT_THAT(refusal_of("gps: {use: true}\n" + section + "\n"),

@@ -140,10 +140,11 @@ TEST(ApproximatePoses, Refusals) {
   EXPECT_EQ(refusal(local + "frame0/0.jpg,32500000,5500000,3,0,0,0\n"), "");
   EXPECT_THAT(refusal("name,qw,qx,qy,qz,x,y,z\nframe0/0.jpg,1,0,0,0,1,2e8,3\n"),
               HasSubstr("p.csv:2: y: 2e+08" + remedy));
-  EXPECT_THAT(refusal(local + "none.jpg,1,2,3,0,0,0\n"), HasSubstr("p.csv:2: pose of 'none.jpg', which is no image"));
+  EXPECT_THAT(refusal(local + "none.jpg,1,2,3,0,0,0\n"),
+              HasSubstr("p.csv:2: the block has no image and no frame 'none.jpg'"));
   EXPECT_THAT(refusal(local + "frame0/0.jpg,1,2,3,0,0,0\nframe0/0.jpg,1,2,3,0,0,0\n"), HasSubstr("appears twice"));
   EXPECT_THAT(refusal("image,x_m,y_m,z_m,yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,1,2,3,0,-85,0\n"),
-              HasSubstr("p.csv:2: pitch_deg near -90 looks like a gimbal's angles"));
+              HasSubstr("p.csv:2: pitch_deg is near -90, as in the angles of a gimbal"));
   EXPECT_THAT(
       refusal("image,latitude_deg,longitude_deg,height_m,yaw_deg,pitch_deg,roll_deg\nframe0/0.jpg,97,1,1,0,0,0\n"),
       HasSubstr("p.csv:2"));

@@ -119,7 +119,7 @@ TEST_F(ControlFile, OpenSfmJson) {
   EXPECT_EQ(points[0].measurements[0].pixel, Eigen::Vector2d(100 + 0.25 * 200, 50 - 0.1 * 200));
   EXPECT_EQ(points[0].measurements[1].pixel, Eigen::Vector2d(100, 50)) << "the image's centre";
   EXPECT_EQ(points[1].role, PointRole::kCheck);
-  EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("json:5: point '1' has no position; left out")));
+  EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("json:5: point '1' is left out, because it has no 'position'")));
 }
 
 TEST_F(ControlFile, OpenSfmJsonRefusals) {

@@ -80,7 +80,7 @@ TEST_F(VerticalsFile, BadRowsAreNamed) {
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,0\n"), HasSubstr("sigma_deg must lie in ["));
   EXPECT_THAT(message(plain_ + "2.jpg,nan,1,0,0.1\n"), HasSubstr("down_x"));
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,nan\n"), HasSubstr("verticals.csv:2"));
-  EXPECT_THAT(message(plain_ + "2.jpg,0,1,1,0.1\n"), HasSubstr("no unit vector"));
+  EXPECT_THAT(message(plain_ + "2.jpg,0,1,1,0.1\n"), HasSubstr("not a unit vector"));
   EXPECT_THAT(message("image,down_x,down_y,down_z\n2.jpg,0,1,0\n"), HasSubstr("sigma_roll_deg"));
   const std::string angles =
       "image,down_x,down_y,down_z,sigma_roll_deg,sigma_pitch_deg,correlation,camera,down_by_camera\n";
@@ -88,7 +88,7 @@ TEST_F(VerticalsFile, BadRowsAreNamed) {
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,1,,\n"), HasSubstr("correlation"));
   EXPECT_THAT(message(angles + "2.jpg,0,0,1,0.1,0.1,0,,\n"), HasSubstr("straight down"));
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1 2,1 2 3\n"), HasSubstr("three numbers for each"));
-  EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 x 3\n"), HasSubstr("'x' is no number"));
+  EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 x 3\n"), HasSubstr("'x' is not a number"));
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 2 3\n"), HasSubstr("another model"));
 }
 
@@ -147,8 +147,8 @@ TEST_F(VerticalsFile, WhatIsSetAsideIsSaidByReason) {
   const std::string all = set_aside_text(
       block_, std::vector<SetAsideVertical>{{ImageIndex(0), kNoConsensus}, {ImageIndex(1), kAgainstGround}}, 2);
   EXPECT_EQ(all, "2 of 2 verticals take no part: 1 that agree with too few others (" + first +
-                     "), 1 not down by the positions or attitudes (" + second +
-                     "); pictures from above show no vertical, leave out 'verticals' for them");
+                     "), 1 contradicted by the positions or attitudes (" + second +
+                     "); images from above show no vertical edges, remove their lines from the file of 'verticals'");
 }
 
 }  // namespace
