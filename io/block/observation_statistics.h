@@ -37,7 +37,7 @@ enum class ObservationKind : std::uint8_t {
 struct ObservationKindRow {
   const char* name;              // for tables
   const char* word;              // for json and HDF5
-  bool estimates_sigma = false;  // adjustment: {estimate_sigmas: true} (adjust/tile/sigma_scales.h)
+  bool estimates_sigma = false;  // merge: {estimate_sigmas: true} scales its sigma (adjust/tile/sigma_scales.h)
 };
 inline constexpr ObservationKindRow kObservationKindTable[] = {
     {"image, tie points", "image_tie"},

@@ -1,4 +1,4 @@
-// What a rig calibration found, for people and for programs.
+// Writes the result of a rig calibration as a table for people and as JSON for programs.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace megablock {
 
-// Table for the terminal: a line per camera, the comparison with the start, warnings.
+// A table for the terminal: one line per camera, the comparison with the rig at the start, and warnings.
 std::string calibration_text(const RigCalibration& calibration);
 
-// All figures (keys carry their units; null where unknown).
+// All figures. The keys contain the units; unknown figures are null.
 std::string calibration_json(const RigCalibration& calibration);
 }  // namespace megablock

@@ -28,7 +28,8 @@ struct Match {
   Pose truth;
 };
 
-// Sum of normalised squares of the errors whose covariance is positive definite.
+// Collects the normalised squares e'C^-1 e / 3 of errors. Errors whose covariance is not positive definite are left
+// out.
 class NormalisedError {
  public:
   void add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
@@ -58,7 +59,7 @@ class RootMeanSquare {
   std::int64_t count_ = 0;
 };
 
-// Oriented frames of the result with their true poses, in block order.
+// The oriented frames of the result with their true poses, in the order of the block.
 std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& truth) {
   std::unordered_map<std::string, std::size_t> row;
   for (std::size_t i = 0; i < truth.names.size(); ++i) row.emplace(truth.names[i], i);
@@ -82,7 +83,7 @@ std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& tru
   return matches;
 }
 
-// Nothing but the images fixes the datum.
+// Whether nothing except the images determines the datum.
 bool is_free(const BlockResult& result) {
   if (!result.gauge.empty()) return result.gauge.starts_with("free");
   for (std::size_t f = 0; f < result.block.frames.size(); ++f) {
@@ -102,11 +103,13 @@ Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
   }
   const auto similarity = matches.size() >= 3 ? fit_similarity(from, to) : std::nullopt;
   if (!similarity)
-    throw InputError("the result is a free block: at least three frames at different places are needed to align it");
+    throw InputError(
+        "the datum of the result is free, and fewer than three of its frames at different places have a true pose; "
+        "give a truth with at least three");
   return *similarity;
 }
 
-// The truth in the result's ground frame, where both say which theirs is.
+// The truth in the ground frame of the result, if both frames are known; otherwise the truth as it is.
 PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
   const auto same = [](double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; };
   if (!truth.ground || !truth.ground->georeferenced || !ground.georeferenced) return truth;
@@ -143,7 +146,7 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     position.add(error.squaredNorm());
     rotation.add(angle.squaredNorm());
     largest = std::max(largest, error.norm());
-    // Neighbours follow one another in their pass.
+    // Successive frames of one pass are neighbours.
     const auto& frames = result.block.frames;
     if (i > 0 && matches[i - 1].frame.value == m.frame.value - 1 &&
         frames[matches[i - 1].frame].pass == frames[m.frame].pass)
@@ -186,7 +189,7 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
     const ControlPoint& point = result.block.control_points[i];
     const BlockResult::ControlResult& found = result.control[i];
     const Eigen::Vector3d error = found.adjusted - point.position;
-    const bool known = !found.residual_px.empty();  // what of it takes part
+    const bool known = !found.residual_px.empty();  // whether the result tells which measurements take part
     if (!error.allFinite() || (known && !found.takes_part())) continue;
     (point.role == PointRole::kCheck ? check : control).add(error.squaredNorm());
     if (point.role != PointRole::kCheck) continue;
@@ -215,7 +218,8 @@ Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const Eva
   const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
   const double variance_factor = options.scale_sigma && !result.sigma_scaled ? result.variance_factor : 1;
   evaluate_frames(result, matches, similarity, variance_factor, evaluation);
-  // The positions of check points are in the ground frame of the block: nothing to compare with when it is free.
+  // The given positions of check points are in the ground frame of the block. A free block is in another frame, so they
+  // cannot be compared.
   if (!evaluation.aligned) evaluate_control(result, variance_factor, evaluation);
   return evaluation;
 }
@@ -228,7 +232,7 @@ Evaluation evaluate_control(const BlockResult& result) {
 
 Evaluation evaluate(const BlockResult& result, const BlockState& truth, const EvaluateOptions& options) {
   if (truth.frames.size() != result.block.frames.size())
-    throw InputError("the truth has " + std::to_string(truth.frames.size()) + " frames, the result " +
+    throw InputError("the truth has " + std::to_string(truth.frames.size()) + " frames, but the result has " +
                      std::to_string(result.block.frames.size()) + "; give the truth as a CSV file of poses instead");
   PoseTable table = pose_table(result.block, truth);
   return evaluate(result, table, options);
@@ -268,7 +272,7 @@ std::string to_text(const Evaluation& e) {
 }
 
 std::string to_json(const Evaluation& e) {
-  nlohmann::ordered_json json;  // a value that is not a number is written as null
+  nlohmann::ordered_json json;  // NaN is written as null
   json["frames"] = e.frames;
   json["frames_missing"] = e.frames_missing;
   json["aligned"] = e.aligned;

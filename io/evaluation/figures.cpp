@@ -17,17 +17,17 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::int64_t kSampleLimit = 100000;  // points that medians are taken from
-constexpr std::int64_t kRayLimit = 24;         // rays of a track compared for its intersection angle
+constexpr std::int64_t kSampleLimit = 100000;  // medians are taken from a sample of at most so many points
+constexpr std::int64_t kRayLimit = 24;         // at most so many rays of a track are compared for its largest angle
 
-// The columns of the tracks are there for all of them.
+// Whether all columns have a row for each track or observation.
 bool consistent(const TrackResults& tracks) {
   const std::size_t rows = tracks.tracks.image.size();
   return tracks.points.size() == tracks.tracks.id.size() && tracks.kept.size() == rows &&
          tracks.residual_x.size() == rows && tracks.residual_y.size() == rows;
 }
 
-// The observations of one triangulated point that count.
+// The kept observations of one triangulated point.
 struct Track {
   std::vector<std::size_t> kept;
   std::int64_t all = 0;
@@ -44,7 +44,7 @@ Track track_of(const TrackResults& result, std::size_t row) {
   return track;
 }
 
-// Tests of the measurements, with the limits of the block, and the largest of them.
+// Tests single observations with the limits that hold for the block, and keeps the largest test values.
 struct Tests {
   double normal_limit = normal_critical_value(), tau_limit, sigma_0, shift = least_shift();
 
@@ -69,8 +69,8 @@ struct Tests {
   }
 };
 
-// Counts what is near the limit of screening, a length of max_residual_sigmas sigmas, of a block whose datum is free:
-// of others nobody asks, and they have up to 10^9 measurements.
+// Counts the residuals near the limit of screening, which is a length of max_residual_sigmas sigmas. Only blocks with a
+// free datum are counted: no remark needs the number of others, and these may have 10^9 observations.
 class LimitCounter {
  public:
   explicit LimitCounter(const BlockResult& result) {
@@ -122,12 +122,13 @@ class Gatherer {
   }
 
  private:
-  // A pass over the images goes through their table and that of the frames piece by piece.
+  // Calls after_reading_ at regular intervals of a loop over all images, which reads their table and that of the
+  // frames.
   void rest_at(ImageIndex image) const {
     if (image.value % kImagesAtATime == 0) after_reading_();
   }
 
-  // The state is there for all that the block names.
+  // Whether the state has values for all frames, cameras and rigs of the block.
   bool complete() const {
     return result_.state.oriented.size() == block_.frames.size() &&
            result_.state.frames.size() == block_.frames.size() &&
@@ -182,7 +183,7 @@ class Gatherer {
   void observations() {
     const auto step = static_cast<std::size_t>(1 + tracks_.track_count() / kSampleLimit);
     std::vector<double> resolution;
-    std::size_t before = 0;  // tracks of the batches before
+    std::size_t before = 0;  // number of tracks in earlier batches
     LimitCounter near_limit(result_);
     tracks_.visit([&](const TrackResults& batch) {
       near_limit.add(batch);
@@ -262,9 +263,10 @@ class Gatherer {
       residual.point = p;
       measurements(p, residual);
       residual.difference = control.adjusted - given.position;
-      if (residual.images == 0) residual.difference.setConstant(kUnknown);  // it stays where it was given
+      if (residual.images == 0) residual.difference.setConstant(kUnknown);  // it keeps its given position
       const bool check = given.role == PointRole::kCheck;
-      const double factor = result_.sigma_scaled && !check ? result_.variance_factor : 1;  // as the covariance has it
+      // The covariance of the result may be scaled; a variance that is subtracted from must have the same scale.
+      const double factor = result_.sigma_scaled && !check ? result_.variance_factor : 1;
       for (int k = 0; k < 3; ++k) {
         const double given_variance = factor * given.sigma[k] * given.sigma[k];
         const double variance = given_variance + (check ? 1 : -1) * control.covariance(k, k);
@@ -315,7 +317,7 @@ class Gatherer {
     f_.point_sigma_up = spread(std::move(point_up_));
   }
 
-  // Of an observation that counts.
+  // Tests both coordinates of a kept observation.
   void reliability(const TrackResults& batch, std::size_t row, std::size_t o, bool sampled) {
     if (batch.redundancy_x.empty() || !(result_.image_sigma_px > 0)) return;
     const std::array<std::pair<float, std::uint8_t>, 2> axes = {std::pair(batch.residual_x[o], batch.redundancy_x[o]),
@@ -347,7 +349,7 @@ class Gatherer {
   const TrackBatches& tracks_;
   const std::function<void()>& after_reading_;
   Tests tests_;
-  std::vector<double> detectable_px_;  // of a sample of the tracks
+  std::vector<double> detectable_px_;  // smallest detectable errors, from a sample of the tracks
   double least_redundancy_ = 1;
   std::vector<double> point_horizontal_, point_up_;  // sigmas of a sample of the points, m
   Figures f_;
@@ -384,7 +386,7 @@ bool oriented(const BlockResult& result, FrameIndex frame) {
 
 std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before,
                                      const std::function<void()>& after_reading) {
-  std::vector<ImageIndex> first;  // a heap, its last on top
+  std::vector<ImageIndex> first;  // a heap with the last of the selected images on top
   for (ImageIndex image(0); result.block.images.contains(image) && count > 0; ++image.value) {
     if (image.value % kImagesAtATime == 0) after_reading();
     if (!oriented(result, result.block.images[image].frame)) continue;

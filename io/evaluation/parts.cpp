@@ -1,5 +1,5 @@
-// Parts of the block that hang together: frames joined by a kept observation of the same tie, control or check point,
-// or by a relative pose.
+// Finds the connected parts of a block. Two frames are connected if both have a kept observation of the same tie,
+// control or check point, or if there is a relative pose between them.
 #include "io/evaluation/parts.h"
 
 #include <algorithm>

@@ -1,11 +1,11 @@
-// Parts of a block that hang together by common points or relative poses.
+// Finds the parts of a block that common points or relative poses connect.
 #pragma once
 
 #include "io/evaluation/figures.h"
 
 namespace megablock::report {
 
-// Fills in parts and part_of_frame.
+// Fills in Figures::parts and Figures::part_of_frame.
 void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures);
 
 }  // namespace megablock::report

@@ -32,7 +32,8 @@ double probability_of_one(std::int64_t count, double probability) {
   return -std::expm1(std::log1p(-probability) / static_cast<double>(std::max<std::int64_t>(1, count)));
 }
 
-// With both tails: Baarda's nomograms leave out that w may exceed the bound on the other side, 1e-13 here.
+// Both tails are counted. Baarda's nomograms neglect that w may exceed the critical value on the other side; the
+// difference is 1e-13 here.
 double least_shift(double false_alarm, double detection) {
   const double bound = normal_critical_value(false_alarm);
   double low = 0, high = bound + normal_quantile(1 - detection) + 1;

@@ -18,18 +18,18 @@ namespace megablock {
 
 namespace {
 
-constexpr std::size_t kNamed = 5;           // points by name
-constexpr std::size_t kParts = 5;           // of a free datum, described
-constexpr double kUnusableRotationDeg = 5;  // sigma beyond which attitudes and heights are no result
-constexpr double kMisstated = 2;            // times the stated sigma, beyond what chance explains
-// Of tie points. Pairs are verified to 3 px across the epipolar line (matching.max_residual_px), two sigmas of what
-// three times the default lets expect: measuring alone leaves no more.
+constexpr std::size_t kNamed = 5;           // number of points or frames that a line names
+constexpr std::size_t kParts = 5;           // number of parts with a free datum that are described
+constexpr double kUnusableRotationDeg = 5;  // attitudes and heights with a larger sigma of the rotation are useless
+constexpr double kMisstated = 2;            // residuals that are so many times the stated sigmas get a line
+// The same for tie points. Pairs are verified to 3 px across the epipolar line (matching.max_residual_px), which is two
+// sigmas of three times the default. Errors of matching alone therefore give no larger factor.
 constexpr double kMisstatedImage = 3;
-constexpr double kContradicted = 6;  // sigmas; one of 14 million normal deviates in three dimensions is beyond
+constexpr double kContradicted = 6;  // sigmas; one of 14 million normal deviates in three dimensions is larger
 
 constexpr const char* kAboutTheVertical = " about the vertical";
 
-// Pixels from fractions to nonsense: 12.3, 4810, 1.4e6.
+// A length in pixels, which may be impossibly large: 12.3, 4810, 1.4e6.
 std::string pixels(double value) {
   if (value < 100) return fmt::format("{:.1f}", value);
   if (value < 1e5) return fmt::format("{:.0f}", value);
@@ -37,12 +37,13 @@ std::string pixels(double value) {
   return fmt::format("{:.1f}e{}", value / std::pow(10, power), power);
 }
 
-// What places a part: positions of its frames and control points that hold, and whether any attitude is observed.
+// The observations that place a part: the number of positions (of frames and of control points that take part), and the
+// number of attitudes.
 struct Placing {
   std::int64_t positions = 0, attitudes = 0;
 };
 
-// Median sigma of the part's frames, largest axis.
+// Median over the frames of a part of the largest sigma of the rotation, degrees.
 double rotation_deg_of(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
   std::vector<double> sigmas;
   for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
@@ -70,7 +71,8 @@ Placing placing_of(const BlockResult& result, const report::Figures& figures, st
   return placing;
 }
 
-// Several positions leave a rotation free only when they lie on a line (merge/datum/gauge.h).
+// The datum parameters that are undetermined. Several positions leave one rotation free only if they lie on a line
+// (merge/datum/gauge.h).
 std::string undetermined(int defect, const Placing& placing) {
   if (defect >= 7) return "place, direction and scale";
   if (defect == 6) return "place and direction";
@@ -81,7 +83,7 @@ std::string undetermined(int defect, const Placing& placing) {
   return fmt::format("{} of the seven parameters of place, direction and scale", defect);
 }
 
-// Direction of an axis of the ground (east or x, north or y, up), whichever way it points.
+// Describes an axis in the ground frame (east or x, north or y, up). Its sign does not matter.
 std::string axis_text(Eigen::Vector3d axis) {
   constexpr double kNear = 20;  // degrees
   if (axis.z() < 0) axis = -axis;
@@ -95,7 +97,7 @@ std::string axis_text(Eigen::Vector3d axis) {
   return fmt::format(" about a level axis of azimuth {:.0f} degrees", azimuth);
 }
 
-// Of the ground, where the rotations' sigmas are largest by far; empty where there is no such axis.
+// The axis about which the rotations are least certain by far; empty if there is no such axis.
 std::string weak_axis(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
@@ -106,13 +108,13 @@ std::string weak_axis(const BlockResult& result, const report::Figures& figures,
   return axis_text(eigen.eigenvectors().col(2));
 }
 
-// A remedy for rotations about anything but the vertical; the block may have it already.
+// Verticals as a remedy for rotations about other axes than the vertical; empty if the block has verticals already.
 std::string or_verticals(const BlockResult& result) {
   return result.block.verticals.empty() ? ", or verticals where walls are seen ('megablock verticals')" : "";
 }
 
-// Of a part with positions most of which the block contradicts: these have hardly any weight, so its datum seems free
-// although it is observed. Empty for others.
+// Describes a part most of whose positions the block contradicts. The robust loss gives them hardly any weight, so the
+// datum seems free although it is observed. Empty for other parts.
 std::string positions_without_hold(const report::Figures& figures, std::int32_t part) {
   std::vector<double> distances;
   std::size_t positions = 0;
@@ -125,8 +127,8 @@ std::string positions_without_hold(const report::Figures& figures, std::int32_t 
   const std::size_t wrong = distances.size();
   const double median = report::spread(std::move(distances)).median;
   return fmt::format(
-      "{} of its {} positions are given but do not hold it, as they differ from the block by {:.{}f} m (median): start "
-      "values ('poses') that are far off, or positions in another coordinate system; correct these and run again",
+      "{} of its {} positions do not determine it, because they differ from the block by {:.{}f} m (median): correct "
+      "start values ('poses') that are far off, or positions in another coordinate system, and run again",
       wrong, positions, median, median < 10 ? 2 : 0);
 }
 
@@ -139,7 +141,7 @@ std::string consequence(const BlockResult& result, int defect, const Placing& pl
   return "coordinates are not usable as they are; add positions, attitudes or control points";
 }
 
-// What remarks need of a report's figures; none before anything was oriented.
+// The figures of the report that remarks need; empty before the orientation.
 report::Figures figures_for_remarks(const BlockResult& result, const TrackBatches& tracks) {
   report::Figures figures;
   if (result.state.oriented.size() != result.block.frames.size()) return figures;
@@ -154,14 +156,14 @@ struct Contradiction {
   double sigmas = 0, size = 0;  // of the difference; metres or degrees
 };
 
-// Frames whose observed position or attitude the block contradicts, worst first, as text; empty without any.
+// Names the frames whose observed position or attitude the block contradicts, worst first; empty if there are none.
 template <typename Residual>
 std::string contradicted_text(const BlockResult& result, const std::vector<Residual>& residuals, double held_sigma,
                               const char* kind, double unit, const char* unit_name) {
   std::vector<Contradiction> wrong;
   std::int64_t observed = 0;
   for (const Residual& r : residuals) {
-    if (r.sigma.minCoeff() <= 2 * held_sigma) continue;  // held: the block was put there
+    if (r.sigma.minCoeff() <= 2 * held_sigma) continue;  // the adjustment held this value, so it has no residual
     ++observed;
     const double sigmas = r.difference.cwiseQuotient(r.sigma).norm();
     if (sigmas > kContradicted) wrong.push_back({r.frame, sigmas, r.difference.norm() * unit});
@@ -177,7 +179,7 @@ std::string contradicted_text(const BlockResult& result, const std::vector<Resid
   return text;
 }
 
-// "positions are held", "positions are stated to 0.01 m" (median); empty without any.
+// "positions are held", "positions are stated to 0.01 m" (median sigma); empty if there are none.
 std::string stated_text(const char* kind, std::vector<double> sigmas, double held_sigma, const char* unit) {
   if (sigmas.empty()) return "";
   const double sigma = report::spread(std::move(sigmas)).median;
@@ -185,7 +187,7 @@ std::string stated_text(const char* kind, std::vector<double> sigmas, double hel
                                  : fmt::format("{} are stated to {:.2g} {}", kind, sigma, unit);
 }
 
-// What else than tie points places the oriented frames, and how exactly it is stated.
+// Lists the observations other than tie points that place the oriented frames, with their stated sigmas.
 std::string placing_text(const BlockResult& result) {
   std::vector<double> positions, attitudes;
   for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
@@ -207,7 +209,8 @@ std::string placing_text(const BlockResult& result) {
   return text;
 }
 
-// Sigma naught does not show what bends the tie points where their sigma is estimated: it is estimated with them.
+// Compares the residuals of tie points with the sigma that the options assume. Sigma naught does not show large
+// residuals if the sigma of the tie points is estimated, because it is estimated from the same residuals.
 std::string image_sigma_text(const BlockResult& result) {
   const std::string stated = option_of(result, "adjustment.image_sigma_px");
   const double factor = result.observation_table[ObservationKind::kTieImage].sigma_factor();
@@ -216,10 +219,10 @@ std::string image_sigma_text(const BlockResult& result) {
   if (!(assumed > 0 && shown > kMisstatedImage * assumed)) return "";
   const std::string placing = placing_text(result);
   return fmt::format(
-      "Tie points fit to {:.1f} px only, {:.1f} times the {} px that adjustment.image_sigma_px assumes: {}the camera "
-      "model is wrong, or many matches are{}",
+      "Tie points fit to {:.1f} px only, {:.1f} times the {} px of adjustment.image_sigma_px: {}the camera model is "
+      "wrong, or many matches are wrong{}",
       shown, shown / assumed, stated,
-      placing.empty() ? "" : "what places the block contradicts the images (" + placing + "), ",
+      placing.empty() ? "" : "the observations that place the block contradict the images (" + placing + "), ",
       placing.empty() ? "; see cameras and images in the report"
                       : "; state larger sigmas, and run with 'adjustment: {use_position_priors: false, "
                         "use_attitude_priors: false}' to see how the images alone fit");
@@ -274,7 +277,7 @@ std::vector<std::string> datum_texts(const BlockResult& result) {
 
 std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines;
-  if (result.state.oriented.size() != result.block.frames.size()) return lines;  // nothing was oriented yet
+  if (result.state.oriented.size() != result.block.frames.size()) return lines;  // before the orientation
   std::size_t free = 0;
   for (std::size_t p = 0; p < figures.parts.size(); ++p) {
     const report::BlockPart& part = figures.parts[p];
@@ -308,6 +311,7 @@ double chance_of_factor(const ObservationStatistics& statistics) { return 5 / st
 std::vector<std::string> misstated_texts(const BlockResult& result) {
   using enum ObservationKind;
   std::vector<std::string> lines;
+  const bool estimated = option_of(result, "merge.estimate_sigmas") == "true";
   if (std::string text = image_sigma_text(result); !text.empty()) lines.push_back(std::move(text));
   for (std::size_t k = 0; k < kObservationKinds; ++k) {
     const auto kind = static_cast<ObservationKind>(k);
@@ -316,10 +320,12 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
     if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, 1 + chance_of_factor(s)))) continue;
     const bool weighed = kind >= kPositionHorizontal && kind <= kRelativePosition;
     lines.push_back(
-        fmt::format("Residuals of {} ({}) are {:.1f} times what the stated sigmas let expect: some are wrong, or the "
-                    "sigmas are too small{}",
+        fmt::format("Residuals of {} ({}) are {:.1f} times as large as the stated sigmas predict: some observations "
+                    "are wrong, or the sigmas are too small{}",
                     name_of(kind), s.count, factor,
-                    weighed ? "; 'merge: {estimate_sigmas: true}' weighs them by what they show" : ""));
+                    !weighed    ? ""
+                    : estimated ? "; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"
+                                : "; 'merge: {estimate_sigmas: true}' estimates these sigmas from the residuals"));
   }
   return lines;
 }
@@ -333,22 +339,23 @@ std::vector<std::string> contradicted_texts(const BlockResult& result, const rep
   return lines;
 }
 
-// A tile decides which of its measurements take part, at first by itself. Clean blocks have half of what normal errors
-// leave near the limit and less, photographs 1.7 to 3.8 times as many, the BAL problem of Dubrovnik 2.9 to 3.3 times.
-// What the tiles change shows where images alone place the block: one tile and several differ by up to 29 sigmas of the
-// rotations (BAL) and by 1.1 (167 photographs without their positions; 0.1 with positions of metres, which hide it).
+// Each tile at first decides alone which of its observations take part. Blocks without outliers have at most half as
+// many observations near the limit as normal errors give; real images have 1.7 to 3.8 times as many, and the BAL
+// problem of Dubrovnik 2.9 to 3.3 times. The choice of tiles matters if images alone place the block: the results with
+// one tile and with several differ by up to 29 sigmas of the rotations (BAL), and by 1.1 (167 real images without their
+// positions). With positions to some metres the difference is hidden (0.1).
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures) {
-  constexpr double kMany = 2.5, kChance = 5;  // times as many as expected; standard deviations
+  constexpr double kMany = 2.5, kChance = 5;  // limits: times the expected number, and standard deviations above it
   const report::NearLimit& found = figures.near_limit;
   const double expected = found.expected * static_cast<double>(found.tested);
   const auto near = static_cast<double>(found.near);
   if (!(near > std::max(kMany * expected, expected + kChance * std::sqrt(expected + 1)))) return "";
   return fmt::format(
-      "{} of {} tie point measurements ({:.2f} %) lie within {:.0f} % of the limit of screening, {:.1f} times as many "
-      "as normal errors would: which of them are kept, and with them poses and estimated sigmas, by a sigma and more, "
-      "depend on how the block is tiled; "
-      "'adjustment: {{image_sigma_px: {:.2g}, estimate_image_sigma: false, max_residual_sigmas: 1000}}' leaves them to "
-      "the loss alone, which does not",
+      "{} of {} tie point observations ({:.2f} %) lie within {:.0f} % of the limit of screening, {:.1f} times as many "
+      "as normal errors would: the division into tiles decides which of them are kept, and changes poses and estimated "
+      "sigmas by a sigma and more; "
+      "with 'adjustment: {{image_sigma_px: {:.2g}, estimate_image_sigma: false, max_residual_sigmas: 1000}}' all are "
+      "kept, and only the robust loss weights them, in every division alike",
       found.near, found.tested, 100 * found.share(), 100 * report::NearLimit::kNear, found.share() / found.expected,
       result.image_sigma_px);
 }

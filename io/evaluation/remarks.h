@@ -1,4 +1,5 @@
-// What a reader of a result must not overlook, in plain words without markup: for the terminal and the report.
+// Remarks about weaknesses of a result that its reader must not overlook. The terminal and the report print the same
+// texts, which are therefore plain text without markup.
 #pragma once
 
 #include <string>
@@ -13,41 +14,42 @@ namespace report {
 struct Figures;
 }
 
-// A control or check point that no measurement holds: all were rejected, or none lies in an oriented image.
+// A control or check point without any measurement that takes part: all were rejected, or none is in an oriented image.
 struct UnusedPoint {
-  std::size_t point = 0;  // in block.control_points
-  ImageIndex image;       // of the worst measurement; invalid: none lies in an oriented image
-  double worst_px = 0;    // its residual
+  std::size_t point = 0;  // row of block.control_points
+  ImageIndex image;       // the image of the worst measurement; invalid: none is in an oriented image
+  double worst_px = 0;    // the residual of this measurement
 };
-// Worst first; none when the result holds no points.
+// The unused points, worst first. Empty if the result has no points.
 std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role);
 
-// "2 control points take no part: 3 (1.4e6 px in 02.jpg), 7 (not seen by an oriented image)"; empty without such.
+// "2 control points take no part: 3 (1.4e6 px in 02.jpg), 7 (not seen by an oriented image)"; empty if there are none.
 std::string unused_points_text(const BlockResult& result, PointRole role);
 
-// What the observations leave undetermined of the datum, a line per part of the block whose datum is free, and whether
-// its rotations are known to several degrees only: "The datum is free: nothing determines the rotation about the line
-// of the positions (sigma of the rotations 28 degrees): ... add attitudes or control points ...". Empty for a sound
-// datum.
+// One line for each part of the block whose datum the observations do not determine, or whose rotations they determine
+// only to several degrees: "The datum is free: nothing determines the rotation about the line of the positions (sigma
+// of the rotations 28 degrees): ... add attitudes or control points ...". Empty if the datum is well determined.
 std::vector<std::string> datum_texts(const BlockResult& result);
-std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures);  // parts are enough
+// `figures` needs only its parts and position residuals.
+std::vector<std::string> datum_texts(const BlockResult& result, const report::Figures& figures);
 
-// Kinds of observations whose residuals are several times what their stated sigmas let expect, a line each, with what
-// can be done. Sigma naught does not show them: it is that of the tie points, which are many. Of tie points: several
-// times what the job's options assume, however their sigma was estimated.
+// One line for each kind of observation whose residuals are several times as large as the stated sigmas predict, with
+// advice. Sigma naught does not show such kinds, because tie points, which are far more, dominate it. The residuals of
+// tie points are compared with the sigma that the options of the job assume, even if their sigma was estimated.
 std::vector<std::string> misstated_texts(const BlockResult& result);
-// Single positions and attitudes that the block contradicts by many times their sigmas, a line for each of the two, the
-// worst by name: "6 of 18 attitudes differ from the block by more than 6 sigmas: DJI_0034.JPG by 178.9 degrees, ...".
-// Robust losses keep them from bending the block, and so from the statistics of their kind.
+// Single positions and attitudes that the block contradicts by many times their sigmas, one line for each of the two
+// kinds, which names the worst: "6 of 18 attitudes differ from the block by more than 6 sigmas: DJI_0034.JPG by 178.9
+// degrees, ...". Robust losses give them little weight, so they hardly appear in the statistics of their kind.
 std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures);
-// Whether so many tie point observations of a block without a datum of its own are near the limit of screening that the
-// result depends on the tiles: "359 of 83718 tie point observations (0.43 %) lie within 10 % of the limit of screening,
-// ...". Empty where not.
+// A line if so many tie point observations of a block with a free datum are near the limit of screening that the result
+// depends on the tiles: "359 of 83718 tie point observations (0.43 %) lie within 10 % of the limit of screening, ...".
+// Empty otherwise.
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures);
-// By how much a factor between shown and stated sigma differs from one by chance: five standard deviations.
+// The largest difference from one that the factor between shown and stated sigma has by chance: five standard
+// deviations.
 double chance_of_factor(const ObservationStatistics& statistics);
 
-// All of this file, one line each.
+// All remarks of this file, one line each.
 std::vector<std::string> remarks(const BlockResult& result);
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks);
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures);

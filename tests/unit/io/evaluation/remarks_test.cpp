@@ -57,12 +57,12 @@ TEST(Remarks, SaysInPlainWordsWhatAFreeDatumLeavesOpen) {
 TEST(Remarks, NamesPositionsThatDoNotHoldTheDatum) {
   BlockResult result = made_up_result(small_block());
   result.free_parts = {{FrameIndex(0), 4}};
-  EXPECT_THAT(datum_texts(result).at(0), testing::Not(HasSubstr("do not hold it")));
+  EXPECT_THAT(datum_texts(result).at(0), testing::Not(HasSubstr("do not determine it")));
   for (Frame& frame : result.block.frames) frame.position_prior->position.x() += 1000;
   EXPECT_THAT(datum_texts(result).at(0),
               testing::AllOf(HasSubstr("The datum is free: nothing determines "),
-                             HasSubstr("; 59 of its 59 positions are given but do not hold it, as they differ from the "
-                                       "block by 1000 m (median): start values ('poses') that are far off"),
+                             HasSubstr("; 59 of its 59 positions do not determine it, because they differ from the "
+                                       "block by 1000 m (median): correct start values ('poses') that are far off"),
                              testing::Not(HasSubstr("add positions"))));
 }
 
@@ -96,8 +96,7 @@ TEST(Remarks, TiePointsThatFitFarWorseThanAssumed) {
   result.image_sigma_px = 3.9;
   EXPECT_TRUE(remark().empty()) << "what was assumed is not known";
   result.provenance.options.push_back({"adjustment.image_sigma_px", "0.5", "0.5"});
-  const std::string start =
-      "Tie points fit to 3.9 px only, 7.8 times the 0.5 px that adjustment.image_sigma_px assumes: ";
+  const std::string start = "Tie points fit to 3.9 px only, 7.8 times the 0.5 px of adjustment.image_sigma_px: ";
   result.block.control_points.clear();
   for (Frame& frame : result.block.frames) {
     frame.position_prior =
@@ -107,16 +106,17 @@ TEST(Remarks, TiePointsThatFitFarWorseThanAssumed) {
   ASSERT_EQ(remark().size(), 1u);
   EXPECT_EQ(remark()[0],
             start +
-                "what places the block contradicts the images (positions are held, attitudes are stated to 0.5 "
-                "degrees), the camera model is wrong, or many matches are; state larger sigmas, and run with "
+                "the observations that place the block contradict the images (positions are held, attitudes are stated "
+                "to 0.5 degrees), the camera model is wrong, or many matches are wrong; state larger sigmas, and run "
+                "with "
                 "'adjustment: {use_position_priors: false, use_attitude_priors: false}' to see how the images "
                 "alone fit");
   EXPECT_THAT(report_html(result), testing::AllOf(HasSubstr("<li class=look>Tie points fit to 3.9 px only"),
                                                   testing::Not(HasSubstr("Residuals agree with the stated sigmas"))));
   for (Frame& frame : result.block.frames) frame.position_prior.reset(), frame.attitude_prior.reset();
   EXPECT_EQ(remark()[0],
-            start + "the camera model is wrong, or many matches are; see cameras and images in the report");
-  result.image_sigma_px = 1.4;  // blurred pictures
+            start + "the camera model is wrong, or many matches are wrong; see cameras and images in the report");
+  result.image_sigma_px = 1.4;  // blurred images
   EXPECT_TRUE(remark().empty());
   result.image_sigma_px = 0.5;  // held, and the residuals say otherwise
   result.observation_table[ObservationKind::kTieImage] = {1000, 9 * 900, 900, 1};
@@ -146,7 +146,7 @@ TEST(Remarks, ManyMeasurementsNearTheLimitOfScreening) {
     result.residual_y[o] = near % 2 ? -1.65F : 1.95F;
   }
   EXPECT_THAT(said(), testing::AllOf(testing::ContainsRegex("^[0-9]+ of " + std::to_string(all) +
-                                                            " tie point measurements "
+                                                            " tie point observations "
                                                             "\\(0\\.[45][0-9] %\\) lie within 10 % of the limit"),
                                      HasSubstr("'adjustment: {image_sigma_px: 0.45, estimate_image_sigma: false, "
                                                "max_residual_sigmas: 1000}'")));
@@ -164,9 +164,13 @@ TEST(Remarks, KindsThatAreWorseThanStated) {
   ObservationStatistics& attitudes = result.observation_table[ObservationKind::kAttitude];
   attitudes = {54, 31 * 50, 50, 1};  // 5.57 times
   const auto first = [&] { return misstated_texts(result).at(0); };
-  EXPECT_THAT(first(), testing::StartsWith("Residuals of attitude (54) are 5.6 times what the stated sigmas let"));
+  EXPECT_THAT(first(), testing::StartsWith("Residuals of attitude (54) are 5.6 times as large as the stated sigmas"));
+  EXPECT_THAT(first(),
+              testing::EndsWith("; 'merge: {estimate_sigmas: true}' estimates these sigmas from the residuals"));
   EXPECT_THAT(report_html(result), HasSubstr("<li class=look>Residuals of attitude (54) are 5.6 times"));
   EXPECT_EQ(remarks(result).size(), 1u);
+  result.provenance.options.push_back({"merge.estimate_sigmas", "true", "false"});
+  EXPECT_THAT(first(), testing::EndsWith("; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"));
   attitudes.weighted_squares = 3.9 * 50;  // not twice
   EXPECT_TRUE(misstated_texts(result).empty());
   attitudes = {3, 6, 1.2, 1};  // 2.2 times, by chance
