@@ -1,4 +1,5 @@
-// The page of a rig calibration: mounts, residuals, and how the measurements cover each camera's sensor.
+// Writes the page of a rig calibration: mounts, residuals, and the distribution of the observations over the sensor of
+// each camera.
 #include "io/report/calibration_page.h"
 
 #include <fmt/core.h>
@@ -17,7 +18,7 @@ namespace {
 
 using namespace report;
 
-constexpr std::int64_t kFew = 4;  // measurements of a quadrant
+constexpr std::int64_t kFew = 4;  // a quadrant of the sensor with fewer observations is not covered
 
 std::string in_pixels(double value) { return fixed(value, 3) + " px"; }
 
@@ -46,7 +47,7 @@ std::string mounts_table(const RigCalibration& c) {
   return table.html();
 }
 
-// Rows of one comparison: rms, largest, over sigma.
+// Adds the rows that compare points before and after: number, rms, largest, rms over sigma.
 void add_points(Table& table, const std::string& what, const std::optional<PointFit>& before,
                 const std::optional<PointFit>& after) {
   if (!before && !after) return;
@@ -119,8 +120,8 @@ std::string calibration_html(const RigCalibration& c, const Block& block) {
       remarks(c) +
       section("mounts", "Mounts",
               mounts_table(c) +
-                  paragraph("σ: posterior, of the worst axis. Residuals before: rig at the start, frames and points "
-                            "adjusted.",
+                  paragraph("σ: posterior sigma of the least certain axis. Residuals before: with the rig at the start "
+                            "and adjusted frames and points.",
                             "muted")) +
       section("comparison", "Compared with the start", comparison_table(c)) + coverage(c, block) + cameras_table(c);
   return page("Rig calibration: " + escape(c.project),

@@ -1,4 +1,4 @@
-// The page that reports the calibration of a rig.
+// Writes the report of a rig calibration as an HTML page.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace megablock {
 
-// One self-contained page, as the report of a job. `block`: of the calibration.
+// Returns one self-contained page, as for the report of a job. `block` is the block of the calibration.
 std::string calibration_html(const RigCalibration& calibration, const Block& block);
 
 }  // namespace megablock

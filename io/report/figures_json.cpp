@@ -72,7 +72,7 @@ OrderedJson cameras(const BlockResult& result) {
   return list;
 }
 
-// Of rigs of two cameras and more. Sigmas along and about the axes of the rig.
+// The mounts of rigs with two or more cameras. Sigmas are along and about the axes of the rig.
 OrderedJson mounts(const BlockResult& result) {
   OrderedJson list = OrderedJson::array();
   for (RigIndex r(0); result.block.rigs.contains(r) && result.state.mounts.contains(r); ++r.value) {
@@ -140,7 +140,8 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
       {"failures", failures(result)},
       {"stages", stages(result)},
       {"notes", result.notes}};
-  // Names may hold anything: bytes that are no UTF-8 are replaced, and no text can end the script element.
+  // Names may contain any bytes. Those that are not UTF-8 are replaced, and '<' is escaped, so that no name can end the
+  // script element.
   const std::string text = json.dump(1, ' ', false, OrderedJson::error_handler_t::replace);
   std::string safe;
   for (char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);

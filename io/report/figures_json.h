@@ -1,4 +1,4 @@
-// The figures of the report as JSON, for programs.
+// Writes the figures of the report as JSON, for programs.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace megablock::report {
 
-// Safe inside <script>.
+// The text can be placed inside a <script> element.
 std::string figures_json(const BlockResult& result, const Figures& figures);
 
 }  // namespace megablock::report

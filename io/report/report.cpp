@@ -17,7 +17,7 @@ namespace megablock {
 
 namespace {
 
-// The line below the title: how large, made from what, when and by what.
+// The line below the title: the size of the block, its project, and the time and program of the computation.
 std::string subtitle_of(const BlockResult& result, const report::Figures& figures, const ReportContext& context) {
   using namespace report;
   std::string text =
@@ -36,8 +36,8 @@ std::string subtitle_of(const BlockResult& result, const report::Figures& figure
 
 std::string name_of(const std::string& job);
 
-// What the block is called: by its project file, unless that has the usual name; else by its image folder; else by the
-// job's directory.
+// The name of the block in the title: that of its project file, unless this has the usual name "block"; else that of
+// its image folder; else that of the job directory.
 std::string title_of(const BlockResult& result, const std::string& job) {
   const std::string project = std::filesystem::path(result.provenance.project).stem().string();
   if (!project.empty() && project != "block") return project;
@@ -45,7 +45,7 @@ std::string title_of(const BlockResult& result, const std::string& job) {
   return name_of(job);
 }
 
-// The name of the job's directory, also of one given as "job/" or ".".
+// The name of the job directory, which may be given as "job/" or ".".
 std::string name_of(const std::string& job) {
   if (job.empty()) return "";
   const std::filesystem::path path = std::filesystem::absolute(job).lexically_normal();
@@ -94,13 +94,13 @@ std::string report_html(const BlockResult& result, const ReportContext& context)
 
 struct Report::Gathered {
   report::Figures figures;
-  TrackResults drawn;  // places of points, the images that see them and which of these take part; nothing else
+  TrackResults drawn;  // a sample of the points, with the images that see them and the flags of kept observations
 };
 
 namespace {
 
 TrackResults drawn_of(const TrackBatches& tracks) {
-  constexpr std::int64_t kDrawn = 200000;  // tracks at most
+  constexpr std::int64_t kDrawn = 200000;  // largest number of tracks
   TrackResults drawn;
   drawn.tracks.begin.push_back(0);
   visit_sample(tracks, kDrawn, [&](const TrackResults& batch, std::size_t row) {
@@ -132,7 +132,7 @@ std::vector<std::string> Report::remarks(const BlockResult& result) const {
 std::string Report::html(BlockResult result, const ReportContext& context) && {
   static_cast<TrackResults&>(result) = std::move(gathered_->drawn);
   std::string page = page_of(result, gathered_->figures, context);
-  // What was read leaves memory before the result is destroyed, which touches all of its frames once more.
+  // The figures leave memory before the result is destroyed, because its destructor touches all frames once more.
   gathered_.reset();
   static_cast<TrackResults&>(result) = {};
   context.after_reading();

@@ -1,5 +1,5 @@
-// The report of a job: one self-contained HTML page (inline styles, drawings as SVG, a few lines of script; nothing is
-// fetched), for the screen, a phone and paper.
+// Writes the report of a job: one self-contained HTML page for screens, phones and paper. Styles are inline, drawings
+// are SVG, and the script is short; the page loads nothing from elsewhere, so it can be sent and archived as one file.
 #pragma once
 
 #include <functional>
@@ -13,26 +13,26 @@
 
 namespace megablock {
 
-// Works for any result, however incomplete: what was not computed is left out or said to be missing, and no figure that
-// is not a number is printed. The page carries its figures as JSON in <script type="application/json" id="figures">
-// (keys as `status --json` where they are the same; metres, radians as named, pixels; null where unknown).
+// Writes the page of any result, however incomplete it is. Missing figures are left out or called missing; NaN is never
+// printed. The page also contains its figures as JSON in <script type="application/json" id="figures">. The keys are
+// those of `status --json` for the same figures; units are metres, pixels, and radians where named; unknown figures are
+// null.
 std::string report_html(const BlockResult& result, const ReportContext& context = {});
-// Of a result without tracks and all of these; maps draw a sample of them.
+// The same for a result whose tracks are given in batches. The maps draw a sample of the tracks.
 std::string report_html(BlockResult result, const TrackBatches& tracks, const ReportContext& context);
 
-// The same in two steps. The first one goes through the tracks, which takes its time, and reads all of the result but
-// its digest.
+// The same in two steps. The constructor reads all tracks, which takes long, and all of the result except its digest.
 class Report {
  public:
-  // `after_reading` as in ReportContext.
+  // `after_reading` is that of ReportContext.
   Report(
       const BlockResult& result, const TrackBatches& tracks, const std::function<void()>& after_reading = [] {});
   ~Report();
   Report(Report&&) noexcept;
-  // Of what was gathered, for other summaries.
+  // Figures that were gathered, for other summaries.
   const ReprojectionStatistics& statistics() const;
   std::vector<std::string> remarks(const BlockResult& result) const;      // io/evaluation/remarks.h
-  std::string html(BlockResult result, const ReportContext& context) &&;  // hands over what was gathered
+  std::string html(BlockResult result, const ReportContext& context) &&;  // consumes the gathered figures
 
  private:
   struct Gathered;

@@ -332,7 +332,7 @@ class BadInput(CopyOfTheBlock):
             shutil.copy(picture, self.images / f"other_{picture.name}")
         self.run_job()
         self.assertEqual(status(self.job)["oriented"], 18)
-        self.assert_reported("falls into 2 parts without a tie point between them")
+        self.assert_reported("consists of 2 parts that no tie point connects")
         self.assertLess(self.errors()["position_max_m"], 0.5)
 
     def test_images_matching_nothing(self):

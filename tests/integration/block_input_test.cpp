@@ -201,7 +201,7 @@ TEST_F(BlockInput, TwoCities) {
     SimulatedBlock s = simulate_block(options);
     append_city(s, SimulatedBlock(s), {200e3, 0, 0});
     const BlockResult result = adjust(s);
-    EXPECT_THAT(report(), HasSubstr("falls into 2 parts"));
+    EXPECT_THAT(report(), HasSubstr("consists of 2 parts"));
     if (free) {
       EXPECT_EQ(result.free_parts.size(), 2u) << result.gauge;
       for (const FreePart& part : result.free_parts) EXPECT_EQ(part.defect, 7);

@@ -1,4 +1,4 @@
-// Drawings of the report, as SVG text.
+// Draws the charts and maps of the report, as SVG text.
 #pragma once
 
 #include <string>
@@ -9,51 +9,53 @@
 
 namespace megablock::report {
 
-// Vertical bars over equal bins. `bell_sigma` > 0: the normal curve of that sigma and the same area over it.
+// Vertical bars over equal bins. If `bell_sigma` > 0, a normal curve with this sigma and the same area is drawn on top.
 struct BarChart {
   const Histogram& histogram;
   std::string x_title, y_title;
-  int decimals = 0;             // of the bins' labels
-  bool open_ended = true;       // the last bin holds all beyond it
-  bool centred_labels = false;  // label bins by their lower value (counts) instead of their limits
+  int decimals = 0;             // decimals of the labels
+  bool open_ended = true;       // the last bin also counts all larger values
+  bool centred_labels = false;  // true: a bin is labelled with its lower value (a count); false: bins have their limits
   double bell_sigma = 0;
 };
 std::string draw(const BarChart& chart);
 
-// Mean residual of each part of the sensor as arrows, exaggerated; the number of observations as shade.
-// The caption says the scale.
+// Draws the mean residual of each part of the sensor as an exaggerated arrow, on a shade for the number of
+// observations. The caption tells the scale.
 struct FieldDrawing {
   std::string svg, caption;
 };
 FieldDrawing draw(const ResidualField& field, const Camera& camera);
-// How many measurements lie in each part of the sensor, with the borders of its quadrants.
+// Draws the number of observations in each part of the sensor, and the borders of its quadrants.
 std::string draw_density(const ResidualField& field, const Camera& camera);
 
-// Horizontal GNSS residuals in plan, and the vertical ones in block order.
+// Draw the horizontal GNSS residuals in plan, and the vertical ones in block order.
 std::string draw_horizontal(const std::vector<PositionResidual>& residuals);
 std::string draw_vertical(const std::vector<PositionResidual>& residuals);
 
-// Of the selected frames: coloured by tile, boundary frames ringed, those not oriented; tie points as a background,
-// links between frames; control and check points when the frames are `placed` in the ground frame. Layers carry classes
-// that the page's script shows and hides. `unit`: of lengths. `after_reading` as in ReportContext, here and below.
+// Draws the selected frames: coloured by tile, with rings around boundary frames, and crosses for frames that are not
+// oriented. Tie points are the background; links between frames are drawn too, and control and check points if the
+// frames are `placed` in the ground frame. The layers have classes, so that the script of the page can hide them.
+// `unit` is that of lengths. `after_reading` is that of ReportContext, here and below.
 std::string draw_map(const BlockResult& result, const FrameSelection& selected, const char* unit, bool placed,
                      const std::function<void()>& after_reading);
 std::string map_legend(const BlockResult& result, const Figures& figures);
 
-// Images that see tie points in each cell of the ground, and the mean number of rays to these.
+// Draws, for each cell of the ground, the number of images that see its tie points. The label also gives the mean
+// number of rays to these points.
 std::string draw_coverage(const BlockResult& result, const FrameSelection& selected, const char* unit,
                           const std::function<void()>& after_reading);
 std::string coverage_legend();
 
-// Horizontal error ellipses of the frames' positions and bars for the sigma of the height, exaggerated; the caption
-// says how much. Empty without covariances.
+// Draws the horizontal error ellipses of the frames, and bars for the sigmas of their heights, both exaggerated by a
+// factor that the caption tells. Empty without covariances.
 FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& selected, const char* unit,
                            const std::function<void()>& after_reading);
 
-// A step of 1, 2 or 5 times a power of ten that divides `range` into at most `parts`.
+// The step of 1, 2 or 5 times a power of ten that divides `range` into at most `parts`.
 double round_step(double range, int parts);
 
-// The largest 1, 2 or 5 times a power of ten that is not above `value`; 1 for what is not positive.
+// The largest 1, 2 or 5 times a power of ten that is at most `value`; 1 for a value that is not positive.
 double step_below(double value);
 // "exaggerated 20-fold", "reduced tenfold", "drawn to scale".
 std::string exaggeration_text(double exaggeration);

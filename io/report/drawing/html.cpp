@@ -18,14 +18,15 @@ std::string grouped(std::string digits) {
   return digits;
 }
 
-// Typographic minus, and none before a value that rounds to zero.
+// Prints a number with the typographic minus sign. A value that rounds to zero has no sign.
 std::string signed_text(double value, int decimals, bool plus) {
   const std::string digits = fmt::format("{:.{}f}", std::abs(value), decimals);
   if (digits.find_first_not_of("0.") == std::string::npos) return digits;
   return (value < 0 ? kMinus : plus ? "+" : "") + digits;
 }
 
-// Short texts stay on one line, notes break between words, and long names, where they must, anywhere.
+// The style of a cell with text: short texts stay on one line, notes break between words, long names may break
+// anywhere.
 const char* text_class(const std::string& text) {
   constexpr std::size_t kShort = 28, kLongWord = 40;
   if (text.size() <= kShort) return " class=t";

@@ -1,4 +1,4 @@
-// Text and numbers for the report's HTML.
+// Formats text, numbers and tables for the HTML of the report.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,32 +11,32 @@ namespace megablock::report {
 
 std::string escape(std::string_view text);  // for HTML text and attribute values
 
-inline constexpr const char* kMissing = "–";  // printed for what is not a finite number
+inline constexpr const char* kMissing = "–";  // printed for a value that is not a finite number
 
 std::string count(std::int64_t value);                  // 27 503, grouped by narrow spaces
-std::string fixed(double value, int decimals);          // kMissing when not finite
-std::string significant(double value, int digits = 3);  // plain decimals, or a power of ten for extremes
-std::string sigma_text(double value);                   // of a standard deviation: three digits at most say something
+std::string fixed(double value, int decimals);          // kMissing if not finite
+std::string significant(double value, int digits = 3);  // plain decimals, or with a power of ten if extreme
+std::string sigma_text(double value);                   // a standard deviation, with at most three significant digits
 std::string with_sign(double value, int decimals);      // +0.012, −0.003
 std::string percent(double part, double whole);         // 99.4 %; never rounded up to 100 %
 std::string duration(double seconds);                   // 0.4 s, 12 s, 3 min 05 s, 2 h 10 min
 std::string memory(double mebibytes);                   // 412 MiB, 2.1 GiB
 
-// A unit of length in which values up to `largest` metres read well.
+// The unit of length in which values up to `largest` metres are easy to read.
 struct LengthUnit {
-  double factor;     // values in metres times this
+  double factor;     // value in this unit = value in metres * factor
   const char* name;  // mm, cm, m
   int decimals;
 };
 LengthUnit length_unit(double largest_m);
 
 std::string in_unit(const std::string& name, const LengthUnit& unit);  // "ΔE [mm]"
-double largest(const std::vector<Eigen::Vector3d>& values);            // component by size, finite ones; else 0
-// One cell per component.
+double largest(const std::vector<Eigen::Vector3d>& values);            // largest finite |component|; 0 if none
+// Adds one cell per component.
 void axes_cells(const Eigen::Vector3d& v, const LengthUnit& unit, bool sign, std::vector<std::string>& cells);
 void sigma_cells(const Eigen::Vector3d& sigmas, const LengthUnit& unit, std::vector<std::string>& cells);
 
-// Rows of cells under headings. The first column is text, the others are aligned as numbers unless said otherwise.
+// A table with headings. The first column is text and the others are numbers, unless the constructor is told otherwise.
 class Table {
  public:
   explicit Table(std::vector<std::string> headings, std::size_t text_columns = 1);
@@ -51,13 +51,13 @@ class Table {
   std::string body_;
 };
 
-// A list that is cut after `listed` of its `all` rows says so.
+// A note below a list that shows only `listed` of its `all` rows; empty if it shows all.
 std::string more(std::size_t all, std::size_t listed);
 
-// Hidden until asked for.
+// A part of the page that is folded until the reader opens it.
 std::string details(const std::string& summary, const std::string& body, bool open = false);
 
-// A titled part of the page.
+// A part of the page with a title.
 std::string section(const std::string& id, const std::string& title, const std::string& body);
 std::string figure(const std::string& drawing, const std::string& caption);
 std::string paragraph(const std::string& text, const std::string& style = "");

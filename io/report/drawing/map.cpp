@@ -14,15 +14,15 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kSingleMarks = 3000;  // frames drawn one by one, with their names
+constexpr std::size_t kSingleMarks = 3000;  // up to so many frames are drawn one by one, with their names
 constexpr std::size_t kBackgroundPoints = 6000;
-constexpr std::size_t kSpreadAtATime = 128;  // of these, whose images lie all over their table
+constexpr std::size_t kSpreadAtATime = 128;  // frames between two calls of after_reading; their images are spread
 constexpr std::size_t kLinks = 20000;
 constexpr std::size_t kMostMarks = 200000;
 constexpr std::array<const char*, 10> kColours = {"#4e79a7", "#f28e2b", "#59a14f", "#b07aa1", "#76b7b2",
                                                   "#d4a017", "#e15759", "#9c755f", "#ff7f9f", "#7a8b99"};
 
-// Colours such that tiles that share tie points differ, as far as ten colours go.
+// Gives the tiles colours such that tiles with common tie points differ, as far as ten colours suffice.
 std::vector<std::size_t> tile_colours(const BlockResult& result, const std::function<void()>& after_reading) {
   std::vector<std::set<std::int64_t>> beside(static_cast<std::size_t>(result.tiles.tile_count));
   const auto tile_at = [&](std::int64_t o) {
@@ -81,7 +81,7 @@ class MapDrawing {
  private:
   static std::string dot(const Eigen::Vector2d& p) { return fmt::format("M{:.1f} {:.1f}h0", p.x(), p.y()); }
 
-  bool here(std::size_t track) const {  // a tie point of the frames that are drawn
+  bool here(std::size_t track) const {  // whether the tie point belongs to the selected frames
     return is_of(result_, track, [&](FrameIndex frame) { return places_[frame].has_value(); });
   }
 
@@ -97,7 +97,7 @@ class MapDrawing {
     return "<path class=\"layer points\" d=\"" + path + "\"/>";
   }
 
-  // Frames tied by tracks: within tiles and across.
+  // Lines between frames with common tracks, within tiles and across.
   std::string links() const {
     if (places_.size() > kSingleMarks) return "";
     std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> shared;
@@ -123,7 +123,7 @@ class MapDrawing {
            "\"/></g>";
   }
 
-  // One path per colour: rings of the boundary frames below, dots above.
+  // The frames, one path per colour: rings of the boundary frames below, dots above.
   std::string frames() const {
     const std::vector<std::size_t> colour = tile_colours(result_, after_reading_);
     const std::size_t step = 1 + places_.size() / kMostMarks;

@@ -136,8 +136,8 @@ main,header>div{max-width:none;padding:0}.row{grid-template-columns:1fr 1fr}figu
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 )css";
 
-// Layers on and off; maps enlarged by wheel or two fingers and moved by dragging (by changing their view box); tables
-// sorted by a click on a heading.
+// The script of the page. It shows and hides layers, enlarges maps by wheel or two fingers and moves them by dragging
+// (by changing their view box), and sorts tables after a click on a heading.
 constexpr const char* kScript = R"js(
 (() => {
   const maps = [...document.querySelectorAll('.map')];

@@ -1,4 +1,4 @@
-// The frame of the report's page: styles and script.
+// Puts the contents of the report into an HTML page with its styles and script.
 #pragma once
 
 #include <string>

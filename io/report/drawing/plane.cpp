@@ -14,11 +14,11 @@ namespace megablock::report {
 namespace {
 
 constexpr double kMostHeight = 900, kLeastHeight = 320, kMargin = 40;
-constexpr int kGridLines = 8;                   // at most, along the longer side
-constexpr double kOutermost = 0.02;             // share of the tie points left out on each side
-constexpr std::size_t kFramingPoints = 100000;  // looked at
+constexpr int kGridLines = 8;                   // largest number along the longer side
+constexpr double kOutermost = 0.02;             // share of the tie points that is left out on each side
+constexpr std::size_t kFramingPoints = 100000;  // at most so many tie points determine the extent
 
-// The corners of where the tie points of the selected frames lie.
+// The corners of the area in which the tie points of the selected frames lie.
 std::vector<Eigen::Vector2d> corners_of_tie_points(const BlockResult& result, const FrameSelection& selected,
                                                    const std::function<void()>& after_reading) {
   std::array<std::vector<double>, 2> values;
@@ -105,7 +105,7 @@ std::string open_map(const Plane& plane, const std::string& label) {
       kMapWidth, height, label);
 }
 
-// Lines of round coordinates; east at the top, north at the left.
+// Draws lines of round coordinates, with labels of east at the top and of north at the left.
 std::string coordinate_grid(const Plane& plane, const char* unit) {
   const Eigen::Vector2d middle = (plane.low + plane.high) / 2;
   const Eigen::Vector2d half = Eigen::Vector2d(kMapWidth, plane.height) / (2 * plane.scale);
@@ -134,7 +134,7 @@ std::string scale_bar(const Plane& plane, const char* unit) {
   const bool kilometres = length >= 1000 && std::string(unit) == "m";
   const std::string label = kilometres ? significant(length / 1000, 2) + " km" : significant(length, 2) + " " + unit;
   return fmt::format(
-      // What is drawn beyond the map's foot does not run under the bar.
+      // A strip below the map covers everything that is drawn there, so nothing lies under the scale bar.
       "<rect x=1 y={:.1f} width={:.0f} height={:.0f} class=strip /><g class=scale><rect x=8 y={:.1f} width={:.1f} "
       "height=26 rx=4 />"
       "<path d=\"M16 {:.1f}v-6m0 3h{:.1f}m0 3v-6\"/><text x={:.1f} y={:.1f}>{}</text></g>",

@@ -1,4 +1,4 @@
-// The ground seen from above as the report's maps draw it.
+// The plan view that the maps of the report share: its extent, its scale, and the places of frames in it.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 namespace megablock::report {
 
 inline constexpr double kMapWidth = 1000;
-inline constexpr double kMapFoot = 30;  // strip below the map for the scale
+inline constexpr double kMapFoot = 30;  // height of the strip below the map, for the scale bar
 
 struct Plane {
   Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Ones();  // metres
@@ -22,22 +22,23 @@ struct Plane {
 };
 Plane plane_over(const std::vector<Eigen::Vector2d>& places);
 
-// The frames of one drawing.
+// Selects the frames of one drawing.
 using FrameSelection = std::function<bool(FrameIndex)>;
 
-// Over the selected frames that are oriented (all, when none is), their tie points but for the outermost 2 % on each
-// side (a facade lies beside the frames, not under them), and the control points with a place, if wanted. Empty when
-// nothing has a place. `after_reading` as in ReportContext.
+// Returns the plane that contains the selected frames that are oriented (or all selected frames if none is), their tie
+// points without the outermost 2 % on each side, and, if wanted, the control points with a position. The tie points are
+// needed because a facade lies beside the frames, not below them. Empty if nothing has a position. `after_reading` is
+// that of ReportContext.
 std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control,
                               const std::function<void()>& after_reading);
 
-// A tie point of the selected frames: its first image tells.
+// Whether a tie point belongs to the selected frames. Its first image decides.
 bool is_of(const BlockResult& result, std::size_t track, const FrameSelection& selected);
 
-// Where a frame is drawn: its pose, else its GNSS position.
+// The place where a frame is drawn: that of its pose, else its GNSS position.
 std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex frame);
 
-// What a drawing's lengths are in: metres, or the units of a part whose scale is its own.
+// The parts of a map around its contents. Lengths are in metres, or in the units of a part with an arbitrary scale.
 std::string open_map(const Plane& plane, const std::string& label);
 std::string coordinate_grid(const Plane& plane, const char* unit);
 std::string scale_bar(const Plane& plane, const char* unit);

@@ -13,7 +13,7 @@ namespace megablock::report {
 
 namespace {
 
-// The plane of a chart: data coordinates to a drawing of fixed size with room for labels.
+// Converts the coordinates of data to a drawing of fixed size with space for labels.
 struct Axes {
   double x_low, x_high, y_low, y_high;
   double width = 480, height = 240, left = 58, right = 12, top = 12, bottom = 44;
@@ -42,10 +42,10 @@ std::string titles(const Axes& a, const std::string& x, const std::string& y) {
                      middle, y);
 }
 
-// As many decimals as the labels of a grid of this step need.
+// The number of decimals that the labels of a grid with this step need.
 int decimals_of(double step) { return std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9))); }
 
-// `factor` turns data into what is labelled.
+// Draws the horizontal grid lines. The labels are the data times `factor`.
 std::string horizontal_grid(const Axes& a, double factor = 1) {
   const double step = round_step((a.y_high - a.y_low) * factor, 5) / factor;
   const int decimals = decimals_of(step * factor);
@@ -59,7 +59,7 @@ std::string horizontal_grid(const Axes& a, double factor = 1) {
   return svg;
 }
 
-// Left of the axis: the title, and counts of up to `most` with their spaces between thousands.
+// The space left of the axis for the title and for counts up to `most`, which have spaces between thousands.
 double room_for_labels(std::int64_t most) {
   constexpr double kTitle = 26, kDigit = 6.8, kSpace = 3;
   const auto digits = static_cast<double>(std::to_string(most).size());
@@ -162,7 +162,7 @@ std::string draw(const BarChart& chart) {
 
 namespace {
 
-// Two by two cells in one.
+// Joins two by two cells into one.
 ResidualField coarser(const ResidualField& fine) {
   ResidualField field;
   field.columns = (fine.columns + 1) / 2;
@@ -183,7 +183,7 @@ ResidualField coarser(const ResidualField& fine) {
 
 }  // namespace
 
-// How many times as long an arrow from `foot` along `d` may be to end inside the frame.
+// The largest factor by which an arrow `d` from `foot` may be lengthened and still end inside the frame.
 double room_in_frame(const Eigen::Vector2d& foot, const Eigen::Vector2d& d, const Eigen::Vector2d& frame) {
   double room = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 2; ++k)
@@ -193,15 +193,15 @@ double room_in_frame(const Eigen::Vector2d& foot, const Eigen::Vector2d& d, cons
 
 FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
   constexpr double width = 480;
-  constexpr std::int64_t enough = 40;  // observations a cell in the mean, so that its mean rises above the noise
+  constexpr std::int64_t enough = 40;  // mean number of observations per cell, so that its mean exceeds the noise
   const bool sparse = fine.observations < enough * fine.columns * fine.rows && fine.columns > 2 && fine.rows > 2;
   const ResidualField field = sparse ? coarser(fine) : fine;
-  constexpr std::int64_t few = 3;  // observations of a cell; fewer say nothing of the mean
+  constexpr std::int64_t few = 3;  // a cell with fewer observations has no useful mean
   const double scale = width / camera.width, height = camera.height * scale;
   const double cell_width = width / field.columns, cell_height = height / field.rows;
   const auto foot_of = [&](int r, int c) { return Eigen::Vector2d((c + 0.5) * cell_width, (r + 0.5) * cell_height); };
   std::vector<double> lengths;
-  std::vector<double> rooms;  // exaggerations at which the arrows just stay inside
+  std::vector<double> rooms;  // for each arrow, the exaggeration at which it just stays inside
   std::int64_t most = 1;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.columns; ++c) {
@@ -211,12 +211,12 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
       lengths.push_back(field.mean(r, c).norm());
       rooms.push_back(room_in_frame(foot_of(r, c), field.mean(r, c) * scale, {width, height}));
     }
-  // The 95 % arrow is as long as a cell, or shorter, so that nearly all arrows end inside the frame: single long ones
-  // must not hide the others. Exaggeration rounded so that it can be told.
+  // An arrow of the 95 % quantile is as long as a cell, or shorter, so that nearly all arrows end inside the frame.
+  // Single long arrows must not make the others invisible. The exaggeration is rounded to a simple number.
   const double typical = spread(lengths).p95;
   const double cell_long = typical > 0 ? cell_width / (typical * scale) : 1;
   std::sort(rooms.begin(), rooms.end());
-  const double room = rooms.empty() ? cell_long : rooms[rooms.size() / 50];  // some may be cut short
+  const double room = rooms.empty() ? cell_long : rooms[rooms.size() / 50];  // 2 % of the arrows may be cut short
   const double wanted = std::clamp(room, 0.25 * cell_long, cell_long);
   const double exaggeration = step_below(wanted);
   std::string shades, arrows, feet;
@@ -285,12 +285,12 @@ std::string draw_horizontal(const std::vector<PositionResidual>& residuals) {
   std::vector<double> sizes;
   for (const PositionResidual& r : residuals) sizes.push_back(r.difference.head<2>().cwiseAbs().maxCoeff());
   const Spread size = spread(sizes);
-  // One outlier must not hide the rest: beyond three times the 95 % value marks sit at the border.
+  // One outlier must not make the others invisible. Marks beyond three times the 95 % quantile are drawn at the border.
   const double reach = 1.1 * std::max(1e-4, std::min(size.largest, 3 * size.p95));
   Axes axes{-reach, reach, -reach, reach};
   axes.height = 340;
   const double aspect = (axes.width - axes.left - axes.right) / (axes.height - axes.top - axes.bottom);
-  axes.x_low *= aspect;  // one scale for both axes
+  axes.x_low *= aspect;  // both axes have the same scale
   axes.x_high *= aspect;
   const LengthUnit unit = length_unit(reach);
   std::string svg =

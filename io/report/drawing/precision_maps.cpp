@@ -1,4 +1,4 @@
-// Maps of how well the ground is covered and how well the frames are placed.
+// Draws the maps of the coverage of the ground and of the precision of the frames.
 #include <fmt/core.h>
 
 #include <Eigen/Eigenvalues>
@@ -15,13 +15,13 @@ namespace megablock::report {
 
 namespace {
 
-constexpr double kMostCells = 56, kLeastCells = 8;  // along the map's longer side
-constexpr double kPointsPerCell = 12;               // in the mean, so that an empty cell says something
-constexpr std::size_t kCoveragePoints = 200000;     // looked at
-constexpr std::size_t kEllipses = 1500;             // drawn
-constexpr std::size_t kNamesAtATime = 64;           // of these, which lie all over the table of frames
+constexpr double kMostCells = 56, kLeastCells = 8;  // number of cells along the longer side of the map
+constexpr double kPointsPerCell = 12;               // mean number, so that an empty cell is no accident
+constexpr std::size_t kCoveragePoints = 200000;     // at most so many points are used
+constexpr std::size_t kEllipses = 1500;             // at most so many ellipses are drawn
+constexpr std::size_t kNamesAtATime = 64;           // ellipses between two calls of after_reading
 
-// 1, 2, 3, 4, 5 to 6, 7 to 9, 10 and more images.
+// The colour classes of the coverage: 1, 2, 3, 4, 5 to 6, 7 to 9, 10 and more images.
 constexpr std::array<int, 7> kSteps = {1, 2, 3, 4, 5, 7, 10};
 constexpr std::array<const char*, 7> kShades = {"#b3261e", "#e08214", "#fdd49e", "#c7e3a8",
                                                 "#7fc07f", "#3f9a6a", "#14685a"};
@@ -105,7 +105,7 @@ class Coverage {
 };
 
 struct Ellipse {
-  Eigen::Vector2d place;    // drawn
+  Eigen::Vector2d place;    // on the drawing
   double major, minor, up;  // sigmas, metres
   double angle;             // of the major axis on the drawing, degrees
   const std::string* name;
@@ -172,8 +172,7 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   for (const Ellipse& e : all) sizes.push_back(std::max(e.major, e.up));
   const double typical = spread(sizes).p95;
   if (!(typical > 0)) return {};
-  // The 95 % figure is drawn as long as half the distance between frames, and never longer than the margin has room
-  // for.
+  // The 95 % quantile is drawn as long as half the distance between frames, but never longer than the margin.
   const double spacing = std::sqrt(kMapWidth * plane->height / static_cast<double>(all.size()));
   const double wanted = std::min(kMapWidth / 28, 0.3 * spacing) / (typical * plane->scale);
   const double exaggeration = step_below(wanted);

@@ -1,4 +1,4 @@
-// Headline and assessment: what is well and what needs a look.
+// Writes the headline with the main figures, and the assessment: the strengths and weaknesses of the result.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -50,18 +50,18 @@ std::string parts_item(const Figures& f) {
   const auto free = std::count_if(f.parts.begin(), f.parts.end(), [](const BlockPart& part) { return !part.placed(); });
   const std::string parts = count(static_cast<std::int64_t>(f.parts.size()));
   if (free == 0)
-    return item("look", fmt::format("The block falls into {} parts without a tie point between them; each is placed by "
-                                    "its own positions or control alone.",
+    return item("look", fmt::format("The block consists of {} parts that no tie point connects; only its own positions "
+                                    "or control points place each of them.",
                                     parts));
-  return item("bad", fmt::format("The block falls into {} parts without a tie point between them, and nothing places "
-                                 "{} of them: their coordinates cannot be compared with those of other parts.",
+  return item("bad", fmt::format("The block consists of {} parts that no tie point connects, and nothing places {} of "
+                                 "them: their coordinates cannot be compared with those of other parts.",
                                  parts, count(free)));
 }
 
 std::string seams_item(const BlockResult& result) {
   if (result.seams.empty()) return "";
   std::int64_t tested = 0, alarmed = 0;
-  double largest = 0;  // disagreement at an alarm, in sigmas
+  double largest = 0;  // largest disagreement at an alarm, in sigmas
   for (const SeamCheck& seam : result.seams) {
     tested += seam.degrees > 0;
     if (!alarms(seam)) continue;
@@ -69,22 +69,23 @@ std::string seams_item(const BlockResult& result) {
     largest = std::max(largest, sigmas_apart(seam));
   }
   const auto untested = static_cast<std::int64_t>(result.seams.size()) - tested;
-  const std::string rest = untested == 0 ? ""
-                                         : fmt::format(" {} more {} parts that share nothing and cannot be tested.",
-                                                       count(untested), untested == 1 ? "joins" : "join");
+  const std::string rest = untested == 0
+                               ? ""
+                               : fmt::format(" {} more {} parts without common unknowns and cannot be tested.",
+                                             count(untested), untested == 1 ? "joins" : "join");
   if (tested == 0)
     return item("look",
-                fmt::format("The {} of the merge tree {} parts that share nothing: there is no seam to test.",
+                fmt::format("The {} of the merge tree {} parts without common unknowns: there is no seam to test.",
                             untested == 1 ? "joint" : count(untested) + " joints", untested == 1 ? "joins" : "join"));
   if (alarmed > 0)
     return item(
         largest > kGrossRatio ? "bad" : "look",
-        fmt::format("{} of {} joints of the merge tree raise an alarm: their sides, each for itself, would differ "
-                    "up to {} times what their sigmas explain. {} See <a href=\"#tiles\">tiles</a>.",
+        fmt::format("{} of {} joints of the merge tree raise an alarm: adjusted separately, their two sides would "
+                    "differ by up to {} times what their sigmas explain. {} See <a href=\"#tiles\">tiles</a>.",
                     count(alarmed), count(tested), fixed(largest, 1),
                     largest > kGrossRatio
                         ? "A tile holds observations that do not fit its neighbours."
-                        : "That little is what an imperfect camera model or optimistic sigmas leave; the "
+                        : "An imperfect camera model or sigmas that are too small cause such small differences; the "
                           "result itself is one adjustment without a step at the joints.") +
             rest);
   return item("good",
@@ -104,10 +105,9 @@ std::string residuals_item(const BlockResult& result, const Figures& f) {
   if (result.degrees_of_freedom <= 0) return list;
   const double s0 = std::sqrt(std::max(0.0, result.variance_factor));
   if (s0 > 1.5)
-    return list + item("look", "Residuals are " + fixed(s0, 1) + " times what the stated sigmas let expect.");
+    return list + item("look", "Residuals are " + fixed(s0, 1) + " times as large as the stated sigmas predict.");
   if (s0 < 0.5)
-    return list +
-           item("look", "Residuals are much smaller than the stated sigmas let expect (σ₀ " + fixed(s0, 2) + ").");
+    return list + item("look", "Residuals are much smaller than the stated sigmas predict (σ₀ " + fixed(s0, 2) + ").");
   return list.empty() ? item("good", "Residuals agree with the stated sigmas (σ₀ " + fixed(s0, 2) + ").") : list;
 }
 
@@ -174,7 +174,7 @@ std::string headline(const BlockResult& result, const Figures& f) {
                 "σ₀ a posteriori",
                 result.degrees_of_freedom > 0 ? "variance factor " + significant(result.variance_factor) + ", " +
                                                     count(result.degrees_of_freedom) + " degrees of freedom, " +
-                                                    fixed(result.image_sigma_px, 3) + " px per tie point measurement"
+                                                    fixed(result.image_sigma_px, 3) + " px per tie point observation"
                                               : "");
   if (std::isfinite(f.ground_resolution_m)) {
     const LengthUnit unit = length_unit(f.ground_resolution_m);

@@ -1,4 +1,4 @@
-// Cameras and mounts.
+// Writes the section about cameras and mounts.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -13,9 +13,9 @@ namespace megablock::report {
 
 namespace {
 
-constexpr double kSignificant = 2;  // sigmas
+constexpr double kSignificant = 2;  // a parameter is significant from so many sigmas
 
-// The value that a parameter has in a camera that does not need it: no distortion, principal point in the centre.
+// The value of a parameter in an ideal camera: no distortion, and the principal point in the centre.
 double neutral(const Camera& camera, int parameter) {
   const Intrinsics start = start_intrinsics(camera.intrinsics.model(), 1, camera.width, camera.height);
   return parameter == kFocal ? 0 : start[static_cast<std::size_t>(parameter)];
@@ -93,7 +93,8 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
   return table.html();
 }
 
-// Along and about the axes of the rig; nothing of a held mount, kMissing of one that no image tells of.
+// Adds the sigmas along and about the axes of the rig. The cells of a held mount are empty; those of a mount without
+// observations are kMissing.
 void add_mount_sigmas(const Mount& mount, const BlockResult::Matrix6& covariance, std::vector<std::string>& cells) {
   const PoseIncrement sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const auto cell = [&](double value) {
@@ -166,7 +167,8 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
     mounts += mounts_table(result, rig);
   if (!mounts.empty()) mounts = "<h3>Mounts</h3>" + mounts;
   const std::string note = paragraph(
-      "÷ sigma: distance from no distortion, of the principal point from the image's centre; parameters within " +
+      "÷ sigma: difference from a camera without distortion, for the principal point from the centre of the image, "
+      "over its sigma. Parameters within " +
           fixed(kSignificant, 0) + " sigma are not significant and shown faint.",
       "muted");
   return section("cameras", "Cameras", note + body + mounts + interest_points_table(result));

@@ -1,4 +1,4 @@
-// Control and check points, and their image measurements.
+// Writes the section about control and check points and their image measurements.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -11,8 +11,8 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kListedPoints = 200;        // points of a role
-constexpr std::size_t kListedMeasurements = 400;  // listed, worst first
+constexpr std::size_t kListedPoints = 200;        // largest number of listed points of each role
+constexpr std::size_t kListedMeasurements = 400;  // largest number of listed measurements, worst first
 
 const char* name_of(PointRole role) { return role == PointRole::kCheck ? "check" : "control"; }
 
@@ -88,10 +88,10 @@ std::string control_section(const BlockResult& result, const Figures& f) {
   add_points(result, f, PointRole::kCheck, unit, table);
   return section("control", "Control and check points",
                  paragraph(fmt::format(
-                     "Differences adjusted − given and their own sigmas: of a check point from the adjusted and the "
-                     "given position together, of a control point, which took part, from the given less the "
-                     "adjusted variance. Images: measurements that take part, of all. Rows beyond {} sigma are marked, "
-                     "and points that no measurement touches: they stay where they were given.",
+                     "Differences are adjusted − given. Their variance is the sum of the adjusted and the given "
+                     "variance for a check point, and the given minus the adjusted variance for a control point, which "
+                     "took part. Images: number of measurements that take part, of all. Marked are rows beyond {} "
+                     "sigma, and points without any measurement that takes part: these keep their given position.",
                      fixed(kGrossRatio, 0))) +
                      table.html("sortable") + measurements_table(result, f));
 }

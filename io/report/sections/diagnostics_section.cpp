@@ -1,4 +1,4 @@
-// Gaps and links: what the block lacks, on a map and in tables.
+// Writes the section about the weaknesses of a block (gaps, thin ground, weak links), with a map and tables.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -14,12 +14,12 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kMostFootprints = 1500;  // that are drawn
+constexpr std::size_t kMostFootprints = 1500;  // footprints are drawn only up to this number
 constexpr std::size_t kMostPlaces = 100000;
-constexpr std::size_t kMostLines = 5000;  // links, proposals
+constexpr std::size_t kMostLines = 5000;  // largest number of links, gaps and proposals on the map
 constexpr std::size_t kMostThinCells = 60000;
-constexpr std::size_t kMostNumbers = 40;  // of gaps, on the map
-constexpr std::size_t kRowsListed = 30;   // rows of a table
+constexpr std::size_t kMostNumbers = 40;  // so many gaps have their number on the map
+constexpr std::size_t kRowsListed = 30;   // largest number of rows of a table
 constexpr std::array<const char*, 8> kPartColours = {"#4e79a7", "#f28e2b", "#59a14f", "#b07aa1",
                                                      "#76b7b2", "#d4a017", "#9c755f", "#ff7f9f"};
 
@@ -60,7 +60,7 @@ class DiagnosticsMap {
     key(!d_.weak_links.empty(), "height:0;border-radius:0;border-top:2px dotted #b26a00", "weak link");
     key(!d_.single_links.empty(), "height:0;border-radius:0;border-top:3px solid #b26a00", "single link");
     key(!d_.proposals.empty(), "background:#fff;border:2px solid #2e7d4f;width:9px;height:9px;transform:rotate(45deg)",
-        "proposed view");
+        "proposed exposure");
     return "<p class=legend>" + text + "</p>";
   }
 
@@ -141,7 +141,8 @@ class DiagnosticsMap {
     return "<path class=proposal d=\"" + path + "\"/>";
   }
 
-  // Beside the gap's middle, where nothing of the gap is drawn; not on top of one another.
+  // Draws the numbers of the gaps. A number is placed beside the middle of its gap; it is left out where it would cover
+  // another number.
   std::string numbers() const {
     std::string svg;
     std::vector<Eigen::Vector2d> taken;
@@ -193,15 +194,14 @@ class DiagnosticsText {
     if (d_.aerial) ground_and_pairs(item);
     if (!d_.links_known) return "<ul class=assessment>\n" + list + "</ul>\n";
     if (d_.part_frames.size() < 2)
-      item(false,
-           fmt::format("All frames hang together by links of {} tie points and more.", d_.requested.min_link_points));
+      item(false, fmt::format("Links of at least {} tie points connect all frames.", d_.requested.min_link_points));
     else
       item(true, fmt::format("{} parts have no link of {} tie points between them; the largest has {} of {} frames.",
                              count_of(d_.part_frames), d_.requested.min_link_points, count(d_.part_frames[0]),
                              count(frames())));
     if (!d_.single_links.empty())
       item(true,
-           fmt::format("{} {} alone {} parts of a block together.", count_of(d_.single_links),
+           fmt::format("{} single {} {} parts of the block together.", count_of(d_.single_links),
                        d_.single_links.size() == 1 ? "link" : "links", d_.single_links.size() == 1 ? "holds" : "hold"));
     return "<ul class=assessment>\n" + list + "</ul>\n";
   }
@@ -209,12 +209,13 @@ class DiagnosticsText {
   std::string scope() const {
     if (!d_.aerial)
       return paragraph(
-          "Most images look sideways, or nothing tells where down is: passes are searched for interruptions and the "
-          "links for weak ones. Footprints, bases, flight lines and proposals are for images that look down.",
+          "Most images look sideways, or the vertical is unknown. Therefore only interruptions of passes and weak "
+          "links "
+          "are searched; footprints, bases, flight lines and proposals need images that look down.",
           "muted");
     return paragraph(
         fmt::format("{} flight {}; {} m between exposures, {} m between lines, {} m above ground (medians). "
-                    "All that is outside what is asked: <code>diagnostics.json</code>.",
+                    "<code>diagnostics.json</code> lists everything outside the required limits.",
                     count(d_.lines), d_.lines == 1 ? "line" : "lines", significant(d_.usual_step_m),
                     significant(d_.line_distance_m), significant(d_.height_m)),
         "muted");
@@ -241,7 +242,7 @@ class DiagnosticsText {
                                 : h.width < 0.1 ? 2
                                                 : 1,
                                 true}),
-                  fmt::format("Base to height of {} {}; asked for: {} to {}.", count_of(values),
+                  fmt::format("Base to height of {} {}; required: {} to {}.", count_of(values),
                               d_.lines > 0 ? "successive exposures" : "linked pairs",
                               fmt::format("{:g}", d_.requested.min_base_to_height),
                               fmt::format("{:g}", d_.requested.max_base_to_height)));
@@ -269,12 +270,12 @@ class DiagnosticsText {
     double area = 0;
     for (const auto& ground : d_.thin_ground) area += ground.area_m2;
     if (d_.footprints.empty())
-      item(true, "No footprint could be drawn: heights above ground or attitudes are not known.");
+      item(true, "No footprint could be calculated, because heights above ground or attitudes are unknown.");
     else if (d_.thin_ground.empty())
-      item(false, fmt::format("Between the images all ground is seen by {} and more.", d_.requested.min_images));
+      item(false, fmt::format("At least {} images see all ground between the images.", d_.requested.min_images));
     else
-      item(true, fmt::format("{} of ground between the images, in {} {}, are seen by fewer than {}.", area_text(area),
-                             count_of(d_.thin_ground), d_.thin_ground.size() == 1 ? "piece" : "pieces",
+      item(true, fmt::format("{} of ground between the images, in {} {}, are seen by fewer than {} images.",
+                             area_text(area), count_of(d_.thin_ground), d_.thin_ground.size() == 1 ? "piece" : "pieces",
                              d_.requested.min_images));
     std::int64_t bases = 0, overlaps = 0;
     for (const auto& pair : d_.pairs) {
@@ -289,7 +290,7 @@ class DiagnosticsText {
                                    fixed(100 * d_.requested.min_overlap, 0)));
     if (!d_.proposals.empty())
       item(true, fmt::format("{} {} proposed to close the gaps.", count_of(d_.proposals),
-                             d_.proposals.size() == 1 ? "view is" : "views are"));
+                             d_.proposals.size() == 1 ? "exposure is" : "exposures are"));
   }
 
   std::string gaps() const {
@@ -309,7 +310,7 @@ class DiagnosticsText {
 
   std::string ground() const {
     if (d_.thin_ground.empty()) return "";
-    Table table({"ground seen too little: centre E", "N", "area [m²]"}, 0);
+    Table table({"ground seen by too few images: centre E", "N", "area [m²]"}, 0);
     std::vector<const BlockDiagnostics::ThinGround*> order;
     for (const auto& ground : d_.thin_ground) order.push_back(&ground);
     std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return a->area_m2 > b->area_m2; });
@@ -331,7 +332,7 @@ class DiagnosticsText {
                         std::isfinite(pair.overlap) ? fixed(100 * pair.overlap, 0) + " %" : kMissing)});
     }
     return all == 0 ? ""
-                    : details("Pairs with a base or an overlap outside what is asked",
+                    : details("Pairs with a base or an overlap outside the required limits",
                               table.html("small") + more(all, kRowsListed));
   }
 

@@ -1,4 +1,4 @@
-// The table of images, for the eye and for sorting.
+// Writes the table of images, which the reader can sort.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -12,10 +12,10 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kListedImages = 1500;  // images
+constexpr std::size_t kListedImages = 1500;  // largest number of listed images
 constexpr std::size_t kOpen = 40;            // a longer table is folded
 
-// Which of the optional columns say something in this block.
+// The optional columns that have values in this block.
 struct Columns {
   bool camera, tile, part, records, sigmas;
   LengthUnit sigma_unit;
@@ -81,7 +81,7 @@ void add_image(const BlockResult& result, const Figures& f, const Columns& colum
   table.add(std::move(cells));
 }
 
-// All oriented images in block order; of a huge block those with the largest residuals.
+// All oriented images in block order. For a huge block, only those with the largest residuals.
 std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& f,
                                       const std::function<void()>& after_reading) {
   if (f.reprojection.oriented_images <= static_cast<std::int64_t>(kListedImages))
@@ -98,7 +98,7 @@ std::vector<ImageIndex> listed_images(const BlockResult& result, const Figures& 
 }  // namespace
 
 std::string images_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
-  constexpr std::size_t kAtATime = 64;  // images, whose rows lie all over the tables
+  constexpr std::size_t kAtATime = 64;  // images between two calls of after_reading; their rows are spread over tables
   const std::vector<ImageIndex> images = listed_images(result, f, after_reading);
   if (images.empty() || f.reprojection.oriented_images == 0) return "";
   const Columns columns = columns_of(result, f);
@@ -109,8 +109,8 @@ std::string images_section(const BlockResult& result, const Figures& f, const st
   }
   const std::int64_t all = f.reprojection.oriented_images;
   std::string note =
-      "Observations: kept ones; rejected: of all measurements in tracks. Positions of the projection "
-      "centres in the ground frame";
+      "Observations: number of kept ones; rejected: share of all observations in tracks. Positions are those of the "
+      "projection centres in the ground frame";
   note += columns.sigmas ? ", sigmas of the frame (rotation: the largest of three axes). " : ". ";
   note += "Click a heading to sort.";
   if (all > static_cast<std::int64_t>(images.size()))

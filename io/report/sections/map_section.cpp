@@ -1,4 +1,5 @@
-// The maps. Parts of the block whose place is not observed are not drawn onto a common map: each has its own.
+// Writes the sections with maps. Each part of the block whose place no observation determines has a map of its own,
+// because its place on a common map would be arbitrary.
 #include <fmt/core.h>
 
 #include "io/report/drawing/drawing.h"
@@ -9,22 +10,22 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kMostMaps = 6;  // of free parts
+constexpr std::size_t kMostMaps = 6;  // largest number of maps of free parts
 constexpr int kScaleFreeDefect = 7;
 
-// What one map shows.
+// The frames that one map shows.
 struct MapSubject {
   FrameSelection selected;
   const char* unit;
   bool placed;
-  std::int32_t part;  // of a free part; -1: all that is placed
+  std::int32_t part;  // number of the free part; -1: all placed frames
 };
 
 FrameSelection in_part(const Figures& f, std::int32_t part) {
   return [&f, part](FrameIndex frame) { return f.part_of_frame[frame] == part; };
 }
 
-// Placed frames and those without pose together, then each free part.
+// One map of the placed frames and of those without a pose, then one of each free part.
 std::vector<MapSubject> subjects_of(const Figures& f) {
   const auto placed = [&f](FrameIndex frame) {
     const std::int32_t part = f.part_of_frame[frame];
@@ -52,10 +53,10 @@ std::string caption_of(const BlockResult& result, const Figures& f, const MapSub
   if (subject.placed) return ground_caption(result.block.ground);
   const BlockPart& part = f.parts[static_cast<std::size_t>(subject.part)];
   return fmt::format(
-      "{}{} images. Its datum is free (defect {}): {} the adjustment's own{}.",
+      "{}{} images. Its datum is free (defect {}): {} arbitrary{}.",
       f.parts.size() > 1 ? "<b>Part " + count(subject.part + 1) + ".</b> " : "", count(part.images), part.defect,
       part.defect >= kScaleFreeDefect ? "place, direction and scale are" : "part of its place, direction and scale is",
-      f.parts.size() > 1 ? "; how it lies to the other parts is not known" : "");
+      f.parts.size() > 1 ? ", also relative to the other parts" : "");
 }
 
 std::string map_controls() {
@@ -94,10 +95,9 @@ std::string coverage_section(const BlockResult& result, const Figures& f, const 
   const std::string drawing = draw_coverage(result, subject.selected, subject.unit, after_reading);
   if (drawing.empty()) return "";
   std::string caption =
-      "Coverage: from how many images tie points in a cell were measured (kept observations). Places seen by one or "
-      "two "
-      "images have no check on their points.";
-  if (subjects.size() > 1) caption += " The first map's part.";
+      "Coverage: number of images with kept observations of the tie points in each cell. Where only one or two images "
+      "see a place, nothing checks its points.";
+  if (subjects.size() > 1) caption += " Only the part on the first map is shown.";
   return section("coverage", "Coverage", coverage_legend() + figure(drawing, caption));
 }
 
@@ -106,7 +106,8 @@ std::string ellipses_figure(const BlockResult& result, const Figures& f, const s
   if (subjects.empty()) return "";
   const FieldDrawing drawing = draw_ellipses(result, subjects.front().selected, subjects.front().unit, after_reading);
   if (drawing.svg.empty()) return "";
-  return figure(drawing.svg, drawing.caption + (subjects.size() > 1 ? " The first map's part." : ""));
+  return figure(drawing.svg,
+                drawing.caption + (subjects.size() > 1 ? " Only the part on the first map is shown." : ""));
 }
 
 }  // namespace megablock::report

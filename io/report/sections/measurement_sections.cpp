@@ -1,4 +1,4 @@
-// Positions, attitudes, accuracy: what is measured in metres and radians.
+// Writes the sections about the residuals of positions and attitudes, and about the accuracy of the result.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kWorst = 5;  // residuals listed
+constexpr std::size_t kWorst = 5;  // number of listed residuals
 
 void add_row(Table& table, const std::string& name, const Eigen::Vector3d& v, const LengthUnit& unit, bool sign) {
   std::vector<std::string> cells = {name};
@@ -23,7 +23,7 @@ void add_row(Table& table, const std::string& name, const Eigen::Vector3d& v, co
   table.add(std::move(cells));
 }
 
-// Rows whose largest component is largest.
+// The rows with the largest components.
 std::vector<std::size_t> largest_rows(const std::vector<Eigen::Vector3d>& values, std::size_t listed) {
   std::vector<std::size_t> order(values.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -35,7 +35,7 @@ std::vector<std::size_t> largest_rows(const std::vector<Eigen::Vector3d>& values
   return order;
 }
 
-// What is held has residuals of zero, which say nothing.
+// The residuals without those of held values, which are zero and say nothing.
 template <typename Residual>
 std::vector<Residual> not_held(const std::vector<Residual>& residuals, double held_sigma) {
   std::vector<Residual> rest;
@@ -151,8 +151,8 @@ std::string accuracy_section(const BlockResult& result, const Figures& f, const 
   return section(
       "accuracy", "Accuracy from the adjustment",
       paragraph(std::string("Standard deviations from the covariance of the whole block, ") +
-                (result.sigma_scaled ? "multiplied by σ₀ a posteriori, as is the last column."
-                                     : "a-priori variance factor 1; the last column multiplies by σ₀ a posteriori.") +
+                (result.sigma_scaled ? "all multiplied by σ₀ a posteriori."
+                                     : "for σ₀ = 1; only those of the last column are multiplied by σ₀ a posteriori.") +
                 " Rotation: the largest of the three axes.") +
           table.html("compact") + ellipses_figure(result, f, after_reading));
 }

@@ -1,4 +1,5 @@
-// Are the stated sigmas true? One row per kind of observation (io/block/observation_statistics.h).
+// Writes the section that compares residuals with the stated sigmas, one row per kind of observation
+// (io/block/observation_statistics.h), and the section's tests of single tie point observations.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -13,33 +14,33 @@ namespace megablock::report {
 
 namespace {
 
-// By more than chance, and at least 10 %.
+// Whether the sigma that the residuals show differs from the stated one by more than chance explains, and by at least
+// 10 %.
 bool misstated(const ObservationStatistics& statistics) {
   const double factor = statistics.sigma_factor();
   const double tolerance = std::max(0.1, chance_of_factor(statistics));
   return std::isfinite(factor) && std::abs(factor - 1) > tolerance;
 }
 
-// What more large residuals than expected mean, if there are more than chance explains (five standard deviations).
+// Explains a surplus of large residuals, if there are more than chance explains (five standard deviations).
 std::string verdict(const Reliability& r) {
   const double expected = kFalseAlarmProbability * static_cast<double>(r.tested);
   const auto found = static_cast<double>(r.beyond_normal);
   if (found <= expected + 5 * std::sqrt(std::max(1.0, expected)))
-    return "No more measurements are beyond the limit than normally distributed errors leave there.";
+    return "No more observations exceed the limit than normally distributed errors give.";
   return fmt::format(
-      "{} times as many measurements are beyond the limit as normally distributed errors of one sigma would leave "
-      "there. "
-      "By itself that is no fault: matched points are not all measured equally well, so that large errors are more "
-      "frequent than normal ones, about ten times so on rendered pictures without any fault. The sigma of the tie "
-      "points, which is estimated, includes them. It matters where they lie together: see whether the largest, below, "
-      "are of one image or one object.",
+      "{} times as many observations exceed the limit as normally distributed errors of one sigma would give. "
+      "This alone is no fault: matched points are not all equally accurate, so large errors are more frequent than "
+      "with a normal distribution, about ten times as frequent on rendered images without any fault. The estimated "
+      "sigma of the tie points includes them. They matter if they lie close together: see in the list below whether "
+      "the largest belong to one image or to one object.",
       significant(found / expected, 2));
 }
 
-// Baarda's and Pope's tests of the tie point observations, and how large an error must be to be found.
+// The tests of Baarda and Pope for tie point observations, and the size of the errors that they detect.
 std::string reliability_part(const BlockResult& result, const Reliability& r) {
   if (r.tested == 0) return "";
-  Table tests({"test of tie point measurements", "limit", "beyond it", "expected by chance"});
+  Table tests({"test of tie point observations", "limit", "beyond it", "expected by chance"});
   const auto expected = static_cast<std::int64_t>(std::llround(kFalseAlarmProbability * static_cast<double>(r.tested)));
   tests.add({"Baarda: |w| = |residual| ÷ (sigma √redundancy)", fixed(r.normal_limit, 2), count(r.beyond_normal),
              count(expected)});
@@ -51,19 +52,18 @@ std::string reliability_part(const BlockResult& result, const Reliability& r) {
                  test.vertical ? "y" : "x", fixed(test.residual, 2), fixed(test.redundancy, 2),
                  fixed(test.normalised, 2)});
   const std::string reliability = fmt::format(
-      "Reliability: an error of one measurement is found (with a probability of {:.0f} %, at a false alarm in {:.0f}) "
-      "from {} px on for half of the measurements, from {} px on for 95 % of them. {} of {} have a redundancy below "
-      "{}; "
-      "{} are checked by nothing else; of the others, an error that is just not found moves no result by more than {} "
-      "of "
-      "its own sigmas. Residuals are taken as they are: beyond the corner of a robust loss, |w| is too large by the "
-      "root "
-      "of the loss's weight.",
+      "Reliability: an error of one observation is detected (with a probability of {:.0f} %, and one false alarm in "
+      "{:.0f}) if it exceeds {} px for half of the observations, and {} px for 95 % of them. {} of {} have a "
+      "redundancy below {}; {} more are not checked by any other observation. For the others, an error that is just "
+      "not detected "
+      "changes no result by more than {} of its own sigmas. Residuals are used without the weight of the robust loss: "
+      "where the loss reduces the weight, |w| is too large by the square root of this weight.",
       100 * kDetectionProbability, 1 / kFalseAlarmProbability, significant(r.detectable_px.median, 2),
       significant(r.detectable_px.p95, 2), count(r.poorly_checked), count(r.tested),
       fixed(Reliability::kPoorRedundancy, 1), count(r.unchecked), significant(r.worst_external, 2));
-  const std::string listed = fmt::format("Listed are the largest |w| of measurements with a redundancy of {} and more.",
-                                         fixed(Reliability::kListedRedundancy, 2));
+  const std::string listed =
+      fmt::format("The list has the largest |w| of observations with a redundancy of at least {}.",
+                  fixed(Reliability::kListedRedundancy, 2));
   return tests.html("compact") + paragraph(verdict(r)) + paragraph(reliability) +
          (largest.empty() ? "" : paragraph(listed, "muted") + largest.html("compact"));
 }
@@ -88,8 +88,8 @@ std::string observations_section(const BlockResult& result, const Figures& figur
              result.degrees_of_freedom > 0 ? fixed(std::sqrt(std::max(0.0, result.variance_factor)), 2) : kMissing},
             "sum");
   return section("observations", "Observations and their sigmas",
-                 paragraph("Redundancy says how much of the observations of a kind is checked by all others; the last "
-                           "column how far their residuals are from what the stated sigmas promise (1: as promised).") +
+                 paragraph("Redundancy tells how many of the observations of a kind all others check. The last column "
+                           "is the sigma that the residuals show, over the stated one (1: as stated).") +
                      table.html("compact") + reliability_part(result, figures.reliability));
 }
 

@@ -1,4 +1,4 @@
-// What failed, what it took, and where the result comes from.
+// Writes the sections about failed images and units, about time and memory, and about the origin of the result.
 #include <fmt/chrono.h>
 #include <fmt/core.h>
 
@@ -14,11 +14,11 @@ namespace megablock::report {
 
 namespace {
 
-constexpr std::size_t kListedFailures = 200;  // failures
+constexpr std::size_t kListedFailures = 200;  // largest number of listed failures
 
 std::string known(std::int64_t value) { return value < 0 ? kMissing : count(value); }
 
-// Size, features, images matched with, matches, observations: what is known of an image that failed.
+// The known figures of a failed image: size, features, images matched with, matches, observations.
 std::vector<std::string> image_cells(const BlockResult& result, const Figures& f, ImageIndex image) {
   const Camera& camera = result.block.cameras[result.block.camera_of(image)];
   const ImageRecord record = result.image_records.contains(image) ? result.image_records[image] : ImageRecord{};
@@ -63,10 +63,9 @@ std::string failures_section(const BlockResult& result, const Figures& f) {
   const std::string lost =
       f.not_oriented.empty()
           ? ""
-          : paragraph(
-                fmt::format("{} {} not oriented. Observations: image measurements in tracks, whether kept or not.",
-                            count(static_cast<std::int64_t>(f.not_oriented.size())),
-                            f.not_oriented.size() == 1 ? "image is" : "images are"));
+          : paragraph(fmt::format("{} {} not oriented. Observations: all in tracks, kept or rejected.",
+                                  count(static_cast<std::int64_t>(f.not_oriented.size())),
+                                  f.not_oriented.size() == 1 ? "image is" : "images are"));
   return section("failures", "What failed", lost + table.html("sortable") + more(all, kListedFailures));
 }
 
@@ -127,7 +126,7 @@ std::string provenance_section(const BlockResult& result, const ReportContext& c
   if (result.global_iterations > 0)
     add("convergence",
         fmt::format("Newton decrement {} after {}{}", significant(result.newton_decrement, 2),
-                    counted(result.global_iterations, "step"),
+                    counted(result.global_iterations, "iteration"),
                     result.decrement_limit > 0 ? ", limit " + significant(result.decrement_limit, 2) : ""));
   add("digest", result.digest.empty() ? "" : "<code>" + escape(result.digest) + "</code>");
   if (table.empty() && provenance.options.empty()) return "";

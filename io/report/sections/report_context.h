@@ -9,13 +9,14 @@
 
 namespace megablock {
 
-// What the page says that is not in the result, whose bits tell no time and no place.
+// Facts about the job that the page prints and that the result does not contain. Results contain neither times nor
+// places, so that equal results are equal files.
 struct ReportContext {
   std::string job;                                               // directory
-  double computed_s = std::numeric_limits<double>::quiet_NaN();  // when the result was written, since 1970
-  const BlockDiagnostics* diagnostics = nullptr;                 // null: not looked for
-  // Called when a section is written, and behind what a section has gone through: tables of the result that lie in a
-  // file may leave memory.
+  double computed_s = std::numeric_limits<double>::quiet_NaN();  // time when the result was written, since 1970
+  const BlockDiagnostics* diagnostics = nullptr;                 // null: not diagnosed
+  // Called after a section is written, and at intervals while a section reads large tables. Tables of the result that
+  // are mapped from a file may then leave memory.
   std::function<void()> after_reading = [] {};
 };
 

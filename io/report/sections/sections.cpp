@@ -1,4 +1,4 @@
-// Tie points, residuals, tiles.
+// Writes the sections about tie points, image residuals and tiles.
 #include "io/report/sections/sections.h"
 
 #include <fmt/core.h>
@@ -95,8 +95,8 @@ std::string tiles_section(const BlockResult& result, const Figures& f) {
     }
     body += "<h3>Seams</h3>" +
             paragraph(
-                "T measures how far the two sides of a joint of the merge tree disagree about what they share; it "
-                "follows a χ² distribution when they do not. Worst first.",
+                "T measures how much the two sides of a joint of the merge tree disagree about their common unknowns. "
+                "It follows a χ² distribution if they agree. Worst first.",
                 "muted") +
             seams.html() + more(order.size(), kTilesListed);
   }

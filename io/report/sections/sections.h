@@ -1,4 +1,4 @@
-// The parts of the report, in the order of the page. Each is empty when there is nothing to say.
+// The sections of the report, in the order of the page. A section without contents is an empty text.
 #pragma once
 
 #include <functional>
@@ -10,17 +10,17 @@
 
 namespace megablock::report {
 
-inline constexpr double kGrossRatio = 3;  // differences beyond so many sigma are marked
+inline constexpr double kGrossRatio = 3;  // differences of more than so many sigmas are marked
 
 bool alarms(const SeamCheck& seam);
-double sigmas_apart(const SeamCheck& seam);  // how far its sides differ, over what their sigmas explain
-std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty when unknown
-// Empty without covariances; `after_reading` as in ReportContext, here and below.
+double sigmas_apart(const SeamCheck& seam);  // difference of its two sides, over what their sigmas explain
+std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty if unknown
+// Empty without covariances. `after_reading` is that of ReportContext, here and below.
 std::string ellipses_figure(const BlockResult& result, const Figures& figures,
                             const std::function<void()>& after_reading);
 
 std::string headline(const BlockResult& result, const Figures& figures);
-std::string assessment(const BlockResult& result, const Figures& figures);  // what is well and what needs a look
+std::string assessment(const BlockResult& result, const Figures& figures);  // strengths and weaknesses
 std::string map_section(const BlockResult& result, const Figures& figures, const std::function<void()>& after_reading);
 std::string coverage_section(const BlockResult& result, const Figures& figures,
                              const std::function<void()>& after_reading);

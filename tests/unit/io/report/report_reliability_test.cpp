@@ -85,12 +85,12 @@ TEST(ReportReliability, SaysWhetherItMattersThatMoreThanExpectedAreBeyondTheLimi
     return report_html(result);
   };
   const std::string normal = page_with_errors(0), mixed = page_with_errors(0.2);
-  constexpr const char* kNoMore = "No more measurements are beyond the limit than normally distributed errors";
-  constexpr const char* kMore = " times as many measurements are beyond the limit";
+  constexpr const char* kNoMore = "No more observations exceed the limit than normally distributed errors";
+  constexpr const char* kMore = " times as many observations exceed the limit";
   EXPECT_THAT(normal, testing::HasSubstr(kNoMore));
   EXPECT_THAT(normal, testing::Not(testing::HasSubstr(kMore)));
   EXPECT_THAT(mixed, testing::HasSubstr(kMore));
-  EXPECT_THAT(mixed, testing::HasSubstr("By itself that is no fault"));
+  EXPECT_THAT(mixed, testing::HasSubstr("This alone is no fault"));
 }
 
 TEST(ReportReliability, IsOnThePage) {

@@ -201,14 +201,14 @@ TEST(Report, PartsWithoutADatumHaveMapsOfTheirOwn) {
     EXPECT_EQ(figures.part_of_frame[f], f.value == 3 ? -1 : f.value < 30 ? 1 : 0);
   const std::string placed = report_html(result);
   EXPECT_EQ(count_of(placed, "aria-label=\"Map of the block\""), 1u);
-  EXPECT_THAT(placed, HasSubstr("each is placed by its own positions or control alone"));
+  EXPECT_THAT(placed, HasSubstr("only its own positions or control points place each of them"));
 
   result.free_parts = {{FrameIndex(0), 7}, {FrameIndex(30), 7}};
   const std::string free = report_html(result);
   expect_sound(free);
   EXPECT_EQ(count_of(free, "aria-label=\"Map of the block\""), 2u);
-  EXPECT_THAT(free, HasSubstr("<li class=bad>The block falls into 2 parts"));
-  EXPECT_THAT(free, HasSubstr("how it lies to the other parts is not known"));
+  EXPECT_THAT(free, HasSubstr("<li class=bad>The block consists of 2 parts"));
+  EXPECT_THAT(free, HasSubstr("are arbitrary, also relative to the other parts"));
   EXPECT_THAT(free, Not(HasSubstr(" km</text>")));  // a free scale is not in metres
 }
 
@@ -216,11 +216,11 @@ TEST(Report, JointsThatShareNothingAreNotGood) {
   BlockResult result = made_up_result(small_block());
   result.seams = {{4, 0, 0, 0, ""}};
   EXPECT_THAT(report_html(result),
-              HasSubstr("<li class=look>The joint of the merge tree joins parts that share nothing"));
+              HasSubstr("<li class=look>The joint of the merge tree joins parts without common unknowns"));
   result.seams.push_back({5, 30, 40, 81, ""});
   EXPECT_THAT(report_html(result),
               HasSubstr("the tiles agree at the joint of the merge tree that was tested. 1 more joins "
-                        "parts that share nothing"));
+                        "parts without common unknowns"));
 }
 
 TEST(Report, ImagesAreListedUpToALimit) {
