@@ -14,7 +14,7 @@ namespace {
 
 struct ExportFormat {
   std::string name;
-  std::vector<std::string> files;  // in a folder; none: one file
+  std::vector<std::string> files;  // files in the output folder; empty: the output is one file
   void (*write)(const BlockResult&, const std::string&);
 };
 

@@ -1,5 +1,4 @@
-// Exports of a result: one entry for all formats. What each file holds: docs/reference/exports.md and the writers'
-// headers.
+// Exports a result in any format. docs/reference/exports.md and the headers of the writers describe the files.
 #pragma once
 
 #include <string>
@@ -18,11 +17,11 @@ namespace megablock {
 // h5:              one self-contained file (write_result)
 const std::vector<std::string>& export_formats();
 
-// The files that a format writes for `out`; of csv some only where the block has what they hold.
+// The files that a format writes for `out`. Some files of csv are written only if the block has contents for them.
 std::vector<std::string> export_files(const std::string& format, const std::string& out);
 
-// Makes the folder of a format that is one, in a folder that is there. InputError for an unknown format, or when it
-// cannot be written.
+// Writes the export. If the format is a folder, the folder is made; its parent must exist. Throws InputError for an
+// unknown format, and if the export cannot be written.
 void export_result(const BlockResult& result, const std::string& format, const std::string& out);
 
 }  // namespace megablock

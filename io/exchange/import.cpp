@@ -33,16 +33,17 @@ const std::vector<ImportFormat>& readers() {
 }
 
 constexpr const char* kProject =
-    "# Imported block; keys: docs/reference/project-file.md\nblock: given.h5\ntie_points: tie_points.h5\n";
+    "# Imported block. The installed manual explains all keys: share/doc/megablock/docs/reference/project-file.md\n"
+    "block: given.h5\ntie_points: tie_points.h5\n";
 
-// Of another block, or of this one with options that were set since.
+// Throws InputError if there is a project file with other contents. It belongs to another block, or was edited.
 void refuse_other_project(const fs::path& path) {
   if (!fs::exists(path)) return;
   std::ifstream file(path);
   if (std::string(std::istreambuf_iterator<char>(file), {}) != kProject)
     throw InputError(path.string() +
-                     ": is there and differs from what an import writes: it was edited, or is of another block; name "
-                     "another folder with -o, or move it away");
+                     ": this project file exists and differs from that of the import: it was edited, or belongs to "
+                     "another block; name another folder with -o, or move it away");
 }
 
 }  // namespace

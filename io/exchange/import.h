@@ -1,4 +1,4 @@
-// Imports of other programs' models as a block with given poses, tie points and their positions.
+// Imports models of other programs, as a block with given poses, tie points and their positions.
 #pragma once
 
 #include <string>
@@ -8,20 +8,20 @@
 
 namespace megablock {
 
-// The formats: "colmap-text" and "colmap-bin" (a folder), "bal" and "bundler" (one file each; image names from
-// <path>.list.txt when it is there).
+// The formats: "colmap-text" and "colmap-bin" (a folder), "bal" and "bundler" (one file each; <path>.list.txt gives the
+// names of the images if it exists).
 const std::vector<std::string>& import_formats();
 
-// InputError with file:line (binary files: the byte) for malformed files and indices out of range, InputError for an
-// unknown format.
+// Reads a model. Throws InputError for an unknown format, and with file:line (for binary files: the byte) for malformed
+// files and indices out of range.
 //
-// BAL and Bundler keep neither image sizes nor principal points: the image is taken as the smallest one, with its
-// centre as principal point, that holds all observations of the camera; principal point, k3, p1, p2 are held. COLMAP
-// cameras SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and FULL_OPENCV (k4..k6 = 0) are read; fx and fy must
-// agree to 1e-9. Observations without a point are left out.
+// BAL and Bundler files have neither image sizes nor principal points. The image is taken as the smallest one that
+// contains all observations of the camera, with its centre as the principal point; principal point, k3, p1, p2 are
+// held. The COLMAP cameras SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and FULL_OPENCV (k4 to k6 = 0) are
+// read; fx and fy must agree to 1e-9. Observations without a point are left out.
 ImportedBlock import_block(const std::string& format, const std::string& path);
 
-// Makes a project of it that `megablock run` reads: folder/block.yaml, given.h5, tie_points.h5.
+// Writes a project that `megablock run` reads: folder/block.yaml, given.h5, tie_points.h5.
 void write_imported(const ImportedBlock& imported, const std::string& folder);
 
 }  // namespace megablock

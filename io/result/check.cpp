@@ -44,7 +44,7 @@ class Check {
   }
 
  private:
-  // Collects what an action throws as one problem.
+  // Runs an action. An error that it throws becomes one problem of the list.
   void attempt(const std::function<void()>& action) {
     try {
       action();
@@ -61,7 +61,8 @@ class Check {
     read_events(store_);
   }
 
-  // Everything sealed: the .h5 files of the job's own folder, everything in the folders of the stages, the result.
+  // The names of all sealed files: the .h5 files in the job's own folder, all files in the folders of the stages, and
+  // the result.
   std::vector<std::string> units() const {
     std::vector<std::string> names;
     for (const std::string& name : store_.list("")) {
@@ -77,7 +78,7 @@ class Check {
 
   void check_unit(const std::string& name) {
     const std::string path = store_.verified_path(name);
-    if (!name.ends_with(".h5")) return;  // its contents are known to its stage alone
+    if (!name.ends_with(".h5")) return;  // only its stage can read its contents
     const std::string kind = file_kind(path);
     if (kind == "result") {
       check_result(path);
@@ -107,11 +108,11 @@ class Check {
     tracks.visit([&](const TrackResults& batch) { contents.add(batch); });
     const std::string digest = contents.text();
     if (digest != result.digest)
-      throw StoreError(path + ": says its digest is " + result.digest + ", its contents have " + digest +
+      throw StoreError(path + ": its digest is " + result.digest + ", but that of its contents is " + digest +
                        "; delete it and run again");
   }
 
-  // A stage of one unit per tile: when some tiles have their file, all must.
+  // Some stages have one unit per tile. If some tiles have their file, all must have one.
   void check_tile_files() {
     if (!store_.seal("tiles.h5")) return;
     const std::int64_t tiles = read_tiles(store_.verified_path("tiles.h5")).tile_count;

@@ -1,4 +1,4 @@
-// The indices of the measurement store: measurements.h5 (by image) and points/box of the result (by place).
+// Makes the two indices of the measurement store: measurements.h5 (by image) and points/box of the result (by place).
 #include "io/result/measurement_index.h"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ std::vector<ImageIndex> distinct_images(const TrackSet& tracks) {
 
 void write_index(const std::string& path, const JobStore& store, const std::vector<std::string>& tiles) {
   std::vector<std::uint64_t> fingerprints;
-  std::vector<std::vector<ImageIndex>> images;  // by tile
+  std::vector<std::vector<ImageIndex>> images;  // [tiles]
   std::size_t count = 0;
   for (const std::string& tile : tiles) {
     images.push_back(distinct_images(TrackReader(store.verified_path(tile)).images()));
@@ -89,7 +89,7 @@ void check_measurement_index(const JobStore& store) {
   const auto fingerprints = Hdf5Reader(path, kMeasurementIndexKind).vector<std::uint64_t>(kTileFingerprint);
   for (std::size_t t = 0; current && t < fingerprints.size(); ++t)
     current = store.up_to_date(tracks_unit(TileIndex(static_cast<std::int64_t>(t))), fingerprints[t]);
-  if (!current) throw StoreError(path + ": is not of the job's tracks as they are; run the job again");
+  if (!current) throw StoreError(path + ": does not belong to the present tracks of the job; run the job again");
 }
 
 namespace {
@@ -99,7 +99,7 @@ constexpr float kBeyond = std::numeric_limits<float>::infinity(), kUnset = std::
 struct Bounds {
   std::array<float, 3> lowest = {kUnset, kUnset, kUnset}, highest = {kUnset, kUnset, kUnset};
 
-  // fmin and fmax pass over NaN.
+  // Extends the box; fmin and fmax ignore NaN.
   void add(const float* low, const float* high) {
     for (std::size_t k = 0; k < 3; ++k) {
       lowest[k] = std::fmin(lowest[k], low[k]);

@@ -1,4 +1,4 @@
-// Names of the index by image that its writer and its readers share. Internal to io/.
+// The names in the index by image, which its writer and its readers share. Internal to io/.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ inline constexpr const char *kMeasurementIndexKind = "measurement_index", *kTile
 
 std::string tracks_unit(TileIndex tile);  // "tracks/000003.h5"
 
-// Of the index made of the files that this list of tracks names.
+// The fingerprint of an index of the track files that this list names.
 std::uint64_t measurement_index_fingerprint(const UnitSeal& tracks);
 
 }  // namespace megablock

@@ -13,16 +13,16 @@ namespace megablock {
 
 namespace {
 
-constexpr std::int64_t kGap = 4096;  // rows; closer ones lie in one chunk, mostly
+constexpr std::int64_t kGap = 4096;  // rows that are closer than this mostly lie in one chunk and are read together
 
-// The values of some rows of a column of which `ranges` were read.
+// Picks the values of some rows from `values`, which has the rows in `ranges`.
 template <typename T>
 std::vector<T> picked(const std::vector<T>& values, const std::vector<RowRange>& ranges,
                       const std::vector<std::int64_t>& rows) {
   std::vector<T> found;
   found.reserve(rows.size());
   std::size_t range = 0;
-  std::int64_t before = 0;  // rows of the ranges before this one
+  std::int64_t before = 0;  // number of rows in earlier ranges
   for (const std::int64_t row : rows) {
     while (row >= ranges[range].first + ranges[range].count) before += ranges[range++].count;
     found.push_back(values[static_cast<std::size_t>(before + row - ranges[range].first)]);
@@ -75,7 +75,7 @@ void sort_by_image(Measurements& all) {
   reorder(all.tile, order);
 }
 
-// Rows of the names among the texts of a dataset, read portion by portion.
+// Finds the rows of names in a dataset of texts; -1 for a missing name. The dataset is read in portions.
 std::vector<std::int64_t> find_texts(const Hdf5Reader& file, const std::string& name,
                                      const std::vector<std::string>& wanted) {
   constexpr std::int64_t kPortion = 1 << 16;
@@ -91,21 +91,22 @@ std::vector<std::int64_t> find_texts(const Hdf5Reader& file, const std::string& 
   return found;
 }
 
-// Of a point (or, with a box, of the point of it that is nearest) from a place.
+// Distance of a box from a place: that of its nearest point. A point is a box without extent.
 double distance_from(const GroundPlace& place, const Eigen::Vector3d& lowest, const Eigen::Vector3d& highest) {
   Eigen::Vector3d offset = (place.centre.cwiseMax(lowest).cwiseMin(highest)) - place.centre;
   if (std::isnan(place.centre.z())) offset.z() = 0;
   return offset.norm();
 }
 
-// Those of `boxes`, of which each stands for `members` of `count` rows one level down, that touch the place.
+// Finds the boxes that touch the place. Each box stands for `members` rows of the next lower level, which has `count`
+// rows; the result has these rows.
 std::vector<RowRange> rows_touched(const std::vector<float>& boxes, const std::vector<RowRange>& ranges,
                                    const GroundPlace& place, std::int64_t members, std::int64_t count) {
   std::vector<RowRange> touched;
   const float* box = boxes.data();
   for (const RowRange& range : ranges)
     for (std::int64_t row = range.first; row < range.first + range.count; ++row, box += 6) {
-      if (std::isnan(box[0])) continue;  // no point with a position
+      if (std::isnan(box[0])) continue;  // the box has no point with a position
       const Eigen::Vector3d lowest(box[0], box[1], box[2]), highest(box[3], box[4], box[5]);
       if (distance_from(place, lowest, highest) <= place.radius_m)
         touched.push_back({row * members, std::min(members, count - row * members)});
@@ -117,7 +118,7 @@ std::vector<RowRange> rows_touched(const std::vector<float>& boxes, const std::v
 
 MeasurementStore::MeasurementStore(const std::string& job) : store_(job) {
   if (!std::filesystem::exists(store_.path("job.json")))
-    throw InputError(job + ": is not a job directory (no job.json); name the folder given to 'run -j'");
+    throw InputError(job + ": is not a job directory (it has no job.json); name the folder given to 'run -j'");
 }
 
 std::vector<ImageIndex> MeasurementStore::find_images(const std::vector<std::string>& names) const {
@@ -125,8 +126,8 @@ std::vector<ImageIndex> MeasurementStore::find_images(const std::vector<std::str
   std::vector<ImageIndex> images;
   for (const std::int64_t row : find_texts(block, "images/name", names)) {
     if (row < 0)
-      throw InputError(store_.directory() + ": no image '" + names[images.size()] +
-                       "'; images are named as in the project's folder of images");
+      throw InputError(store_.directory() + ": the job has no image '" + names[images.size()] +
+                       "'; give its path relative to the project's folder of images");
     images.emplace_back(row);
   }
   return images;
@@ -137,7 +138,8 @@ std::vector<ImageIndex> MeasurementStore::images_of_frames(const std::vector<std
   const std::vector<std::int64_t> frames = find_texts(block, "frames/name", names);
   for (std::size_t f = 0; f < frames.size(); ++f)
     if (frames[f] < 0)
-      throw InputError(store_.directory() + ": no frame '" + names[f] + "'; 'export --format csv' lists them");
+      throw InputError(store_.directory() + ": the job has no frame '" + names[f] +
+                       "'; 'export --format csv' lists the frames");
   const std::vector<std::int64_t> frame_of = block.vector<std::int64_t>("images/frame");
   std::vector<ImageIndex> images;
   for (std::size_t i = 0; i < frame_of.size(); ++i)
@@ -154,7 +156,7 @@ std::vector<std::string> MeasurementStore::names_of(const std::vector<ImageIndex
   return picked(block.text_rows("images/name", ranges), ranges, rows);
 }
 
-// Ascending.
+// The tiles that have observations in these images, ascending.
 std::vector<TileIndex> MeasurementStore::tiles_of(const std::vector<ImageIndex>& images) const {
   if (!index_) {
     const auto tracks = store_.seal(kTrackList);
@@ -197,20 +199,20 @@ Measurements MeasurementStore::of_images(std::vector<ImageIndex> images) const {
   return all;
 }
 
-// The result is as large as the block. It is not hashed here: HDF5 checks what it reads of it chunk by chunk.
+// The result is as large as the block, so its hash is not verified here. HDF5 checks each chunk that it reads.
 const Hdf5Reader& MeasurementStore::result() const {
   if (result_) return *result_;
   if (!store_.seal(kResult))
     throw InputError(store_.directory() +
-                     ": the job has no result yet, which tells the places of points; run it to the end");
+                     ": the job has no result yet, and only the result has the positions of points; run it to the end");
   auto file = std::make_unique<Hdf5Reader>(store_.path(kResult), "result");
   if (!file->has("points/district") || !file->has("points/track"))
-    throw StoreError(store_.path(kResult) + ": has no index by place; delete it and run the job again");
+    throw StoreError(store_.path(kResult) + ": has no index of places; delete it and run the job again");
   result_ = std::move(file);
   return *result_;
 }
 
-// Rows of the result's points, ascending.
+// The rows of the points of the result in a place, ascending.
 std::vector<std::int64_t> MeasurementStore::points_near(const GroundPlace& place) const {
   const Hdf5Reader& file = result();
   const std::int64_t count = file.shape("points/id").front(), run_count = file.shape("points/box").front(),
@@ -236,7 +238,7 @@ Eigen::AlignedBox3d MeasurementStore::extent() const {
   const std::vector<float> districts =
       result().rows<float>("points/district", {{0, result().shape("points/district").front()}});
   for (auto box = districts.begin(); box != districts.end(); box += 6) {
-    if (std::isnan(box[0])) continue;  // no point with a position
+    if (std::isnan(box[0])) continue;  // the box has no point with a position
     extent.extend(Eigen::Vector3d(box[0], box[1], box[2]));
     extent.extend(Eigen::Vector3d(box[3], box[4], box[5]));
   }
@@ -245,7 +247,7 @@ Eigen::AlignedBox3d MeasurementStore::extent() const {
 
 Measurements MeasurementStore::near(const GroundPlace& place) const {
   if (!place.centre.head<2>().allFinite() || !std::isfinite(place.radius_m) || place.radius_m < 0)
-    throw InputError("a place needs finite east and north, and a radius of 0 m or more");
+    throw InputError("east and north of a place must be finite numbers, and its radius at least 0 m");
   const std::vector<std::int64_t> points = points_near(place);
   const Hdf5Reader& file = result();
   std::vector<std::int64_t> rows;

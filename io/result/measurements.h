@@ -1,12 +1,13 @@
-// The measurement store: a block's observations of tie points by image and by place, from the few parts of the job's
-// files that hold them, so that the size of the block hardly matters (docs/reference/file-formats.md, "Measurements").
+// The measurement store: finds the tie point observations of images, or those near a place on the ground. Only the
+// necessary parts of the job's files are read, so a query takes hardly longer in a large block
+// (docs/reference/file-formats.md, "Measurements").
 //
-// By image: `measurements.h5` tells the tiles an image is seen in; the image column of a tile's file of tracks is its
-// index by image. By place: `points/district` and `points/box` of the result tell where the points of runs of
-// rows lie; places are the adjusted ones. Nothing is stored twice.
+// For images, `measurements.h5` lists the tiles with observations in each image; the column of images in the track file
+// of a tile then gives the rows. For places, `points/district` and `points/box` of the result bound the adjusted
+// positions of runs of points. No observation is stored twice.
 //
-// Errors: InputError when the job holds no tracks (no result); StoreError when files are damaged or older than those
-// they are made of.
+// Errors: InputError if the job has no tracks (no result, for places); StoreError if files are damaged, or older than
+// the files they were made from.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,13 +22,13 @@
 
 namespace megablock {
 
-// One row per measurement, all of one length.
+// One row per observation. All columns have the same length.
 struct Measurements {
   std::vector<ImageIndex> image;
-  std::vector<TrackIndex> track;            // as in the file of the tile
+  std::vector<TrackIndex> track;            // index in the file of the tile
   std::vector<std::int32_t> x, y, feature;  // as in TrackSet
-  std::vector<TileIndex> tile;              // that owns the track
-  // By place only:
+  std::vector<TileIndex> tile;              // the tile that owns the track
+  // Only from near():
   std::vector<std::uint8_t> kept;             // 1: takes part in the adjustment
   std::vector<float> residual_x, residual_y;  // adjusted minus measured, px
 
@@ -35,7 +36,7 @@ struct Measurements {
 };
 
 struct GroundPlace {
-  Eigen::Vector3d centre;  // ground frame, m; up NaN: distances are horizontal
+  Eigen::Vector3d centre;  // ground frame, metres; if up is NaN, distances are horizontal
   double radius_m = 0;
 };
 
@@ -43,17 +44,19 @@ class MeasurementStore {
  public:
   explicit MeasurementStore(const std::string& job);
 
-  // By names; InputError names the first that is not there.
+  // Find images by their names, or by those of their frames. Throw InputError with the first name that does not exist.
   std::vector<ImageIndex> find_images(const std::vector<std::string>& names) const;
   std::vector<ImageIndex> images_of_frames(const std::vector<std::string>& names) const;
-  // Of images in ascending order.
+  // The names of images, which must be ascending.
   std::vector<std::string> names_of(const std::vector<ImageIndex>& images) const;
 
-  // In the order of image, then of tile, then of track; images without measurements have no rows.
+  // The observations in some images, ordered by image, then by tile, then by track.
   Measurements of_images(std::vector<ImageIndex> images) const;
-  // Of the points of the result within the radius, in the order of its points; rejected ones too.
+  // The observations of all points of the result within the radius, including rejected observations, in the order of
+  // the points.
   Measurements near(const GroundPlace& place) const;
-  // Where the points of the result lie, ground frame, m, to the digits of a float; empty: none has a position.
+  // The bounds of the points of the result (ground frame, metres) with the precision of a float. Empty if no point has
+  // a position.
   Eigen::AlignedBox3d extent() const;
 
  private:
@@ -62,23 +65,23 @@ class MeasurementStore {
   std::vector<std::int64_t> points_near(const GroundPlace& place) const;
 
   JobStore store_;
-  // Opened by the first question that needs them.
+  // Opened by the first query that needs them.
   mutable std::unique_ptr<Hdf5Reader> index_, result_;
 };
 
-// Brings the index by image up to date with the files of the tiles, in tile order, that tracks/index.txt lists.
-// Returns what was wrong with the index that was there, if it was damaged.
+// Updates the index by image from the track files that tracks/index.txt lists (in the order of the tiles). If the old
+// index was damaged, returns the damage.
 std::string update_measurement_index(const JobStore& store, const std::vector<std::string>& tiles);
 
-// Throws StoreError when the index by image is not that of the files of tracks as they are.
+// Throws StoreError if the index by image does not belong to the present track files.
 void check_measurement_index(const JobStore& store);
 
-// The index by place of the result: bounds of the positions of each run of successive points (points/box) and of each
-// district of runs (points/district): six numbers (lowest east, north, up; highest) rounded outwards; points without
-// position count for nothing, NaN: no point at all.
+// The index by place of the result: the bounds of the positions of each run of kPointRun successive points (points/box)
+// and of each district of kDistrictRuns runs (points/district). Each box has six numbers: the lowest east, north, up,
+// then the highest, rounded outwards. Points without a position do not count; a box without any point is NaN.
 inline constexpr std::int64_t kPointRun = 1024, kDistrictRuns = 64;
 std::vector<float> boxes_of(const std::vector<Eigen::Vector3d>& points);
-// Of the unions of kDistrictRuns successive boxes.
+// The bounds of kDistrictRuns successive boxes each.
 std::vector<float> districts_of(const std::vector<float>& boxes);
 
 }  // namespace megablock

@@ -35,7 +35,8 @@ void add_state(Hasher& hasher, const BlockState& state) {
   }
 }
 
-// A point, or a mark for its absence (a NaN has many bit patterns), and its kept observations.
+// Adds a point and its kept observations to the hash. A missing point is hashed as a mark, because NaN has many bit
+// patterns.
 void add_point(Hasher& hasher, const TrackResults& result, std::size_t row) {
   const TrackSet& tracks = result.tracks;
   const Eigen::Vector3d& point = result.points[row];
@@ -62,7 +63,7 @@ bool BlockResult::ControlResult::takes_part() const {
 void TrackResults::append(const TrackResults& from, std::size_t first, std::size_t last) {
   const auto begin = static_cast<std::int64_t>(first), end = static_cast<std::int64_t>(last);
   const auto copy = [](const auto& source, std::int64_t row, std::int64_t behind, auto& target) {
-    if (!source.empty()) append_rows(source, row, behind, target);  // an optional column
+    if (!source.empty()) append_rows(source, row, behind, target);  // the column is optional
   };
   append_tracks(from.tracks, begin, end, tracks);
   copy(from.points, begin, end, points);
@@ -86,7 +87,7 @@ void TrackResults::clear() {
 void visit_sample(const TrackBatches& tracks, std::int64_t most,
                   const std::function<void(const TrackResults& batch, std::size_t row)>& visit) {
   const std::int64_t step = 1 + (tracks.track_count() - 1) / most;
-  std::int64_t before = 0;  // tracks of the batches before
+  std::int64_t before = 0;  // number of tracks in earlier batches
   tracks.visit([&](const TrackResults& batch) {
     for (std::int64_t row = (step - before % step) % step; row < batch.tracks.track_count(); row += step)
       visit(batch, static_cast<std::size_t>(row));
@@ -140,7 +141,7 @@ ReprojectionStatistics reprojection_statistics(const BlockResult& result, const 
         const auto i = static_cast<std::size_t>(o);
         if (!batch.kept[i]) continue;
         const double x = batch.residual_x[i], y = batch.residual_y[i];
-        if (std::isnan(x) || std::isnan(y)) continue;  // of an image without pose
+        if (std::isnan(x) || std::isnan(y)) continue;  // the image has no pose
         sum += std::hypot(x, y);
         sum_of_squares += x * x + y * y;
         ++used;

@@ -1,4 +1,4 @@
-// result/block.h5: docs/reference/file-formats.md, "Result".
+// Reads and writes result/block.h5 (docs/reference/file-formats.md, "Result").
 #include <algorithm>
 #include <utility>
 
@@ -39,7 +39,7 @@ std::int64_t rows(const auto& items) { return static_cast<std::int64_t>(items.si
 
 using MountCovariances = IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>>;
 
-// One row per mount, in the order of the group 'mounts'.
+// Writes one row per mount, in the order of the group 'mounts'.
 void put_mount_covariances(Hdf5Writer& file, const MountCovariances& rigs) {
   std::vector<BlockResult::Matrix6> mounts;
   for (const auto& rig : rigs) mounts.insert(mounts.end(), rig.begin(), rig.end());
@@ -61,7 +61,7 @@ MountCovariances get_mount_covariances(const Hdf5Reader& file, const IndexedVect
 }
 
 void put_precision(Hdf5Writer& file, const BlockResult& result) {
-  static_assert(sizeof(BlockResult::Matrix6) == 36 * sizeof(double));  // so these are written as they lie there
+  static_assert(sizeof(BlockResult::Matrix6) == 36 * sizeof(double));  // the matrices can be written without a copy
   if (!result.frame_covariance.empty())
     file.dataset("frames/covariance", ElementType::kDouble, result.frame_covariance.data(),
                  {rows(result.frame_covariance), 6, 6},
@@ -148,7 +148,8 @@ void get_figures(const Hdf5Reader& file, BlockResult& result) {
   result.digest = file.text_attribute("/", "digest");
 }
 
-// These have a row whether they are observed or not, as they have had in every result.
+// The first kinds of the table have a row even without observations. This keeps the files equal to those of earlier
+// programs, which wrote them always.
 constexpr std::size_t kKindsOfEveryResult = 14;
 
 void put_observation_table(Hdf5Writer& file, const ObservationTable& table) {
@@ -172,7 +173,7 @@ void put_observation_table(Hdf5Writer& file, const ObservationTable& table) {
               {"", "sigma of the adjustment over the stated one"});
 }
 
-// Kinds are found by their word; results of earlier programs have none.
+// Reads the kinds by their words. Results of earlier programs have no such table.
 void get_observation_table(const Hdf5Reader& file, ObservationTable& table) {
   if (!file.has("statistics")) return;
   const std::vector<std::string> words = file.texts("statistics/kind");
@@ -251,7 +252,7 @@ void put_provenance(Hdf5Writer& file, const Provenance& provenance) {
   file.texts("options/default", column(options, [](const OptionRecord& o) { return o.default_value; }));
 }
 
-// Results of earlier programs have none.
+// Reads the origin of the result, which results of earlier programs lack.
 void get_provenance(const Hdf5Reader& file, Provenance& provenance) {
   if (!file.has("options")) return;
   provenance.project = file.text_attribute("/", "project");
@@ -309,7 +310,7 @@ void get_free_parts(const Hdf5Reader& file, BlockResult& result) {
 
 namespace {
 
-// What comes before the tracks, and behind them.
+// The groups of the file before the tracks, and those after them.
 void put_head(Hdf5Writer& file, const BlockResult& result) {
   put_provenance(file, result.provenance);
   put_block(file, result.block);
@@ -330,7 +331,7 @@ void put_tail(Hdf5Writer& file, const BlockResult& result) {
   put_figures(file, result);
 }
 
-// Larger files are written as they grow, not put together in memory.
+// Small files are made in memory; large ones are written to disk while they grow.
 Hdf5Storage storage_for(const TrackBatches& tracks) {
   constexpr std::int64_t kMostInMemory = 1 << 20;
   return tracks.track_count() > kMostInMemory ? Hdf5Storage::kDisk : Hdf5Storage::kMemory;

@@ -1,4 +1,4 @@
-// How an option of the job was set that made a result.
+// Finds the value of an option of the job that made a result.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace megablock {
 
-// Its text, such as "false"; empty when it is not known.
+// The value as text, such as "false"; empty if it is unknown.
 inline std::string option_of(const BlockResult& result, const std::string& name) {
   for (const OptionRecord& option : result.provenance.options)
     if (option.name == name) return option.value;

@@ -104,7 +104,7 @@ void ResultTrackWriter::add_optional_columns(const TrackResults& batch) {
   if (!batch.point_covariance.empty()) file_.growing<float>("points/covariance", {3, 3}, {"m^2", "posterior"});
 }
 
-// Of whole boxes; the last one may be smaller.
+// Adds the boxes of further points. Only full boxes are made, except for the last one.
 void ResultTrackWriter::add_boxes(const std::vector<Eigen::Vector3d>& more, bool last) {
   waiting_.insert(waiting_.end(), more.begin(), more.end());
   const std::size_t whole =

@@ -1,4 +1,5 @@
-// The tracks of result/block.h5 (docs/reference/file-formats.md, "Result"), batch behind batch. Internal to io/.
+// Writes and reads the tracks of result/block.h5 in batches (docs/reference/file-formats.md, "Result"). Internal to
+// io/.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,11 +11,12 @@
 
 namespace megablock {
 
-// Throws ComputeError unless a column of a result to be written is as long as it must be.
+// Throws ComputeError if a column of a result that is to be written has the wrong length.
 void require_size(std::size_t found, std::size_t expected, const char* what);
 
-// Writes points and observations: all batches, then `finish`. The first one that is not empty says which optional
-// columns there are. Errors: as Hdf5Writer; ComputeError when columns of a batch differ in length.
+// Writes points and observations. All batches are appended, then finish() is called. The first batch that is not empty
+// decides on the optional columns of the file. Throws as Hdf5Writer does, and ComputeError if the columns of a batch
+// differ in length.
 class ResultTrackWriter {
  public:
   explicit ResultTrackWriter(Hdf5Writer& file);
@@ -28,14 +30,14 @@ class ResultTrackWriter {
   Hdf5Writer& file_;
   bool first_ = true;
   std::int64_t observations_ = 0;
-  std::vector<Eigen::Vector3d> waiting_;  // points of a box that is not full
+  std::vector<Eigen::Vector3d> waiting_;  // points of the box that is not yet full
   std::vector<float> boxes_;
 };
 
-// Number of tracks; all columns must be as long as there are tracks or observations (else StoreError).
+// Returns the number of tracks. Throws StoreError if a column is not as long as the number of tracks or observations.
 std::int64_t count_result_tracks(const Hdf5Reader& file);
 
-// Some successive tracks.
+// Reads some successive tracks.
 TrackResults read_result_tracks(const Hdf5Reader& file, const RowRange& rows_of_points);
 
 }  // namespace megablock

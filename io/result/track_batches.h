@@ -1,4 +1,5 @@
-// The tracks of a result in global order, batch by batch: of a block of a million images they are never held whole.
+// Gives the tracks of a result in global order in batches. The tracks of a block of a million images do not fit into
+// memory, so no function may need all of them at once.
 #pragma once
 
 #include <functional>
@@ -12,13 +13,13 @@ class TrackBatches {
  public:
   virtual ~TrackBatches() = default;
   virtual std::int64_t track_count() const = 0;
-  // Batches of whole tracks, ascending by index within a batch and from one to the next; all of them have the same
-  // optional columns.
+  // Calls `visit` with batches of whole tracks. Indices ascend within a batch and from batch to batch. All batches have
+  // the same optional columns.
   using Visit = std::function<void(const TrackResults&)>;
   virtual void visit(const Visit& visit) const = 0;
 };
 
-// Tracks in memory, as one batch. They outlive it.
+// Tracks in memory, as one batch. They must outlive this object.
 class WholeTracks final : public TrackBatches {
  public:
   explicit WholeTracks(const TrackResults& tracks) : tracks_(tracks) {}
@@ -29,7 +30,7 @@ class WholeTracks final : public TrackBatches {
   const TrackResults& tracks_;
 };
 
-// Those of a result's file. Errors: as read_result.
+// The tracks in the file of a result. Throws as read_result does.
 class StoredTracks final : public TrackBatches {
  public:
   explicit StoredTracks(std::string path);
@@ -41,7 +42,7 @@ class StoredTracks final : public TrackBatches {
   std::int64_t count_ = 0;
 };
 
-// Every n-th track, n such that there are no more than `most`: the batch and the row in it.
+// Visits every n-th track, with the smallest n that gives at most `most` tracks. `visit` gets the batch and the row.
 void visit_sample(const TrackBatches& tracks, std::int64_t most,
                   const std::function<void(const TrackResults& batch, std::size_t row)>& visit);
 TrackResults sample_of(const TrackBatches& tracks, std::int64_t most);

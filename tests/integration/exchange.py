@@ -50,7 +50,7 @@ class Exchange(unittest.TestCase):
             file.write("merge: {decrement: 1e-6}\n")
         edited = (project / "block.yaml").read_text(), (project / "given.h5").read_bytes()
         line = one_line(megablock("import", "bal", work / "model.txt", "-o", project, expect=BAD_INPUT))
-        self.assertIn("block.yaml: is there and differs", line)
+        self.assertIn("block.yaml: this project file exists and differs", line)
         self.assertEqual(((project / "block.yaml").read_text(), (project / "given.h5").read_bytes()), edited)
 
     def test_a_broken_model_gets_one_line(self):

@@ -15,7 +15,7 @@ bool is_brown(const Intrinsics& k) { return k.model().kind == CameraModelKind::k
 void check_bal_model(const std::string& camera, const CameraModel& model) {
   if (!sees_sideways(model)) return;
   throw InputError("camera '" + camera + "' has the model " + model_name(model) +
-                   ", whose images BAL and Bundler files cannot hold");
+                   ", whose images BAL and Bundler files cannot hold; choose another format");
 }
 
 BalCamera to_bal(const Pose& pose, const Intrinsics& k) {

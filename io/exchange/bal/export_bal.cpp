@@ -8,9 +8,10 @@ namespace megablock {
 
 namespace {
 
-// Observations in the files' image coordinates; those that cannot be converted are left out (and points below two).
+// Observations in the image coordinates of the files. Observations that cannot be converted are left out, and points
+// with fewer than two others as well.
 struct BalObservations {
-  std::vector<std::int64_t> tracks;  // positions in view.tracks
+  std::vector<std::int64_t> tracks;  // rows of view.tracks
   std::vector<std::int64_t> begin = {0};
   std::vector<std::int64_t> image, rank;
   std::vector<Eigen::Vector2d> position;

@@ -1,5 +1,5 @@
-// BAL problems and Bundler files; the conversion is in io/exchange/bal/bal_camera.h. Only oriented images, known points
-// and kept observations are written; every image has a camera of its own there.
+// Writes BAL problems and Bundler files (conventions: io/exchange/bal/bal_camera.h). Only oriented images, points with
+// a position and kept observations are written. In these formats every image has its own camera.
 #pragma once
 
 #include <string>
@@ -8,11 +8,11 @@
 
 namespace megablock {
 
-// "cameras points observations", observations "camera point x y" by point, then per camera the nine numbers rotation
-// vector, t, f, k1, k2, one a line, then the points.
+// The file has a line "cameras points observations", then a line "camera point x y" per observation, ordered by point,
+// then for each camera nine numbers (rotation vector, t, f, k1, k2), one per line, then the points.
 void export_bal(const BlockResult& result, const std::string& path);
 
-// Bundle file v0.3, and the images' names in <path>.list.txt ("name 0 focal_px").
+// A Bundle file v0.3, and the names of the images in <path>.list.txt ("name 0 focal_px").
 void export_bundler(const BlockResult& result, const std::string& path);
 
 }  // namespace megablock

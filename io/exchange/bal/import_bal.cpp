@@ -64,7 +64,7 @@ ImportedBlock block_from_bal(const BalProblem& problem, const std::vector<std::s
     for (; o < sorted.size() && sorted[o].point == static_cast<std::int64_t>(p); ++o) {
       const ImageIndex image(sorted[o].camera);
       if (static_cast<std::int64_t>(tracks.image.size()) > tracks.begin.back() && tracks.image.back() == image)
-        continue;  // seen twice in one image: the first counts
+        continue;  // of two observations in one image, the first counts
       const Camera& camera = block.cameras[CameraIndex(sorted[o].camera)];
       tracks.image.push_back(image);
       tracks.x.push_back(to_fixed_pixel(camera.intrinsics[kPrincipalX] + sorted[o].position.x()));
@@ -122,7 +122,7 @@ std::vector<std::string> read_list(const std::string& path, std::size_t count) {
   std::vector<std::string> names;
   while (!reader.at_end()) {
     names.emplace_back(reader.rest_of_line());
-    // "name 0 focal": the last two words when they are numbers.
+    // A line may be "name 0 focal". The last two words are removed if they are numbers.
     std::string& name = names.back();
     for (int i = 0; i < 2; ++i) {
       const auto blank = name.find_last_of(' ');
@@ -139,7 +139,7 @@ bool is_rotation(const Eigen::Matrix3d& r) {
   return (r * r.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && r.determinant() > 0;
 }
 
-// One of focal length 0 has no rotation.
+// Reads a camera. A camera with focal length 0 has no rotation matrix.
 BalCamera read_bundler_camera(NumberReader& reader, std::int64_t c) {
   BalCamera camera;
   camera.focal = reader.number("a camera's focal length");
@@ -158,7 +158,7 @@ BalCamera read_bundler_camera(NumberReader& reader, std::int64_t c) {
 
 ImportedBlock import_bal(const std::string& path) { return block_from_bal(read_bal(path), {}); }
 
-// Cameras with focal length 0 were not oriented by the program that wrote the file; they are left out.
+// Reads a Bundler file. Cameras with focal length 0 are left out: the program that wrote the file did not orient them.
 ImportedBlock import_bundler(const std::string& path) {
   NumberReader reader(path);
   if (!reader.rest_of_line().starts_with("# Bundle file v0.3")) reader.fail("is no Bundler file (v0.3)");

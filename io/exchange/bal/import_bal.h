@@ -1,4 +1,4 @@
-// Readers of BAL and Bundler files (io/exchange/bal/bal_camera.h has the conventions). Internal to io/.
+// Reads BAL and Bundler files (conventions: io/exchange/bal/bal_camera.h). Internal to io/.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace megablock {
 
 struct BalObservation {
   std::int64_t camera = 0, point = 0;
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();  // y up, about the principal point
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  // relative to the principal point, y up
 };
 
 struct BalProblem {
@@ -22,7 +22,7 @@ struct BalProblem {
 
 BalProblem read_bal(const std::string& path);
 
-// One camera, rig, frame and image per BAL camera; names as given or image000000 ...
+// Makes one camera, rig, frame and image of each BAL camera. Without names, images are called image000000, ...
 ImportedBlock block_from_bal(const BalProblem& problem, const std::vector<std::string>& names);
 
 ImportedBlock import_bal(const std::string& path);

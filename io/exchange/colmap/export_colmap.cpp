@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kGrey = 128;
 
-// Mean residual length of a point, px. Recomputed, so that it belongs to what the files hold.
+// Mean length of the residuals of a point, pixels. It is calculated anew from the values that the files contain.
 double point_error(const ExportView& view, std::int64_t t) {
   double sum = 0;
   const std::int64_t begin = view.begin[static_cast<std::size_t>(t)], end = view.begin[static_cast<std::size_t>(t) + 1];
@@ -34,7 +34,8 @@ std::int64_t point_id(const ExportView& view, std::int64_t t) {
   return view.result.tracks.id[row].value + 1;
 }
 
-// Walks over everything a model holds, in file order; the two writers differ in what they do with it.
+// Passes all parts of a model to a writer, in the order of the files. There is one writer for text and one for binary
+// files.
 template <typename Writer>
 void write_model(const BlockResult& result, Writer& writer) {
   const ExportView view = make_export_view(result);

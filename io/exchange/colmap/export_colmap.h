@@ -1,9 +1,10 @@
-// COLMAP sparse models, text and binary: a folder with cameras, images, points3D (.txt or .bin).
+// Writes COLMAP sparse models in text or binary form: a folder with the files cameras, images, points3D (.txt or .bin).
 //
-// Conventions agree with ours: rotation world -> camera, t = -R C, looking along +z, y down, pixel centres at +0.5. The
-// world is the block's local frame. Camera model OPENCV (fx fy cx cy k1 k2 p1 p2), FULL_OPENCV with k3 (k4..k6 = 0)
-// when k3 is not zero; both are our model exactly. Ids are the block's indices + 1. Images of rigs are written as
-// single cameras. Points carry no colour (grey) and, as error, the mean length of their residuals in pixels.
+// COLMAP has our conventions: the rotation is world -> camera, t = -R C, the camera looks along +z with y down, and
+// pixel centres are at +0.5. The world is the ground frame of the block. Brown cameras are written as OPENCV (fx fy cx
+// cy k1 k2 p1 p2), or as FULL_OPENCV with k4 to k6 = 0 if k3 is not zero; both are exactly our model. Ids are the
+// indices of the block + 1. Images of rigs are written as single cameras. Points are grey, and their error is the mean
+// length of their residuals in pixels.
 #pragma once
 
 #include <string>

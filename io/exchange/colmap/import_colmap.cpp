@@ -76,7 +76,7 @@ ImportedBlock ColmapBuilder::finish() {
   return std::move(imported_);
 }
 
-// Tracks in the order of the points' ids; of two observations in one image the first counts.
+// Makes the tracks, ordered by the ids of their points. Of two observations in one image, the first counts.
 void ColmapBuilder::make_tracks() {
   std::stable_sort(observations_.begin(), observations_.end(), [](const Observation& a, const Observation& b) {
     return std::tie(a.point, a.image) < std::tie(b.point, b.image);

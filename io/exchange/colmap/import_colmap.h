@@ -1,4 +1,4 @@
-// What the two readers of COLMAP models share. Internal to io/.
+// Builds a block from a COLMAP model, for the readers of text and binary files. Internal to io/.
 #pragma once
 
 #include <functional>
@@ -11,23 +11,23 @@
 
 namespace megablock {
 
-// The camera model with this name in COLMAP. Ends with `fail` when it is none of colmap_camera_forms().
+// The camera model with this name in COLMAP. Calls `fail`, which throws, for a name that colmap_camera_forms() does not have.
 const ColmapCameraForm& colmap_camera_form(const std::string& name,
                                            const std::function<void(const std::string&)>& fail);
 
-// Puts the parts of a model together: points, then cameras, then images with their observations.
+// Assembles a model from its parts, which must come in this order: points, cameras, images with their observations.
 class ColmapBuilder {
  public:
-  // Throws InputError with the place in the file that is read now; to be set before anything is added.
+  // Throws InputError with the present place in the file. It must be set before anything is added.
   std::function<void(const std::string&)> fail;
 
   void add_point(std::int64_t id, const Eigen::Vector3d& position);
   void add_camera(std::int64_t id, const ColmapCameraForm& form, std::int64_t width, std::int64_t height,
                   const std::vector<double>& parameters);
-  // q = (w, x, y, z) and t of X_cam = R X + t.
+  // Adds an image with q = (w, x, y, z) and t of X_cam = R X + t.
   void add_image(std::int64_t id, const std::array<double, 4>& q, const Eigen::Vector3d& translation,
                  std::int64_t camera, const std::string& name);
-  // Of the image added last; point -1: none.
+  // Adds an observation in the last image; point -1 stands for none.
   void add_observation(double x, double y, std::int64_t point);
 
   ImportedBlock finish();

@@ -1,4 +1,5 @@
-// Binary models: little-endian, without padding. Counts are 64 bits, ids of cameras and images 32, of points 64.
+// Reads binary COLMAP models. They are little-endian and have no padding. Counts have 64 bits, ids of cameras and
+// images 32 bits, and ids of points 64 bits.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -18,7 +19,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-// A file in memory, read from its beginning to its end.
+// Reads a file in memory from its beginning to its end.
 class Bytes {
  public:
   explicit Bytes(const std::string& path) : path_(path) {
@@ -91,7 +92,7 @@ class BinaryReader {
     for (double& value : point) value = bytes.number("a point's coordinates");
     bytes.skip(3 + 8, 1, "a point's colour and error");
     const auto length = bytes.value<std::uint64_t>("a point's track");
-    bytes.skip(length, 8, "a point's track");  // it comes from the images
+    bytes.skip(length, 8, "a point's track");  // the tracks are made from the images
     builder_.add_point(id, point);
   }
 

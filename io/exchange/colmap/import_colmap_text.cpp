@@ -20,7 +20,7 @@ class TextReader {
   }
 
  private:
-  // Hands over the first word of each line that is no comment; the function reads the rest.
+  // Calls the function with the first word of each line that is no comment. The function reads the rest of the line.
   template <typename ReadLine>
   void read_file(const char* name, ReadLine read_line) {
     NumberReader reader((std::filesystem::path(folder_) / name).string());
@@ -45,7 +45,7 @@ class TextReader {
   void read_point(NumberReader& reader, const std::string& first) {
     Eigen::Vector3d point;
     for (double& value : point) value = reader.number("a point's coordinates");
-    reader.rest_of_line();  // colour, error; the track comes from the images
+    reader.rest_of_line();  // colour, error and track; the tracks are made from the images
     builder_.add_point(parse_id(reader, first, "a point's id"), point);
   }
 

@@ -1,5 +1,5 @@
-// What the exporters have in common: the oriented images with their camera poses, the points and observations to write.
-// Internal to io/.
+// Selects the contents of an export, for all writers: the oriented images with their camera poses, and the points and
+// observations. Internal to io/.
 #pragma once
 
 #include <vector>
@@ -10,19 +10,19 @@ namespace megablock {
 
 struct ExportView {
   const BlockResult& result;
-  std::vector<ImageIndex> images;               // oriented ones, ascending
-  IndexedVector<ImageIndex, std::int64_t> row;  // position in `images`, -1 = not oriented
+  std::vector<ImageIndex> images;               // the oriented images, ascending
+  IndexedVector<ImageIndex, std::int64_t> row;  // row in `images`; -1: not oriented
 
-  // Points: rows of result.tracks whose point is known and seen by two or more oriented images with kept observations.
+  // Rows of result.tracks whose point has a position and kept observations in two or more oriented images.
   std::vector<std::int64_t> tracks;
   std::vector<std::int64_t> begin;         // [tracks + 1] into observations
-  std::vector<std::int64_t> observations;  // rows of result.tracks' observations, kept, of oriented images
+  std::vector<std::int64_t> observations;  // rows of the observations of result.tracks: kept ones in oriented images
 
   const Image& image(std::int64_t i) const { return result.block.images[images[static_cast<std::size_t>(i)]]; }
   std::string image_name(std::int64_t i) const { return result.block.name_of(images[static_cast<std::size_t>(i)]); }
   CameraIndex camera_index(std::int64_t i) const { return result.block.camera_of(images[static_cast<std::size_t>(i)]); }
   const Intrinsics& intrinsics(std::int64_t i) const { return result.state.cameras[camera_index(i)]; }
-  Pose pose(std::int64_t i) const;  // of the camera in the ground frame
+  Pose pose(std::int64_t i) const;  // pose of the camera in the ground frame
   std::int64_t image_of(std::int64_t observation) const {
     return row[result.tracks.image[static_cast<std::size_t>(observation)]];
   }
@@ -36,15 +36,15 @@ struct ExportView {
 
 ExportView make_export_view(const BlockResult& result);
 
-// Observations by image (rows of view.observations, ascending), compressed rows.
+// The observations of each image (ascending), as compressed sparse rows.
 struct ObservationsByImage {
   std::vector<std::int64_t> begin;        // [images + 1]
-  std::vector<std::int64_t> observation;  // positions in view.observations
-  std::vector<std::int64_t> rank;         // [view.observations] position inside its image
+  std::vector<std::int64_t> observation;  // rows of view.observations
+  std::vector<std::int64_t> rank;         // [view.observations] number within the image
 };
 ObservationsByImage observations_by_image(const ExportView& view);
 
-// Point of each position in view.observations (position in view.tracks).
+// For each row of view.observations, the row of its point in view.tracks.
 std::vector<std::int64_t> track_of_observation(const ExportView& view);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// The block that a reader of a foreign format returns: the common result of all importers.
+// The common result of all importers: the block that a reader of a foreign format returns.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 namespace megablock {
 
 struct ImportedBlock {
-  Block block;                          // every frame with a given pose; not georeferenced
+  Block block;                          // every frame has a given pose; not georeferenced
   BlockState state;                     // poses, cameras
   TrackSet tracks;                      // observations rounded to 2^-10 px
   std::vector<Eigen::Vector3d> points;  // [tracks]

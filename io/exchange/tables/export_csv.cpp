@@ -22,9 +22,9 @@ void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
     writer.print(",{:.12g}", angle * kDegreesPerRadian);
 }
 
-// Of (rotation about the ground axes, position) of the image's projection centre, from its frame's covariance: the
-// centre is C + R' c with the camera's place c in the rig, which a rotation w of the frame moves by [R' c]x w. The
-// mount's own covariance is not in it.
+// The covariance of an image's rotation (about the ground axes) and projection centre, from that of its frame. The
+// projection centre is C + R' c, where c is the place of the camera in the rig; a rotation w of the frame moves it by
+// [R' c]x w. The covariance of the mount itself is not included.
 BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i) {
   const FrameIndex frame = view.image(i).frame;
   BlockResult::Matrix6 move = BlockResult::Matrix6::Identity();
@@ -34,7 +34,7 @@ BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i) {
 
 constexpr const char* kSigmaColumns = ",sigma_{0}_m,sigma_{1}_m,sigma_{2}_m,sigma_rotation_deg";
 
-// Along the axes that `to_axes` turns the ground's to.
+// Prints the sigmas along the axes into which `to_axes` turns those of the ground frame.
 void print_sigmas(TextWriter& writer, const BlockResult::Matrix6& covariance, const Eigen::Quaterniond& to_axes) {
   const Eigen::Matrix3d r = to_axes.toRotationMatrix();
   const Eigen::Vector3d position = (r * covariance.bottomRightCorner<3, 3>() * r.transpose()).diagonal();
@@ -81,7 +81,7 @@ void write_wgs84(const ExportView& view, const std::string& path) {
   writer.close();
 }
 
-// Names of the parameters of all models, in the order of their first appearance.
+// The names of the parameters of all camera models, in the order of their first appearance.
 std::vector<std::string> all_parameters(const IndexedVector<CameraIndex, Camera>& cameras) {
   std::vector<std::string> names;
   for (const Camera& camera : cameras)
@@ -92,7 +92,7 @@ std::vector<std::string> all_parameters(const IndexedVector<CameraIndex, Camera>
   return names;
 }
 
-// Cells of parameters that a camera does not have stay empty.
+// Writes the table of cameras. Cells of parameters that a camera does not have are empty.
 void write_cameras(const BlockResult& result, const std::string& path) {
   const std::vector<std::string> names = all_parameters(result.block.cameras);
   TextWriter writer(path);
@@ -125,7 +125,7 @@ bool has_rig(const Block& block) {
   return std::any_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.mounts.size() > 1; });
 }
 
-// Of the rigs of two cameras and more; sigmas along and about the axes of the rig.
+// Writes the mounts of rigs with two or more cameras. The sigmas are along and about the axes of the rig.
 void write_mounts(const BlockResult& result, const std::string& path) {
   TextWriter writer(path);
   writer.print("rig,mount,camera,x_m,y_m,z_m,qw,qx,qy,qz");

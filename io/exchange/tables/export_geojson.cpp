@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Median height of the points each image sees; NaN where it sees none.
+// For each image the median height of the points that it sees; NaN if it sees none.
 std::vector<double> ground_heights(const ExportView& view) {
   const ObservationsByImage by_image = observations_by_image(view);
   const std::vector<std::int64_t> track = track_of_observation(view);
@@ -32,8 +32,8 @@ std::vector<double> ground_heights(const ExportView& view) {
   return heights;
 }
 
-// The image's corners on the plane z = height, anticlockwise from above; empty when one of them does not reach it, or
-// only so far away (10 times the height above the plane) that the footprint says nothing.
+// The corners of the image on the plane z = height, anticlockwise from above. Empty if the ray of a corner does not
+// meet the plane, or meets it farther away than 10 times the height above it; such a footprint would be useless.
 std::vector<Eigen::Vector3d> footprint(const Camera& camera, const Intrinsics& k, const Pose& pose, double height) {
   const double above = pose.centre.z() - height;
   if (!(above > 0)) return {};

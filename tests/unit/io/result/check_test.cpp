@@ -99,7 +99,7 @@ TEST_F(CheckJob, ResultWhoseDigestIsNotItsOwnIsNamed) {
   BlockResult result = read_result(store_.path("result/block.h5"));
   result.state.cameras[CameraIndex(0)][kFocal] += 1;
   put("result/block.h5", [&](const std::string& path) { write_result(path, result); });
-  EXPECT_THAT(problems(), ElementsAre(HasSubstr("says its digest is")));
+  EXPECT_THAT(problems(), ElementsAre(HasSubstr(": its digest is ")));
 }
 
 TEST_F(CheckJob, BadJobFileIsNamed) {

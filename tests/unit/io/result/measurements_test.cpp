@@ -184,10 +184,12 @@ TEST_F(MeasurementsByImage, AStaleIndexIsRefusedAndMadeAgain) {
   tiles_[0] = tiles_[1];
   store_.write(unit_of(0), 77, [&](const std::string& path) { write_tracks(path, tiles_[0]); });  // killed thereafter
   EXPECT_THAT(complaint_of([&] { asked({0}); }), HasSubstr("is newer than measurements.h5"));
-  EXPECT_THAT(complaint_of([&] { check_measurement_index(store_); }), HasSubstr("is not of the job's tracks"));
+  EXPECT_THAT(complaint_of([&] { check_measurement_index(store_); }),
+              HasSubstr("does not belong to the present tracks"));
   write_list();
   EXPECT_THAT(complaint_of([&] { asked({0}); }), HasSubstr("is older than the job's tracks"));
-  EXPECT_THAT(complaint_of([&] { check_measurement_index(store_); }), HasSubstr("is not of the job's tracks"));
+  EXPECT_THAT(complaint_of([&] { check_measurement_index(store_); }),
+              HasSubstr("does not belong to the present tracks"));
   update_measurement_index(store_, {unit_of(0), unit_of(1), unit_of(2), unit_of(3), unit_of(4)});
   check_measurement_index(store_);
   EXPECT_EQ(asked({100}), brute_force({100}));
