@@ -96,7 +96,8 @@ class BadInput(CopyOfTheBlock):
         with (self.folder / "simulated/block.yaml").open("a") as f:
             f.write("tiles: {tile_max_frames: 6}\n")
         self.assertRegex(one_line(megablock(*simulation, expect=BAD_INPUT)),
-                         "simulated/block.yaml: is there and differs .*; name another folder with -o, or give --overwrite")
+                         "simulated/block.yaml: this project file exists and differs .*; "
+                         "name another folder with -o, or give --overwrite")
         megablock(*simulation, "--overwrite")
         self.assertNotIn("tiles", (self.folder / "simulated/block.yaml").read_text())
 

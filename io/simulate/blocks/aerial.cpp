@@ -1,4 +1,5 @@
-// Aerial block: flight lines east and west over smooth terrain, nadir images, the long image side across the line.
+// Simulates an aerial block: flight lines to the east and west over smooth terrain, with nadir images whose long side
+// is across the line.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,7 +21,7 @@ class AerialScene : public Scene {
     range_m_ = 1.15 * deepest * half_diagonal + 0.1 * options.height_m;
   }
 
-  // The terrain under a random pixel of the frame's image, by fixed-point iteration on the height.
+  // Returns the terrain point at a random pixel of the frame's image. Its height is found by fixed-point iteration.
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
     const Eigen::Vector2d pixel(random.uniform(0, options_.image_width), random.uniform(0, options_.image_height));
     const auto ray = viewing_ray(intrinsics_, pixel);
@@ -46,7 +47,8 @@ class AerialScene : public Scene {
   double range_m_;
 };
 
-// Nadir camera whose image x axis (right) points at azimuth `right` (from east, counter-clockwise): y down = backward.
+// The rotation of a nadir camera whose image x axis (right) has the direction `right` (from east, counter-clockwise).
+// The y axis of the image (down) then points backwards.
 Eigen::Quaterniond nadir_rotation(double right) {
   Eigen::Matrix3d r;
   r.row(0) << std::cos(right), std::sin(right), 0;
@@ -64,7 +66,7 @@ Layout make_aerial_layout(const SimulationOptions& options) {
   const double base = (1 - options.forward_overlap) * options.height_m * options.image_height / options.focal_px;
   const double spacing = (1 - options.side_overlap) * options.height_m * options.image_width / options.focal_px;
   const double n = static_cast<double>(options.frames);
-  // As square on the ground as possible.
+  // The block is as square on the ground as possible.
   const auto lines = std::max<std::int64_t>(1, std::llround(std::sqrt(n * base / spacing)));
   const std::int64_t per_line = (options.frames + lines - 1) / lines;
   for (std::int64_t f = 0; f < options.frames; ++f) {

@@ -1,4 +1,4 @@
-// Control and check points of a simulated block: spread over it, or in zones on pedestrian crossings.
+// Simulates control and check points, either spread over the block or in zones on pedestrian crossings.
 #include <algorithm>
 #include <cmath>
 
@@ -20,8 +20,8 @@ ControlPoint measure_control(const SimulationOptions& options, const Eigen::Vect
   return point;
 }
 
-// Places follow an additive recurrence over the block's extent (Roberts' R2 sequence), each moved to the view of the
-// nearest frame; roles alternate in proportion.
+// The places come from an additive recurrence over the extent of the block (Roberts' R2 sequence). Each is then moved
+// into the view of the nearest frame. Roles alternate in proportion to their numbers.
 void simulate_control(const SimulationOptions& options, const Observer& observer, Layout& layout) {
   const int total = options.control_points + options.check_points;
   if (total == 0) return;
@@ -61,12 +61,13 @@ void simulate_control(const SimulationOptions& options, const Observer& observer
 
 namespace {
 
-constexpr int kFewest = 8, kMost = 40;     // points of a zone
-constexpr int kCheckEvery = 7;             // of a zone's points one is a check point
-constexpr std::size_t kMeasurements = 12;  // of a point at most
-constexpr double kAround = 25;             // metres from a crossing, within which frames are its own
+constexpr int kFewest = 8, kMost = 40;     // number of points of a zone
+constexpr int kCheckEvery = 7;             // one of so many points of a zone is a check point
+constexpr std::size_t kMeasurements = 12;  // largest number of measurements of a point
+constexpr double kAround = 25;             // frames within so many metres belong to a crossing
 
-// Crossings with frames of at least two streets or drives around, those first that are far from the others chosen.
+// Chooses crossings with frames of at least two streets or drives around them. The next one is always far from those
+// chosen before.
 std::vector<Eigen::Vector2d> choose_zones(const SimulationOptions& options, const Layout& layout) {
   std::vector<Eigen::Vector2d> driven, zones;
   for (const Eigen::Vector2d& crossing : layout.crossings) {
@@ -88,8 +89,8 @@ std::vector<Eigen::Vector2d> choose_zones(const SimulationOptions& options, cons
   return zones;
 }
 
-// A corner of a stripe of one of the four zebras of a crossing: stripes of half a metre along the way, three metres
-// long.
+// A corner of a stripe of one of the four zebra crossings at a junction. The stripes are half a metre wide and three
+// metres long.
 Eigen::Vector2d stripe_corner(const Eigen::Vector2d& crossing, Random& random) {
   const double across = 0.5 * static_cast<double>(random.below(16)) - 3.75;
   const double along = random.uniform() < 0.5 ? 9.5 : 12.5;

@@ -1,4 +1,4 @@
-// Which images see a place.
+// Finds the images that see a place.
 #include <algorithm>
 #include <cmath>
 
@@ -15,7 +15,8 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
     const Pose pose = camera_pose(layout.truth.frames[entry.frame], mount);
     views_.push_back({pose.rotation.toRotationMatrix(), pose.centre, block.camera_of(image).value});
   }
-  // The distortion polynomial turns back far outside the image; only rays inside the corners are projected.
+  // Far outside the image the distortion polynomial turns back and would give false pixels. Therefore only rays inside
+  // the corners of the image are projected.
   for (std::size_t c = 0; c < block.cameras.size(); ++c) {
     const Camera& camera = block.cameras[CameraIndex(static_cast<std::int64_t>(c))];
     double radius_sq = 0;
@@ -29,7 +30,7 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
     max_radius_sq_.push_back(1.05 * radius_sq);
   }
 
-  // Counting sort of the frames into cells as large as the range.
+  // The frames are sorted into cells as large as the range, by counting sort.
   cell_m_ = layout.scene->range_m();
   Eigen::Vector2d low = layout.truth.frames.front().centre.head<2>(), high = low;
   for (const Pose& pose : layout.truth.frames) {

@@ -1,4 +1,4 @@
-// Panorama scene: a camera turned about a point beside its projection centre (or in it), points all around.
+// Simulates a panorama: a camera turns about a point in or beside its projection centre, with points all around.
 #include "io/simulate/blocks/panorama.h"
 
 #include <algorithm>
@@ -79,13 +79,13 @@ std::vector<Eigen::Vector3d> geodesic_sphere(int times) {
 
 namespace {
 
-// Points all around, each seen by whatever image holds it.
+// Points all around the camera. Every image that contains a point sees it.
 class PanoramaScene : public Scene {
  public:
   PanoramaScene(const SimulationOptions& options, const Intrinsics& intrinsics)
       : options_(options), intrinsics_(intrinsics) {}
 
-  // Behind a random pixel of the frame's image.
+  // Returns a point at a random pixel of the frame's image.
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
     const Eigen::Vector2d pixel(random.uniform(0, options_.image_width), random.uniform(0, options_.image_height));
     const double distance = options_.panorama_radius_m * (1 + options_.depth_spread * random.uniform(-1, 1));

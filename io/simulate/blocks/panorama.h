@@ -1,5 +1,5 @@
-// A camera turned about a point: the rotations of a panorama and the cameras and points of the published simulations
-// (Cannelle 2013, 2.3.3).
+// Gives the rotations of a panorama, and the cameras and points of the published simulations of a camera that turns
+// about a point (Cannelle 2013, 2.3.3).
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,9 @@
 
 namespace megablock {
 
-// Simulated cameras of the thesis, all of the model ign-radial. Its table prints b of the third with a minus and sy of
-// the fourth as 3709; neither agrees with the edge corrections it prints.
+// The simulated cameras of the thesis, all of the model ign-radial. The table of the thesis prints b of the third
+// camera with a minus sign, and sy of the fourth as 3709. Neither agrees with the edge corrections in the same table,
+// so both are corrected here.
 struct PublishedCamera {
   const char* name;
   int width, height;  // px
@@ -20,13 +21,13 @@ struct PublishedCamera {
 };
 const std::vector<PublishedCamera>& published_cameras();
 
-// Rotations ground -> camera that cover the sphere's girdle: three rows, pitched by half of the vertical field of view,
-// each with the images evenly around the circle, or, when these are too few to close it, at steps of `step` of the
-// horizontal field of view.
+// Rotations ground -> camera that cover the sphere around the horizon in three rows, whose pitches differ by half of
+// the vertical field of view. The images of a row are evenly distributed over the circle. If they are too few to close
+// it, they follow each other at `step` times the horizontal field of view.
 std::vector<Eigen::Quaterniond> panorama_rotations(double horizontal_rad, double vertical_rad, std::int64_t images,
                                                    double step = 0.4);
 
-// Vertices of the icosahedron subdivided `times` times, unit vectors: 10 * 4^times + 2.
+// The vertices of an icosahedron that was subdivided `times` times: 10 * 4^times + 2 unit vectors.
 std::vector<Eigen::Vector3d> geodesic_sphere(int times);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// Priors and given poses of a simulated block. Every stated sigma is the true one.
+// Simulates priors and given poses. Every stated sigma is the true one.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,7 +10,7 @@ namespace megablock {
 
 namespace {
 
-// Exactly round(share * frames) frames, at random.
+// Selects exactly round(share * frames) frames at random.
 std::vector<std::uint8_t> frames_with_position(const SimulationOptions& options) {
   const auto total = static_cast<std::size_t>(options.frames);
   const auto wanted = static_cast<std::size_t>(std::llround(options.gps_share * static_cast<double>(total)));
@@ -25,8 +25,8 @@ std::vector<std::uint8_t> frames_with_position(const SimulationOptions& options)
   return chosen;
 }
 
-// Errors of a drifting trajectory: a stationary first-order process along the pass and white noise on top, together of
-// standard deviation 1 per axis.
+// The errors of a drifting trajectory: a stationary first-order process along the pass plus white noise. Their sum has
+// the standard deviation 1 per axis.
 class DriftingError {
  public:
   Eigen::Vector3d next(bool new_pass, Random& random) {
@@ -40,11 +40,11 @@ class DriftingError {
   Eigen::Vector3d slow_ = Eigen::Vector3d::Zero();
 };
 
-// Given poses by integration of the relative poses (SimulationOptions::start_offset_m).
+// Makes given poses by integration of the relative poses (SimulationOptions::start_offset_m).
 class IntegratedChain {
  public:
   explicit IntegratedChain(const SimulationOptions& options) : options_(options) {}
-  // `relative`: from the frame before, nullptr at the beginning of a pass.
+  // `relative` is the pose relative to the previous frame; nullptr at the beginning of a pass.
   Pose next(std::int64_t frame, const Pose& truth, const RelativePose* relative) {
     if (relative == nullptr || length_ == options_.start_chain_frames) {
       length_ = 0;
@@ -94,8 +94,8 @@ void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated
     const FrameIndex index(static_cast<std::int64_t>(i));
     Frame& frame = block.frames[index];
     const Pose& pose = simulated.truth.frames[index];
-    // One stream per frame; every quantity is drawn whether it is asked for or not, so that options do not disturb
-    // one another.
+    // Each frame has its own stream, and every quantity is drawn even if the options do not need it. A change of one
+    // option therefore leaves the other quantities as they are.
     Random random(options.seed, Random::Purpose::kPriors, 1 + static_cast<std::uint64_t>(i));
     const Eigen::Vector3d position_noise = random.normal3(), attitude_noise = random.normal3();
     const bool new_pass = i == 0 || block.frames[FrameIndex(index.value - 1)].pass != frame.pass;

@@ -14,7 +14,7 @@ namespace megablock {
 
 namespace {
 
-// Beyond these no block is meant, and numbers lose their digits.
+// Larger values are typing errors, and calculations with them would lose digits.
 constexpr std::int64_t kMostFrames = 100'000'000;
 constexpr double kFarthest_m = 100e3, kHighestRelief_m = 10e3;
 constexpr int kMostPixels = 100'000;  // per side
@@ -188,7 +188,7 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
     truth[kPrincipalY] += 0.003 * options.focal_px * random.uniform(-1, 1);
   }
   if (options.distortion && model != CameraModel()) {
-    constexpr double kShare = 0.15;  // of the weak prior sigmas
+    constexpr double kShare = 0.15;  // errors of the true camera, as a share of the weak prior sigmas
     for (int p = kPrincipalY + 1; p < truth.size(); ++p)
       truth[p] += kShare * weak[static_cast<std::size_t>(p)] * random.uniform(-1, 1);
   } else if (options.distortion) {
@@ -230,7 +230,7 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
       name.append("_c").append(std::to_string(m));
     layout.block.add_image(name.append(".jpg"), {index, static_cast<int>(m), 0});
   }
-  if (cameras == 1) frame.name += ".jpg";  // a single image's frame carries the name of its image
+  if (cameras == 1) frame.name += ".jpg";  // the frame of a single image has the name of this image
   layout.block.frames.push_back(std::move(frame));
   layout.truth.frames.push_back(pose);
   layout.truth.oriented.push_back(1);

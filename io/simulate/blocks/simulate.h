@@ -1,4 +1,4 @@
-// Simulated blocks with known truth: one options-driven generator behind all pipeline tests and `megablock simulate`.
+// Simulates blocks with known truth from a set of options. `megablock simulate` and the tests of whole blocks use it.
 #pragma once
 
 #include <functional>
@@ -12,8 +12,8 @@ namespace megablock {
 
 SimulatedBlock simulate_block(const SimulationOptions& options);
 
-// The same block, its tracks handed over in batches in the order of their indices. The memory is that of one batch and
-// of the frames and images.
+// The same block, but its tracks are passed to a function in batches, in the order of their indices. The memory holds
+// one batch, the frames and the images.
 inline constexpr std::int64_t kTrackBatch = 1 << 20;  // observations
 SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink& sink,
                               std::int64_t batch_observations = kTrackBatch);

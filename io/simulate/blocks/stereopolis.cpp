@@ -1,8 +1,10 @@
-// The Stereopolis block: a vehicle with a panoramic rig on a grid of streets, in several drives on several days.
+// Simulates the Stereopolis block: a vehicle with a panoramic rig on a grid of streets, in several drives on several
+// days.
 //
-// A drive goes over the streets along x in serpentines, then over those along y, and back to where it began, as often
-// as its length asks for; every second drive goes the other way, the third and fourth (seventh, eighth ...) with x and
-// y exchanged. The second street along x may pass over the second one along y on a bridge.
+// A drive goes over the streets along x in serpentines, then over those along y, and back to its beginning, and repeats
+// this until it has its number of frames. Every second drive goes in the opposite direction; the third and fourth (and
+// seventh, eighth, ...) drives have x and y exchanged. The second street along x may cross the second one along y on a
+// bridge.
 #include <algorithm>
 #include <cmath>
 
@@ -17,16 +19,16 @@ namespace megablock {
 namespace {
 
 constexpr double kSpeed = 8;                   // metres per second
-constexpr double kDay = 86400, kBreak = 1800;  // seconds; between two drives of a day
+constexpr double kDay = 86400, kBreak = 1800;  // seconds; kBreak lies between two drives of a day
 constexpr double kRampGap = 15;                // from the end of a ramp to the next crossing, metres
-constexpr std::int64_t kVisit = 25;            // frames: a hundred metres further a place is left
+constexpr std::int64_t kVisit = 25;            // after so many frames (a hundred metres), a visit of a place is over
 
 class StereopolisScene : public StreetScene {
  public:
   StereopolisScene(const SimulationOptions& options, const std::optional<Bridge>& bridge)
       : StreetScene(options, street_terrain(options)), bridge_(bridge) {}
 
-  // Height of the road for who drives along x or along y.
+  // The height of the road for a vehicle that drives along x or along y.
   double road_height(const Eigen::Vector2d& place, bool along_x) const {
     const double z = ground(place.x(), place.y());
     return bridge_ && along_x && bridge_->carries(place.x(), place.y()) ? z + bridge_->rise(place.x()) : z;
@@ -55,7 +57,7 @@ class StereopolisScene : public StreetScene {
 
   std::int64_t visit_frames() const override { return kVisit; }
 
-  // Facades repeat by windows, along the street; on the road, vehicles drive along the street either way.
+  // Windows repeat along facades. On the road, other vehicles drive along the street in both directions.
   std::optional<Mistake> mistake(const SurfacePoint& point, Random& random) const override {
     Mistake mistake;
     const double sense = random.uniform() < 0.5 ? -1 : 1, size = random.uniform();
@@ -73,13 +75,13 @@ class StereopolisScene : public StreetScene {
 
  private:
   Eigen::Vector3d above_ground(const Eigen::Vector3d& p) const { return {p.x(), p.y(), p.z() - ground(p.x(), p.y())}; }
-  // Height of the deck on which a frame stands; 0: on none.
+  // The height of the bridge deck below a frame; 0 if it is not on the bridge.
   double rise_under(const Eigen::Vector3d& eye) const {
     if (!bridge_ || !bridge_->carries(eye.x(), eye.y())) return 0;
     const double rise = bridge_->rise(eye.x());
     return above_ground(eye).z() > rise ? rise : 0;
   }
-  // Deck or wall.
+  // A random point on the deck or on a wall of the bridge.
   std::optional<SurfacePoint> sample_bridge(const Pose& frame, Random& random) const {
     const double x = frame.centre.x() + random.uniform(-0.6, 0.6) * range_m();
     const double side = random.uniform(-1, 1), up = random.uniform();
@@ -96,7 +98,7 @@ class StereopolisScene : public StreetScene {
   std::optional<Bridge> bridge_;
 };
 
-// The closed way over a grid of streets, and the corner at which the second street along y is done.
+// The closed route over a grid of streets, and the corner at the end of the second street along y.
 struct Route {
   Drive drive;
   std::size_t bridge_done;
@@ -107,7 +109,7 @@ Route make_route(std::int64_t streets, double spacing) {
   std::vector<Eigen::Vector2d> corners = drive_corners(streets, spacing);
   const double far = static_cast<double>(streets - 1) * spacing;
   const bool even = streets % 2 == 0;
-  if (even) corners.insert(corners.end(), {{0, far}, {0, 0}});  // an odd number ends where it began
+  if (even) corners.insert(corners.end(), {{0, far}, {0, 0}});  // with an odd number, the route is closed already
   return {Drive(std::move(corners)), static_cast<std::size_t>(2 * streets + 3), even ? spacing : far - spacing};
 }
 
@@ -116,12 +118,13 @@ std::vector<Eigen::Vector2d> exchanged(std::vector<Eigen::Vector2d> corners) {
   return corners;
 }
 
-// How many frames a drive takes.
+// The number of frames of a drive.
 std::int64_t frames_of_drive(const SimulationOptions& options, int drive) {
   return options.frames / options.drives + (drive < options.frames % options.drives ? 1 : 0);
 }
 
-// The largest grid on which a drive gets over the bridge; without one, the smallest that a drive does not exhaust.
+// Chooses the number of streets: the largest grid on which a drive still crosses the bridge. If no drive is long enough
+// for a bridge, the smallest grid that is longer than a drive.
 std::int64_t choose_streets(const SimulationOptions& options, bool& bridge) {
   const double length = options.frame_distance_m * static_cast<double>(frames_of_drive(options, options.drives - 1));
   std::int64_t streets = 2;

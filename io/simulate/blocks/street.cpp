@@ -1,4 +1,5 @@
-// Street block: a grid of streets driven twice by a rig of cameras around the compass (drive.h, street_scene.h).
+// Simulates a street block: a rig with cameras in all directions drives twice over a grid of streets (drive.h,
+// street_scene.h).
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,7 +12,8 @@ namespace megablock {
 
 namespace {
 
-// Rig axes: x right, y down, z forward. Cameras look horizontally around the compass, the first one forward.
+// The rig axes are x right, y down, z forward. The cameras look horizontally in equally spaced directions, the first
+// one forward.
 Pose mount_pose(const SimulationOptions& options, int camera) {
   Random random(options.seed, Random::Purpose::kCamera, 1000 + static_cast<std::uint64_t>(camera));
   const double yaw = 2 * std::numbers::pi * camera / options.rig_cameras;
@@ -30,7 +32,7 @@ void add_drive(const SimulationOptions& options, const StreetScene& scene, const
   for (std::int64_t i = 0; i < frames; ++i) {
     const auto index = static_cast<std::uint64_t>(layout.block.frames.size());
     Random random(options.seed, Random::Purpose::kFrame, index);
-    // The second drive goes the other way, at places of its own.
+    // The second drive goes in the opposite direction and has other places.
     double s = options.frame_distance_m * (static_cast<double>(i) + random.uniform(-0.1, 0.1));
     const double turn = pass == 0 ? 1 : -1;
     if (pass == 1) s = options.frame_distance_m * (static_cast<double>(frames) - 0.5) - s;

@@ -1,6 +1,6 @@
-// The target field: a place between walls on which the vehicle's rig is calibrated, with targets (the control points)
-// and tie points on walls and ground. Path shapes as in Cannelle (2013), 2.4: they decide how well the rig is
-// determined.
+// Simulates a target field on which the rig of a vehicle is calibrated: an area between walls, with targets (the
+// control points) and tie points on walls and ground. The shapes of the paths are those of Cannelle (2013), 2.4; they
+// decide how well the rig is determined.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -13,15 +13,15 @@ namespace megablock {
 
 namespace {
 
-constexpr double kHalfLength = 30, kHalfWidth = 20;  // of the place, metres
-constexpr double kWallHeight = 24;  // the cameras that look up must see walls from the middle of the place
+constexpr double kHalfLength = 30, kHalfWidth = 20;  // of the area, metres
+constexpr double kWallHeight = 24;  // metres; cameras that look up must see walls from the middle of the area
 using Path = SimulationOptions::Path;
 
 class TargetField : public Scene {
  public:
   explicit TargetField(bool one_wall) : one_wall_(one_wall) {}
 
-  // On one of the four walls, or on the ground; sparse: on the wall ahead alone.
+  // A random point on one of the four walls or on the ground. In the sparse scene, on the wall ahead only.
   std::optional<SurfacePoint> sample(const Pose&, Random& random) const override {
     const double u = random.uniform(-1, 1), v = random.uniform();
     const double place = one_wall_ ? 0 : random.uniform(0, 2 * (kHalfLength + kHalfWidth) / 0.75);
@@ -52,7 +52,7 @@ std::vector<Eigen::Vector2d> circle(double rx, double ry) {
   return corners;
 }
 
-// Two half circles, the other way round each: an S lying on its side.
+// Two half circles with opposite turns: an S that lies on its side.
 std::vector<Eigen::Vector2d> s_shape(double radius) {
   std::vector<Eigen::Vector2d> corners;
   for (int k = 0; k <= 48; ++k) {
@@ -79,7 +79,7 @@ std::vector<Eigen::Vector2d> path_corners(Path path) {
   }
 }
 
-// Frames evenly along a path, one pass.
+// Adds a pass with frames at equal distances along a path.
 void add_path(const SimulationOptions& options, Path path, std::int64_t pass, std::int64_t frames, Layout& layout) {
   const Drive way(path_corners(path));
   for (std::int64_t i = 0; i < frames; ++i) {

@@ -1,14 +1,15 @@
-// Tie points and their observations.
+// Simulates tie points and their observations.
 //
-// Every frame seeds points_per_frame / mean_track points on the surfaces in its images; a second round tops up the
-// frames that got too few from their neighbours (the borders of the block). A point's observations are chosen among all
-// images that see it: the seeding frame's and, at the wanted track length, others in random order (aerial) or nearest
-// in time first, partly from another pass (street).
+// Every frame seeds points_per_frame / mean_track points on the surfaces in its images. A second loop adds points to
+// frames that got too few observations from their neighbours (at the borders of the block). The observations of a point
+// are chosen among all images that see it. The first one is in the seeding frame. The others, up to the wanted track
+// length, are taken in random order (aerial blocks), or nearest in time first and partly from another pass (streets).
 //
-// Frames work in groups. All threads find what the frames of a group propose, which depends on what was there before
-// the group alone; in the order of the frames it is seen how many observations each track gets and what its number is;
-// all threads measure. Proposals draw from the frame's stream, measurements from the track's, and groups have the same
-// frames for any number of threads: so has the block.
+// The frames are processed in groups, in three steps. First, all threads find the points that the frames of a group
+// propose; these depend only on the state before the group. Then, in the order of the frames, one thread decides on the
+// number of observations and the index of each track. Last, all threads simulate the observations. Proposals draw from
+// the random stream of the frame, observations from that of the track, and the groups do not depend on the number of
+// threads. The block is therefore the same for any number of threads.
 #include <algorithm>
 #include <cmath>
 
@@ -21,15 +22,15 @@ namespace megablock {
 namespace {
 
 constexpr std::int64_t kGroup = 64;  // frames
-constexpr int kMostExtra = 2;        // observations that a track gets for those that others lack
-// Of the observations that are asked for, below which a frame is topped up.
+constexpr int kMostExtra = 2;        // a track gets at most so many observations in place of those that others lack
+// A frame with a smaller share of the wanted observations gets more points.
 constexpr double kEnough = 0.97;
 
 // A point that a frame seeds.
 struct Proposal {
   SurfacePoint point;
-  int wanted = 0;                   // observations
-  std::vector<Sighting> sightings;  // that may become them, first ones first; then those that do, by image
+  int wanted = 0;                   // number of observations
+  std::vector<Sighting> sightings;  // candidates for observations, by preference; later the observations, by image
 };
 
 class TrackMaker {
@@ -52,7 +53,7 @@ class TrackMaker {
       for (std::int64_t f = group * kGroup; f < std::min(frames, (group + 1) * kGroup); ++f) members.emplace_back(f);
       make_tracks(members, [&](FrameIndex frame) { return seeds(frame); });
     }
-    // Far from one another: what one of them gets leaves the others as they are.
+    // The frames of a group are far from one another, so the points of one do not change the others.
     for (std::int64_t group = 0; group < groups; ++group) {
       std::vector<FrameIndex> members;
       for (std::int64_t f = group; f < frames; f += groups) members.emplace_back(f);
@@ -97,7 +98,7 @@ class TrackMaker {
 
   std::vector<Proposal> seeds(FrameIndex frame) const {
     Random random = stream_of(frame, 0);
-    // The fractional part is settled by chance, so that the mean comes out right.
+    // The number is rounded up or down at random, so that its mean is right.
     const auto points = static_cast<std::int64_t>(options_.points_per_frame / options_.mean_track + random.uniform());
     std::vector<Proposal> seeded;
     for (int tries = 0; std::ssize(seeded) < points && tries < most_tries(); ++tries)
@@ -121,7 +122,7 @@ class TrackMaker {
     return added;
   }
 
-  // Empty: the draw hit nothing, or nothing that another frame sees.
+  // Empty if the draw met no surface, or if no other frame sees the point.
   std::optional<Proposal> propose(FrameIndex frame, Random& random) const {
     const auto point = layout_.scene->sample(layout_.truth.frames[frame], random);
     if (!point) return std::nullopt;
@@ -133,7 +134,7 @@ class TrackMaker {
     return Proposal{*point, wanted, first_choice(frame, seen, wanted + kMostExtra, random)};
   }
 
-  // The seeding frame first, then those whose observations are wanted most; so many of them.
+  // Selects `count` candidates: the seeding frame first, then the images with the highest preference.
   std::vector<Sighting> first_choice(FrameIndex frame, const std::vector<Sighting>& seen, std::ptrdiff_t count,
                                      Random& random) const {
     const bool two_passes = layout_.scene->along_passes() && random.uniform() < 0.3;
@@ -149,7 +150,8 @@ class TrackMaker {
       const FrameIndex other = frame_of(s);
       double rank = random.uniform();
       if (layout_.scene->along_passes()) {
-        // Frames of another visit are ranked by distance: they meet the point anywhere in their drive.
+        // Frames of another visit are ranked by distance, because their time has no relation to that of the first
+        // visit.
         const bool same = layout_.block.frames[other].pass == pass &&
                           std::abs(other.value - frame.value) <= layout_.scene->visit_frames();
         rank += same ? static_cast<double>(std::abs(other.value - frame.value))
@@ -166,7 +168,7 @@ class TrackMaker {
     std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
       return a.rank != b.rank ? a.rank < b.rank : a.sighting.image < b.sighting.image;
     });
-    // The second of the list must be of another frame: two cameras of a rig make no track.
+    // The second candidate must belong to another frame: two cameras of one frame are not enough for a track.
     const auto partner = std::find_if(candidates.begin() + 1, candidates.end(),
                                       [&](const Candidate& c) { return frame_of(c.sighting) != frame; });
     std::rotate(candidates.begin() + 1, partner, partner + 1);
@@ -176,7 +178,8 @@ class TrackMaker {
     return chosen;
   }
 
-  // The observations of the track. What tracks at the border of the block lack is given to later ones.
+  // Decides on the observations of the track. Observations that tracks at the border of the block lack are added to
+  // later tracks.
   void accept(Proposal& proposal) {
     const int length = proposal.wanted + std::min(kMostExtra, lacking_);
     std::vector<Sighting>& seen = proposal.sightings;
@@ -204,7 +207,7 @@ class TrackMaker {
     const WrongGroup wrong = draw_wrong_group(options_, layout_, observer_, proposal.point, seen, random);
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const Camera& camera = layout_.block.cameras[layout_.block.camera_of(seen[i].image)];
-      const bool agreed = i >= wrong.begin && i < wrong.begin + wrong.pixels.size();  // on a wrong place
+      const bool agreed = i >= wrong.begin && i < wrong.begin + wrong.pixels.size();  // in a group of wrong matches
       const bool stray = agreed ? !wrong.pixels[i - wrong.begin] : random.uniform() < wrong.stray_share;
       const Eigen::Vector2d place = agreed && !stray ? *wrong.pixels[i - wrong.begin] : seen[i].pixel;
       Eigen::Vector2d pixel;
@@ -234,7 +237,7 @@ class TrackMaker {
   const Observer& observer_;
   const TrackSink& sink_;
   std::int64_t batch_observations_;
-  SimulatedTracks batch_;            // finished tracks that the sink has not got yet
+  SimulatedTracks batch_;            // finished tracks that were not yet passed to the sink
   std::int64_t next_track_ = 0;      // index of the next track
   std::vector<std::int64_t> count_;  // observations of each frame so far
   int lacking_ = 0;                  // observations by which tracks fell short of their wanted length

@@ -10,7 +10,7 @@ namespace megablock {
 
 namespace {
 
-// Rig axes: x right, y down, z ahead; yaw to the right, pitch upwards.
+// The place of a camera in the rig. The rig axes are x right, y down, z ahead; yaw is to the right, pitch upwards.
 struct Placing {
   int id;
   double yaw_deg, pitch_deg;
@@ -21,7 +21,7 @@ Eigen::Vector3d on_head(double yaw_deg, double up) {
   return {0.25 * std::sin(kDegree * yaw_deg), -up, 0.25 * std::cos(kDegree * yaw_deg)};
 }
 
-// In the order in which cameras are added as the rig grows.
+// The cameras in the order in which larger rigs add them.
 std::vector<Placing> places() {
   const auto head = [](int id, double yaw, double pitch) {
     return Placing{id, yaw, pitch, on_head(yaw, pitch > 0 ? 0.15 : 0)};
@@ -53,9 +53,9 @@ Pose nominal_mount(const Placing& place) {
   return {Eigen::Quaterniond(r).normalized(), place.centre};
 }
 
-// Camera 3 of the thesis (HD, f = 1400 px): principal point (961, 542), up to 14 px of distortion at the edge, here as
-// Brown's model. The lab's calibration, which the block starts from, is off by 0.1 % of the focal length, a pixel of
-// the principal point and about a pixel of distortion at the edge.
+// Adds camera 3 of the thesis (HD, f = 1400 px): principal point (961, 542) and up to 14 px of distortion at the edge,
+// here in Brown's model. The initial values of the block come from a laboratory calibration with errors of 0.1 % of the
+// focal length, one pixel of the principal point, and about one pixel of the distortion at the edge.
 CameraIndex add_camera(const SimulationOptions& options, const std::string& name, Random& random, Layout& layout) {
   const CameraIndex index = layout.block.cameras.next_index();
   Camera camera;

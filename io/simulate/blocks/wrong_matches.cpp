@@ -5,8 +5,8 @@
 
 namespace megablock {
 
-// With n observations a group has m of them, m uniform in 1 .. n/2, mean (1 + n/2) / 2. It is drawn with probability
-// p = group_share n / mean, so that the expected number of wrong observations is group_share n.
+// Of n observations a group has m, with m uniform in 1 .. n/2 and the mean (1 + n/2) / 2. A group is drawn with the
+// probability p = group_share n / mean, so that the expected number of outliers is group_share n.
 WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layout, const Observer& observer,
                             const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random) {
   WrongGroup group;
@@ -15,7 +15,7 @@ WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layo
   const auto mistake = layout.scene->mistake(point, random);
   if (!mistake) return group;
   const double group_share = options.outlier_share * 2 / 3, n = static_cast<double>(seen.size());
-  // Of the observations outside of groups, so that the shares add up.
+  // This is a share of the observations outside of groups, so that both kinds add up to outlier_share.
   group.stray_share = (options.outlier_share - group_share) / (1 - group_share);
   const auto most = static_cast<std::int64_t>(seen.size() / 2);
   const double mean = 0.5 * static_cast<double>(1 + most);
@@ -33,7 +33,7 @@ WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layo
     const double elapsed = time_of(s) - time_of(seen[group.begin]);
     const Eigen::Vector3d place = point.position + mistake->offset + mistake->velocity * (0.5 + elapsed);
     auto pixel = std::abs(elapsed) < 10 ? observer.pixel_of(s.image, place) : std::nullopt;
-    // Too near to be wrong: along the line of sight.
+    // If the wrong place is on the line of sight, its pixel is too near the right one to be an outlier.
     if (pixel && (*pixel - s.pixel).norm() < 5 + 6 * options.image_noise_px) pixel.reset();
     group.pixels.push_back(pixel);
   }

@@ -1,20 +1,21 @@
-// Wrong matches that agree with one another.
+// Simulates wrong matches that agree with one another. A robust estimator must also withstand these, not only outliers
+// at random places.
 #pragma once
 
 #include "io/simulate/scene/scene.h"
 
 namespace megablock {
 
-// A run of a track's observations that show another place than the point: a window further along a repeated facade, or
-// a spot on a vehicle that drives by. At most half of the observations, so that the point keeps the majority.
+// A run of observations of a track that show another place than its point: another window of a repeated facade, or a
+// spot on a vehicle that drives by. It has at most half of the observations, so the majority shows the point.
 struct WrongGroup {
   std::size_t begin = 0;                               // first observation of the run
-  std::vector<std::optional<Eigen::Vector2d>> pixels;  // of the run; empty: the place is not in the image
+  std::vector<std::optional<Eigen::Vector2d>> pixels;  // one per observation; empty: the place is not in the image
   Verdict verdict = Verdict::kRepeated;
-  double stray_share = 0;  // of the other observations: wrong anywhere in the image
+  double stray_share = 0;  // probability of each other observation to be an outlier anywhere in the image
 };
 
-// Groups take two thirds of outlier_share where the scene knows mistakes, stray observations the rest.
+// If the scene has mistakes, groups get two thirds of outlier_share, and outliers at random places the rest.
 WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layout, const Observer& observer,
                             const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random);
 

@@ -15,9 +15,10 @@ void refuse_edited_project(const std::string& folder, const std::string& text, E
   if (edited == EditedProject::kOverwrite || !std::filesystem::exists(path)) return;
   std::ifstream file(path);
   if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return;
-  throw InputError(path.string() +
-                   ": is there and differs from what would be written: it was edited, or is of another simulation; "
-                   "name another folder with -o, or give --overwrite");
+  throw InputError(
+      path.string() +
+      ": this project file exists and differs from the new one: it was edited, or belongs to another simulation; "
+      "name another folder with -o, or give --overwrite");
 }
 
 void write_text(const std::string& path, const std::string& text) {

@@ -1,4 +1,4 @@
-// The block.yaml of a simulated block, which its user may have edited since.
+// Writes the block.yaml of a simulated block, but does not overwrite one that the user has edited.
 #pragma once
 
 #include <string>
@@ -7,12 +7,13 @@
 
 namespace megablock {
 
-// What becomes of a block.yaml that is in the folder and differs from what would be written.
+// The treatment of an existing block.yaml that differs from the new one.
 enum class EditedProject { kRefuse, kOverwrite };
 
-// InputError when there is one with other contents, unless it may be overwritten. Asked before anything is written.
+// Throws InputError if there is a block.yaml with other contents that must not be overwritten. It is called before
+// anything is written.
 void refuse_edited_project(const std::string& folder, const std::string& text, EditedProject edited);
-// Throws InputError when that is not possible.
+// Writes a text file. Throws InputError if that is impossible.
 void write_text(const std::string& path, const std::string& text);
 
 }  // namespace megablock

@@ -1,4 +1,4 @@
-// The project files of a simulated block at the level of tie points.
+// Writes the project files of a simulated block without images.
 #include "io/simulate/files/write.h"
 
 #include <filesystem>

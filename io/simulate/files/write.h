@@ -1,4 +1,4 @@
-// A simulated block in files, at the level of tie points.
+// Writes a simulated block without images: its tie points are given in a file.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace megablock {
 
-// The tie-point level, streamed to the files: folder/block.yaml (with `tie_points: tie_points.h5`, `block: given.h5`),
-// truth.csv, truth.h5 (poses, cameras), truth_tracks.h5 (points, wrong observations).
+// Writes folder/block.yaml (with `tie_points: tie_points.h5` and `block: given.h5`), truth.csv, truth.h5 (poses and
+// cameras), and truth_tracks.h5 (points, outliers). Tracks are written in batches while they are simulated.
 void write_simulated_block(const SimulationOptions& options, const std::string& folder,
                            EditedProject edited = EditedProject::kRefuse,
                            std::int64_t batch_observations = kTrackBatch);
-// Of truth_tracks.h5: positions of the points and verdicts on the observations, no tracks.
+// Reads truth_tracks.h5: the positions of the points and the verdicts on the observations, without the tracks.
 SimulatedTracks read_truth_tracks(const std::string& path);
 
 }  // namespace megablock

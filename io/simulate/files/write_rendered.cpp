@@ -1,4 +1,4 @@
-// A simulated block as images with the project files around them.
+// Renders the images of a simulated block and writes the project files for them.
 #include "io/simulate/files/write_rendered.h"
 
 #include <algorithm>
@@ -45,7 +45,7 @@ Pose image_pose(const Layout& layout, ImageIndex image) {
   return camera_pose(layout.truth.frames[entry.frame], layout.truth.mounts[rig][static_cast<std::size_t>(entry.mount)]);
 }
 
-// The name that the program gives to a camera by the headers of its images.
+// The name that the program will give to a camera because of the headers of its images.
 std::string name_by_headers(const Camera& camera) {
   std::ostringstream name;
   name << "Megablock Simulated " << camera.name << ' ' << camera.width << 'x' << camera.height << ' ' << std::fixed
@@ -53,7 +53,7 @@ std::string name_by_headers(const Camera& camera) {
   return name.str();
 }
 
-// The vehicle in a camera's images; its mount is that of the rig with this camera.
+// The vehicle as it appears in the images of a camera. The mount is found in the rig that has this camera.
 std::optional<VehicleView> vehicle_seen(const SimulationOptions& options, const Layout& layout, CameraIndex camera,
                                         const RayTable& rays) {
   if (!options.vehicle) return std::nullopt;
@@ -71,7 +71,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
                   const fs::path& folder) {
   const auto& city = dynamic_cast<const City&>(*layout.scene);
   const Georeference georeference(layout.block.ground);
-  // Camera by camera: a table of rays is large.
+  // The images are rendered camera by camera, because a table of rays is large.
   for (std::size_t c = 0; c < layout.block.cameras.size(); ++c) {
     const CameraIndex camera(static_cast<std::int64_t>(c));
     const RayTable rays(layout.block.cameras[camera], layout.truth.cameras[camera]);
@@ -90,7 +90,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
       exif.focal_px = layout.block.cameras[camera].intrinsics[kFocal];
       exif.time_s = layout.block.frames[layout.block.images[image].frame].time_s;
       const auto& prior = with_priors.frames[with_priors.images[image].frame].position_prior;
-      if (prior) exif.position = georeference.to_geodetic(prior->position);  // of the antenna
+      if (prior) exif.position = georeference.to_geodetic(prior->position);  // position of the antenna
       exif.position_sigma_m = options.gps_sigma_m;
       write_jpeg((folder / layout.block.name_of(image)).string(), picture, exif);
     }
@@ -99,7 +99,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
 
 bool has_rig(const Block& block) { return block.rigs.front().mounts.size() > 1; }
 
-// OpenSfM's description of a rig: X_camera = R X_rig + t, and which images were exposed together.
+// Writes OpenSfM's files of a rig: the rig cameras (X_camera = R X_rig + t), and the images of each exposure.
 void write_rig(const Block& block, const fs::path& root) {
   nlohmann::ordered_json cameras, assignments;
   for (const Mount& mount : block.rigs.front().mounts) {
@@ -117,14 +117,14 @@ void write_rig(const Block& block, const fs::path& root) {
   write_text((root / "rig_assignments.json").string(), assignments.dump(2) + "\n");
 }
 
-// The given poses, for those who want to start from them.
+// The given poses, for users who want to start from them.
 PoseTable given_poses(const Block& block) {
   const BlockState start = initial_state(block);
   return pose_table(block, start);
 }
 
-// The control points (without the check points) in the form that other programs read: longitude, latitude, ellipsoidal
-// height, then column and row counted from the centre of the first pixel.
+// Writes the control points (without the check points) in the form that other programs read: longitude, latitude,
+// ellipsoidal height, then column and row, which count from the centre of the first pixel.
 void write_gcp_list(const Block& block, const fs::path& path) {
   const Georeference georeference(block.ground);
   std::ofstream stream(path);
@@ -141,7 +141,7 @@ void write_gcp_list(const Block& block, const fs::path& path) {
   if (!stream) throw_file_error(path.string(), "written", errno);
 }
 
-// "    distortion: {k1: -0.03, ...}", a line of all parameters behind the principal point.
+// Writes "    distortion: {k1: -0.03, ...}", a line with all parameters after the principal point.
 void write_distortion(const Intrinsics& k, std::ostream& yaml) {
   const char* separator = "    distortion: {";
   for (int p = kPrincipalY + 1; p < k.size(); ++p) {
@@ -154,7 +154,7 @@ void write_distortion(const Intrinsics& k, std::ostream& yaml) {
 
 void write_cameras(const SimulationOptions& options, const Block& block, std::ostream& yaml) {
   const bool brown = options.camera_model == model_name(CameraModel());
-  // The headers of the images say enough, unless there is a calibration to start from or to hold.
+  // The headers of the images are sufficient, unless there is a calibration to start from or to hold.
   if (options.calibrate && !is_stereopolis(options)) {
     if (!brown) yaml << "cameras:\n  default: {model: " << options.camera_model << "}\n";
     return;
@@ -214,7 +214,7 @@ void write_rendered_block(const SimulationOptions& asked, const std::string& fol
   if (asked.scene == SimulationOptions::Scene::kTargetField)
     throw InputError("simulation: the target field is made of tie points only; leave out --rendered");
   SimulationOptions options = asked;
-  options.bridge = false;  // the renderer knows houses only
+  options.bridge = false;  // the renderer cannot draw bridges
   const fs::path root(folder);
   make_folder((root / "images").string());
   Layout layout = make_city_layout(options);

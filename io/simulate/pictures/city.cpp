@@ -45,8 +45,9 @@ Eigen::Vector3d HeightGrid::normal(double x, double y) const {
   return Eigen::Vector3d(-s[1], -s[2], 1).normalized();
 }
 
-// Far from the ground by steps that cannot overshoot: the ray's height above the ground shrinks at most by the slope of
-// the ray plus the steepest ground. Near the ground by Newton's method, except on grazing rays.
+// Intersects a ray with the terrain. Far from the ground it takes steps that cannot go below it: the height of the ray
+// above the ground decreases at most by the slope of the ray plus that of the steepest ground. Near the ground it uses
+// Newton's method, except for grazing rays.
 double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit,
                              double guess) const {
   const double closing = -direction.z() + steepest_ * direction.head<2>().norm();
@@ -57,7 +58,7 @@ double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3
     t = (highest_ - origin.z()) / direction.z();
   }
   const bool steep = -direction.z() > 2 * (closing + direction.z());
-  if (steep && guess > 0) t = guess;  // a steep ray meets the ground once
+  if (steep && guess > 0) t = guess;  // a steep ray meets the ground only once, so any start is safe
   for (int i = 0; i < 200 && t < limit; ++i) {
     const Eigen::Vector3d p = origin + t * direction;
     const Eigen::Vector3d ground = sample(p.x(), p.y());
@@ -126,7 +127,7 @@ void City::build_streets() {
       for (auto house = static_cast<std::int64_t>(std::floor(low_[along] / kHouse));
            static_cast<double>(house) * kHouse < high_[along]; ++house) {
         const double start = static_cast<double>(house) * kHouse, end = start + kHouse;
-        // Houses end where the crossing street begins.
+        // The row of houses ends at the crossing street.
         const double crossing = spacing * static_cast<double>(nearest_axis(start + 0.5 * kHouse, spacing));
         constexpr double kClear = kFacade + kFacadeDepth;
         const double first = end > crossing ? std::max(start, crossing + kClear) : start;
@@ -190,7 +191,7 @@ bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d&
   return true;
 }
 
-// Walks through the cells that the ray crosses in plan (Amanatides and Woo 1987).
+// Visits the cells that the ray crosses in plan (Amanatides and Woo 1987).
 std::int64_t City::nearest_box(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit,
                                double& distance, int& axis) const {
   const Eigen::Vector3d inverse = direction.cwiseInverse();
@@ -199,7 +200,7 @@ std::int64_t City::nearest_box(const Eigen::Vector3d& origin, const Eigen::Vecto
     if (direction.z() >= 0) return -1;
     t = (highest_box_ - origin.z()) * inverse.z();
   }
-  // Enter and leave the extent.
+  // Find the distances at which the ray enters and leaves the extent.
   for (int k = 0; k < 2; ++k) {
     const double a = (low_[k] - origin[k]) * inverse[k], b = (high_[k] - origin[k]) * inverse[k];
     t = std::max(t, std::min(a, b));
@@ -268,7 +269,7 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
   Eigen::Vector3f base;
   float detail = 0;
   if (hit.object == kGround) {
-    // Grass and soil by large patches, with roads where nothing is built.
+    // The ground has large patches of grass and soil, with roads where nothing is built.
     const double patch = street_ ? 7 : 0.12 * options_.height_m;
     const float kind = Texture::cell(p.x() + 0.3 * p.y(), p.y() - 0.3 * p.x(), patch, 11);
     base = kind < 0.3f   ? Eigen::Vector3f(104, 112, 72)
@@ -289,7 +290,7 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
       double along = p[1 - across], up = p.z();
       const std::uint32_t wall = number + static_cast<std::uint32_t>(1 + across) + (hit.normal[across] > 0 ? 7 : 0);
       if (Texture::cell(2.5, 0.5, 1, number) < options_.repeated_facades) {
-        // The same two windows again and again, with what weather has made of each.
+        // The same two windows repeat, each with its own traces of weather.
         detail = 0.2f * texture_.detail(along, up, wall + 3, footprint);
         along -= 2 * kWindow * std::floor(along / (2 * kWindow));
         up -= kStorey * std::floor(up / kStorey);
@@ -297,7 +298,7 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
       } else {
         detail = texture_.detail(along, up, wall, footprint);
       }
-      // Windows of different brightness.
+      // The windows have different brightness.
       const double u = along / kWindow - std::floor(along / kWindow), v = up / kStorey - std::floor(up / kStorey);
       if (u > 0.3 && u < 0.85 && v > 0.25 && v < 0.8)
         base *= 0.3f + 0.7f * Texture::cell(along, up * kWindow / kStorey, kWindow, wall);

@@ -1,4 +1,4 @@
-// The surfaces of the rendered scenes: terrain with boxes on it, cut by rays.
+// The surfaces of the rendered scenes (terrain with boxes on it), their intersections with rays, and their colours.
 #pragma once
 
 #include "io/simulate/pictures/texture.h"
@@ -11,15 +11,15 @@ struct Box {
   Eigen::Vector3d low, high;  // metres, sides parallel to the axes
 };
 
-// Whether a ray from outside enters the box (slab test), at which distance, and through which axis' face. `inverse`: of
-// the direction's components.
+// Whether a ray from outside enters the box (slab test). If so, sets the distance and the axis of the face through
+// which it enters. `inverse` has the inverses of the components of the direction.
 bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d& inverse, double& distance, int& axis);
 
-// Heights on a square lattice, bilinear between: the terrain of a rendered scene exactly.
+// The terrain of a rendered scene: heights on a square lattice with bilinear interpolation.
 class HeightGrid {
  public:
   HeightGrid() = default;
-  // Samples `height(x, y)` over the rectangle; outside it the border's heights go on.
+  // Samples `height(x, y)` over the rectangle. Outside it, the heights of the border continue.
   template <typename Height>
   HeightGrid(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double cell_m, const Height& height)
       : low_(low), cell_m_(cell_m) {
@@ -33,7 +33,8 @@ class HeightGrid {
   }
   double height(double x, double y) const { return sample(x, y)[0]; }
   Eigen::Vector3d normal(double x, double y) const;
-  // Distance along the ray (unit direction) to the surface; infinity beyond `limit`. `guess`: of a neighbouring ray.
+  // Distance along the ray (unit direction) to the surface; infinity beyond `limit`. `guess` is the distance of a
+  // neighbouring ray.
   double intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit, double guess) const;
 
  private:
@@ -59,11 +60,11 @@ class City : public Scene {
 
   City(const SimulationOptions& options, const Layout& layout);
 
-  // `ground_guess`: distance at which a neighbouring ray met the ground; 0 = unknown.
+  // `ground_guess` is the distance at which a neighbouring ray met the ground; 0 = unknown.
   Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double ground_guess = 0) const;
-  // Red, green, blue, 0 to 255. `pixel_angle`: of a pixel, radians.
+  // Red, green, blue, 0 to 255. `pixel_angle` is the angle of a pixel, radians.
   Eigen::Vector3f colour(const Hit& hit, const Eigen::Vector3d& direction, double pixel_angle) const;
-  // What falls on a surface: sunlight from the south-west, with shadows of the boxes, and skylight.
+  // The light on a surface: sunlight from the south-west, with shadows of the boxes, and skylight.
   float light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
 
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override;
@@ -82,7 +83,7 @@ class City : public Scene {
   void build_streets();  // houses along the streets of the street scene
   void add_box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double height);
   void sort_boxes();
-  // Nearest box before `limit`; returns its number or -1, its distance and the axis of the face.
+  // Finds the nearest box before `limit`. Returns its number (-1: none), its distance and the axis of the face.
   std::int64_t nearest_box(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double limit,
                            double& distance, int& axis) const;
 
@@ -95,7 +96,7 @@ class City : public Scene {
   Texture texture_;
   std::vector<Box> boxes_;
   double highest_box_ = 0;
-  // Boxes by square cells in plan: those that touch cell c are rows [cell_begin_[c], cell_begin_[c + 1]).
+  // The boxes by square cells in plan. Those that touch cell c are the rows [cell_begin_[c], cell_begin_[c + 1]).
   double cell_m_ = 1;
   std::int64_t columns_ = 0, rows_ = 0;
   std::vector<std::int64_t> cell_begin_, cell_boxes_;

@@ -1,4 +1,4 @@
-// Writes a rendered image as a camera would: JPEG with EXIF.
+// Writes a rendered image as a camera would write it: as JPEG with EXIF.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -11,13 +11,13 @@ namespace megablock {
 
 struct SimulatedExif {
   std::string model;
-  double focal_px = 0;  // written as millimetres with the resolution of the focal plane
-  double time_s = 0;    // since 1970
+  double focal_px = 0;  // written in millimetres, with the resolution of the focal plane
+  double time_s = 0;    // seconds since 1970
   std::optional<Geodetic> position;
   double position_sigma_m = 0;  // horizontal; 0: not stated
 };
 
-// Quality 95. InputError when the file cannot be written.
+// Writes a JPEG of quality 95. Throws InputError if the file cannot be written.
 void write_jpeg(const std::string& path, const cv::Mat& image, const SimulatedExif& exif);
 
 }  // namespace megablock

@@ -28,8 +28,8 @@ RayTable::RayTable(const Camera& camera, const Intrinsics& intrinsics)
 
 namespace {
 
-constexpr float kNoise = 1.5f;           // of the sensor, grey values
-constexpr std::int64_t kOnVehicle = -3;  // in place of an object of the city
+constexpr float kNoise = 1.5f;           // sigma of the sensor noise, grey values
+constexpr std::int64_t kOnVehicle = -3;  // number of the vehicle among the objects of the city
 
 // Approximately normal: the sum of four uniform numbers.
 float sensor_noise(std::uint64_t bits) {
@@ -64,7 +64,7 @@ cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera,
         if (hit[k].object == City::kGround) guess = hit[k].distance;
         edge = edge || hit[k].object != hit[0].object;
       }
-      // Within one surface two samples on the diagonal do: the texture fades where it is finer than the pixel.
+      // Within one surface, two samples on the diagonal are enough, because texture finer than the pixel fades out.
       Eigen::Vector3f mean = Eigen::Vector3f::Zero();
       const std::size_t step = edge ? 1 : 3;
       for (std::size_t k = 0; k < 4; k += step) {

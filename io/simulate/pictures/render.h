@@ -1,4 +1,4 @@
-// Images of a City as a camera sees them.
+// Renders the images of a City.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -8,7 +8,7 @@
 
 namespace megablock {
 
-// Viewing directions of a camera at the 2 x 2 samples of every pixel, computed once and used for all its images.
+// The viewing directions of a camera at the 2 x 2 samples of every pixel. They are computed once for all its images.
 class RayTable {
  public:
   RayTable(const Camera& camera, const Intrinsics& intrinsics);
@@ -24,14 +24,14 @@ class RayTable {
   std::vector<Eigen::Vector2f> rays_;
 };
 
-// The vehicle in a camera's images, and the light on it where this one was taken.
+// The vehicle in the images of a camera, and the light on it at the place of one image.
 struct SeenVehicle {
   const VehicleView* view = nullptr;  // none: the image shows the scene alone
   VehicleView::Light light{};
 };
 
-// 8-bit BGR image; `camera` is the pose ground -> camera. Sensor noise depends on `seed` alone, and the image not
-// on the number of threads.
+// Renders an 8-bit BGR image. `camera` is the pose ground -> camera. The sensor noise depends only on `seed`, and the
+// image does not depend on the number of threads.
 cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera, double focal_px, std::uint64_t seed,
                      const SeenVehicle& vehicle = {});
 

@@ -9,7 +9,7 @@ namespace megablock {
 
 namespace {
 
-// floor() is a slow call at the baseline instruction set.
+// The floor of a number. std::floor() is a slow call with the baseline instruction set.
 std::int64_t whole(double x) {
   const auto i = static_cast<std::int64_t>(x);
   return i - (x < static_cast<double>(i));
@@ -43,7 +43,7 @@ float Texture::noise(double x, double y) const {
   return top + b * (bottom - top);
 }
 
-// One disc in a square of the lattice, wholly inside it.
+// Each square of the lattice has one disc, which lies completely inside it.
 float Texture::discs(double u, double v, double size_m, std::uint32_t surface) const {
   const double x = u / size_m, y = v / size_m;
   const std::int64_t i = whole(x), j = whole(y);
@@ -59,7 +59,7 @@ float Texture::discs(double u, double v, double size_m, std::uint32_t surface) c
 }
 
 float Texture::detail(double u, double v, std::uint32_t surface, double footprint_m) const {
-  // Cosine and sine of the turn between octaves (about 37 degrees).
+  // Cosine and sine of the angle between successive octaves (about 37 degrees).
   constexpr double kCos = 0.8, kSin = 0.6;
   const double shift = static_cast<double>(surface % 1021) * 17.3;
   double x = u + shift, y = v - shift, wave = finest_m_;

@@ -1,8 +1,8 @@
-// Procedural texture of the rendered scenes: a colour for each place of a surface, the same from every view.
+// Computes the texture of the rendered scenes: a grey value for each place of a surface, the same in every image.
 //
-// Sum of octaves of value noise (random numbers on a lattice, smoothly interpolated) from three ground pixels up, each
-// octave turned against the others, and discs of random size and brightness. Octaves finer than the pixel's footprint
-// fade out, so that distant surfaces do not alias.
+// The texture is a sum of octaves of value noise (random numbers on a lattice, smoothly interpolated) with waves from
+// three ground pixels up, each octave turned against the others, and of discs with random size and brightness. Octaves
+// that are finer than the footprint of the pixel fade out, so distant surfaces do not alias.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,14 +13,14 @@ namespace megablock {
 
 class Texture {
  public:
-  // `finest_m`: length of the shortest noise wave, metres.
+  // `finest_m` is the length of the shortest noise wave, metres.
   Texture(std::uint64_t seed, double finest_m);
 
-  // Grey value about 0, mostly within +-1, at a place (u, v) [metres] of surface number `surface`. `footprint_m`: size
-  // of the pixel on the surface.
+  // The grey value, about 0 and mostly within +-1, at the place (u, v) (metres) of surface number `surface`.
+  // `footprint_m` is the size of the pixel on the surface.
   float detail(double u, double v, std::uint32_t surface, double footprint_m) const;
 
-  // One random number in [0, 1) per square of `size_m`: patches, windows.
+  // A random number in [0, 1) for each square of side `size_m`: for patches and windows.
   static float cell(double u, double v, double size_m, std::uint32_t surface);
 
  private:

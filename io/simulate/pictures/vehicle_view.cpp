@@ -29,7 +29,7 @@ VehicleView::VehicleView(const SimulationOptions& options, const RayTable& rays,
   const std::vector<Part> all = parts();
   const Eigen::Matrix3d to_rig = mount.rotation.toRotationMatrix().transpose();
   const double pixel_angle = 1 / options.focal_px;
-  const Texture texture(options.seed, 3 * pixel_angle);  // the finest wave is three pixels at a metre
+  const Texture texture(options.seed, 3 * pixel_angle);  // the finest wave is three pixels long at a distance of 1 m
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column) {
       const Eigen::Vector2d ray = rays.at(row, column).cast<double>();

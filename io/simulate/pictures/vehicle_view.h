@@ -1,6 +1,6 @@
-// What the cameras of the Stereopolis vehicle see of the vehicle itself: the same in all images of a camera, light
-// apart. Roof, a dome and a thin mast on it, and a scanner at the left side, seen by the level cameras; those that look
-// up the facades see nothing of it.
+// Renders the Stereopolis vehicle in the images of its own cameras. Apart from the light it looks the same in all
+// images of a camera. The level cameras see the roof, a dome and a thin mast on it, and a scanner at the left side;
+// cameras that look up the facades do not see the vehicle.
 #pragma once
 
 #include <array>
@@ -15,10 +15,10 @@ class RayTable;
 
 class VehicleView {
  public:
-  // Of a camera on its mount.
+  // The view of a camera with this mount.
   VehicleView(const SimulationOptions& options, const RayTable& rays, const Pose& mount);
 
-  // Light on the six faces (-x, x, -y, y, -z, z of the rig) where the vehicle stands.
+  // The light on the six faces (-x, x, -y, y, -z, z of the rig) at the place of the vehicle.
   using Light = std::array<float, 6>;
   static Light light_at(const City& city, const Pose& rig);
 
@@ -28,7 +28,7 @@ class VehicleView {
     const Surface& s = surfaces_[static_cast<std::size_t>(surface_[at(row, column)])];
     return light[static_cast<std::size_t>(s.face)] * s.colour;
   }
-  // Its mask as a project takes them: 0 where most samples of a pixel show the vehicle, else 255.
+  // The mask of the vehicle, as a project uses it: 0 where most samples of a pixel show the vehicle, else 255.
   cv::Mat mask() const;
 
  private:
@@ -39,7 +39,7 @@ class VehicleView {
   std::size_t at(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
   }
-  int rows_, columns_;                 // of samples
+  int rows_, columns_;                 // numbers of samples
   std::vector<std::int32_t> surface_;  // [samples] row of surfaces_; -1: the scene
   std::vector<Surface> surfaces_;
 };

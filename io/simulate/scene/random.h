@@ -1,7 +1,7 @@
-// Random numbers with the same bits everywhere: the distributions of the standard library differ between libraries.
+// Random numbers with the same bits on every machine; those of the standard library differ between implementations.
 //
-// SplitMix64 (Steele, Lea, Flood 2014). A generator is named by (seed, stream), so that every frame draws from its own
-// stream and no result depends on the order in which frames are visited.
+// The generator is SplitMix64 (Steele, Lea, Flood 2014). Seed and stream select a generator, so every frame can draw
+// from its own stream, and no result depends on the order in which frames are processed.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@ inline std::uint64_t mix_bits(std::uint64_t z) {
 
 class Random {
  public:
-  // What a stream is drawn for; streams of different purposes are independent.
+  // The purpose of a stream. Streams with different purposes are independent.
   enum class Purpose : std::uint64_t {
     kCamera = 1,
     kTerrain,
@@ -42,7 +42,8 @@ class Random {
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   std::int64_t below(std::int64_t n) { return static_cast<std::int64_t>(uniform() * static_cast<double>(n)); }
 
-  // Standard normal deviate (Box-Muller; the second of the pair is dropped so that there is no hidden state).
+  // A standard normal deviate (Box-Muller). The second deviate of the pair is dropped, so that there is no hidden
+  // state.
   double normal() {
     const double radius = std::sqrt(-2 * std::log(1 - uniform()));
     return radius * std::cos(2 * std::numbers::pi * uniform());
@@ -51,7 +52,7 @@ class Random {
     const double x = normal(), y = normal(), z = normal();
     return {x, y, z};
   }
-  // Poisson deviate by inversion; for means up to a few tens.
+  // A Poisson deviate by inversion, for means up to a few tens.
   int poisson(double mean) {
     double product = uniform();
     const double limit = std::exp(-mean);

@@ -10,15 +10,15 @@
 
 namespace megablock {
 
-// What a simulated observation shows.
+// The object that a simulated observation shows.
 enum class Verdict : std::uint8_t {
   kRight = 0,     // the point, with image_noise_px
   kStray = 1,     // anything, anywhere in the image
-  kRepeated = 2,  // another place of a repeated facade, in which neighbouring observations of the track agree
+  kRepeated = 2,  // another place of a repeated facade, the same one in neighbouring observations of the track
   kVehicle = 3    // a spot on a moving vehicle, the same one in neighbouring observations
 };
 
-// State of the satellites at a frame of a simulated trajectory.
+// The reception of satellites at a frame of a simulated trajectory.
 enum class Gnss : std::uint8_t { kNone = 0, kMasked = 1, kClear = 2 };
 
 struct SimulatedTracks {
@@ -27,12 +27,12 @@ struct SimulatedTracks {
   std::vector<std::uint8_t> outlier;    // [observations] Verdict; 0 = right
 };
 
-// Everything of a block; its tracks are all of them, or none where they went to a sink.
+// A simulated block with its truth. It has all tracks, or none if they were passed to a sink.
 struct SimulatedBlock : SimulatedTracks {
-  Block block;  // what a job is given
+  Block block;  // the block that the job gets
   BlockState truth;
   std::vector<Eigen::Vector3d> control_truth;  // true positions [block.control_points]
-  std::vector<Gnss> gnss;                      // [frames] Stereopolis; else empty
+  std::vector<Gnss> gnss;                      // [frames] in the scene Stereopolis, else empty
 };
 
 // Receives the tracks of a block in batches, in the order of their indices.

@@ -1,4 +1,4 @@
-// Smooth ground: a sum of four plane waves.
+// Smooth terrain for simulated blocks: a sum of four plane waves.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ namespace megablock {
 
 class Terrain {
  public:
-  // Heights stay within +-relief_m / 2; the shortest wave is 1.5 times `scale_m` long.
+  // Heights are within +-relief_m / 2. The shortest wave is 1.5 times `scale_m` long.
   Terrain(std::uint64_t seed, double relief_m, double scale_m) {
     Random random(seed, Random::Purpose::kTerrain);
     constexpr std::array<double, 4> kShare = {0.4, 0.3, 0.2, 0.1}, kLength = {6, 4, 2.5, 1.5};

@@ -11,14 +11,15 @@ namespace megablock {
 
 namespace {
 
-constexpr double kMemory_frames = 40;  // of the errors under a clear sky
+constexpr double kMemory_frames = 40;  // correlation length of the errors under a clear sky
 constexpr double kAnySpeed = 1e9;
-constexpr int kWaves = 4;                    // of a drift
-constexpr double kDriftHeight = 0.3;         // of the horizontal drift
-constexpr double kHeadingDrift_deg = 0.045;  // mean of the largest of a stretch
+constexpr int kWaves = 4;                    // number of waves of a drift
+constexpr double kDriftHeight = 0.3;         // drift in height, over the horizontal drift
+constexpr double kHeadingDrift_deg = 0.045;  // mean of the largest drift of the heading in a stretch
 
-// Smooth stationary process of unit variance: an autoregressive process through the same filter again, e_i = c e_{i-1}
-// + u_i, u_i = c u_{i-1} + n_i. Its steps have the sigma 1 - c; those of e_i = c e_{i-1} + n_i had sqrt(2 (1 - c)).
+// A smooth stationary process of unit variance. An autoregressive process passes the same filter twice: e_i = c e_{i-1}
+// + u_i with u_i = c u_{i-1} + n_i. Its steps have the sigma 1 - c. Those of the simple process e_i = c e_{i-1} + n_i
+// would have sqrt(2 (1 - c)).
 class SmoothError {
  public:
   explicit SmoothError(Random& random)
@@ -40,11 +41,11 @@ struct Stretch {
   std::int64_t begin, end;
 };
 
-// Masked stretches of random lengths about `mean`, with clear ones before, between and after.
+// Draws masked stretches of random lengths with the mean `mean`, with clear stretches before, between and after them.
 std::vector<Stretch> draw_stretches(double share, double mean, std::int64_t frames, Random& random) {
   const double masked = share * static_cast<double>(frames);
   const auto count = static_cast<std::size_t>(std::max<std::int64_t>(1, std::llround(masked / mean)));
-  std::vector<double> lengths(2 * count + 1);  // clear, masked, clear, ...
+  std::vector<double> lengths(2 * count + 1);  // of the clear and masked stretches in turn, first a clear one
   double sums[] = {0, 0};
   for (std::size_t k = 0; k < lengths.size(); ++k) sums[k % 2] += lengths[k] = random.uniform(0.75, 1.25);
   std::vector<Stretch> stretches;
@@ -57,15 +58,16 @@ std::vector<Stretch> draw_stretches(double share, double mean, std::int64_t fram
   return stretches;
 }
 
-// Drift over a stretch, zero before and after it: half waves of random amplitudes ~ 1/k^3 (a Karhunen-Loeve series as
-// that of the Brownian bridge, and smoother) times `shape` along the axes; the first one is a unit vector in the first
-// `axes` coordinates. Scaled to a largest length of `largest` over these, but to steps of at most `fastest`.
+// Draws the drift over a stretch, which is zero before and after it. It is a sum of half waves with random amplitudes ~
+// 1/k^3 (a Karhunen-Loeve series like that of the Brownian bridge, but smoother) times `shape` along the axes. The
+// first amplitude is a unit vector in the first `axes` coordinates. The drift is scaled so that its largest length in
+// these coordinates is `largest`, but its steps are at most `fastest`.
 std::vector<Eigen::Vector3d> draw_drift(std::int64_t length, double largest, double fastest, int axes,
                                         const Eigen::Vector3d& shape, Random& random) {
   std::array<Eigen::Vector3d, kWaves> amplitudes;
   for (int k = 0; k < kWaves; ++k) amplitudes[k] = shape.cwiseProduct(random.normal3()) / std::pow(k + 1, 3);
   amplitudes[0].head(axes).normalize();
-  std::vector<Eigen::Vector3d> drift(static_cast<std::size_t>(length) + 1);  // and the frame after it
+  std::vector<Eigen::Vector3d> drift(static_cast<std::size_t>(length) + 1);  // with the frame after the stretch
   double longest = 0, steepest = 0;
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < drift.size(); ++i) {
@@ -104,7 +106,7 @@ PassErrors draw_pass_errors(const SimulationOptions& options, std::int64_t pass,
         draw_drift(length, options.drift_m * share, options.drift_per_frame_m, 2, {1, 1, kDriftHeight}, random);
     const auto turn = draw_drift(length, kDegree * kHeadingDrift_deg * random.uniform(2.0 / 3, 4.0 / 3), kAnySpeed, 3,
                                  {0.5, 1, 0.5}, random);
-    // Without any satellite: a part of the stretch, somewhere in it.
+    // A part of the stretch, at a random place in it, has no satellite at all.
     const double absent = static_cast<double>(length) * options.gnss_absent_share / options.gnss_masked_share;
     const double absent_from = random.uniform(0, static_cast<double>(length) - absent);
     for (std::int64_t i = 0; i < length; ++i) {

@@ -13,7 +13,7 @@ double Bridge::rise(double x) const {
   return 0.5 * kHeight * (1 + std::cos(std::numbers::pi * (r - kFlat) / (half_length_ - kFlat)));
 }
 
-// Lower where the ramp meets the road.
+// The height of the walls, which are lower where the ramp meets the road.
 double Bridge::wall(double x) const { return kWall * std::min(1.0, rise(x) / 2); }
 
 bool Bridge::upon(const Eigen::Vector3d& p) const { return carries(p.x(), p.y()) && p.z() > rise(p.x()) - 0.5 * kSlab; }
@@ -21,7 +21,7 @@ bool Bridge::upon(const Eigen::Vector3d& p) const { return carries(p.x(), p.y())
 bool Bridge::hides(const Eigen::Vector3d& eye, const Eigen::Vector3d& place) const {
   const Eigen::Vector3d sight = place - eye;
   const bool from = upon(eye), to = upon(place);
-  // The walls' planes y = centre +- kHalfWidth.
+  // Intersect the line with the planes of the walls, y = centre +- kHalfWidth.
   for (const int side : {-1, 1}) {
     if (sight.y() == 0) break;
     const double t = (centre_.y() + side * kHalfWidth - eye.y()) / sight.y();
@@ -33,7 +33,7 @@ bool Bridge::hides(const Eigen::Vector3d& eye, const Eigen::Vector3d& place) con
     const bool under = std::abs(cut.x() - centre_.x()) <= kOpening && cut.z() < deck - kSlab;
     if (!under || from || to) return true;
   }
-  // The deck and what carries it: the line must not change between above and below it.
+  // Test the deck and the slab below it: the line must not pass from above the deck to below it.
   constexpr int kSteps = 16;
   bool above = false, below = false;
   for (int i = 0; i <= kSteps; ++i) {

@@ -1,8 +1,9 @@
-// A street that passes over another one on a bridge with ramps.
+// A bridge with ramps, on which one street crosses another.
 //
-// The street along x through y = centre.y is raised between its neighbouring crossings: flat over the street along y,
-// raised cosines down to the ground. On both sides stand walls, closed to the ground beside the opening. From the
-// bridge nothing of the street below is seen over the walls within the range of the street scene, nor the other way.
+// The street along x through y = centre.y is raised between its neighbouring crossings. It is flat over the street
+// along y and descends to the ground on both sides as a raised cosine. Walls stand on both sides; beside the opening
+// they reach down to the ground. Because of the walls, the bridge and the street below do not see each other within the
+// range of the street scene.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,22 +17,22 @@ class Bridge {
   static constexpr double kHalfWidth = 5;   // of the deck, from axis to wall
   static constexpr double kWall = 3.5;      // height of the walls above the deck
   static constexpr double kSlab = 1;        // thickness of the deck
-  static constexpr double kFlat = 12;       // half length of the part that is flat
+  static constexpr double kFlat = 12;       // half length of the flat part
   static constexpr double kOpening = 10.5;  // half width of the opening for the street below
 
-  // `half_length`: from the crossing to the end of a ramp.
+  // `half_length` is the distance from the crossing to the end of a ramp, metres.
   Bridge(const Eigen::Vector2d& centre, double half_length) : centre_(centre), half_length_(half_length) {}
 
   const Eigen::Vector2d& centre() const { return centre_; }
   double half_length() const { return half_length_; }
-  // Height of the deck above the ground, and of the walls above the deck.
+  // The height of the deck above the ground, and of the walls above the deck.
   double rise(double x) const;
   double wall(double x) const;
-  // In plan between the walls, ramps included.
+  // Whether a place in plan is between the walls, ramps included.
   bool carries(double x, double y) const {
     return std::abs(x - centre_.x()) <= half_length_ && std::abs(y - centre_.y()) < kHalfWidth;
   }
-  // Whether bridge and walls hide a place from another; heights are above the ground.
+  // Whether the bridge or its walls hide one place from another. Heights are above the ground.
   bool hides(const Eigen::Vector3d& eye, const Eigen::Vector3d& place) const;
 
  private:

@@ -12,7 +12,7 @@ std::vector<Eigen::Vector2d> drive_corners(std::int64_t streets, double spacing)
     corners.emplace_back(j % 2 == 0 ? 0 : far, y);
     corners.emplace_back(j % 2 == 0 ? far : 0, y);
   }
-  // Continue from the corner reached; the serpentine along y starts at its x side, at the far y.
+  // The serpentine along y continues from the last corner: at the x of this corner and at the far y.
   const bool from_far = streets % 2 == 1;
   for (std::int64_t i = 0; i < streets; ++i) {
     const double column = static_cast<double>(i) * spacing, x = from_far ? far - column : column;

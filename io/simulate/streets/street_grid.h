@@ -1,7 +1,7 @@
-// The street scene's plan, shared by the drives, the tie points and the rendered houses.
+// The plan of the street scene, which drives, tie points and rendered houses share.
 //
-// Streets run along x = i S and y = j S for all integers i, j (S the spacing); the ground between them is built up to
-// about kFacade metres from the axes, house by house.
+// The axes of the streets are x = i S and y = j S for all integers i, j, where S is the spacing. Houses stand on the
+// ground between them, up to about kFacade metres from the axes.
 #pragma once
 
 #include "io/simulate/scene/simulated_block.h"
@@ -11,11 +11,11 @@
 namespace megablock {
 
 inline constexpr double kFacade = 9;         // mean distance of the facades from the axis, metres
-inline constexpr double kFacadeDepth = 1.5;  // houses stand back or forward by up to this, metres
+inline constexpr double kFacadeDepth = 1.5;  // largest distance of a house from this mean, metres
 inline constexpr double kHouse = 12;         // length of a house, metres
 
-// Number of the nearest street axis in one coordinate, and the distance to it. (std::round is a slow call at the
-// baseline instruction set.)
+// The number of the nearest street axis in one coordinate, and the distance to it. std::round is not used, because it
+// is a slow call with the baseline instruction set.
 inline std::int64_t nearest_axis(double x, double spacing) {
   return static_cast<std::int64_t>(x / spacing + (x < 0 ? -0.5 : 0.5));
 }
@@ -23,7 +23,7 @@ inline double off_axis(double x, double spacing) {
   return std::abs(x - spacing * static_cast<double>(nearest_axis(x, spacing)));
 }
 
-// Distance from the axis of the facade at a place of a street; each house stands at its own.
+// The distance of the facade from the axis at a place of a street. Each house has its own distance.
 inline double facade_distance(std::uint64_t seed, bool street_along_x, std::int64_t axis, int side, double place) {
   const auto house = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(place / kHouse)));
   const auto street = static_cast<std::uint64_t>(axis * 4 + (street_along_x ? 2 : 0) + (side > 0 ? 1 : 0));

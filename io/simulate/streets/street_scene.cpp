@@ -42,7 +42,7 @@ bool StreetScene::visible(const Eigen::Vector3d& eye, const SurfacePoint& point)
   const Eigen::Vector3d sight = point.position - eye;
   const double distance = sight.norm();
   if (distance > kRange || distance < 2 || -sight.dot(point.normal) < 0.12 * distance) return false;
-  for (const int across : {0, 1})  // both ends in one street
+  for (const int across : {0, 1})  // whether both ends are in one street
     if (nearest_axis(eye[across], spacing_) == nearest_axis(point.position[across], spacing_) &&
         std::max(off_axis(eye[across], spacing_), off_axis(point.position[across], spacing_)) <= kFacade + kFacadeDepth)
       return true;

@@ -13,14 +13,15 @@ class StreetScene : public Scene {
 
   double ground(double x, double y) const { return terrain_.height(x, y); }
   double spacing() const { return spacing_; }
-  // Of the street that a place lies in: 0 along x, 1 along y (at crossings, that whose axis is nearer).
+  // The direction of the street at a place: 0 along x, 1 along y. At a crossing, the street with the nearer axis
+  // counts.
   int direction_at(const Eigen::Vector3d& place) const {
     return off_axis(place.y(), spacing_) < off_axis(place.x(), spacing_) ? 0 : 1;
   }
 
-  // A place on the road or on a facade along the frame's street.
+  // A random place on the road or on a facade of the frame's street.
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override;
-  // Within range, not too flat, and the line of sight stays over the streets.
+  // Whether the point is within the range, not seen at too flat an angle, and the line of sight stays over the streets.
   bool visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const override;
   double range_m() const override;
   bool along_passes() const override { return true; }
