@@ -1,5 +1,5 @@
-// The one family of exceptions of the project. A message is one line that lets the user act: what is wrong, where, and
-// what to do. cluster/ turns the exceptions into exit codes in one place.
+// The exceptions of the project. A message is one line that lets the user act: it tells the fault, its place and the
+// remedy. cluster/ turns the exceptions into exit codes in one place.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// 64-bit hashes by XXH3: fingerprints of units of work, checksums of files, digests of results.
+// Computes 64-bit hashes by XXH3: fingerprints of units of work, checksums of files, digests of results.
 #pragma once
 
 #include <cstddef>

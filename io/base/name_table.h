@@ -1,5 +1,5 @@
-// The names of a table's rows in one text, one after the other. A million image names take a third of the memory of as
-// many strings. The table can also be unloaded while no name is needed.
+// Stores the names of the rows of a table in one text, one after the other. A million image names need a third of the
+// memory of as many strings. The table can also be unloaded while no name is needed.
 #pragma once
 
 #include <cstdint>

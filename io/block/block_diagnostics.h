@@ -1,6 +1,6 @@
-// Weaknesses of a block: gaps, missing overlap, weak links, unfavourable bases, and places where exposures should be
-// added (Kalantari 2009, chapter 10, suggests this). partition/diagnostics/block_diagnostics.h finds them from any
-// state of a job; the report draws them and writes them as JSON beside it.
+// Holds the weaknesses of a block: gaps, missing overlap, weak links, unfavourable bases, and places where exposures
+// should be added (after Kalantari 2009, chapter 10). partition/diagnostics/block_diagnostics.h finds them in any state
+// of a job. The report draws them and writes them as JSON beside it.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Coordinate reference systems, by PROJ: the local frame of the block, and input in other systems.
+// Transforms coordinates between reference systems, by PROJ: the local frame of the block, and input in other systems.
 //
 // The local frame is topocentric (east, north, up; metres) about the origin of GroundFrame. It is a rotation and a
 // shift of geocentric coordinates and therefore exact at every distance. Every object has its own PROJ context: use an

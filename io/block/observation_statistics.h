@@ -1,4 +1,4 @@
-// Statistics of the observations after an adjustment, for each kind: are the stated standard deviations true?
+// Collects statistics of the residuals of each kind of observation, which show whether its stated sigmas are true.
 //
 // A residual v with the weighted Jacobian J (divided by sigma, multiplied by sqrt(rho') of the robust loss) has the
 // redundancy number r = 1 - J Q J', where Q is the posterior covariance (W. Baarda, 1968). The redundancy numbers of
@@ -29,7 +29,7 @@ enum class ObservationKind : std::uint8_t {
   kIntrinsics,  // prior values of cameras
   kMount,       // prior values of mounts
   kLine,        // lines known to be vertical or horizontal
-  kVertical,    // where images see down
+  kVertical,    // verticals that images see
   kDistance,    // known distances of frames
 };
 

@@ -1,4 +1,4 @@
-// Differences of an adjusted pose from its observed position and attitude.
+// Computes the differences of an adjusted pose from its observed position and attitude.
 #pragma once
 
 #include "geometry/transform/rotation.h"

@@ -1,5 +1,5 @@
-// Places where passes are registered with each other, and the results: partition/ chooses them, adjust/ registers them,
-// files hold them.
+// Holds the places where passes are registered with each other, and the results of these registrations. partition/
+// chooses the places, and adjust/ registers the passes.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Residuals of image observations in cells over the sensor of a camera. They show systematic errors of the camera
-// model, and which parts of the sensor have observations.
+// Collects the residuals of image observations in cells over the sensor of a camera. They show systematic errors of the
+// camera model, and the parts of the sensor that have observations.
 #pragma once
 
 #include <Eigen/Core>

@@ -3,8 +3,8 @@
 
 It joins sensor_widths_makers.csv (makers' data sheets, kept by hand) with the public tables of other programs:
   --colmap FILE   src/colmap/sensor/specs.cc (since 3.9) or src/util/camera_specs.cc (up to 3.8) of COLMAP
-  --opensfm FILE  opensfm/data/sensor_data.json of OpenSfM, which OpenDroneMap uses, too
-Where two tables know the same camera, the makers' table counts, then COLMAP's, then OpenSfM's.
+  --opensfm FILE  opensfm/data/sensor_data.json of OpenSfM, which OpenDroneMap also uses
+If several tables have the same camera, the makers' table counts first, then COLMAP's, then OpenSfM's.
 usage: make_sensor_widths.py [--colmap FILE] [--opensfm FILE] > sensor_widths.csv
 """
 import argparse

@@ -1,4 +1,4 @@
-// Numbers with the noun that they count.
+// Writes numbers with the noun that they count.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Lists of file formats with names. Internal to io/.
+// Finds a file format by its name, for exports and imports. Internal to io/.
 #pragma once
 
 #include <string>

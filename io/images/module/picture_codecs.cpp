@@ -1,4 +1,5 @@
-// libmegablock_pictures.so: OpenCV's imgcodecs for io/images/picture_codec.h.
+// The only source of libmegablock_pictures.so, which gives io/images/picture_codec.h the codecs of OpenCV. It is a
+// library of its own for the reasons stated there.
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/images/picture_codec.h"

@@ -1,6 +1,6 @@
-// Camera parameters in files, one row per camera: the names of models and parameters, and the values as a matrix. It
-// has as many columns as the largest model has parameters, with NaN after the last parameter of a smaller one
-// (docs/reference/file-formats.md, "Cameras"). Internal to io/.
+// Writes and reads camera parameters in files, one row per camera: the names of models and parameters, and the values
+// as a matrix. The matrix has as many columns as the largest model has parameters; after the last parameter of a
+// smaller model follows NaN (docs/reference/file-formats.md, "Cameras"). Internal to io/.
 #pragma once
 
 #include <vector>

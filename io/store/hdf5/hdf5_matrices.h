@@ -1,4 +1,4 @@
-// Lists of square matrices in HDF5 files. Internal to io/.
+// Converts lists of square matrices to the values of HDF5 datasets, and back. Internal to io/.
 #pragma once
 
 #include <Eigen/Core>

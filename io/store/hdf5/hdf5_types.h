@@ -1,4 +1,4 @@
-// Common parts of the HDF5 reader and writer. Internal to io/store/hdf5/.
+// The common parts of the HDF5 reader and writer: types, errors, properties of files. Internal to io/store/hdf5/.
 #pragma once
 
 #include <hdf5.h>

@@ -1,6 +1,6 @@
-// The events of a job: one line of JSON for each unit that was finished or failed. Each run and rank has its own file,
-// events/<start>-<rank>.jsonl. Events serve the report and people; the progress of the job follows from the unit files
-// alone.
+// Writes and reads the events of a job: one line of JSON for each unit that was finished or failed. Each run and rank
+// has its own file, events/<start>-<rank>.jsonl. Events are for the report and for people; the progress of the job
+// follows only from the unit files.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct UnitEvent {
   std::string stage, unit;  // "features", "features/000003.h5"
   int rank = 0;
   double seconds = 0;        // duration of the unit by the wall clock
-  double claim_seconds = 0;  // part of it spent waiting for the claim
+  double claim_seconds = 0;  // the part of the duration that was spent waiting for the claim
   std::int64_t bytes = 0;    // size of the unit's file
   double peak_rss_mib = 0;   // largest memory of the rank so far
   std::string failure;       // the reason of a failure; empty for a finished unit

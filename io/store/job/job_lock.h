@@ -1,4 +1,4 @@
-// The lock of a job: one run at a time works on a job directory.
+// The lock of a job, which ensures that only one run at a time works on a job directory.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The job directory: one sealed file for each unit of work (docs/reference/file-formats.md).
+// Reads and writes the job directory, which has one sealed file for each unit of work (docs/reference/file-formats.md).
 //
 // A unit is first written to a temporary file in its final directory. It is sealed by a trailer of 64 bytes (magic,
 // format version, payload length, XXH3 of the payload, fingerprint), flushed to the disk and renamed; then the

@@ -1,4 +1,4 @@
-// The result of a tile's adjustment: docs/reference/file-formats.md, "Adjustment".
+// Reads and writes the result of a tile's adjustment (docs/reference/file-formats.md, "Adjustment").
 #include "io/store/units/adjustment_file.h"
 
 #include "io/store/hdf5/hdf5_cameras.h"

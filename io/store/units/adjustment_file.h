@@ -1,7 +1,7 @@
-// The adjustment of a tile in a file (shapes, types and units: docs/reference/file-formats.md, "Adjustment").
+// Stores the adjustment of a tile in a file (shapes, types and units: docs/reference/file-formats.md, "Adjustment").
 //
-// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
-// file.
+// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError with the name
+// of the file.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace megablock {
 struct TileAdjustment {
   std::vector<FrameIndex> frames;
   std::vector<Pose> poses;  // [frames]
-  // [frames] kept ones: a frame of several tiles starts from the tile with most of them.
+  // [frames] number of kept observations. A frame of several tiles starts from the tile with most of them.
   std::vector<std::int64_t> observations;
   std::vector<CameraIndex> cameras;
   std::vector<Intrinsics> intrinsics;             // [cameras]

@@ -1,4 +1,5 @@
-// The block, as read from the project file and the image headers: docs/reference/file-formats.md, "Block".
+// Reads and writes the block as it was read from the project file and the image headers
+// (docs/reference/file-formats.md, "Block").
 #include "io/store/units/block_file.h"
 
 #include <algorithm>

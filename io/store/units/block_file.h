@@ -1,7 +1,7 @@
-// The block in a file (shapes, types and units: docs/reference/file-formats.md, "Block").
+// Stores the block in a file (shapes, types and units: docs/reference/file-formats.md, "Block").
 //
-// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
-// file.
+// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError with the name
+// of the file.
 #pragma once
 
 #include <functional>

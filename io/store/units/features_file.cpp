@@ -1,4 +1,4 @@
-// The features of the images of one shard: docs/reference/file-formats.md, "Features".
+// Reads and writes the features of the images of one shard (docs/reference/file-formats.md, "Features").
 #include "io/store/units/features_file.h"
 
 #include <algorithm>

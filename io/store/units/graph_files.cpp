@@ -1,4 +1,5 @@
-// Candidate pairs, verified matches and tiles: docs/reference/file-formats.md, "Candidates", "Matches", "Tiles".
+// Reads and writes candidate pairs, verified matches and tiles (docs/reference/file-formats.md, "Candidates",
+// "Matches", "Tiles").
 #include "io/store/units/graph_files.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
-// Candidate pairs, verified matches and tiles in files (shapes, types and units: docs/reference/file-formats.md,
+// Stores candidate pairs, verified matches and tiles in files (shapes, types and units: docs/reference/file-formats.md,
 // "Candidates", "Matches", "Tiles").
 //
-// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
-// file.
+// The writers make plain HDF5 files at `path`, which JobStore::write seals. The readers throw StoreError with the name
+// of the file.
 #pragma once
 
 #include <string>

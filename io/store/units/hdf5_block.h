@@ -1,4 +1,5 @@
-// The groups of the block in a file; block.h5 and result/block.h5 share them (docs/reference/file-formats.md, "Block").
+// Reads and writes the groups of the block in a file. block.h5 and result/block.h5 share them
+// (docs/reference/file-formats.md, "Block").
 #pragma once
 
 #include "io/block/block.h"

@@ -1,5 +1,5 @@
-// The groups of a block's current values in a file; state files and result/block.h5 share them. The groups frames,
-// cameras, rigs and mounts must exist already (docs/reference/file-formats.md, "State").
+// Reads and writes the current values of a block as groups of a file. State files and result/block.h5 share them. The
+// groups frames, cameras, rigs and mounts must exist already (docs/reference/file-formats.md, "State").
 #pragma once
 
 #include "io/block/block.h"

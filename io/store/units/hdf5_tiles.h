@@ -1,4 +1,4 @@
-// The groups of tiles and merge tree in a file; tiles.h5 and result/block.h5 share them
+// Reads and writes tiles and merge tree as groups of a file. tiles.h5 and result/block.h5 share them
 // (docs/reference/file-formats.md, "Tiles").
 #pragma once
 

@@ -1,4 +1,4 @@
-// Places and registrations: docs/reference/file-formats.md, "Registration".
+// Reads and writes places and registrations (docs/reference/file-formats.md, "Registration").
 #include "io/store/units/registration_file.h"
 
 #include "io/store/hdf5/hdf5_tables.h"

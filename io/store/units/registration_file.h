@@ -1,4 +1,4 @@
-// Places and registrations of a trajectory in files (shapes, types and units: docs/reference/file-formats.md,
+// Stores places and registrations of a trajectory in files (shapes, types and units: docs/reference/file-formats.md,
 // "Registration").
 #pragma once
 

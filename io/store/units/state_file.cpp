@@ -1,4 +1,4 @@
-// The current values of poses, intrinsics and mounts: docs/reference/file-formats.md, "State".
+// Reads and writes the current values of poses, intrinsics and mounts (docs/reference/file-formats.md, "State").
 #include "io/store/units/state_file.h"
 
 #include "io/base/error.h"

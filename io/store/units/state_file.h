@@ -1,8 +1,8 @@
-// Poses, intrinsics and mounts of the block in a file, and the initial orientation (shapes, types and units:
+// Stores poses, intrinsics and mounts of the block, and the initial orientation, in files (shapes, types and units:
 // docs/reference/file-formats.md, "State").
 //
-// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
-// file.
+// The writers make plain HDF5 files at `path`, which JobStore::write seals. The readers throw StoreError with the name
+// of the file.
 #pragma once
 
 #include <string>

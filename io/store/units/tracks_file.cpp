@@ -1,4 +1,4 @@
-// Tracks: docs/reference/file-formats.md, "Tracks".
+// Reads and writes tracks (docs/reference/file-formats.md, "Tracks").
 #include "io/store/units/tracks_file.h"
 
 #include <algorithm>

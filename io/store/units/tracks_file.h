@@ -1,7 +1,7 @@
-// The tracks of a tile in a file (shapes, types and units: docs/reference/file-formats.md, "Tracks").
+// Stores the tracks of a tile in a file (shapes, types and units: docs/reference/file-formats.md, "Tracks").
 //
-// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError naming the
-// file.
+// The writer makes a plain HDF5 file at `path`, which JobStore::write seals. The reader throws StoreError with the name
+// of the file.
 #pragma once
 
 #include <string>
