@@ -274,15 +274,16 @@ std::vector<std::string> describe(const MotionVerdict& verdict) {
   std::vector<std::string> lines;
   if (verdict.collinear)
     lines.push_back(
-        fmt::format("the positions lie on one straight line: the rotation about it is known from the attitude priors "
-                    "alone (sigma {:.2g} degrees); add a control point away from the line, or a cross strip",
+        fmt::format("the positions lie on one straight line: mainly the attitude priors determine the rotation about "
+                    "it (sigma {:.2g} degrees); add a control point away from the line, or a cross strip",
                     degrees(verdict.line_sigma_rad)));
   if (verdict.weak_common_rotation())
     lines.push_back(
-        fmt::format("a common rotation of all frames is known from the attitude priors alone (sigma {:.2g} degrees in "
-                    "{} dimension{}, whatever the number of points); add control points",
+        fmt::format("a common rotation of all frames is known mainly from the attitude priors (sigma {:.2g} degrees; "
+                    "{} of the 7 parameters of rotation, shift and scale of the block depend{} on them); more tie "
+                    "points do not help, add control points",
                     degrees(verdict.common_sigma_rad), verdict.weak - (verdict.collinear ? 1 : 0),
-                    verdict.weak - (verdict.collinear ? 1 : 0) == 1 ? "" : "s"));
+                    verdict.weak - (verdict.collinear ? 1 : 0) == 1 ? "s" : ""));
   return lines;
 }
 

@@ -57,7 +57,10 @@ void orientation(Job& job, StageResults& results) {
   job.tables.release();
   const auto& oriented = results.oriented.oriented;
   if (std::none_of(oriented.begin(), oriented.end(), [](auto o) { return o != 0; }))
-    throw AgreedError<ComputeError>("no image could be oriented; see the matches in the report of stage 'match'");
+    throw AgreedError<ComputeError>(
+        "no image could be oriented from the matches; check that images overlap and that focal lengths are right, "
+        "leave "
+        "wrong GPS positions out with 'gps: {use: false}', or give approximate poses ('poses')");
 }
 
 void adjustment(Job& job, StageResults& results) {

@@ -64,8 +64,8 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
       continue;
     }
     if (fields.size() > columns_.size())
-      throw InputError(place + ": " + std::to_string(fields.size()) + " fields, the header has " +
-                       std::to_string(columns_.size()));
+      throw InputError(place + ": " + std::to_string(fields.size()) + " fields, but the header has only " +
+                       std::to_string(columns_.size()) + "; delete surplus fields, or put texts with commas in quotes");
     fields.resize(columns_.size());
     rows_.push_back(std::move(fields));
     lines_.push_back(number);

@@ -182,7 +182,7 @@ TEST_F(ControlFile, CsvRefusals) {
               HasSubstr("c.csv:2: x: 'nan' is not a finite number"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,1e9,sub/0.jpg,3,4\n"), HasSubstr("c.csv:2: z: 1e+09 is beyond"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4\na,9,,,sub/1.jpg,3,4\n"), HasSubstr("another x"));
-  EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4,5\n"), HasSubstr("8 fields, the header has 7"));
+  EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4,5\n"), HasSubstr("8 fields, but the header has only 7"));
   EXPECT_THAT(refusal("c.csv", "# crs: EPSG:32633\n" + header + "a,1e9,2,3,sub/0.jpg,3,4\n"), HasSubstr("c.csv:3"));
 }
 
