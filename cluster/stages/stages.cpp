@@ -59,8 +59,7 @@ void orientation(Job& job, StageResults& results) {
   if (std::none_of(oriented.begin(), oriented.end(), [](auto o) { return o != 0; }))
     throw AgreedError<ComputeError>(
         "no image could be oriented from the matches; check that images overlap and that focal lengths are right, "
-        "leave "
-        "wrong GPS positions out with 'gps: {use: false}', or give approximate poses ('poses')");
+        "leave out wrong GPS positions ('gps: {use: false}'), or give approximate poses ('poses')");
 }
 
 void adjustment(Job& job, StageResults& results) {

@@ -33,7 +33,7 @@ const std::vector<ImportFormat>& readers() {
 }
 
 constexpr const char* kProject =
-    "# Imported block. The installed manual explains all keys: share/doc/megablock/docs/reference/project-file.md\n"
+    "# Imported block; all keys: reference/project-file.md in share/doc/megablock/docs of the installation\n"
     "block: given.h5\ntie_points: tie_points.h5\n";
 
 // Throws InputError if there is a project file with other contents. It belongs to another block, or was edited.

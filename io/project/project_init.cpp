@@ -39,8 +39,8 @@ std::string quoted(const std::string& text) {
 
 std::string head(const InitOptions& options, const fs::path& folder) {
   std::string text =
-      "# Project of an image block. The installed manual explains all keys: "
-      "share/doc/megablock/docs/reference/project-file.md\nimages: " +
+      "# Project of an image block; all keys: reference/project-file.md in share/doc/megablock/docs of the "
+      "installation\nimages: " +
       quoted(path_for(options.images, folder)) + "\n";
   if (!options.mask_folder.empty()) text += "masks: " + quoted(path_for(options.mask_folder, folder)) + "\n";
   if (!options.gcp_file.empty()) text += "control: " + quoted(path_for(options.gcp_file, folder)) + "\n";

@@ -1,17 +1,23 @@
-// One job on a simulated block of any size, from given tie points to the evaluated result:
+// Runs one job on a simulated block of any size, from given tie points to the evaluated result:
 //
 //   adjust_scale --scene street|aerial [--frames 1000] [--ranks 1] [--threads 1] [--memory 16] [--folder F]
 //                [--seed 1] [--calibration held|shared] [--arithmetic avx2|avx512] [--plain]
 //
-// Scenes: tests/benchmark/scenes.h. Runs 'megablock simulate' and 'mpirun megablock run' and prints one JSON object as
-// its last line; seconds are those of the run on the wall clock. peak_rss_mib_per_rank: the largest VmHWM of a rank,
-// but for the summary that is printed at the end; stage_peak_rss_mib: that of each stage, of the merge without its
-// result. Of the last round of the merge: leaf_seconds_per_image, work on tiles (leaves) of one pass up and down, of
-// all ranks; front_seconds_per_iteration, work on the fronts above them, in the mean of the ranks; peak_front_mib,
-// what fronts and updates at work took of a rank at most; steps_tried: accepted ones, refused ones and those that
-// confirm. seam_alarms: lines of the result that say that tiles disagree. What --folder holds is not simulated again.
-// image_sigma_px: that of the tie points, which the job estimates, so that chi2_per_dof
-// says nothing of it but with --plain.
+// tests/benchmark/scenes.h describes the scenes. The program runs 'megablock simulate' and 'mpirun megablock run' and
+// prints one JSON object as its last line. A block that --folder has already is not simulated again. The figures are:
+//
+//   seconds                     duration of the run by the wall clock
+//   peak_rss_mib_per_rank       largest VmHWM of a rank, without the summary that is printed at the end
+//   stage_peak_rss_mib          the same for each stage; that of the merge is without its result
+//   leaf_seconds_per_image      time for the tiles (leaves) in one sweep up and down, sum of all ranks
+//   front_seconds_per_iteration time for the fronts above them, mean of the ranks
+//   peak_front_mib              largest memory of the fronts and updates of a rank
+//   steps_tried                 number of accepted steps, of refused ones, and of those that confirm the optimum
+//   seam_alarms                 number of lines of the result that report a disagreement of tiles
+//   image_sigma_px              sigma of the tie points. The job estimates it, so chi2_per_dof tests it only with
+//   --plain
+//
+// The figures of leaves, fronts and steps are those of the last round of the merge.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -46,8 +52,8 @@ constexpr const char* kPlain =
     "adjustment: {image_sigma_px: 0.5, estimate_image_sigma: false, image_loss: none, position_loss: none, "
     "max_residual_sigmas: 8}\n";
 
-// Median over the accepted steps of the global adjustment, refused ones before them included. Each leaves an event on
-// the first rank, "merge/<round>-<accepted>"; so does the end of a round, with as many accepted as before.
+// Median duration of the iterations, which include refused steps before an accepted one. Each accepted step leaves an
+// event "merge/<round>-<accepted>" on the first rank. The end of a round leaves one with the last number once more.
 double seconds_per_iteration(const fs::path& job) {
   std::vector<UnitEvent> events = read_events(JobStore(job.string()));
   std::stable_sort(events.begin(), events.end(),

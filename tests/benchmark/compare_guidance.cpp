@@ -1,5 +1,5 @@
-// Matching along trusted epipolar lines (match/pairs/guided_matching.h) against matching of whole images, on rendered
-// pictures of the Stereopolis vehicle between houses whose facades repeat: matches, right ones, time.
+// Compares matching along trusted epipolar lines (match/pairs/guided_matching.h) with matching of whole images, on
+// rendered images of the Stereopolis vehicle between houses with repeated facades: number of matches, right ones, time.
 //
 //   compare_guidance [frames = 8] [share of repeated facades = 0.7] [seed = 1]
 //
@@ -60,7 +60,7 @@ Town make_town(std::int64_t frames, double repeated, std::uint64_t seed) {
   simulated.truth = town.layout.truth;
   simulate_given(o, simulated);
   town.block = simulated.block;
-  town.block.relative_poses.clear();  // pictures come with poses alone
+  town.block.relative_poses.clear();  // a rendered block has poses only
   const auto& city = dynamic_cast<const City&>(*town.layout.scene);
   const ScratchDirectory scratch;
   const std::string file = scratch.path("image.jpg");

@@ -1,16 +1,16 @@
 #!/usr/bin/python3
-"""Are the stated sigmas true? Normalised errors of simulated blocks over many seeds.
+"""Tests whether posterior sigmas are true, by the normalised errors of simulated blocks over many seeds.
 
-Every seed is a block of its own: simulated, run, held against its truth (megablock evaluate --scale-sigma). The figures
-are sqrt(mean of e'C^-1 e / 3) over the frames or check points of a block, e the error and C its posterior covariance
-times the a-posteriori variance factor: 1 in the root mean square over the seeds when the sigmas are true. The frames of
-a block err together, so single seeds scatter.
+Every seed gives a block that is simulated, adjusted and compared with its truth (megablock evaluate --scale-sigma). The
+figures are sqrt(mean of e'C^-1 e / 3) over the frames or check points of a block, where e is the error and C its
+posterior covariance times the a-posteriori variance factor. Their root mean square over the seeds is 1 if the sigmas
+are true. Single seeds scatter, because the errors of the frames of a block are correlated.
 
-With --tile-max-frames also by place: interior frames, and boundary frames, which several tiles touch.
+With --tile-max-frames, interior frames and boundary frames, which several tiles touch, are evaluated separately too.
 
-Rendered pictures by default (about 30 s of processor time a seed); --tie-points: exact Gaussian noise (1 s a seed).
-With --verify the root mean squares must be 1 within four of their standard errors, which follow from the scatter, and
-of 50 seeds and more between 0.9 and 1.1.
+The blocks have rendered images by default (about 30 s of processor time per seed). With --tie-points they have tie
+points with exact Gaussian noise (1 s per seed). With --verify, the root mean squares must be 1 within four of their
+standard errors, which follow from the scatter, and with 50 seeds or more also between 0.9 and 1.1.
 
     tests/benchmark/normalised_errors.py build/release/megablock --seeds 20
     tests/benchmark/normalised_errors.py build/release/megablock --seeds 40 --tie-points --verify

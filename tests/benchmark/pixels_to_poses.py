@@ -1,12 +1,14 @@
 #!/usr/bin/python3
-"""From pixels to poses: rendered pictures of the Stereopolis vehicle (40 frames of ten cameras), masks found in them, the rig
-calibrated on a simulated target field, the whole run with control, poses against the truth.
+"""Computes poses from pixels and compares them with the truth. Images of the Stereopolis vehicle are rendered (40
+frames of ten cameras), masks are found in them, the rig is calibrated on a simulated target field, and a whole run uses
+control points.
 
 usage: pixels_to_poses.py MEGABLOCK FOLDER [--width 960] [--known-rig]
 
-The trajectory's positions take no part (their stated sigmas lie): control gives the datum. Cameras and mounts start as the
-target field gave them, with their sigmas, and are estimated with the poses; with --known-rig they are held at the truth. What
-FOLDER holds is not computed again. Exit code 1 when positions are worse than 1 cm or rotations than 0.01 degrees, rms."""
+The positions of the trajectory are not used, because their stated sigmas are too small; control points give the datum.
+Cameras and mounts have the values and sigmas of the target field as priors and are estimated with the poses; with
+--known-rig they are held at the truth. Parts that FOLDER has already are not computed again. The exit code is 1 if
+positions are worse than 1 cm rms, or rotations worse than 0.01 degrees rms."""
 import argparse
 import json
 import pathlib
@@ -19,7 +21,7 @@ FIELD_FRAMES = 160
 
 
 def calibrate(megablock, folder, block, size):
-    """calibration.yaml of the same vehicle, with the names that the pictures' headers give to the cameras."""
+    """calibration.yaml of the same vehicle, with the names that the headers of the images give to the cameras."""
     megablock("simulate", "--scene", "target-field", "--path", "all", "--frames", FIELD_FRAMES, *size, "-o", folder / "field")
     megablock("calibrate", folder / "field" / "block.yaml", "-o", folder / "calibration")
     text = (folder / "calibration" / "calibration.yaml").read_text()

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Photographs oriented without and with what `megablock verticals` finds in them, in turns: images, points, seconds of
-each turn. Every second turn begins with verticals, as the first run of a set reads its files from a colder cache. Fails
-where fewer images are oriented with verticals, or a street of many takes no less time, finding them included; exits with
-77 without the photographs.
+"""Orients real images in turns without and with the verticals that `megablock verticals` finds, and prints images,
+points and seconds of each turn. Every second turn begins with verticals, because the first run of a set reads its files
+from a colder cache. Fails if fewer images are oriented with verticals, or if a street of many images takes no less
+time, including the search for verticals. Exits with 77 without the images.
 
 usage: with_verticals.py MEGABLOCK DATA [TURNS [SET ...]]    e.g. with_verticals.py build/release/megablock /data 3 lund
 """
@@ -33,7 +33,7 @@ for name, work, without in projects("lund", "berlin", "brighton_beach", "seneca"
     for turn in range(TURNS):
         for project in (without, beside) if turn % 2 == 0 else (beside, without):
             if project is beside:
-                (work / "verticals.csv.found").unlink(missing_ok=True)  # or it would not be looked at pictures again
+                (work / "verticals.csv.found").unlink(missing_ok=True)  # otherwise the images would not be read again
                 finding.append(call("verticals", without, "-o", work / "verticals.csv")[0])
             job = work / f"{project.stem}{turn}"
             status[project], seconds, of_matching = figures(project, job)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A free street whose given poses bend, in many small tiles that have no common datum: merged in few steps, and as
-exact as one tile. usage: free_tiles.py MEGABLOCK"""
+"""Tests a free street whose given poses are bent, in many small tiles without a common datum: it must be merged in few
+iterations, and as exactly as one tile. usage: free_tiles.py MEGABLOCK"""
 import json
 import pathlib
 import tempfile
@@ -12,7 +12,7 @@ MOST_STEPS = 12
 
 
 def run(project, job, truth):
-    """Steps of the global adjustment, and errors after a similarity."""
+    """Number of iterations, and errors after a similarity."""
     megablock("run", project, "-j", job, "-q")
     done, found = status(job), json.loads(megablock("evaluate", job, truth, "--json"))
     assert done["oriented"] == done["images"] and found["aligned"], (done, found)

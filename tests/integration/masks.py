@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Masks that are there stay as they are; a proposal of an earlier run is no stranger. usage: masks.py MEGABLOCK"""
+"""Tests that `megablock masks` leaves existing masks as they are, and accepts the proposals of an earlier run.
+usage: masks.py MEGABLOCK"""
 import pathlib
 import tempfile
 
@@ -37,7 +38,7 @@ def main():
         assert "the project has" in said and "which stays as it is" in said, said
         assert drawn.read_bytes() == by_hand and (folder / "others" / names[0]).read_bytes() == proposed[names[0]]
 
-        # The trajectory of these pictures, misspelt.
+        # The trajectory of these images, misspelt.
         given = (folder / "poses.csv").read_text()
         for header, said in ("name,qq,qx", "column 'qw' is missing"), ("name,a,b", "no columns of poses"):
             text = given.replace("name,qw,qx", header)

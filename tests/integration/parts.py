@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A whole job of pictures without positions, oriented in parts that are joined by similarities: as good as oriented as a
-whole. usage: parts.py MEGABLOCK"""
+"""Tests a whole job of images without positions that is oriented in parts, which are joined by similarities: the result
+must be as good as that of an orientation as a whole. usage: parts.py MEGABLOCK"""
 import json
 import pathlib
 import tempfile

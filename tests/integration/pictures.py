@@ -1,4 +1,4 @@
-"""Changes pictures for the tests: JPEG headers in place, and plain PNG files."""
+"""Changes JPEG headers in place, and writes plain PNG files, for the tests."""
 import struct
 import zlib
 
@@ -66,7 +66,7 @@ def strip_exif(file):
 
 
 def make_blank(file, width, height):
-    """Leaves the APP1 segments (EXIF, XMP) of a JPEG file and makes its picture one of middle grey."""
+    """Keeps the APP1 segments (EXIF, XMP) of a JPEG file and makes all its pixels middle grey."""
     def segment(marker, content):
         return b"\xff" + bytes([marker]) + struct.pack(">H", 2 + len(content)) + content
 
@@ -81,7 +81,7 @@ def make_blank(file, width, height):
 
 
 def write_png(file, width, height, row):
-    """A grey picture; row(y) gives the bytes of a row."""
+    """Writes a grey image; row(y) gives the bytes of a row."""
     def chunk(kind, content):
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 

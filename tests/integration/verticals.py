@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Verticals of rendered street pictures against the true poses, their sigmas, and bad pictures; verticals against given
-poses. usage: verticals.py MEGABLOCK [FRAMES = 2]    frames of four pictures; with 12 those of the figures in docs
-"""
+"""Tests the verticals that are found in rendered images of a street, and their sigmas, against the true poses; also bad
+images, and verticals that contradict given poses.
+usage: verticals.py MEGABLOCK [FRAMES = 2]    frames of four images; with 12, the figures are those of the documents"""
 import csv
 import json
 import math
@@ -53,7 +53,7 @@ def errors(folder, table):
 
 
 def held_upside_down(folder, table):
-    """A picture whose EXIF orientation says that the camera was held upside down: down is where up was."""
+    """An image whose EXIF orientation says that the camera was held upside down: its vertical points the other way."""
     picture = folder / "images" / "f000000_c1.jpg"
     upright = picture.read_bytes()
     entry = bytes.fromhex("12010300010000000100")  # orientation, one short: 1
@@ -69,7 +69,7 @@ def held_upside_down(folder, table):
 
 
 def blank(folder, table):
-    """A picture of one grey shows no edge: it is named in one line, the others stay what they are."""
+    """An image of uniform grey has no edge: one line names it, and the others do not change."""
     before = table.read_text().splitlines()
     picture = folder / "images" / "f000000_c3.jpg"
     content = picture.read_bytes()
@@ -125,13 +125,13 @@ def main():
             assert frames > 2 or "8 of 8 images show the vertical" in said, said
             assert "give 'verticals: verticals.csv' in the project file" in said, said
             rms, normalised = errors(folder, table)
-            # The sigma of an unknown lens is far larger than what it does to most pictures.
+            # The sigma of an unknown lens is far larger than its effect in most images.
             assert (0.3 if calibrated else 0) < normalised < 3, normalised
             assert rms < (0.25 if calibrated else 0.8), rms
 
         if frames > 2:
             return  # figures alone
-        # The same again; an unreadable picture is named, the others stay what they are.
+        # The same again; an unreadable image is named, and the others do not change.
         first = table.read_bytes()
         megablock("verticals", folder / "block.yaml", "-o", table)
         assert table.read_bytes() == first

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Same bits for any number of ranks and threads: runs one simulated block on 1, 2, 3 and 4 ranks (aerial also on 8), and
-# on 1 rank with 1 and 3 threads (as one tile with 1, 2, 3 and 5), and compares the digests.
+# Tests that the bits of a result do not depend on the number of ranks and threads. Runs one simulated block on 1, 2, 3
+# and 4 ranks (aerial also on 8), and on 1 rank with 1 and 3 threads (as one tile with 1, 2, 3 and 5), and compares the
+# digests.
 # usage: digests.sh MEGABLOCK aerial|street|rendered|registration FRAMES
-# `rendered` makes pictures, so that features, matches and the initial orientation are compared too. `registration`
+# `rendered` makes images, so that features, matches and the initial orientation are compared too. `registration`
 # registers a trajectory of that many frames.
 set -euo pipefail
 megablock=$1 scene=$2 frames=$3

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Real photographs from the folder of images to the merged block, held against the figures asked for.
+"""Runs blocks of real images from the folder of images to the merged block, and compares them with the required
+figures.
 
 usage: photographs.py MEGABLOCK DATA    (or the environment variable MEGABLOCK_DATA); skips (77) without the photographs
 """
@@ -69,7 +70,7 @@ with tempfile.TemporaryDirectory() as folder:
     expect(lund["oriented"] == 29, "lund: all 29 images")
     for name, without in ("berlin", berlin), ("lund", lund), ("brighton_beach", brighton):
         expect(with_verticals(work, name)["oriented"] >= without["oriented"], f"{name}: as many images with verticals")
-    # Verticals that are wrong in every picture are said to be so, and do no harm.
+    # Verticals that are wrong in every image are reported, and do no harm.
     project, names = work / "berlin.yaml", sorted(path.name for path in (data / "berlin").glob("*.jpg"))
     rows = [f"{name},{down},0.1\n" for name, down in zip(names, ["1,0,0", "-1,0,0", "0,-0.6,0.8"])]
     (work / "wrong.csv").write_text("image,down_x,down_y,down_z,sigma_deg\n" + "".join(rows))

@@ -228,7 +228,7 @@ TEST(Spec, AT35SameVanishingPointsForAnyNumberOfThreads) {
   });
 }
 
-// Sights of a camera, half of them wrong.
+// Observations of a camera, half of which are outliers.
 TEST(Spec, AT35SameResectionsForAnyNumberOfThreads) {
   constexpr std::size_t kPictures = 64;
   std::mt19937_64 random(36);

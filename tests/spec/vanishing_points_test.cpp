@@ -328,9 +328,9 @@ TEST(Spec, AT25VerticalsOfPhotographs) {
   GTEST_SKIP() << "the photographs of entry-P10 (Strecha et al. 2008) are not available";
 }
 
-// Three pictures by a camera on a theodolite (X8), grades: angles from their three orthogonal vanishing points, and the
-// instrument's circles. The angles go through the rays of the vanishing points and come back; what is published beyond
-// them are differences between pictures, which the instrument shares but for the camera's mounting.
+// Three images by a camera on a theodolite (X8), in grades: the angles from their three orthogonal vanishing points,
+// and those of the instrument's circles. The angles are converted to the rays of the vanishing points and back. Besides
+// them, differences between images are published, in which the instrument agrees except for the mounting of the camera.
 TEST(Spec, AT28AnglesOfAPhototheodolite) {
   struct Picture {
     double omega, vertical_circle, phi, horizontal_circle;
@@ -367,7 +367,7 @@ TEST(Spec, AT28AnglesOfAPhototheodolite) {
     const Picture &a = pictures[d.from], &b = pictures[d.to];
     const double omega = (read[d.to].pitch - read[d.from].pitch) / kGrade;
     const double phi = (read[d.to].yaw - read[d.from].yaw) / kGrade;
-    const std::string of = fmt::format("pictures {} and {}, gr: ", d.from + 1, d.to + 1);
+    const std::string of = fmt::format("images {} and {}, gr: ", d.from + 1, d.to + 1);
     expect_within(omega, d.omega, kRounding, of + "difference of omega");
     expect_within(phi, d.phi, kRounding, of + "difference of phi");
     expect_within(omega - (b.vertical_circle - a.vertical_circle), d.off_vertical, kRounding,

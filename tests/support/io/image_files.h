@@ -1,4 +1,4 @@
-// Small image files with EXIF and XMP for the tests of the project reader.
+// Writes small image files with EXIF and XMP for the tests of the project reader.
 #pragma once
 
 #include <exiv2/exiv2.hpp>
@@ -24,7 +24,7 @@ inline std::string read_file(const std::string& path) {
 
 using Tags = std::map<std::string, std::string>;  // EXIF or XMP keys of Exiv2 and their values
 
-// A grey picture; `shade` makes the bytes differ.
+// Writes a grey image. Different values of `shade` give different bytes.
 inline void write_picture(const std::string& path, int width, int height, int shade, const Tags& tags = {}) {
   std::filesystem::create_directories(std::filesystem::path(path).parent_path());
   megablock::write_picture(path, cv::Mat(height, width, CV_8UC3, cv::Scalar(shade % 256, shade / 256, 90)));

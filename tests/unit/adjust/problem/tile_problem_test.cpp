@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Six single photos of two cameras; frames 0-2 in tile 0, 3-5 in tile 1; everything has a prior.
+// Six single images of two cameras. Frames 0 to 2 are in tile 0, 3 to 5 in tile 1. Everything has a prior.
 class TwoTiles : public testing::Test {
  protected:
   TwoTiles() {

@@ -122,7 +122,7 @@ TEST_P(Blocks, SurvivesManyOutliers) {
   EXPECT_LT(tile.position_rms(), 0.2);
 }
 
-// Headings that are far off, as of pictures that were turned and saved again, tell nothing by the default loss of
+// Headings that are far off, as those of images that were turned and saved again, tell nothing by the default loss of
 // attitudes, and turn the block without one.
 TEST(TileAdjustment, ForgetsWrongAttitudes) {
   SimulationOptions simulation = aerial(18, 9);
@@ -304,7 +304,7 @@ TEST_P(Blocks, FindsLostFrames) {
   EXPECT_LT(tile.position_rms(), 0.1);
 }
 
-// The sigma of tie point measurements follows the images, whatever it is said to be; that of control points stays.
+// The sigma of tie point observations follows from the images, whatever is stated; that of control points stays.
 TEST(Sigmas, AreEstimatedFromTheResiduals) {
   for (const double noise : {0.12, 1.5}) {
     SimulationOptions simulation = aerial(40, 19);

@@ -84,8 +84,8 @@ TEST_F(TrackPartsOf, SplitTracksHoldTheSameObservations) {
   EXPECT_THROW(split_tracks(tracks, {0, 0}), StoreError);
 }
 
-// Repeated facades and moving vehicles make groups of wrong observations that agree; most come back as tracks of their
-// own, at the places they show.
+// Repeated facades and moving vehicles give groups of outliers that agree with each other. Most of these come back as
+// tracks of their own, at the places that they show.
 TEST(TrackParts, OfASimulatedStreetBringBackAgreeingGroups) {
   SimulationOptions simulation;
   simulation.scene = SimulationOptions::Scene::kStereopolis;
@@ -114,10 +114,11 @@ TEST(TrackParts, OfASimulatedStreetBringBackAgreeingGroups) {
       back[verdict] += parts[o] > 0;
     }
   }
-  std::printf("%lld observations of agreeing groups, %lld put back; strays %lld, vehicles %lld, right %lld put back\n",
-              static_cast<long long>(agreeing), static_cast<long long>(agreeing_back),
-              static_cast<long long>(back[Verdict::kStray]), static_cast<long long>(back[Verdict::kVehicle]),
-              static_cast<long long>(back[Verdict::kRight]));
+  std::printf(
+      "%lld observations of agreeing groups, %lld put back; outliers %lld, vehicles %lld, right %lld put back\n",
+      static_cast<long long>(agreeing), static_cast<long long>(agreeing_back),
+      static_cast<long long>(back[Verdict::kStray]), static_cast<long long>(back[Verdict::kVehicle]),
+      static_cast<long long>(back[Verdict::kRight]));
   EXPECT_GT(agreeing, 100);
   EXPECT_GE(agreeing_back, agreeing * 7 / 10);
   EXPECT_LE(back[Verdict::kStray], agreeing_back / 20);

@@ -1,4 +1,4 @@
-// What the command 'verticals' expects of a picture, and what it says of all of them.
+// Tests the pitch that the command 'verticals' expects of an image, and its remarks about all images.
 #include "cluster/commands/verticals_command.h"
 
 #include <gmock/gmock.h>

@@ -55,7 +55,7 @@ struct UprightStreet {
   }
 
  private:
-  static constexpr float kUpright = 105;  // degrees; a picture's down is at 90: the middle of a sector
+  static constexpr float kUpright = 105;  // degrees; the middle of a sector. Down in an image is at 90
 
   void add(ImageIndex image, const Keypoint& keypoint, const SiftDescriptor& descriptor) {
     ImageFeatures& of = features[static_cast<std::size_t>(image.value)];

@@ -17,11 +17,11 @@ using testing::HasSubstr;
 class OutputCheckTest : public testing::Test {
  protected:
   OutputCheckTest() {
-    for (const char* folder : {"photos/day", "job/events", "job/result", "job/features"})
+    for (const char* folder : {"flight/day", "job/events", "job/result", "job/features"})
       fs::create_directories(scratch_.path(folder));
-    for (const char* file : {"photos/day/a.JPG", "photos/notes.txt", "gcp.csv", "poses.csv", "seen.csv", "rig.json"})
+    for (const char* file : {"flight/day/a.JPG", "flight/notes.txt", "gcp.csv", "poses.csv", "seen.csv", "rig.json"})
       std::ofstream(scratch_.path(file)) << "x";
-    std::ofstream(scratch_.path("block.yaml")) << "images: photos\ncontrol: {file: gcp.csv, check: [p1]}\n"
+    std::ofstream(scratch_.path("block.yaml")) << "images: flight\ncontrol: {file: gcp.csv, check: [p1]}\n"
                                                   "rigs: {cameras: rig.json}\nposes: poses.csv\nverticals: seen.csv\n";
     std::ofstream(scratch_.path("job/job.json"))
         << R"({"version": 1, "project": ")" << scratch_.path("block.yaml") << "\"}";
@@ -44,10 +44,10 @@ class OutputCheckTest : public testing::Test {
 TEST_F(OutputCheckTest, TakesTheProjectAndWhatItNamesForInputs) {
   for (const std::string& source : {scratch_.path("block.yaml"), scratch_.path("job")}) {
     const std::vector<std::string> inputs = inputs_of(source);
-    for (const char* input : {"block.yaml", "photos/day/a.JPG", "gcp.csv", "rig.json", "poses.csv", "seen.csv",
-                              "photos/../gcp.csv", "./block.yaml"})
+    for (const char* input : {"block.yaml", "flight/day/a.JPG", "gcp.csv", "rig.json", "poses.csv", "seen.csv",
+                              "flight/../gcp.csv", "./block.yaml"})
       EXPECT_THAT(refusal(input, inputs), HasSubstr(": is an input of this command or of its job")) << input;
-    for (const char* other : {"new.csv", "photos/b.jpg", "photos/notes.txt", "photos", "gcp.csv.found"})
+    for (const char* other : {"new.csv", "flight/b.jpg", "flight/notes.txt", "flight", "gcp.csv.found"})
       EXPECT_EQ(refusal(other, inputs), "") << other;
   }
 }

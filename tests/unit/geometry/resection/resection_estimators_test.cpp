@@ -1,4 +1,4 @@
-// Resection by RANSAC for single cameras and rigs: the true pose among wrong observations, and a minimum after the
+// Resection by RANSAC for single cameras and rigs: the true pose is found among outliers, and is a minimum after the
 // adjustment.
 #include "geometry/resection/resection_estimators.h"
 

@@ -110,7 +110,7 @@ TEST(Attitude, SignsOfTheAngles) {
   EXPECT_LT((rotation_from(YawPitchRoll{0.3, 0, 0.2}).conjugate() * Eigen::Vector3d::UnitX()).z(), -0.1);
   // Kappa turns the image counter-clockwise as seen from above: its x axis turns from east towards north.
   EXPECT_GT((rotation_from(OmegaPhiKappa{0, 0, 0.2}).conjugate() * Eigen::Vector3d::UnitX()).dot(kNorth), 0.1);
-  // Omega tilts the view towards the north, phi towards the west (the view is along the photo's -z).
+  // Omega tilts the view towards the north, phi towards the west (the view is along the image's -z).
   EXPECT_GT((rotation_from(OmegaPhiKappa{0.2, 0, 0}).conjugate() * Eigen::Vector3d::UnitZ()).dot(kNorth), 0.1);
   EXPECT_LT((rotation_from(OmegaPhiKappa{0, 0.2, 0}).conjugate() * Eigen::Vector3d::UnitZ()).dot(kEast), -0.1);
 }

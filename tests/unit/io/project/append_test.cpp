@@ -10,7 +10,7 @@
 namespace megablock {
 namespace {
 
-// One photo per name, all of one camera per first letter; position priors east of the origin.
+// One image per name, and one camera per first letter of the names. Position priors lie east of the origin.
 Block block_of(const std::vector<std::string>& names, const GroundFrame& ground) {
   Block block;
   block.ground = ground;

@@ -37,7 +37,7 @@ using ::testing::SizeIs;
 
 const Tags kDji = {{"Exif.Image.Make", "DJI"}, {"Exif.Image.Model", "FC300S"}, {"Exif.Photo.FocalLength", "361/100"}};
 
-// Five photos on a line to the east, about 76 m apart, at 46.84 N 91.99 W, 250 m.
+// Five images on a line to the east, about 76 m apart, at 46.84 N 91.99 W, 250 m.
 void write_line(const ScratchDirectory& folder, int count = 5) {
   for (int i = 0; i < count; ++i)
     write_picture(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
@@ -331,7 +331,7 @@ TEST(Project, RefusalsNameFileAndLine) {
               HasSubstr("block.yaml:2: unknown key 'imges'; did you mean 'images'?"));
   EXPECT_THAT(refusal(folder, images + "# a comment\nimges: images\n"),
               HasSubstr("block.yaml:3: unknown key 'imges'; did you mean 'images'? known keys: "));
-  EXPECT_EQ(refusal(folder, "\nimages: pictures\n"), "block.yaml:2: images: folder 'pictures' does not exist");
+  EXPECT_EQ(refusal(folder, "\nimages: flight\n"), "block.yaml:2: images: folder 'flight' does not exist");
   EXPECT_THAT(refusal(folder, "images: nothing\n"), HasSubstr("block.yaml:1: images: no readable image"));
   EXPECT_THAT(refusal(folder, images + "gps:\n  sigma_horizontal_m: 3 m\n"),
               HasSubstr("block.yaml:3: gps.sigma_horizontal_m: '3 m' has text after the number"));

@@ -129,8 +129,8 @@ TEST(Report, SaysWhatTheResultComesFrom) {
 
 TEST(Report, IsCalledByTheProjectOrTheImageFolder) {
   BlockResult result = made_up_result(small_block());
-  result.block.image_folder = "/data/photos/";
-  EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: photos</h1>"));
+  result.block.image_folder = "/data/flight/";
+  EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: flight</h1>"));
   result.provenance.project = "harbour-2024.yaml";
   EXPECT_THAT(report_html(result, {"/data/job", 0}), HasSubstr("<h1>Block report: harbour-2024</h1>"));
 }
@@ -354,7 +354,7 @@ TEST(ReportFigures, GnssResidualsApplyTheLeverArm) {
 }
 
 TEST(ReportFigures, IntersectionAnglesAndTrackLengths) {
-  BlockResult result;  // two photos 2 m apart, a point 1 m in front: rays cross at a right angle
+  BlockResult result;  // two images 2 m apart, a point 1 m in front: rays cross at a right angle
   Camera camera;
   camera.name = "camera";
   camera.width = camera.height = 100;

@@ -149,7 +149,7 @@ TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
     const ImageVertical v = find_image_vertical(file, camera_, {}, 1);
     EXPECT_FALSE(v.found);
     EXPECT_GT(v.segments, 20);
-    EXPECT_LT(2 * v.segments, std::ssize(find_line_segments(picture, {}))) << "of the whole picture";
+    EXPECT_LT(2 * v.segments, std::ssize(find_line_segments(picture, {}))) << "of the whole image";
   }
 }
 

@@ -1,5 +1,5 @@
 // Posterior covariances of a small block of several tiles equal those of ceres::Covariance over one problem with
-// automatic derivatives: frames, cameras, mounts, points, and boundary unknowns with one another.
+// automatic derivatives: frames, cameras, mounts, points, and separator unknowns with one another.
 #include <ceres/covariance.h>
 #include <gtest/gtest.h>
 

@@ -19,7 +19,7 @@ using namespace point_kernels;
 
 constexpr std::int64_t kCount = 16, kStride = 24;
 constexpr double kLambda = 0.01, kFloor = 1e-12;
-// Of four sights as if they were one point's.
+// The frames of four observations, as if they belonged to one point.
 constexpr std::array<std::int64_t, 4> kFramesOfPairs{1, 0, 3, 2};
 constexpr std::size_t kPairs = pair_number(4, 0);
 
@@ -28,7 +28,7 @@ const Kernels* kernels_of_width(int width) {
   return width == 8 ? &kAvx512 : width == 4 ? &kAvx2 : &kPortable;
 }
 
-// Sixteen observations of eight points, two sights of each: what the kernels make of them.
+// The results of the kernels for sixteen observations of eight points, two of each point.
 struct Worked {
   std::vector<double> linearised = random(lane_kernels::kValueCount * kStride, 1);
   std::vector<double> points = std::vector<double>(kPointValueCount * kStride, 0.0);
@@ -190,7 +190,7 @@ TEST_P(PointKernels, EqualPlainMatrices) {
   EXPECT_EQ(std::ranges::count(w.used, 1), std::ssize(w.used));
 }
 
-// What two cameras of one frame see of a point is one sight.
+// The observations of a point in two images of one frame are joined into one.
 TEST_P(PointKernels, MergeWhatAFrameSees) {
   constexpr std::array<std::int64_t, 6> kSights{0, 0, 0, 1, 2, 2};
   const auto merged = [&](const Kernels& kernels) {

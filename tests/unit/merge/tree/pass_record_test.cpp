@@ -1,4 +1,4 @@
-// Records of an upward pass: what comes back is what was written, and nothing that is not whole.
+// Records of a sweep up: they are read back as they were written, and incomplete records are ignored.
 #include "merge/tree/pass_record.h"
 
 #include <gtest/gtest.h>

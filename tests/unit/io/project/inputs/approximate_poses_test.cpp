@@ -96,7 +96,7 @@ TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
   EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("broken.jpg")));
 }
 
-// The same nadir photo, its top to the east, in the three kinds of angles.
+// The same nadir image, its top to the east, in the three kinds of angles.
 TEST(ApproximatePoses, AnglesOfBodyGimbalAndPhotoAgree) {
   ScratchDirectory folder;
   const std::vector<std::string> tables = {

@@ -14,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// A facade lies beside the frames: the map is framed by its points, but for stray ones.
+// A facade lies beside the frames, so the map must contain its points, except outliers.
 TEST(ReportDrawing, MapsAreFramedByFramesAndTiePoints) {
   BlockResult result = made_up_result(SimulationOptions{.frames = 60});
   double low = 1e300, high = -1e300;
@@ -56,7 +56,7 @@ TEST(ReportDrawing, TextOfCellsBreaksOnlyWhereItMay) {
   EXPECT_THAT(html, HasSubstr("<td class=\"t long\">xxx"));
 }
 
-// Residuals that point outwards everywhere, those at the border most; and one that would reach across the picture.
+// Residuals that point outwards everywhere, those at the border most; and one that would reach across the drawing.
 TEST(ReportDrawing, ArrowsOfResidualsEndInsideTheFrame) {
   const BlockResult result = made_up_result(small_block());
   const Camera& camera = result.block.cameras.front();

@@ -175,7 +175,8 @@ TEST(Stereopolis, ObservationsHaveTheirNoiseAndTheirShareOfWrongMatches) {
   EXPECT_NEAR(n / static_cast<double>(s.points.size()), 5, 0.4);
 }
 
-// Neighbouring wrong observations of a repeated facade agree: they meet in a place of their own, whole windows away.
+// Neighbouring outliers on a repeated facade agree with each other: their rays meet at another place, a whole number of
+// windows away.
 TEST(Stereopolis, RepeatedFacadesAreOtherPlacesOfTheFacade) {
   const SimulatedBlock& s = town();
   double agree = 0, groups = 0;
@@ -373,7 +374,7 @@ TEST(Stereopolis, NonsenseIsRefused) {
   refused([](SimulationOptions& o) { o.mount_rotation_error_deg = -1; });
 }
 
-// Pictures, and a project that starts from the trajectory, the nominal mounts and the laboratory's calibration.
+// Images, and a project that starts from the trajectory, the nominal mounts and the laboratory's calibration.
 TEST(StereopolisRendered, FilesAreAProject) {
   SimulationOptions options = small(4);
   options.rig_cameras = 3;

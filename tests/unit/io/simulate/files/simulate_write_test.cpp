@@ -55,7 +55,7 @@ TEST_F(SimulateWriteTest, AnEditedProjectIsNotOverwritten) {
     write(EditedProject::kOverwrite);
     write(EditedProject::kRefuse);
   };
-  const std::string points = file("points"), pictures = file("pictures");
+  const std::string points = file("points"), pictures = file("rendered");
   check(points, [&](EditedProject edited) { write_simulated_block(options, points, edited); });
   check(pictures, [&](EditedProject edited) { write_rendered_block(options, pictures, edited); });
 }

@@ -105,8 +105,8 @@ TEST_P(RenderTest, RaysMeetTheNearestSurface) {
   EXPECT_GT(box, 20);
 }
 
-// A point of a surface projects to the pixel that shows it: cast through that pixel it is met again, and both
-// pictures have its colour there.
+// A point of a surface projects to the pixel that shows it: the ray of this pixel meets the same point, and both images
+// have its colour there.
 TEST_P(RenderTest, SurfacesAppearWhereTheyProject) {
   const std::int64_t first = 1 * std::ssize(layout_.block.cameras);
   const cv::Mat a = render(first);
