@@ -1,8 +1,9 @@
-// Elimination template of a polynomial system (M18), made once per kind of problem: which products of its equations,
-// eliminated like linear equations in their monomials, give a Groebner basis whatever the numbers.
+// Makes the elimination template of a polynomial system (M18), once per kind of problem. The template names products of
+// the equations. If they are eliminated like linear equations in their monomials, they give a Groebner basis for any
+// coefficients.
 //
-// All products up to a degree are taken, the lowest that will do; then one after the other, the highest first, is left
-// out for good if what remains still gives every leading monomial of the basis.
+// All products up to a degree are taken, the lowest degree that is sufficient. Then the products are tried one by one,
+// the highest first: a product is removed if the others still give every leading monomial of the basis.
 #pragma once
 
 #include "tests/algebra/ideal.h"

@@ -1,12 +1,12 @@
-// Polynomial ideals with finitely many solutions over a prime field: an oracle for the solvers in closed form, off the
-// product (M15, M16).
+// Polynomial ideals with finitely many solutions over a prime field (M15, M16). They test the closed-form solvers of
+// the program independently; the program does not contain them.
 //
-// In place of Buchberger's pairs plain linear algebra: V_d is the smallest space of polynomials of degree <= d that
-// holds the generators and with every f of degree < d all x_i f too. Its echelon form in degree reverse lexicographic
-// order is kept row by row; a row whose degree fell in the reduction is multiplied again. Where no standard monomial
-// (one that leads no row) has degree d - 1 or d, multiplication of the standard monomials is defined and commutes, so
-// that they are a basis of R / I and the rows a Groebner basis (Mourrain, "A new criterion for normal form algorithms",
-// AAECC 1999).
+// Plain linear algebra replaces Buchberger's pairs. V_d is the smallest space of polynomials of degree <= d that
+// contains the generators and, with every f of degree < d, also all x_i f. Its echelon form in degree reverse
+// lexicographic order is built row by row; a row whose degree fell in the reduction is multiplied again. If no standard
+// monomial (one that leads no row) has degree d - 1 or d, then the multiplication of the standard monomials is defined
+// and commutes. They are then a basis of R / I, and the rows are a Groebner basis (Mourrain, "A new criterion for
+// normal form algorithms", AAECC 1999).
 #pragma once
 
 #include <algorithm>

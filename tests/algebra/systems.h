@@ -1,4 +1,5 @@
-// The polynomial systems of relative orientation and of similarities (M39, M47, M50), with random numbers of the field.
+// Gives the polynomial systems of relative orientation and of similarities (M39, M47, M50), with random coefficients
+// from the field.
 #pragma once
 
 #include <array>

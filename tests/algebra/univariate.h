@@ -1,5 +1,6 @@
-// Rational univariate representation (Rouillier 1999; M17): with t a linear form that tells the solutions apart,
-// f(t) = 0 and x_i = g_i(t) / g_1(t). f is the characteristic polynomial of multiplication by t,
+// Computes the rational univariate representation (Rouillier 1999; M17). Let t be a linear form with a different value
+// at each solution. Then f(t) = 0 and x_i = g_i(t) / g_1(t), where f is the characteristic polynomial of the
+// multiplication by t:
 //
 //     f = sum a_i T^(D-i),   g_v = sum_i Tr(M_v M_t^i) H_(D-1-i),   H_j = sum_(i <= j) a_i T^(j-i).
 #pragma once

@@ -1,8 +1,9 @@
 #!/bin/bash
-# What one image added to a finished job costs: the units computed by stage, and the processor time of both runs.
+# Measures the cost of one image that is added to a finished job: the number of computed units by stage, and the
+# processor time of both runs.
 #
 # usage: add_one_image.sh MEGABLOCK FOLDER [IMAGES [IMAGE]]
-#   IMAGES  photographs (default: seneca of $MEGABLOCK_DATA); IMAGE  the one added last (default: IMG_0557.jpg)
+#   IMAGES  folder of images (default: seneca of $MEGABLOCK_DATA); IMAGE  the one added last (default: IMG_0557.jpg)
 # Works in FOLDER, which must not exist.
 set -eu
 megablock=$(realpath "$1"); folder=$2

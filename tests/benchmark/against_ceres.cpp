@@ -1,27 +1,33 @@
-// The merge of a block in tiles against Ceres, which holds it as one problem:
+// Compares the merge of a block in tiles with Ceres, which adjusts the block as one problem:
 //
 //   against_ceres --scene street|aerial [--frames 2000] [--seed 1] [--folder F] [--tile-frames 120]
 //                 [--calibration held|shared] [--loss huber|cauchy|none] [--free] [--ranks 1|2] [--exactness|--speed]
 //
-// Scenes: tests/benchmark/scenes.h. A job of the block on as many ranks, merged to a decrement of 1e-7, gives the
-// tiles, the observations it kept and its solution. How exact this is (cluster/outcome/monolithic_comparison.h):
-// max_pose_difference_sigmas, the largest component of the undamped Newton step of one Ceres problem with automatic
-// derivatives at the solution over its posterior sigma; relative_cost_difference, how far Ceres lowers the cost from
-// there with all tolerances 1e-16. With --exactness these alone, with --speed all but these.
+// tests/benchmark/scenes.h describes the scenes. A job on that many ranks merges the block to a decrement of 1e-7. It
+// gives the tiles, the kept observations and the solution.
 //
-// How fast: from the same job's observations, points and sigmas, with every component of every pose moved off it by a
-// normal deviate of its sigma, run, each in processes of their own and with the arithmetic that the processor is best
-// at, Ceres on two threads, with SPARSE_SCHUR by automatic and by analytic derivatives and with ITERATIVE_SCHUR
-// (Schur-Jacobi, three steps) by analytic ones, and before each of them three times the merge on one rank with two
-// threads, or on two. Of Ceres' runs the one with the fastest iterations counts, of ours the middle one.
+// Exactness (cluster/outcome/monolithic_comparison.h; with --exactness only this part, with --speed only the other
+// one): max_pose_difference_sigmas is the largest component, over its posterior sigma, of the undamped Newton step that
+// one Ceres problem with automatic derivatives makes at the solution. relative_cost_difference is the part of the cost
+// by which Ceres can still lower it from there, with all tolerances 1e-16.
 //
-// Prints one JSON object as its last line: the two figures above; of the second runs' ends
-// relative_cost_difference_of_runs ((ours - Ceres') / Ceres', of the best SPARSE_SCHUR) and
-// max_pose_difference_sigmas_of_runs (Ceres stops a little before its optimum); seconds_per_iteration_ratio and
-// peak_memory_ratio (Ceres' / ours) against the best setting, whose derivatives may be ours;
-// seconds_per_iteration_ratio_automatic against Ceres with its own; and the figures of all runs. seconds_per_iteration:
-// median of the steps on the wall clock, without reading and ordering; processor_seconds_per_iteration: of all threads
-// or ranks; peak_rss_mib: largest resident memory of the process, ours the sum of both.
+// Speed: all runs start from the observations, points and sigmas of the same job, with every component of every pose
+// moved by a normal deviate of its sigma. Each run is a process of its own and uses the best arithmetic of the
+// processor. Ceres runs on two threads: with SPARSE_SCHUR by automatic and by analytic derivatives, and with
+// ITERATIVE_SCHUR (Schur-Jacobi, three steps) by analytic ones. Before each of them, the merge runs three times, on one
+// rank with two threads or on two ranks. The fastest run of Ceres counts, and the median one of ours.
+//
+// The last line is one JSON object with these figures:
+//
+//   relative_cost_difference_of_runs       (ours - Ceres') / Ceres' at the ends of the runs, for the best SPARSE_SCHUR
+//   max_pose_difference_sigmas_of_runs     the same for the poses; Ceres stops a little before its optimum
+//   seconds_per_iteration_ratio            Ceres' / ours, for its best setting, whose derivatives may be ours
+//   seconds_per_iteration_ratio_automatic  the same for Ceres with its own derivatives
+//   peak_memory_ratio                      Ceres' / ours, for its best setting
+//
+// and for all runs seconds_per_iteration (median by the wall clock, without reading and ordering),
+// processor_seconds_per_iteration (sum of all threads or ranks), and peak_rss_mib (largest resident memory of the
+// process; for two ranks of ours, their sum).
 #include <ceres/ceres.h>
 #include <omp.h>
 

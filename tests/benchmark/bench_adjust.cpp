@@ -1,5 +1,5 @@
-// Tile adjustment on simulated aerial tiles, one thread: triangulation, screening and self-calibration from given poses
-// 1 m and 1 degree off, 3 % wrong matches.
+// Measures the time of the tile adjustment on simulated aerial tiles with one thread: triangulation, screening and
+// self-calibration, from given poses that are off by 1 m and 1 degree, with 3 % wrong matches.
 //
 //     bench_adjust --benchmark_min_time=0.001
 #include <benchmark/benchmark.h>

@@ -1,5 +1,6 @@
-// Poses and similarities from observations of which many are wrong: milliseconds of a hundred calls on one core, median
-// error in the units of the scene, and the share of calls whose error is within what exact data would give ("success").
+// Measures the robust estimation of poses and similarities from observations with many outliers: milliseconds of a
+// hundred calls on one core, median error in the units of the scene, and the share of calls whose error is not larger
+// than with exact data ("success").
 //
 //     bench_consensus
 #include <benchmark/benchmark.h>

@@ -1,10 +1,11 @@
-// Matching rate: verified pairs per second for images of 4 000 and 8 000 features.
+// Measures the rate of matching: verified pairs per second for images of 4 000 and 8 000 features.
 //
 // Sample runs:
 //   bench_matching            both sizes, all cores
 //   bench_matching 8000 40    8 000 features, 40 pairs
 //
-// Every pair shares a third of its features (noisy copies), seen over relief from two places; the rest is unrelated.
+// The images of a pair have a third of their features in common (noisy copies), as seen over relief from two places.
+// The other features are unrelated.
 #include <omp.h>
 
 #include <algorithm>

@@ -1,11 +1,11 @@
-// One Levenberg-Marquardt iteration of a tile, one thread, with its own cells and nothing passed to a merge tree:
+// Measures one Levenberg-Marquardt iteration of a single tile with one thread, without a merge tree:
 //   scene 0  a street of 300 frames of ten cameras, 1 000 observations per frame, five per point; calibration held
 //   scene 1  the same; eight intrinsics and six mount unknowns of every camera shared by all frames
 //   scene 2  500 aerial images, overlaps of 80 and 60 %, 300 observations each; the camera's eight intrinsics shared
-// Parts: condense (linearise, eliminate points, factorise the cells), down (back-substitute), evaluate (points in the
-// tail of the loss, cost of the new state); iteration: all of them, one after the other (MergeInMemory), with the datum
-// and the new state; from_scratch: a tile out of core comes back, as it does twice an iteration (what its files hold
-// stands beside it). The counter is observations per second of processor time.
+// The parts are: condense (linearise, eliminate the points, factorise the cells of the tile), down (back-substitution),
+// evaluate (points in the tail of the loss, cost of the new state). `iteration` is all of them in turn (MergeInMemory),
+// with the datum and the new state. `from_scratch` reads a tile back from disk, which happens twice per iteration; the
+// size of its files is printed beside it. The counter is observations per second of processor time.
 //
 //     bench_merge --benchmark_repetitions=5
 #include <benchmark/benchmark.h>

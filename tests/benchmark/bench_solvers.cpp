@@ -1,5 +1,5 @@
-// The minimal solvers of geometry/: microseconds per solve on one core, mean number of solutions, and the share of
-// samples with the truth among them ("success"), as the benchmark of PoseLib has it.
+// Measures the minimal solvers of geometry/: microseconds per call on one core, mean number of solutions, and the share
+// of samples with the truth among the solutions ("success"), as in the benchmark of PoseLib.
 //
 // Scenes of relative orientation (pair_scene.h): 0 general, 1 plane, 2 forward, 3 plane seen along its normal, 4 short
 // base (0.01), 5 no base (the rotation alone counts); second argument: noise in tenths of a pixel. Without noise the

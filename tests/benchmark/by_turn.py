@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Photographs from above oriented by default and without comparing by the turn of each pair (`matching.by_turn`), in
-turns: images, points, seconds of whole runs on the clock and of the processor. Fails where fewer images are oriented by
-turn, or in no less processor time; exits with 77 without the photographs.
+"""Orients real images from above in turns with and without `matching.by_turn` (matching by the rotation of each pair),
+and prints images, points, and seconds of whole runs by the wall clock and of the processor. Fails if `by_turn` orients
+fewer images or saves no processor time. Exits with 77 without the images.
 
 usage: by_turn.py MEGABLOCK DATA [TURNS [SET ...]]    e.g. by_turn.py build/release/megablock /data 3 brighton_beach
 """

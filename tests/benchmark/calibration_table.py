@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Rig calibration of the simulated vehicle (mounts off by 5 mm and 0.5 degrees): off-line, on-line and both (CN-06, CN-07),
-and by path shape (CN-08), each on another site: 8 panoramas on a loop, 3 control and 92 check points, rig held as calibrated.
+"""Makes the table of rig calibrations of the simulated vehicle, whose mounts are off by 5 mm and 0.5 degrees: off-line,
+on-line and both (CN-06, CN-07), and by the shape of the path (CN-08). Each result is verified on another site with 8
+panoramas on a loop, 3 control and 92 check points, and the rig held as calibrated.
 
     tests/benchmark/calibration_table.py build/release/megablock [--seeds 5] [--mounts free]
 """

@@ -1,10 +1,12 @@
-// Initial orientation of simulated blocks without positions, as a whole and in parts that are then assembled.
+// Compares the initial orientation of simulated blocks without positions as a whole with that in parts, which are then
+// assembled.
 //
 //   compare_assembly [--scene aerial|street] [--frames 400] [--part-frames 0 100 200] [--wrong-pairs 0.1]
 //
-// aerial: rows of 14 m by 30 m, 80 m above the ground; street: a frame each 3 m, looking ahead; 60 points a frame, 0.5
-// px, one observation of a tenth of the tracks wrong. 0 part frames: as a whole. Prints processor time, frames
-// oriented, and errors after the best similarity, in m and degrees.
+// aerial: images every 14 m in rows 30 m apart, 80 m above the ground; street: a frame every 3 m that looks ahead.
+// There are 60 points per frame with 0.5 px of noise, and a tenth of the tracks has an outlier. 0 part frames stands
+// for the orientation as a whole. Prints processor time, number of oriented frames, and errors after the best
+// similarity, in metres and degrees.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>

@@ -1,14 +1,14 @@
-// The measurement store (CN-16) at the size of the published one: the measurements of an image, of a frame, of 16
-// neighbouring frames (16 000 rows) and about a place (as many) out of 4.6e8.
+// Measures the measurement store (CN-16) at the size of the published one: queries for the observations of an image, of
+// a frame, of 16 neighbouring frames (16 000 rows), and near a place (as many), out of 4.6e8.
 //
 //   compare_measurements [--rows 460000000] [--folder F] [--queries 100] [--seed 1]
 //
-// A made-up block of streets, each driven twice: a frame of ten cameras each 4 m, 1 000 measurements per frame, five
-// per point, which 40 % of the points have in both passes; tiles of 500 frames; pixels anywhere in 1920 x 1080, feature
-// rows anywhere in 2 000. Names, files of tracks and their index are written by the program's own functions, the result
-// (of a size that the program does not yet hold in memory) in its layout. What --folder holds is not made again, and
-// stays; without --folder nothing does. Every question is put to a store opened for it, with its files verified: warm,
-// and cold, after the kernel was told to forget the job's files; "open": the same question to the same store again.
+// The block is made up: streets that are driven twice, a frame of ten cameras every 4 m, 1 000 observations per frame,
+// five per point, for 40 % of the points in both passes; tiles of 500 frames; random pixels in 1920 x 1080 and random
+// feature rows below 2 000. The program's own functions write names, track files and their index; the benchmark writes
+// the result in the same layout, because the program cannot hold a result of this size in memory. Files in --folder are
+// kept and not made again. Every query opens a new store and verifies its files: "warm", and "cold" after the kernel
+// was told to forget the files of the job. "open" is the same query to the same store once more.
 #include <fcntl.h>
 #include <sys/wait.h>
 #include <unistd.h>

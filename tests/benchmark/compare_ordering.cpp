@@ -1,6 +1,6 @@
-// Orderings of a trajectory's normal equations (CN-20): chain and 2x2 registrations at all places, positions and
-// attitudes, six unknowns per frame; ordered, factored and solved by CHOLMOD. The graph of frames is ordered, one node
-// for six unknowns. Seconds are of processor time.
+// Compares orderings of the normal equations of a trajectory (CN-20) with a chain, 2x2 registrations at all places,
+// positions and attitudes, and six unknowns per frame. CHOLMOD orders, factors and solves them. The ordering is that of
+// the graph of frames, with one node for six unknowns. Seconds are processor time.
 //
 //   megablock simulate --scene stereopolis --frames 44633 --drives 4 --points-per-frame 10 -o town
 //   compare_ordering town/block.yaml [d_cons = 3]

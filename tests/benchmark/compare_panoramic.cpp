@@ -1,8 +1,10 @@
-// The published simulations of panoramic self-calibration (Cannelle 2013, 2.3.3): four cameras, noise of 0 to 3 px,
-// projection centre 1 mm to 10 cm beside the axis along each axis of the camera; all points of a geodesic sphere of
-// radius 10 m, subdivided four times, three closed rows of images. Mean absolute errors over the seeds, as CSV.
-//   compare_panoramic [seeds = 5] > panoramic.csv;  tests/benchmark/panoramic_plot.py panoramic.csv
-//   docs/results/panoramic.svg
+// Repeats the published simulations of panoramic self-calibration (Cannelle 2013, 2.3.3): four cameras, noise of 0 to 3
+// px, a projection centre that is 1 mm to 10 cm off the axis of rotation along each axis of the camera, all points of a
+// geodesic sphere of radius 10 m that is subdivided four times, and three closed rows of images. Prints mean absolute
+// errors over the seeds as CSV.
+//
+//   compare_panoramic [seeds = 5] > panoramic.csv
+//   tests/benchmark/panoramic_plot.py panoramic.csv docs/results/panoramic.svg
 #include <array>
 #include <chrono>
 #include <cstdio>

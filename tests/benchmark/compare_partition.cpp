@@ -1,11 +1,11 @@
-// Tiles and merge tree of a large image graph, from the links to the tree.
+// Measures the partition of a large image graph into tiles and a merge tree.
 //
 //   compare_partition [--scene aerial|street] [--frames 1000000] [--tile-max-frames 500]
 //
-// aerial: a square of rows with 80 % overlap along and 60 % across; a link weighs 300 tracks times the area that two
-// images share. street: a grid of streets 100 m apart, driven twice, a frame each 4 m; frames are linked up to 20 m and
-// to those of the other drive and of crossing streets that near. Prints time, peak memory, tiles and their balance, and
-// the shares of frames with links to another tile and in separators.
+// aerial: a square block with overlaps of 80 % along and 60 % across the rows; a link has 300 tracks times the common
+// share of the areas of two images. street: a grid of streets 100 m apart, driven twice, with a frame every 4 m; frames
+// up to 20 m apart are linked, also those of the other drive and of crossing streets. Prints time, peak memory, tiles
+// and their balance, and the shares of frames with links to another tile and of frames in separators.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
-// 2x2 registrations (CN-25) at many simulated crossings: share of the feasible ones that converge to 2 cm and 0.02
-// degrees, with the robust start, with the published one, and by the 3-D/3-D baseline (CN-24).
+// Compares 2x2 registrations (CN-25) at many simulated crossings with the robust start, with the published one, and
+// with the 3-D/3-D baseline (CN-24): the share of the feasible registrations that converge to 2 cm and 0.02 degrees.
 //
 //   compare_registration [crossings = 2000] [seed = 1]
 #include <cstdio>

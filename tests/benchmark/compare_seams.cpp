@@ -1,12 +1,13 @@
-// What the seam check finds against what could be found: a tile's measurements of two boundary frames are turned by
-// 1e-4 rad (docs/results/whole-blocks.md, "Seam check"). Every tile of every block in turn; alarm limits are
-// those of a block of 200 tiles, whatever the number of tiles.
+// Compares the seam check with the best possible test. The observations that a tile has of two boundary frames are
+// turned by 1e-4 rad (docs/results/whole-blocks.md, "Seam check"), for every tile of every block in turn. The alarm
+// limits are those of a block of 200 tiles, whatever the number of tiles.
 //
 //   compare_seams street|rig|aerial [image_noise_px = 0.5] [blocks = 4]
 //   compare_seams clean [blocks = 100]
 //
-// ideal: a test that is told of each of 200 tiles which two frames might be turned, and how. With B'AB the information
-// about that one number (merge/checks/seam_check.h) it is normal with mean sqrt(B'AB), and no test has more power.
+// "ideal" is a test that knows, for each of 200 tiles, which two frames might be turned, and how. With B'AB as the
+// information about this one number (merge/checks/seam_check.h), its statistic is normal with the mean sqrt(B'AB). No
+// test has more power.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -1,12 +1,13 @@
-// Tracks of more matches than memory holds (CN-13): time, memory, truth, and that the cells in which pairs were matched
-// do not matter.
+// Measures how tracks are built from more matches than the memory can hold (CN-13): time, memory, and agreement with
+// the truth. The result must not depend on the cells in which pairs were matched.
 //
 //   compare_tracks [matches = 20000000] [cells = 1] [scratch = /tmp/megablock-compare-tracks]
 //
-// Images of 400 features follow one another; every image matches its four predecessors, as a point is seen by five
-// successive images; three matches in a hundred are wrong. The matches are made pair by pair and never held; pair i
-// comes in cell i % cells. Prints matches, tracks, a hash of all of them, the share of the true neighbours (a feature
-// and the same point's in the next image) that are in one track, processor time and peak memory.
+// The images have 400 features and form a sequence. Five successive images see a point, so every image matches its four
+// predecessors; three per cent of the matches are wrong. The matches are made pair by pair and are never in memory
+// together; pair i belongs to cell i % cells. Prints the numbers of matches and tracks, a hash of all tracks, the share
+// of true neighbours (features of the same point in successive images) that are in one track, processor time and peak
+// memory.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

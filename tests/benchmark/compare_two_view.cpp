@@ -1,6 +1,6 @@
-// Verification of pairs (match/verification/two_view.h) against OpenCV's robust estimators (opencv_two_view.h):
-// processor time, right models, errors of rotation and base (medians; root mean square; pairs where ours is the nearer
-// one).
+// Compares the verification of pairs (match/verification/two_view.h) with OpenCV's robust estimators
+// (opencv_two_view.h): processor time, right models, and errors of rotation and base (medians, root mean squares, and
+// number of pairs for which ours is nearer to the truth).
 //
 //   compare_two_view [PAIRS = 40 [SCENE]]    simulated: general, plane, rotation (all); 10 to 70 % wrong matches
 //   compare_two_view selection [PAIRS]       the same, verification alone: wrong matches that are accepted, right ones

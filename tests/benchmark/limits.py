@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Acceptance tests at their full size, and speeds against their limits; fails where one is missed.
+"""Runs acceptance tests at their full size, and compares speeds with their limits. Fails if one is missed.
 
 usage: limits.py tracks COMPARE_TRACKS      T-KP11: 10^8 matches, in one cell and in 64; memory that 7 x 10^8 would take
        limits.py solvers BENCH_SOLVERS      microseconds of minimal solvers, medians of five

@@ -1,6 +1,6 @@
-// Relative orientation by OpenCV's robust estimators (USAC: MAGSAC scores, uniform samples, inner local optimisation,
-// p = 0.999, 3000 draws), as match/ had it until it had its own: what compare_two_view measures ours against. Models
-// are told apart, and refined, as in match/verification/two_view.cpp.
+// Computes the relative orientation by OpenCV's robust estimators (USAC: MAGSAC scores, uniform samples, inner local
+// optimisation, p = 0.999, 3000 draws), which match/ used before it had its own. compare_two_view compares the two.
+// Models are selected and refined as in match/verification/two_view.cpp.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Plot of the simulations of panoramic self-calibration, and their table in Markdown.
+"""Plots the simulations of panoramic self-calibration, and prints their table in Markdown.
 
     build/release/tests/benchmark/compare_panoramic 5 > panoramic.csv
     tests/benchmark/panoramic_plot.py panoramic.csv docs/results/panoramic.svg

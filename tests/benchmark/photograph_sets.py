@@ -1,5 +1,5 @@
-"""What comparisons of whole runs over sets of photographs have in common. Arguments of the script: MEGABLOCK DATA [TURNS
-[SET ...]]; exits with 77 without the photographs."""
+"""The common parts of scripts that compare whole runs over sets of real images. Their arguments are MEGABLOCK DATA
+[TURNS [SET ...]]; they exit with 77 without the images."""
 import json
 import pathlib
 import resource

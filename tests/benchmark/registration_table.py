@@ -1,15 +1,16 @@
 #!/usr/bin/python3
-"""The table of CN-30 on a simulated Stereopolis block: errors of the trajectory by method, one control zone left out in turn.
+"""Makes the table of CN-30 on a simulated Stereopolis block: errors of the trajectory by method, while one control zone
+after the other is left out.
 
-Absolute: rms distance of the frames within 40 m of the held-out zone's points from their true positions. Relative: rms
-error of the vector between the frames of all places (true ones). `resection alone`: of the frames near a zone that are
-resected from its points, with the rig that `register` estimated, and of those whose stated sigma is at most 1 cm. Seconds
-are of processor time, means over the zones.
+Absolute error: rms distance of the frames within 40 m of the points of the zone from their true positions. Relative
+error: rms error of the vector between the frames of all true places. `resection alone` concerns the frames near a zone
+that are resected from its points with the rig that `register` estimated, and those of them with a stated sigma of at
+most 1 cm. Seconds are processor time, means over the zones.
 
     megablock simulate --scene stereopolis --frames 45000 --drives 4 --control-zones 7 -o town
     tests/benchmark/registration_table.py build/release/megablock town /tmp/job [--zones 0 1 4] [--only all ...]
 
-Places are registered once; rows differ by the joint adjustment alone.
+Places are registered once; the rows differ only by the joint adjustment.
 """
 import argparse
 import csv

@@ -1,13 +1,14 @@
-// The simulated blocks of the benchmarks of whole adjustments, and how to run the program on them.
+// Makes the simulated blocks for benchmarks of whole adjustments, and runs the program on them.
 //
-// street: grid of 100 m, every street driven twice, a frame of ten cameras each 4 m, 1 000 observations per frame, five
-// per point, 0.5 px; position priors of 0.5 m on half of the frames, relative poses of 1 cm and 0.01 degrees;
-// calibration held; start = these integrated over whole passes, each off by up to 2 m. aerial: 80 % and 60 %
-// overlap, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is calibrated.
+// street: a grid of 100 m whose streets are driven twice, a frame of ten cameras every 4 m, 1 000 observations per
+// frame, five per point, 0.5 px; position priors of 0.5 m for half of the frames, relative poses of 1 cm and 0.01
+// degrees; calibration held. The start values are the relative poses, integrated over whole passes and off by up to 2
+// m. aerial: overlaps of 80 % and 60 %, 300 points per image, GNSS of 0.05 m, attitudes of 0.02 degrees; the camera is
+// calibrated.
 //
-// Of a street with shared calibration all eight intrinsics of every camera are free, and of all mounts but the first
-// six unknowns with weak prior values (1 degree, 0.1 m); of an aerial camera seven. A free block has no positions and
-// attitudes; the relative poses of a street stay.
+// With shared calibration, a street has eight free intrinsics of every camera, and six unknowns with weak priors (1
+// degree, 0.1 m) of every mount except the first one; an aerial block has seven free intrinsics. A free block has no
+// positions and attitudes, but a street keeps its relative poses.
 #pragma once
 
 #include <unistd.h>

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The programs that measure the acceptance of large blocks, on small ones: every figure that is asked for is in their
-last line and a number, and the merge is exact.
+"""Runs the programs for the acceptance of large blocks on small blocks: their last line must have every required figure
+as a number, and the merge must be exact.
 usage: acceptance_programs.py adjust_scale ADJUST_SCALE
        acceptance_programs.py against_ceres AGAINST_CERES"""
 import json

@@ -1,4 +1,5 @@
-"""A job at either level of arithmetic: equal to 1e-6 sigma, and not mixed. usage: arithmetic.py MEGABLOCK"""
+"""Tests jobs at both levels of arithmetic: they must agree to 1e-6 sigma, and one job must not mix them.
+usage: arithmetic.py MEGABLOCK"""
 import pathlib
 import tempfile
 

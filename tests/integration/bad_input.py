@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What bad input gets: one clear line, nothing lost, the documented exit code. Here the project and what it names; what
-became of a job is bad_input_job.py's.
+"""Runs the program with bad input: it must print one clear line, lose nothing, and end with the documented exit code.
+This test changes the project and the files that it names; bad_input_job.py changes the job.
 
 usage: bad_input.py MEGABLOCK [unittest arguments]
 Works on a small rendered block; needs nothing but the program and the standard library.

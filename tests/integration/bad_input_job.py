@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What a job gets that is damaged, of another version or block, in use, or on a disk that is full or read-only: one clear
-line, nothing lost, the documented exit code.
+"""Runs the program on jobs that are damaged, of another version or block, in use, or on a disk that is full or read-
+only: it must print one clear line, lose nothing, and end with the documented exit code.
 
 usage: bad_input_job.py MEGABLOCK [unittest arguments]
 Works on a small rendered block; needs nothing but the program and the standard library. Cases that need a file system

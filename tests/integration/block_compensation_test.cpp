@@ -1,5 +1,5 @@
-// Blocks of 500 images in eight and more tiles: the optimum of the block-wise compensation is that of one monolithic
-// problem.
+// Tests blocks of 500 images in eight and more tiles: the block-wise adjustment must have the same optimum as one
+// monolithic problem.
 #include <gtest/gtest.h>
 
 #include "adjust/lanes/tile_cost.h"

@@ -1,4 +1,4 @@
-// A block with its tie points as the files that a job reads, and the job beside them, run in this process.
+// Writes a block and its tie points as the files that a job reads, and runs the job in this process.
 #pragma once
 
 #include <fstream>

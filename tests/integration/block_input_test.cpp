@@ -1,5 +1,5 @@
-// What bad blocks and tie points get from a whole job: an error that names what is wrong, or a job that goes on, says
-// so, and is as good as ever everywhere else.
+// Runs whole jobs with bad blocks and tie points. The job must end with an error that names the fault, or report it and
+// give good results for everything else.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

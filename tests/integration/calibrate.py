@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Calibration of a rig by the program, from the simulated target field to a drive adjusted with the result.
+"""Tests the calibration of a rig by the program, from the simulated target field to a drive that uses the result.
 
 usage: calibrate.py MEGABLOCK [unittest arguments]
 """

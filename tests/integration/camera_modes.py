@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`calibrate --panoramic` and `--compare-models` on simulated blocks, and their bad input.
+"""Tests `calibrate --panoramic` and `--compare-models` on simulated blocks, also with bad input.
 
 usage: camera_modes.py MEGABLOCK [unittest arguments]
 """

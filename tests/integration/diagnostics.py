@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What a block lacks, before and after its adjustment, in the report and as JSON. usage: diagnostics.py MEGABLOCK"""
+"""Tests `megablock diagnose` before and after the adjustment, in the report and as JSON.
+usage: diagnostics.py MEGABLOCK"""
 import csv
 import json
 import math

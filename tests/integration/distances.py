@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Known distances from the project file to the result: they give a free block in several tiles its scale, and are still
-there when the job is run again. usage: distances.py MEGABLOCK"""
+"""Tests known distances from the project file to the result: they must give a free block in several tiles its scale,
+and still do so when the job is run again.
+usage: distances.py MEGABLOCK"""
 import csv
 import math
 import pathlib

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Models of other programs: out of a job, into a project, through a job of its own, out again.
+"""Tests the exchange with other programs: a model is exported from a job, imported as a project, adjusted, and exported
+again.
 
 usage: exchange.py MEGABLOCK [unittest arguments]
 """

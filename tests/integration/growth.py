@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What is computed again when an image is added to a finished job, and when an option changes: what depends on it, and
-nothing else.
+"""Tests that only the dependent units are computed again when an image is added to a finished job, or an option
+changes.
 
 usage: growth.py MEGABLOCK [unittest arguments]
 Works on a rendered block of four tiles; needs nothing but the program and the standard library (and mpirun, if there).

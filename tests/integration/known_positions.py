@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Whole jobs whose positions are known: held through tiles and merge, what the attitude priors alone tell, and the
-determinant method beside the adjustment. usage: known_positions.py MEGABLOCK"""
+"""Tests whole jobs with known positions: these are held in tiles and merge, rotations that only attitude priors
+determine are reported, and the determinant method is compared with the adjustment.
+usage: known_positions.py MEGABLOCK"""
 import csv
 import json
 import os

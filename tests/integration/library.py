@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""The installed library from another tree: the examples are configured, built and run against an install prefix.
+"""Tests the installed library: the examples are configured, built and run against an install prefix, outside of the
+tree.
 
-The poses that the example prints are held against the simulator's truth by their own standard deviations. Every
-installed header is compiled, in two orders, so that none needs a header that is not installed or not included.
+The poses that the example prints are compared with the truth of the simulator, in units of their own standard
+deviations. Every installed header is compiled, in two orders, so that none needs a header that is not installed or not
+included.
 usage: library.py MEGABLOCK BUILD_FOLDER SOURCE_FOLDER
 """
 import csv

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Lines of known direction from the project file to the result, and still there when the job is run again.
+"""Tests lines of known direction from the project file to the result, also when the job is run again.
 usage: lines.py MEGABLOCK"""
 import pathlib
 import tempfile

@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""The merged result of whole jobs against one monolithic adjustment of the same observations.
+"""Compares the merged result of whole jobs with one monolithic adjustment of the same observations.
 usage: monolithic.py MEGABLOCK
 
-Tiles screen their observations and take over what others have moved before they are merged: a frame left where its own
-tile put it would show here in sigmas. A free block's solutions differ by similarities: the step that the
-monolithic problem would still make is the one under inner constraints, and no second adjustment is compared."""
+Before the merge, tiles screen their observations and adopt the frames that other tiles have moved. If a frame stayed
+where its own tile put it, this test would show a difference of some sigmas. The solutions of a free block differ by
+similarities; therefore the step that the monolithic problem would still make is calculated under inner constraints,
+and no second adjustment is compared."""
 import json
 import os
 import tempfile

@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""Sigmas of free mounts in the result of whole jobs: true, and the same bits on two ranks. usage: mounts.py MEGABLOCK
+"""Tests the sigmas of free mounts in the result of whole jobs: they must be true, and have the same bits on two ranks.
+usage: mounts.py MEGABLOCK
 
-The given mounts of a simulated vehicle are off by what they state, so that e'C^-1 e of a mount's error e and covariance C
-has 6 degrees of freedom, whose sum over independent blocks follows the chi-square distribution. The mounts of one block
-err together, as all are given from the first: each has a sum of its own, and the mean over all of a block may scatter
-as it does between blocks.
+The given mounts of a simulated vehicle have errors with the stated sigmas. For the error e of a mount and its
+covariance C, e'C^-1 e therefore has 6 degrees of freedom, and its sum over independent blocks follows the chi-square
+distribution. The errors of the mounts of one block are correlated, because all are relative to the first mount. So
+each mount has a sum of its own, and the mean over all mounts may scatter as it does between blocks.
 """
 import json
 import math

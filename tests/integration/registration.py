@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A street-rig block from its trajectory to the bundle adjustment: simulate, register, run, evaluate, report.
+"""Tests a street-rig block from its trajectory to the bundle adjustment: simulate, register, run, evaluate, report.
 
 usage: registration.py MEGABLOCK
 The mounts are off by their default 5 mm and 0.5 degrees, the trajectory by metres where satellites are masked.

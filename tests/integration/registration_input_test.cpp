@@ -1,5 +1,5 @@
-// What bad input gets from `megablock register`: an error that names file, place, cause and remedy, or a remark, with
-// everything else registered as well as ever.
+// Runs `megablock register` with bad input. It must end with an error that names file, place, cause and remedy, or give
+// a remark and register everything else as well as before.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

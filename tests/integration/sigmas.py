@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What the options on sigmas do to a whole run. usage: sigmas.py MEGABLOCK"""
+"""Tests the effect of the options on sigmas in whole runs. usage: sigmas.py MEGABLOCK"""
 import json
 import os
 import re

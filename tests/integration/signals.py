@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""What signals do to a run: it ends soon, says so, and what it had done is kept. usage: signals.py MEGABLOCK
+"""Tests the effect of signals on a run: it must end soon, say so, and keep its finished units.
+usage: signals.py MEGABLOCK
 
-How soon a run ends is timed: these tests want the computer for themselves.
+The time until a run ends is measured, so nothing else should run on the computer.
 """
 import contextlib
 import os

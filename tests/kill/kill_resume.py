@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""A run killed by SIGKILL at random moments and started again gives the same bits, and computes no unit twice.
+"""Tests that a run that is killed by SIGKILL at random moments and started again gives the same bits, and computes no
+unit twice.
 
 usage: kill_resume.py MEGABLOCK [--kills 10] [--ranks 2] [--rendered | --register | --project FILE] [--seed 4711]
 
-Moments are drawn evenly over the measured length of an undisturbed run. A unit has its event once its file is sealed,
-so that a unit with two events was computed again although it was there; a kill may lose the event of a unit that was
-just sealed, one a rank.
+The moments are drawn evenly over the measured length of an undisturbed run. A unit gets its event after its file is
+sealed, so a unit with two events was computed again although it existed. A kill may lose the event of a unit that
+was just sealed, one per rank.
 """
 import argparse
 import json

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The merge alone: the same digest on 1, 2, 3, 4 and 8 ranks, and after ten SIGKILLs at random moments.
+"""Tests that the merge gives the same digest on 1, 2, 3, 4 and 8 ranks, and after ten SIGKILLs at random moments.
 
 usage: merge_kills.py MEGABLOCK [--kills 10] [--seed 4711]
 
-Everything before the merge is computed once. Every second kill takes one rank only: the others must end by themselves,
-and nothing of what was sealed may be lost. A run that ends before its moment starts again from the tiles.
+Everything before the merge is computed once. Every second kill ends only one rank: the others must end by
+themselves, and no sealed file may be lost. A run that ends before its moment starts again from the tiles.
 """
 import argparse
 import os

@@ -1,4 +1,4 @@
-"""Programs under mpirun, and their end by SIGKILL."""
+"""Runs programs under mpirun and ends them by SIGKILL."""
 import contextlib
 import os
 import pathlib

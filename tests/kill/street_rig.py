@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Every command of street mapping writes the same bytes on 1, 2 and 3 ranks, and after a SIGKILL.
+"""Tests that every command of street mapping writes the same bytes on 1, 2 and 3 ranks, and after a SIGKILL.
 
 usage: street_rig.py MEGABLOCK
 
-`run` is asked for all that a rig with poses may have: cones, masks, guided matching, filter, lines, estimated sigmas.
-A run is killed twice, a command that writes at its end once; moments are drawn evenly over the length of the undisturbed
-one, again where it ends before. (`register`: kill_resume.py.)
+`run` uses all options for a rig with poses: cones, masks, guided matching, filter, lines, estimated sigmas. A run is
+killed twice; a command that only writes at its end is killed once. The moments are drawn evenly over the length of
+the undisturbed run, and drawn again if a run ends before. kill_resume.py tests `register`.
 """
 import pathlib
 import random

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""megablock verticals, killed at random moments: what was found stays, and the table is that of a run left alone.
+"""Tests that `megablock verticals`, killed at random moments, keeps its results and writes the table of an undisturbed
+run.
 
 usage: verticals.py MEGABLOCK [--kills 4] [--seed 4711]
 """

@@ -1,5 +1,5 @@
-// Messages of more than 2^31 bytes between two ranks: MPI counts in int, so they go in parts. usage: mpirun -n 2
-// large_messages. Needs no such memory (tests/unit/ranges/aliased_memory.h).
+// Tests messages of more than 2^31 bytes between two ranks. MPI counts in int, so they are sent in parts. The test
+// needs no such amount of memory (tests/unit/ranges/aliased_memory.h). usage: mpirun -n 2 large_messages
 #include <cstdio>
 #include <cstdlib>
 #include <string>

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""An error that one rank has alone is said once, by that rank, and ends the others: no rank waits for ever.
+"""Tests that an error of a single rank is printed once, by this rank, and that it ends the others: no rank may wait for
+ever.
 
 usage: lone_error.py MEGABLOCK
-Rank 1 cannot write its events: folders stand where its file of any coming second would be.
+Rank 1 cannot write its events, because folders have the names of its files for all seconds to come.
 """
 import datetime
 import os

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Tiles and factors of the merge in memory, in scratch or, factors, computed again: the same bits, on one rank and on
-# three, and each way is really gone (the run says how many). With 'full' instead, the disk of the scratch fills on the
-# way (skipped, 77, without the right to mount one).
+# Tests that the merge gives the same bits with tiles and factors in memory, on the scratch disk, or (factors) computed
+# again, on one rank and on three. The messages of the run prove that each way was used. With 'full', the scratch disk
+# becomes full during the run instead (skipped with 77 without the permission to mount one).
 # usage: memory.sh MEGABLOCK [full]
 set -euo pipefail
 megablock=$1

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What all ranks refuse alike is said once, whatever the command, with the exit code of bad input.
+"""Tests that an error that all ranks find is printed once, by every command, with the exit code of bad input.
 
 usage: refusals.py MEGABLOCK
 """

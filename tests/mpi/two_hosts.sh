@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The same bits on two simulated hosts: network namespaces with host names of their own, joined by a bridge, so that
-# ranks talk TCP only. No claim of a unit waits longer than 0.1 s, and each rank does at least 1 / (2 N) of the units.
+# Tests that a job gives the same bits on two simulated hosts. These are network namespaces with their own host names,
+# joined by a bridge, so that ranks communicate only by TCP. No claim of a unit may wait longer than 0.1 s, and each of
+# the N ranks must do at least 1 / (2 N) of the units.
 # usage: two_hosts.sh MEGABLOCK [PROJECT]    needs root and iproute2; skips (77) where namespaces are not allowed
 set -euo pipefail
 megablock=$1 project=${2:-}

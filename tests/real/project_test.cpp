@@ -1,4 +1,4 @@
-// The project reader on real photographs.
+// Tests the project reader on real images.
 #include "io/project/project.h"
 
 #include <gmock/gmock.h>

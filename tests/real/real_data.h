@@ -1,5 +1,5 @@
-// Where the real photographs are: the folder of the environment variable MEGABLOCK_DATA, else ../shared/data beside the
-// sources. Tests skip, and say so, when a set is absent.
+// Finds the real images: in the folder of the environment variable MEGABLOCK_DATA, else in ../shared/data beside the
+// sources. Tests are skipped with a remark if a set is missing.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Verticals in photographs: of streets and a façade they are found in all, in none of trees and a shore from above,
-// where the gimbal says that edges which look upright cannot be.
+// Tests verticals in real images. They must be found in all images of streets and of a façade, and in none of trees and
+// a shore from above, where the angles of the gimbal exclude that edges are vertical.
 #include <algorithm>
 #include <cmath>
 

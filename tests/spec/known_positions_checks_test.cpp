@@ -1,5 +1,5 @@
 // Acceptance tests of "Bundle adjustment with known positions" (A. Barrier, S. Martin): tiles against one problem, and
-// what tells of a result that no truth is known of.
+// checks of a result without known truth.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

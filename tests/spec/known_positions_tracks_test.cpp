@@ -1,5 +1,5 @@
 // Acceptance tests of "Bundle adjustment with known positions" (A. Barrier, S. Martin) that concern tracks: building
-// them from pairs, choosing images by what they have in common, thresholds of the verification.
+// them from pairs, choosing images by their common points, thresholds of the verification.
 #include <gtest/gtest.h>
 
 #include <algorithm>

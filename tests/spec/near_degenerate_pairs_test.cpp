@@ -1,6 +1,6 @@
-// What the covariance and the twin of a pair are worth to a block (Kalantari 2009, M41, M43): flat ground, images that
-// follow one another closely, from changing heights, some nearly from one place; in narrow views of a plane both its
-// orientations fit nearly all pairs.
+// Tests how much the covariance and the twin of a pair improve a block (Kalantari 2009, M41, M43). The ground is flat;
+// images follow one another closely, from changing heights, some nearly from the same place. In narrow views of a
+// plane, both its orientations fit nearly all pairs.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// The figure a test reaches beside the limit of its specification, printed so that docs/reference/methods.md can state
-// it.
+// Prints the figure that a test reaches beside the limit of its specification, so that docs/reference/methods.md can
+// state it.
 #pragma once
 
 #include <gtest/gtest.h>

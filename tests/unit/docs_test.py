@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""What the documents name is there: links and their headings, paths, ctest patterns. What the code has stands in the
-documents: folders, commands with their options, keys that a command prints. usage: docs_test.py SOURCE_FOLDER"""
+"""Checks that everything that the documents name exists: links and their headings, paths, ctest patterns. Also
+checks that the documents name everything that the code has: folders, commands with their options, keys that a
+command prints.
+usage: docs_test.py SOURCE_FOLDER"""
 import pathlib
 import re
 import sys

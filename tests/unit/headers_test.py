@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that every source file has its own header, and that every header has a test.
 
-A header has a test when a file under tests/ includes it. Where neither holds, tests/unit/headers.txt says why:
+A header has a test if a file under tests/ includes it. If one of the two is missing, tests/unit/headers.txt says why:
   part    SOURCE HEADER REASON   the source file implements a part of this header
   covered HEADER TEST   REASON   the test (a file under tests/) goes through this header without including it
 usage: headers_test.py SOURCE_FOLDER

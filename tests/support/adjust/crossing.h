@@ -1,5 +1,5 @@
-// Two passes of a street rig at one place, for tests: the frames, their trajectory with its errors, the points that all
-// four frames see, some of them matched wrongly.
+// Simulates two passes of a street rig at one place, for tests: the frames, their trajectory with errors, and the
+// points that all four frames see, with some wrong matches.
 #pragma once
 
 #include "adjust/registration/four_frames.h"

@@ -1,4 +1,4 @@
-// Vertical and horizontal lines in a simulated block, measured with the true cameras.
+// Adds vertical and horizontal lines to a simulated block, measured with the true cameras.
 #pragma once
 
 #include <cmath>

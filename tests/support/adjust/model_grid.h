@@ -1,5 +1,5 @@
-// Sub-blocks in a grid, each in a frame of its own: points and images that neighbours share, with noise, wrong points
-// and wrong links; and what of it an assembly finds.
+// Simulates sub-blocks in a grid, each in its own coordinate system: points and images that neighbours share, with
+// noise, wrong points and wrong links. Counts how many of these an assembly finds.
 #pragma once
 
 #include <algorithm>

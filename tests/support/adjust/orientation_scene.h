@@ -1,5 +1,5 @@
-// Small scenes with known truth for the tests of initial orientation: single cameras, points, and what matching would
-// give of them, with noise, wrong tracks and wrong relative rotations.
+// Simulates small scenes with known truth for the tests of initial orientation: single cameras, points, and matches
+// with noise, wrong tracks and wrong relative rotations.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// The simulations of Cannelle (2013), 2.3.3: a camera turned about a point, all points of a geodesic sphere measured
-// in all images that see them.
+// Repeats the simulations of Cannelle (2013), 2.3.3: a camera turns about a point, and all points of a geodesic sphere
+// are measured in all images that see them.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Verticals seen by the images of a simulated block.
+// Simulates the verticals that the images of a block see.
 #pragma once
 
 #include <random>

@@ -1,4 +1,4 @@
-// A simulated block as one tile, and how far its adjustment ends from the truth.
+// Makes one tile of a simulated block, and measures the errors of its adjustment.
 #pragma once
 
 #include <limits>

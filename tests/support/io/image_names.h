@@ -1,4 +1,4 @@
-// Names of a block's images, for tests.
+// Gives the names of the images of a block, for tests.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// A plausible result for tests of what reads results: a simulated block with its truth as state, tiles in strips, noisy
-// residuals and sigmas. Nothing in it was adjusted.
+// Makes a plausible result, for tests of the readers of results: a simulated block with its truth as state, tiles in
+// strips, noisy residuals, and sigmas. Nothing in it was adjusted.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// A directory of its own for a test, deleted at the end.
+// Makes a directory for one test and deletes it at the end.
 #pragma once
 
 #include <cstdlib>

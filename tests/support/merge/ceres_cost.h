@@ -1,4 +1,4 @@
-// What Ceres makes of a tile's problem: the reference for our own optimum.
+// Adjusts the problem of a tile with Ceres, as the reference for our own optimum.
 #pragma once
 
 #include <ceres/ceres.h>

@@ -1,4 +1,4 @@
-// A scratch directory that fails: what is said of a file that cannot be read, and a disk that is full.
+// Simulates failures of a scratch directory: the error for a file that cannot be read, and a full disk.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A known line of frames in overlapping pieces, each moved by a similarity of its own.
+// Cuts a known line of frames into overlapping pieces, each of which is moved by its own similarity.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// A simulated block cut into tiles, with states near the truth, and the same block as one problem.
+// Cuts a simulated block into tiles with states near the truth, and also makes one problem of the same block.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// A tile whose measurements of two boundary frames are wrong: what the seam check has to find.
+// Falsifies the observations that a tile has of two boundary frames, which the seam check must find.
 #pragma once
 
 #include <algorithm>

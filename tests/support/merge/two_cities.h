@@ -1,4 +1,4 @@
-// Two blocks in one, with the same cameras and rigs.
+// Joins two blocks into one, with the same cameras and rigs.
 #pragma once
 
 #include "io/simulate/blocks/simulate.h"

@@ -1,4 +1,4 @@
-// Artificial frame graphs, and the properties that every tree over them must have.
+// Makes artificial graphs of frames, and checks the properties that every tree over them must have.
 #pragma once
 
 #include <gtest/gtest.h>

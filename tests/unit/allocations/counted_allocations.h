@@ -1,5 +1,6 @@
-// Counts what the program takes from the heap: malloc and its kin themselves, which operator new and Eigen's matrices
-// of dynamic size come down to. For programs of their own, without sanitizers, which bring a heap.
+// Counts the allocations on the heap. It replaces malloc and the related functions, which operator new and the dynamic
+// matrices of Eigen call. Tests with it are separate programs without sanitizers, because these have a heap of their
+// own.
 #pragma once
 
 #include <cstdint>

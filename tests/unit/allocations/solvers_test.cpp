@@ -1,4 +1,4 @@
-// Minimal solvers run millions of times: none takes anything from the heap, whether it finds solutions or none.
+// Minimal solvers run millions of times. Therefore none may allocate memory on the heap, with or without solutions.
 #include <gtest/gtest.h>
 
 #include <random>

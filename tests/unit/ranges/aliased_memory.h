@@ -1,9 +1,9 @@
-// Addresses without memory, for tests of offsets beyond 2^31: a program that links aliased_memory.cpp gets every
-// allocation of kAliasedFrom bytes or more (by operator new, so of containers too) as so many addresses, behind which
-// the same kAliasPeriod bytes appear again and again. Offset arithmetic that wraps around leaves the addresses and ends
-// the program; what is written at an offset is read there, unless something was written since at an offset that differs
-// by a multiple of the period (pages, but no power of two: neither parts of messages nor rows of matrices repeat with
-// it).
+// Gives addresses without memory, for tests of offsets beyond 2^31. In a program that links aliased_memory.cpp, every
+// allocation of kAliasedFrom bytes or more (by operator new, so also of containers) has that many addresses, but only
+// kAliasPeriod bytes of memory, which appear again and again. If offset arithmetic wraps around, it leaves the
+// addresses and the program ends. A value is read back at its offset, unless another one was written at an offset that
+// differs by a multiple of the period. The period is a number of pages but no power of two, so that neither parts of
+// messages nor rows of matrices repeat with it.
 #pragma once
 
 #include <cstddef>

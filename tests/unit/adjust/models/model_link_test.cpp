@@ -1,4 +1,4 @@
-// Links of two models: their similarities and what they say of their errors.
+// Links of two models: their similarities, and the covariances of these.
 #include "adjust/models/model_link.h"
 
 #include <gtest/gtest.h>

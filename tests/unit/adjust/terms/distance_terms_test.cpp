@@ -1,4 +1,4 @@
-// Scale bars give a block without any other datum its scale, within what they state.
+// Scale bars give a block without any other datum its scale, with the accuracy that they state.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What given poses decide in matching: whether the verticals of two images go together (given_poses_join).
+// Given poses decide in matching whether the verticals of two images agree (given_poses_join).
 #include "cluster/stages/pipeline/matching.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The calibration file and the project key that takes it over; names, figures, the page.
+// Tests the calibration file and the project key that adopts it, the names of mounts, the figures and the page.
 #include "io/block/calibration.h"
 
 #include <gmock/gmock.h>

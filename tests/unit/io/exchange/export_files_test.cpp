@@ -1,4 +1,4 @@
-// Which files an export writes, and where it refuses to.
+// Tests which files an export writes, and when it refuses to write.
 #include <gmock/gmock.h>
 
 #include <filesystem>

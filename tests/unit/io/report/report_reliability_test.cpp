@@ -1,4 +1,4 @@
-// The report's tests of single measurements, against a plain count over all of them.
+// The report's tests of single observations, against a plain count over all of them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Results whose tracks are never held whole give the same file, figures and page as those in memory.
+// A result whose tracks come in batches gives the same file, figures and page as a result in memory.
 #include "io/result/track_batches.h"
 
 #include <gtest/gtest.h>

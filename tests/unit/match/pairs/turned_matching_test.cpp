@@ -1,4 +1,4 @@
-// The turn of two vertical images from their matches, among wrong ones.
+// The rotation between two vertical images from their matches, with outliers.
 #include "match/pairs/turned_matching.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Tiles that say too little or nothing: the block goes on to the same optimum, and what is not determined is held and
+// Tiles with too little information or none: the block reaches the same optimum, and undetermined unknowns are held and
 // reported.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

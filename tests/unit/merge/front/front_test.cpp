@@ -1,4 +1,4 @@
-// Fronts, their covariances and costs against dense algebra; what is spilled and what makes room.
+// Fronts, their covariances and costs against dense algebra, and the choice of fronts that are moved to disk.
 #include "merge/front/front.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Plans out of core: what comes back is what was put.
+// Plans on disk are read back as they were written.
 #include "merge/plan/plan_store.h"
 
 #include <gtest/gtest.h>

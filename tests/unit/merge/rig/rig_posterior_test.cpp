@@ -1,4 +1,5 @@
-// Posterior sigmas of mounts against the inverse of the whole normal equations, and what a rig leaves undetermined.
+// Posterior sigmas of mounts against the inverse of the whole normal equations, and the undetermined parameters of a
+// rig.
 #include "merge/rig/rig_posterior.h"
 
 #include <gtest/gtest.h>

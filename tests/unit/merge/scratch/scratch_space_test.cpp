@@ -1,4 +1,4 @@
-// A rank's scratch directory: its files never are more than the budget, and those that are needed come back.
+// The scratch directory of a rank: its files never exceed the budget, and files can be read back.
 #include "merge/scratch/scratch_space.h"
 
 #include <gtest/gtest.h>

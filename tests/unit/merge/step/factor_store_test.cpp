@@ -1,4 +1,4 @@
-// Factors between the passes: in memory, in scratch or given up, and never another one's.
+// Factors between the sweeps are in memory, on disk, or dropped, and are never confused.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Tiles out of core: what comes back is what was put, whatever the memory and whatever becomes of the scratch disk.
+// Tiles on disk are read back as they were written, with any memory limit and after failures of the scratch disk.
 #include "merge/step/tile_store.h"
 
 #include <gtest/gtest.h>

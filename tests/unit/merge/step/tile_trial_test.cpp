@@ -1,4 +1,4 @@
-// A step tried in one go, against its parts one behind the other.
+// The trial of a step in one call, against the sequence of its parts.
 #include "merge/step/tile_trial.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Robust losses: their curvature against finite differences, points in the tail, and the steps it all takes.
+// Robust losses: their curvature against finite differences, points in the tail, and the number of iterations.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>

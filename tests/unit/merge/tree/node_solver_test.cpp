@@ -1,5 +1,4 @@
-// Another way to solve the nodes of the tree, by Eigen and without blocks, takes the place of the dense one and leads
-// to the same solution.
+// The nodes of the tree can be solved in another way, by Eigen and without blocks, with the same solution.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
