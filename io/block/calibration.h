@@ -82,8 +82,8 @@ struct RigCalibration {
   double seconds = 0;
   double sigma0 = 0, image_sigma_px = 0;  // a posteriori; standard deviation of an observation of a tie point
   RigFit before, after;
-  // Of observations that took no part: robust standard deviation per axis from the median of the residuals, pixels;
-  // NaN: there are none.
+  // Robust standard deviation per axis of the observations that took no part, from the median of their residuals,
+  // pixels; NaN if there are none.
   double held_out_before_px = 0, held_out_px = 0;
   std::int64_t held_out = 0;
   std::optional<RigFit> verification_before, verification;  // on another site

@@ -33,7 +33,7 @@ enum class ObservationKind : std::uint8_t {
   kDistance,    // known distances of frames
 };
 
-// By ObservationKind.
+// The properties of each ObservationKind, in the same order.
 struct ObservationKindRow {
   const char* name;              // for tables
   const char* word;              // for json and HDF5

@@ -17,14 +17,15 @@ namespace megablock {
 
 void load_picture_codecs();
 
-// As cv::imdecode, with the `flags` of cv::ImreadModes. Empty for anything that imgcodecs cannot decode.
+// Decodes the bytes of an image file as cv::imdecode does, with the `flags` of cv::ImreadModes. Empty for anything that
+// imgcodecs cannot decode.
 cv::Mat decode_picture(const std::vector<unsigned char>& file, int flags);
 
-// As cv::imread, the same for a file. Empty also if the file cannot be read.
+// The same for a file, as cv::imread does. Empty also if the file cannot be read.
 cv::Mat read_picture(const std::string& path, int flags);
 
-// As cv::imencode. `extension` is ".jpg" or ".png", for example; `parameters` are pairs of cv::ImwriteFlags and values.
-// Throws ComputeError where imgcodecs fails.
+// Encodes an image as cv::imencode does. `extension` is ".jpg" or ".png", for example; `parameters` are pairs of
+// cv::ImwriteFlags and values. Throws ComputeError where imgcodecs fails.
 std::vector<unsigned char> encode_picture(const std::string& extension, const cv::Mat& picture,
                                           const std::vector<int>& parameters = {});
 

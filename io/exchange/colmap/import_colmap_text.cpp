@@ -1,3 +1,4 @@
+// Reads COLMAP models in text form.
 #include <charconv>
 #include <filesystem>
 

@@ -1,3 +1,4 @@
+// Writes the tables of a result as CSV files.
 #include <cmath>
 #include <filesystem>
 

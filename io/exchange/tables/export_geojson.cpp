@@ -1,3 +1,4 @@
+// Writes the footprints of the images as GeoJSON.
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,3 +1,4 @@
+// Writes points and projection centres as PLY.
 #include "io/exchange/model/export_view.h"
 #include "io/exchange/tables/export_tables.h"
 #include "io/text/text_writer.h"

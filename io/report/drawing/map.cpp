@@ -1,3 +1,4 @@
+// Draws the map of the block.
 #include <fmt/core.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Draws the charts of the report: bars, residual fields, densities, GNSS residuals.
 #include <fmt/core.h>
 
 #include <algorithm>

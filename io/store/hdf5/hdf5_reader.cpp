@@ -1,3 +1,4 @@
+// Reads HDF5 files (Hdf5Reader).
 #include <algorithm>
 #include <filesystem>
 

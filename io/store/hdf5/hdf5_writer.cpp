@@ -1,3 +1,4 @@
+// Writes HDF5 files (Hdf5Writer), in memory or to reserved disk space.
 #include <fcntl.h>
 #include <unistd.h>
 
