@@ -145,7 +145,8 @@ CameraGrouping read_camera_grouping(YamlReader& cameras) {
   if (grouping == "exif") return CameraGrouping::kExif;
   if (grouping == "folder") return CameraGrouping::kFolder;
   if (grouping == "one") return CameraGrouping::kOne;
-  throw InputError(cameras.where("grouping") + ": cameras.grouping: '" + grouping + "' is none of: exif, folder, one");
+  throw InputError(cameras.where("grouping") + ": cameras.grouping: '" + grouping +
+                   "' is not one of: exif, folder, one");
 }
 
 void read_cameras(YamlReader& cameras, Block& block) {

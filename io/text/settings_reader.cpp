@@ -149,7 +149,7 @@ bool SettingsReader::choice(const std::string& key, const std::vector<std::strin
     std::string list;
     for (const std::string& choice : choices) list += (list.empty() ? "" : ", ") + choice;
     throw InputError(entry->where + ": " + section_ + "." + key + ": " + in_apostrophes(entry->value) +
-                     " is none of: " + list);
+                     " is not one of: " + list);
   }
   field = static_cast<int>(found - choices.begin());
   return true;

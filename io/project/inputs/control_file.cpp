@@ -191,7 +191,7 @@ ControlTable read_json(const std::string& text, const std::string& path) {
 PointRole role_of(const std::string& text, const std::string& where) {
   if (text.empty() || text == "control") return PointRole::kControl;
   if (text == "check") return PointRole::kCheck;
-  throw InputError(where + ": role: '" + text + "' is none of: control, check");
+  throw InputError(where + ": role: '" + text + "' is not one of: control, check");
 }
 
 // Reads the first line of a point, which gives its coordinates. Later lines may repeat them or leave them empty.

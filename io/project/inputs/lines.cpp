@@ -17,7 +17,7 @@ constexpr double kShortestPx = 10;
 KnownLine::Direction direction_of(const std::string& text, const std::string& where) {
   if (text == "vertical") return KnownLine::Direction::kVertical;
   if (text == "horizontal") return KnownLine::Direction::kHorizontal;
-  throw InputError(where + ": direction: '" + text + "' is none of: vertical, horizontal");
+  throw InputError(where + ": direction: '" + text + "' is not one of: vertical, horizontal");
 }
 
 Eigen::Vector2d end_of(const CsvTable& csv, std::size_t row, const char* number, const Camera& camera) {

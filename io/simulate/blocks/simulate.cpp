@@ -151,7 +151,7 @@ void SimulationOptions::check() const {
   require_option(std::max(image_width, image_height) <= kMostPixels,
                  "image_width and image_height must be at most 1e5 px");
   const auto model = find_model(camera_model);
-  require_option(model.has_value(), "camera_model '" + camera_model + "' is none of: " + model_list());
+  require_option(model.has_value(), "camera_model '" + camera_model + "' is not one of: " + model_list());
   require_option(
       focal_px >= 0.3 * std::max(image_width, image_height) && focal_px <= 100.0 * std::max(image_width, image_height),
       "focal_px must lie in [0.3, 100] times the larger side");

@@ -231,7 +231,7 @@ TEST(CameraModelSimulation, ObservesByTheModel) {
   }
   SimulationOptions unknown;
   unknown.camera_model = "fish";
-  EXPECT_THAT(message_of<InputError>([&] { unknown.check(); }), HasSubstr("camera_model 'fish' is none of: brown,"));
+  EXPECT_THAT(message_of<InputError>([&] { unknown.check(); }), HasSubstr("camera_model 'fish' is not one of: brown,"));
 }
 
 }  // namespace

@@ -360,7 +360,7 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "origin: [46, 3, 1e300]\n"),
               HasSubstr("block.yaml:2: origin: 1e+300 is beyond"));
   EXPECT_THAT(refusal(folder, images + "images: images\n"), HasSubstr("block.yaml:2: key 'images' appears twice"));
-  EXPECT_THAT(refusal(folder, images + "cameras: {grouping: colour}\n"), HasSubstr("none of: exif, folder, one"));
+  EXPECT_THAT(refusal(folder, images + "cameras: {grouping: colour}\n"), HasSubstr("not one of: exif, folder, one"));
   EXPECT_THAT(refusal(folder, images + "cameras: {Nikon: {focal_px: 3}}\n"),
               HasSubstr("block.yaml:2: cameras: no camera is named 'Nikon'; the cameras are 'DJI FC300S"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_mm: 3}}\n"), HasSubstr("belong together"));

@@ -91,7 +91,7 @@ TEST(SettingsReader, RefusesUnitsAndWrongKinds) {
   EXPECT_THAT(input_message_of([&] {
                 SettingsReader(settings, "adjustment").choice("on", {"a", "b"}, choice);
               }),
-              HasSubstr("'yes' is none of: a, b"));
+              HasSubstr("'yes' is not one of: a, b"));
 }
 
 }  // namespace
