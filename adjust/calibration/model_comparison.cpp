@@ -37,7 +37,7 @@ void sort_by_size(std::vector<ModelCandidate>& candidates) {
 ModelCandidate find_candidate(const std::string& name) {
   const std::size_t slash = name.find('/');
   const auto model = find_model(name.substr(0, slash));
-  if (!model) throw InputError("'" + name + "' is no camera model; they are " + model_list());
+  if (!model) throw InputError("'" + name + "' is not a camera model; the models are " + model_list());
   if (is_panorama(*model))
     throw InputError("'" + name + "' is no model of a lens: stitched panoramas have none to compare");
   if (slash == std::string::npos) return candidate_of(*model, kAllTerms);

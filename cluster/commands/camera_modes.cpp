@@ -59,7 +59,7 @@ PanoramicTracks tracks_of(const CalibrationInput& input, CameraIndex camera) {
 Intrinsics start_of(const Camera& camera, const std::string& model_given) {
   if (model_given.empty()) return camera.intrinsics;
   const auto model = find_model(model_given);
-  if (!model) throw InputError("--model: '" + model_given + "' is no camera model; they are " + model_list());
+  if (!model) throw InputError("--model: '" + model_given + "' is not a camera model; the models are " + model_list());
   if (*model == camera.intrinsics.model()) return camera.intrinsics;
   return start_intrinsics(*model, camera.intrinsics[kFocal], camera.width, camera.height);
 }

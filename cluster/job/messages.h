@@ -1,4 +1,4 @@
-// Sends the messages of a run both to the console, as plain lines for a person, and to the log of this rank
+// Sends the messages of a run to the console, as plain lines for a person, and to the log of this rank
 // (cluster/process/job_log.h), with stage and unit.
 #pragma once
 
@@ -15,7 +15,8 @@ void say(const Job& job, const std::string& stage, const std::string& text);
 // Gives a warning, which the console shows even if the run is quiet: "merge        warning: ...".
 void warn(const Job& job, const std::string& stage, const std::string& text);
 
-// Gives a warning that the report and `status` list among the notes of the job. All ranks call it with the same text.
+// Gives a warning that the report and `status` list among the notes of the job; the console of the run does not show it.
+// All ranks call it with the same text.
 void add_note(Job& job, const std::string& stage, const std::string& text);
 
 // Warns of a damaged file of the job, which is computed again: "megablock: warning: FILE: PROBLEM; it is computed

@@ -5,7 +5,7 @@
 namespace megablock {
 
 std::span<const FrameMeasurementType> frame_measurement_types() {
-  static const std::vector<FrameMeasurementType> types{{"distances", "distance_m", "sigma_m"}};
+  static const std::vector<FrameMeasurementType> types{{"distances", "distance_m", "sigma_m", true}};
   return types;
 }
 

@@ -12,6 +12,7 @@ struct FrameMeasurementType {
   const char* key;           // in the project file: names the CSV file; in the block's file: the group
   const char* value_column;  // of the CSV file, with its unit
   const char* sigma_column;
+  bool positive;  // a value of zero or less is refused, as for lengths; false for signed values
 };
 std::span<const FrameMeasurementType> frame_measurement_types();
 

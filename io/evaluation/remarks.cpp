@@ -318,13 +318,12 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
     const ObservationStatistics& s = result.observation_table.kinds[k];
     const double factor = s.sigma_factor();
     if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, 1 + chance_of_factor(s)))) continue;
-    const bool weighed = kind >= kPositionHorizontal && kind <= kRelativePosition;
     lines.push_back(
         fmt::format("Residuals of {} ({}) are {:.1f} times as large as the stated sigmas predict: some observations "
                     "are wrong, or the sigmas are too small{}",
                     name_of(kind), s.count, factor,
-                    !weighed    ? ""
-                    : estimated ? "; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"
+                    !estimates_sigma(kind) ? ""
+                    : estimated            ? "; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"
                                 : "; 'merge: {estimate_sigmas: true}' estimates these sigmas from the residuals"));
   }
   return lines;

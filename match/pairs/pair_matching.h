@@ -23,7 +23,7 @@ struct MatchOptions {
   double ratio = 0.85;           // a neighbour passes if its distance < ratio * distance of neighbour k + 1
   double max_residual_px = 3.0;  // largest epipolar (Sampson) residual of an inlier (see TwoViewOptions), pixels
   double sample_spacing_px = 0;  // smallest distance in the first image between points of a RANSAC sample
-  int min_inliers = 20;          // with fewer inliers the pair is not verified
+  int min_inliers = 20;          // fewest inliers of a pair that is kept, besides those that chance gives
   // For vertical images, compare only features that agree with the turn of the pair (turned_matching.h).
   bool by_turn = true;
   // For pairs whose relative orientation is trusted (trusted_pair.h):

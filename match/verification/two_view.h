@@ -21,7 +21,7 @@ struct TwoViewOptions {
   // standard deviation also widens the limit for the transfer residuals of rotations and planes, up to 1.6 times
   // max_residual. Infinite: neither.
   double max_sigmas = 6;
-  int min_inliers = 20;
+  int min_inliers = 20;  // the stage `matching` sets it from MatchOptions (match/pairs/pair_matching.h)
   double by_chance = 0;  // share of wrong matches that fit by chance; 0: as for matches anywhere in the image
   // Points of a sample of three or five are at least this far apart in the image a (normalised units), if twenty draws
   // find such points (Kalantari 2009, chapter 7: 100 pixels).

@@ -76,7 +76,7 @@ class CompareModels(unittest.TestCase):
     def test_bad_input(self):
         def refused(*arguments):
             return one_line(megablock("calibrate", *arguments, "-o", work / "bad", expect=BAD_INPUT))
-        self.assertIn("is no camera model", refused(self.job, "--compare-models", "--models", "brwn"))
+        self.assertIn("is not a camera model", refused(self.job, "--compare-models", "--models", "brwn"))
         self.assertIn("radial terms", refused(self.job, "--compare-models", "--models", "brown/7"))
         self.assertIn("no job directory", refused(work, "--compare-models"))
         self.assertFalse((work / "bad").exists())

@@ -154,7 +154,7 @@ std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
   std::vector<std::string> lines;
   for (const TilePart* part : poor | std::views::take(kLines))
     lines.push_back(
-        fmt::format("tile {} disagrees with itself: it keeps {} of {} tie point observations ({:.0f} %), the others "
+        fmt::format("tile {} keeps few observations: {} of {} tie point observations ({:.0f} %), the others "
                     "{:.0f} %: most of its observations were rejected, and the others may agree by chance; check its "
                     "start poses and matches",
                     part->tile, part->kept, part->measured, 100 * share(*part), 100 * share_of_others(*part)));

@@ -67,7 +67,7 @@ ColmapCamera to_colmap(const std::string& camera, const Intrinsics& k) {
     return result;
   }
   throw InputError("camera '" + camera + "' has the model " + model_name(k.model()) + ", which COLMAP does not have; " +
-                   exportable_models() + " can be exported");
+                   "choose another format (COLMAP has " + exportable_models() + ")");
 }
 
 CameraFromColmap from_colmap(const ColmapCameraForm& form, const std::vector<double>& parameters) {

@@ -35,7 +35,8 @@ void read_frame_measurements(const FrameMeasurementType& type, const std::string
   const std::map<std::string, FrameIndex> frames = frames_by_name(block);
   for (std::size_t row = 0; row < csv.row_count(); ++row) {
     FrameMeasurement measured;
-    measured.value = positive_number(csv, row, type.value_column);
+    measured.value = type.positive ? positive_number(csv, row, type.value_column)
+                                   : csv.needed_number(row, type.value_column);
     measured.sigma = positive_number(csv, row, type.sigma_column);
     bool used = true;
     for (const char* end : {"from", "to"}) {

@@ -173,12 +173,12 @@ TEST(ResultParts, TilesThatKeepFarLessThanOthersAreNamed) {
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_THAT(lines[0],
               testing::StartsWith(
-                  "tile 1 disagrees with itself: it keeps 46 of 757 tie point observations (6 %), the others 94 %:"));
+                  "tile 1 keeps few observations: 46 of 757 tie point observations (6 %), the others 94 %:"));
   std::vector<TilePart> many{part(9, 100000, 99000)};
   for (std::int64_t t = 0; t < 5; ++t) many.push_back(part(t, 1000, 100 - t));
   const std::vector<std::string> worst = judge_kept(many);
   ASSERT_EQ(worst.size(), 4U);
-  EXPECT_THAT(worst[0], testing::HasSubstr("tile 4 disagrees with itself: it keeps 96 of 1000"));
+  EXPECT_THAT(worst[0], testing::HasSubstr("tile 4 keeps few observations: 96 of 1000"));
   EXPECT_THAT(worst[3], testing::StartsWith("2 more tiles"));
 }
 
