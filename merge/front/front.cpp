@@ -12,6 +12,17 @@ namespace megablock {
 
 namespace {
 
+// The factorisation goes through the columns of E in panels (right-looking, blocked). With A_11 the diagonal block of
+// the panel, A_21 what is below it, and A_22 the columns of E behind it:
+//
+//     L_11 L_11' = A_11            column by column, with the test of every pivot
+//     L_21 = A_21 L_11^-T          dtrsm; the columns of held unknowns are then set to zero
+//     z_1 = L_11^-1 b_1,  b_2 -= L_21 z_1                            all right-hand sides
+//     A_22 -= L_21 L_21'           dsyrk for the rows of E, dgemm for those of P
+//
+// The columns of P get -Y Y' in one dsyrk after the last panel, so that the largest matrix is read and written once.
+// All but the small diagonal blocks is done by BLAS. LAPACK's dpotrf is no choice for these blocks: it stops at the
+// first pivot that is not positive, where this code has to hold the unknown and go on.
 constexpr std::int64_t kPanel = 64;  // columns per step of the blocked factorisation
 
 void write_sums(ByteWriter& out, const SubtreeSums& sums) {
@@ -41,7 +52,8 @@ SubtreeSums read_sums(ByteReader& in) {
 }
 
 // The partial Cholesky factorisation of the first e rows and columns of a symmetric n x n matrix. `factor` holds the
-// columns of these [n x e], `update` the rest [p x p] (lower triangles, column-major).
+// columns of these [n x e], `update` the rest [p x p] (lower triangles, column-major). `reference` [e] are the diagonal
+// elements with which the pivots are compared.
 class PartialCholesky {
  public:
   PartialCholesky(double* factor, double* update, std::int64_t n, std::int64_t e, double* rhs,
@@ -55,6 +67,7 @@ class PartialCholesky {
       cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, blas(p), blas(e_), -1, a_ + e_, blas(n_), 1, update_,
                   blas(p));
   }
+  // After run(): the rows that were held, ascending, and their pivots over `reference`.
   std::vector<std::int64_t> held;
   std::vector<double> held_ratio;
 
@@ -81,10 +94,13 @@ class PartialCholesky {
     }
   }
 
-  // Factorises column by column with the test of the pivots. A held row and column become those of the identity.
+  // Factorises column by column with the test of the pivots. A held row and column become those of the identity. Its
+  // row is cleared back to the first column of E, so that dtrsm and the steps down see the identity, too.
   void factorise_diagonal_block(std::int64_t first, std::int64_t end) {
     for (std::int64_t k = first; k < end; ++k) {
       const double pivot = at(k, k);
+      // The condition is negated, so that a pivot that is no number is held as well. Observations that are not finite
+      // have been refused before (point_equations.cpp).
       if (!(pivot > kPivotTolerance * reference_[k])) {
         held.push_back(k);
         held_ratio.push_back(reference_[k] > 0 ? pivot / reference_[k] : 0);
@@ -103,6 +119,7 @@ class PartialCholesky {
     }
   }
 
+  // z_1 and b_2 of the head. A held unknown gets z = 0.
   void forward_substitute(std::int64_t first, std::int64_t width, std::size_t held_before) {
     for (std::size_t h = held_before; h < held.size(); ++h)
       for (std::int64_t c = 0; c < columns_; ++c) rhs_[held[h] + c * n_] = 0;
@@ -241,6 +258,7 @@ Step Step::from_bytes(const Bytes& bytes) {
   return step;
 }
 
+// Takes the smallest buffer that is large enough. Without one, the largest buffer is given back to the system.
 std::vector<double> FrontMemory::take(std::size_t size) {
   std::vector<double> buffer;
   const auto enough = std::find_if(free_.begin(), free_.end(), [&](const auto& b) { return b.capacity() >= size; });
@@ -271,6 +289,7 @@ Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand
   eliminated_dimension_ = eliminated_rows_.back();
   for (std::int64_t& row : passed_rows_) row += eliminated_dimension_;
   dimension_ = passed_rows_.back();
+  // A full matrix of this size takes 80 GB.
   if (dimension_ > 100000)
     throw ComputeError("merge: a front of " + std::to_string(dimension_) +
                        " unknowns; make tiles smaller or drop weak links between tiles");
@@ -291,7 +310,8 @@ std::int64_t Front::row_of(const UnknownId& id) const {
 }
 
 void Front::add(const UpdateMatrix& child) {
-  // A run of the child's rows that follow each other in this front too.
+  // A run of the child's rows that follow each other in this front too. Most frames of a child are neighbours here as
+  // well, so that whole stretches are added without a table of rows.
   struct Run {
     std::int64_t row, first, count;  // row in this front, first row in the child, number of rows
   };
@@ -306,6 +326,7 @@ void Front::add(const UpdateMatrix& child) {
       runs.push_back({row, n, u.dimension});
     n += u.dimension;
   }
+  // The packed triangle of the child is read once, from its first to its last value.
   const double* source = child.matrix.data();
   for (auto across = runs.begin(); across != runs.end(); ++across) {
     for (std::int64_t k = 0; k < across->count; ++k) {
@@ -313,7 +334,9 @@ void Front::add(const UpdateMatrix& child) {
       for (auto down = across; down != runs.end(); ++down) {
         const std::int64_t skipped = down == across ? k : 0, count = down->count - skipped;
         const std::int64_t row = down->row + skipped;
-        const bool below = row >= column;  // otherwise the block is added transposed
+        // A later row of the child lies above an earlier one where the first is in E and the second in P. The block is
+        // then added transposed.
+        const bool below = row >= column;
         const Place target = below ? place(row, column) : place(column, row);
         const std::int64_t step = below ? 1 : target.stride;
         if (step == 1)
@@ -334,6 +357,8 @@ void Front::add(const UpdateMatrix& child) {
 
 Front::Result Front::eliminate(double lambda) && {
   const std::int64_t n = dimension_, e = eliminated_dimension_, p = n - e;
+  // The pivots are compared with the damped diagonal. The constraints of a free datum are in K and not in `diagonal_`,
+  // so that they add no information to the comparison.
   std::vector<double> reference(static_cast<std::size_t>(e));
   for (std::int64_t k = 0; k < e; ++k) {
     const double d = diagonal_[static_cast<std::size_t>(k)];
@@ -361,10 +386,12 @@ Front::Result Front::eliminate(double lambda) && {
 
   update.sums = std::move(sums_);
   update.sums.unknowns += e;
+  // Only the first right-hand side is the gradient; the others belong to the inner constraints.
   double squares = 0;
   for (std::int64_t k = 0; k < e; ++k) squares += rhs_[static_cast<std::size_t>(k)] * rhs_[static_cast<std::size_t>(k)];
   update.sums.decrement_squared += squares;
   for (std::size_t h = 0; h < cholesky.held.size(); ++h) {
+    // The unknown that has this row: the last one that begins at or before it.
     const auto after = std::upper_bound(eliminated_rows_.begin(), eliminated_rows_.end(), cholesky.held[h]);
     const auto u = static_cast<std::size_t>(after - eliminated_rows_.begin()) - 1;
     update.sums.held.push_back({eliminated_[u].id, cholesky.held[h] - eliminated_rows_[u], cholesky.held_ratio[h]});
@@ -379,6 +406,8 @@ Step back_substitute(const FrontFactor& factor, const Step& passed) {
   const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
   const std::int64_t columns = factor.right_hand_sides;
   const Step outer = factor.passed.empty() ? Step{{}, columns, {}} : passed.restricted_to(factor.passed);
+  // x_E = L^-T (z - Y'x_P) for all right-hand sides at once. Held unknowns get zero and change no other, because their
+  // rows of z and columns of L and Y are zero but for the one on the diagonal.
   std::vector<double> x = factor.z;
   if (e > 0) {
     if (p > 0)

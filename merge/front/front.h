@@ -1,16 +1,33 @@
 // Dense fronts: one step of the elimination, the same for the cells of a tile and for the nodes of the merge tree.
 //
 // A front holds the normal equations K x = b of the unknowns E, which are eliminated here, and of the separator P,
-// whose equations go to the parent. With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the update
-// matrix is
+// whose equations go to the parent. It stands for the quadratic form of the residuals below its node,
+//
+//     q(x) = 1/2 x'K x - b'x,    K = | K_EE   .   |   b = | b_E |
+//                                    | K_PE  K_PP |,      | b_P |.
+//
+// With K_EE = L L', Y = K_PE L^-T and z = L^-1 b_E (blocked Cholesky), the minimum over x_E is again a quadratic form,
+// now of x_P alone: min q = 1/2 x_P'S x_P - s'x_P - 1/2 |z|^2. Its matrix S is the Schur complement of K_EE, and it is
+// the update matrix that goes to the parent:
 //
 //     S = K_PP - Y Y',   s = b_P - Y z.
 //
-// The square of the Newton decrement grows by |z|^2, and on the way down x_E = L^-T (z - Y' x_P).
+// The parent adds the forms of its children, which is exact: nothing is approximated on the way to the root. This is
+// Helmert's blocking (1880) along a tree. In the literature on sparse matrices it is nested dissection (A. George, SIAM
+// J. Numer. Anal. 10(2), 1973) by the multifrontal method (I. Duff, J. Reid, ACM TOMS 9(3), 1983).
+//
+// The square of the Newton decrement b'K^-1 b of the whole block is the sum of |z|^2 over all nodes and points, so each
+// front adds its |z|^2. On the way down x_E = L^-T (z - Y' x_P).
+//
+// Damping: (J'J + lambda D) x = b with D = diag(J'J) (Marquardt 1963). The diagonal of K is smaller than D once
+// children have been eliminated, because S = K_PP - Y Y'. D therefore goes up the tree next to the matrices. Each
+// unknown is damped once, at the node that eliminates it, where the D of all residuals with this unknown is complete.
 //
 // A pivot below 1e-12 of the diagonal of J'J before the elimination (of the damped diagonal when lambda > 0) marks a
-// direction that the observations do not determine. Its scalar unknown is held (x = 0, a minimal constraint) and
-// reported.
+// direction that the observations do not determine. Without damping the ratio is the squared sine of the angle between
+// the column of J and the space of the columns eliminated before it. The scalar unknown of the pivot is held (x = 0, a
+// minimal constraint) and reported. In the formulas above, its row and column of L become those of the identity, and
+// its rows of z and columns of Y become zero.
 //
 // Sign: b = -J'r, so that x is the step. Right-hand side 0 is b; a free block adds further ones for its inner
 // constraints. The result of every function depends on its inputs alone, and children are added in their order, so that
@@ -34,7 +51,8 @@ struct HeldUnknown {
   double ratio = 0;            // pivot / diagonal before the elimination; 0 / 0 counts as 0
 };
 
-// Sums over a subtree besides the matrices.
+// Sums over a subtree besides the matrices. All of them are additive. They travel with the update, so that the root has
+// the sums of the whole block.
 struct SubtreeSums {
   double cost = 0;                // 1/2 sum rho(|r|^2)
   double weighted_squares = 0;    // sum rho' |r|^2
@@ -48,7 +66,8 @@ struct SubtreeSums {
   void add(const SubtreeSums& other);  // in the order of the calls
 };
 
-// The decrease of x'Sx - 2 b'x from x = 0 to its minimum, b'S^+ b, and the rank of S.
+// The decrease of x'Sx - 2 b'x from x = 0 to its minimum, b'S^+ b, and the rank of S. The value is twice the decrease
+// of the cost, as a chi-square wants it.
 struct LeastSquares {
   double value = 0;
   std::int64_t rank = 0;
@@ -85,7 +104,9 @@ struct FrontFactor {
   static FrontFactor read(ByteReader& in);
 };
 
-// Values of a list of unknowns, such as a step of the adjustment.
+// Values of a list of unknowns, such as a step of the adjustment. Frames and mounts have a rotation (radians) and a
+// position (metres); increments are those of geometry/transform/rotation.h. Column 0 answers the right-hand side b, the
+// further ones answer those of the inner constraints.
 struct Step {
   UnknownList unknowns;  // ascending
   std::int64_t columns = 1;
@@ -124,10 +145,10 @@ class FrontMemory {
 
 // A front that is being filled. The rows of the eliminated unknowns come first, those of the separator unknowns follow.
 // The columns of the two are stored apart, so that the first become the factor without a copy. Only the lower triangle
-// is used.
+// is used. Of the columns of P only the rows of P are stored, because the rows of E above them are in the columns of E.
 class Front {
  public:
-  // `memory` may be null; otherwise it outlives the front.
+  // `memory` may be null; otherwise it outlives the front. Throws ComputeError for more unknowns than a front may have.
   Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1, FrontMemory* memory = nullptr);
 
   std::int64_t dimension() const { return dimension_; }
@@ -154,7 +175,7 @@ class Front {
 
   struct Result;
   // Adds lambda * diagonal to the eliminated rows and factorises them. Returns the update and the factors. The front
-  // cannot be used afterwards.
+  // cannot be used afterwards. Its eliminated columns become the factor without a copy; the update is packed.
   Result eliminate(double lambda) &&;
 
  private:

@@ -1,4 +1,17 @@
 // Computes the covariance of a front, block by block (front.h).
+//
+// With X = K_PE K_EE^-1 = Y L^-1 [p x e], the unknowns of E depend on those of P by x_E = K_EE^-1 b_E - X'x_P. Given
+// x_P they have the covariance K_EE^-1, and x_P itself has C_PP from the parent. Both parts are independent, hence
+//
+//     C_PE = -C_PP X,    C_EE = L^-T L^-1 + X' C_PP X = L^-T L^-1 - X' C_PE.
+//
+// This is the recursion of K. Takahashi, J. Fagan and M.-S. Chin (1973) in blocks: of the inverse of the whole normal
+// matrix only those elements are computed that the fronts hold. It is complete, because the front of the parent holds
+// all unknowns of P, and so its covariance has all of C_PP. A sweep with lambda = 0 must have made the factors: a
+// damped factor gives covariances that are too small.
+//
+// A held unknown has a unit row and column in L. Its one in the right-hand side of L^-1 is replaced by zero, so that
+// its row and column of L^-1 and X vanish, and with them its variance and covariances.
 #include <cblas.h>
 
 #include <algorithm>
@@ -80,6 +93,7 @@ FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix give
   FrontCovariance covariance{factor.eliminated, factor.passed, {}, {}, std::move(given.matrix)};
   if (e == 0) return covariance;
 
+  // The memory of L^-1 is free again before X and C_PE are allocated.
   covariance.inner.assign(static_cast<std::size_t>(e * e), 0);
   {
     std::vector<double> inverse(static_cast<std::size_t>(e * e), 0);  // L^-1
@@ -106,7 +120,8 @@ FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix give
 
 namespace {
 
-// The elements of a front's covariance, in the order of a list of its unknowns.
+// The elements of a front's covariance, in the order of a list of its unknowns. The three blocks stay where they are,
+// and an element above the diagonal is read from below it.
 class RestrictedCovariance {
  public:
   // Throws ComputeError when one is missing.

@@ -1,4 +1,7 @@
 // Finds the rows of unknowns in the matrices of fronts, and packs triangles. Internal to merge/front/.
+//
+// Lists of unknowns name blocks of several scalar rows each (unknowns.h). The matrices have a row for every scalar. The
+// functions translate the first into the second.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +13,11 @@
 
 namespace megablock {
 
+// BLAS takes dimensions of 32 bits. The limit of a front's dimension (front.cpp) lies far below.
 inline int blas(std::int64_t n) { return static_cast<int>(n); }
 
-// The first row of every unknown of `wanted` in `list`, whose rows are laid out as by row_offsets(list).
+// The first row of every unknown of `wanted` in `list`, whose rows are laid out as by row_offsets(list). Throws
+// ComputeError, with `what` as the subject of its message, when one is missing.
 inline std::vector<std::int64_t> rows_in(const UnknownList& list, const UnknownList& wanted, const char* what) {
   const std::vector<std::int64_t> offsets = row_offsets(list);
   std::vector<std::int64_t> rows;
