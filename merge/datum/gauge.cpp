@@ -1,3 +1,20 @@
+// The information of a component about its datum is the 7 x 7 matrix of gauge.h, in blocks of phi (r), t and s:
+//
+//     | N_rr  N_rt  n_rs |
+//     |       N_tt  n_ts |
+//     |             n_ss |
+//
+// The free directions are found in the order shift, rotation, scale. Each is eliminated before the next is judged, so
+// that a direction is called determined only by what is left once the earlier ones are estimated along with it:
+//
+//     t   = -N_tt^+ (N_tr phi + n_ts s)                                    to_rotation, to_scale
+//     A   = N_rr - N_rt N_tt^+ N_tr,   a = n_rs - N_rt N_tt^+ n_ts         turning, both
+//     phi = -A^+ a s                                                       turned
+//     information about s = n_ss - n_st N_tt^+ n_ts - a'A^+ a              scale_information
+//
+// Rotations and the scale have natural units, and their information is compared with one (kDetermined). Shifts have
+// none; they are free in the null space alone, which is a share of the largest eigenvalue. Pseudo-inverses leave out
+// the eigenvectors that are free.
 #include "merge/datum/gauge.h"
 
 #include <algorithm>
@@ -25,7 +42,10 @@ struct PartGroup {
   std::int64_t lowest_frame = -1;
 };
 
-// Expresses similarity parameters about the part's own centre and extent by those about (to.centre, to.extent).
+// Expresses similarity parameters about the part's own centre and extent (c, L) by those about (c', L') of the
+// component. From phi x (X - c') + L't' + s (X - c') = phi x (X - c) + L t + s (X - c) for all X, with u = c - c',
+//
+//     t = (L't' - [u]x phi + s u) / L.
 Matrix77 change_of_reference(const GaugePart& from, const BlockComponent& to) {
   const Eigen::Vector3d shift = from.centre - to.centre;
   Matrix77 change = Matrix77::Identity();
@@ -73,6 +93,7 @@ Freedom freedom_of(const Matrix77& normal) {
     else
       turned -= turn.vectors.col(i) * turn.vectors.col(i).dot(both) / turn.values(i);
   }
+  // A free rotation takes along the shift that follows from it.
   freedom.directions = Eigen::MatrixXd::Zero(7, free_shifts + free_turns);
   freedom.directions.block(3, 0, 3, free_shifts) = shift.vectors.leftCols(free_shifts);
   freedom.directions.block(0, free_shifts, 3, free_turns) = turn.vectors.leftCols(free_turns);
@@ -88,6 +109,7 @@ Matrix77 movable_directions(const Matrix77& held) {
   Matrix77 movable = Matrix77::Identity();
   const SymmetricEigen movement = symmetric_eigen(held);
   for (int i = 0; i < 7; ++i)
+    // Where no position is held, all values are zero and nothing is taken out.
     if (movement.values(i) > kNullDirection * movement.values(6))
       movable -= movement.vectors.col(i) * movement.vectors.col(i).transpose();
   return movable;
@@ -97,6 +119,7 @@ Matrix77 movable_directions(const Matrix77& held) {
 BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   BlockComponent c;
   c.lowest_frame = group.lowest_frame;
+  // The sums go in the order of the tiles.
   for (const GaugePart* part : group.parts) {
     c.frames += part->frames;
     c.centre += static_cast<double>(part->frames) * part->centre;
@@ -115,6 +138,7 @@ BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   }
   c.movable = movable_directions(held);
   c.pivot = c.centre;
+  // The held positions give sum L^2 I as the block of t and sum L (X - c) as the column of t and s.
   if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
   freedom = freedom_of(normal);
   // A scale moves no frame where all frames are at one place: a single frame that is known by its position only, for
@@ -149,6 +173,7 @@ void number_columns(const std::vector<std::size_t>& scale_group, const std::vect
     std::int64_t component = -1, column = -1;
     bool free() const { return component >= 0 && information <= limit; }
   };
+  // Information about a common scale adds up over its components, whose scales are the same unknown.
   std::vector<Scale> scales(components.size());  // by the number of the group
   for (std::size_t c = 0; c < components.size(); ++c) {
     Scale& scale = scales[scale_group[c]];
@@ -180,6 +205,11 @@ void number_columns(const std::vector<std::size_t>& scale_group, const std::vect
 
 // Holds the lowest frame along all directions that it can hold, and the farthest frame along the rest. The position of
 // a frame stands for its reference place: a direction near the free one holds the free one as well.
+//
+// `free` has combinations of the free directions as columns. The singular values of W^1/2 N_f `free` say how far each
+// moves the frame. The frame holds those above kHeldDirection; the right singular vectors of the others are returned,
+// and the second frame holds these. The scale, for example, hardly moves a frame near the centroid, but it moves one
+// far from it.
 void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<GaugeConstraint>& constraints) {
   const Vector6 unit = c.weights().cwiseSqrt();
   const auto hold = [&](std::int64_t frame, const Eigen::Vector3d& centre, const Eigen::MatrixXd& free) {
@@ -330,6 +360,8 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
   columns.columns = gauge.defect();
   for (const Unknown& u : plan.owned)
     if (u.id.kind == UnknownKind::kFrame) columns.unknowns.push_back(u);
+  // The further right-hand sides are the rows W N of the owned frames. The other unknowns have zero, because W weighs
+  // frames alone.
   const std::int64_t n = total_dimension(columns.unknowns);
   columns.values.assign(at(n * columns.columns), 0);
   for (std::size_t i = 0; i < columns.unknowns.size(); ++i) {

@@ -1,18 +1,23 @@
 // Finds the directions of the datum that the observations of the block leave free, and fixes them by minimal
 // constraints. Covariances are expressed under inner constraints. Every free direction is reported.
-// A similarity of the ground has the rotation phi about the centroid c of a component, the shift L t and the scale 1 +
-// s, where L is the extent of the component. It moves
+//
+// A similarity of the ground has the rotation phi (radians) about the centroid c of a component, the shift L t and the
+// scale 1 + s, where L is the extent of the component in metres. It moves
 //
 //     points   dX = phi x (X - c) + L t + s (X - c)
 //     frames   dw = -phi,  dC = phi x (C - c) + L t + s (C + R'C_0 - c)
 //     mounts   dC_m = s (C_m - C_0),   C_0 that of the rig's first mount, which is held and so moves with the frame
 //
-// and changes no image residual; the scale only where two held mounts of a rig do not fix it. With N the matrix of
-// these movements, the priors determine the similarity by the 7 x 7 matrix sum (J N)'(J N) of their residuals. Its null
-// space is free: 7 directions for single cameras without priors, 6 with held rigs, 1 for positions on one straight
-// line, 4 with attitudes only. A rotation also counts as free when the priors give it no better than to a radian, and a
-// scale when they give it no better than to a factor (positions that are within their own noise of a straight line):
-// the linearised system says nothing of such directions.
+// and changes no image residual; the scale only where two held mounts of a rig do not fix it. The frame's centre C does
+// not grow about c itself: the camera of the first mount is at the reference place C + R'C_0, it must move as a point
+// does, and C_0 keeps its length. The other cameras of the rig follow because their mounts grow about C_0.
+//
+// Let N be the matrix of these movements, with the columns (phi, t, s), and J the Jacobian of all residuals. Images
+// give J N = 0, so only the other observations tell the similarity, by the 7 x 7 matrix sum (J N)'(J N) of their
+// residuals. Its null space is free: 7 directions for single cameras without priors, 6 with held rigs, 1 for positions
+// on one straight line, 4 with attitudes only. A rotation also counts as free when the priors give it no better than to
+// a radian, and a scale when they give it no better than to a factor (positions that are within their own noise of a
+// straight line): the linearised system says nothing of such directions.
 //
 // The free directions belong to a connected component of the block, and are found before every sweep up. Pivots that
 // vanish in spite of the datum (front.h) are unknowns that too few observations determine; they are reported as such.
@@ -20,9 +25,16 @@
 // and it is then one direction of all of them together.
 //
 // The minimal constraints hold one frame along the free directions, and a second frame along the directions that the
-// first cannot hold (the scale, in one of the components that have it in common). Each adds D^1/2 P D^1/2 to the
-// frame's own 6 x 6 block, where D is the diagonal of that block and P the projection on the directions. This couples
-// no unknowns, makes no dense rows, adds nothing to the gradient, and leaves the decrement unchanged.
+// first cannot hold (the scale, in one of the components that have it in common). With N_f the six rows of N of a
+// frame, D the diagonal of its own 6 x 6 block and B = Q'D^1/2, Q an orthonormal basis of the columns of D^1/2 N_f,
+// each adds B'B = D^1/2 Q Q'D^1/2 to this block: the constraint B x_f = 0 with the weight of the observations of the
+// frame. B N is regular. Then, for normal equations H x = b with b = -J'r and so N'b = 0,
+//
+//     (H + B'B)^-1 b is a solution x of H x = b with B x = 0,    b'(H + B'B)^-1 b = b'x,
+//
+// whatever the weight. The constraints thus move no adjusted observation and leave the decrement unchanged. They couple
+// no unknowns, make no dense rows and add nothing to the gradient. A rotation that priors give, but no better than to a
+// radian, is held in the same way, although for it H N is not quite zero.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,12 +52,14 @@ using Matrix37 = Eigen::Matrix<double, 3, 7>;
 using Matrix67 = Eigen::Matrix<double, 6, 7>;
 using Matrix77 = Eigen::Matrix<double, 7, 7>;
 
-// A part of a tile that holds together, with the tile's information about the datum of its component.
+// A part of a tile that holds together, with the tile's information about the datum of its component. It is small, and
+// every rank gathers the parts of all tiles: the datum of the block follows from them alone.
 struct GaugePart {
   std::vector<std::int64_t> boundary_frames;  // frames that other tiles may share, ascending indices of the block
   std::int64_t frames = 0;                    // number of frames of the part, boundary frames included
   std::int64_t lowest_frame = -1;             // index in the block
   Eigen::Vector3d lowest_centre = Eigen::Vector3d::Zero();
+  // The second frame of the minimal constraints, far from the first one, is chosen among these.
   std::array<std::int64_t, 6> extreme_frames{};  // indices of the frames with the smallest and largest east, north, up
   Eigen::Matrix<double, 3, 6> extreme_centres = Eigen::Matrix<double, 3, 6>::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // c of `normal`
@@ -61,13 +75,14 @@ struct TileGauge {
   Bytes to_bytes() const;
   static TileGauge from_bytes(const Bytes& bytes);
 };
+// Needs all tables of the tile, also those that may lie in scratch (tile_store.h).
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
 // The reference place C + R'C_0 of a frame row.
 Eigen::Vector3d reference_place(const TileProblem& problem, const TileState& state, std::size_t frame);
 
-// The movement by a similarity about `centre`, with columns (phi, t, s). `reference` is the reference place of the
-// frame.
+// The movement by a similarity about `centre`, with columns (phi, t, s): rows of N, radians and metres. `reference` is
+// the reference place of the frame. That of a mount has only the column of the scale.
 Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& reference,
                              const Eigen::Vector3d& centre, double extent);
 Matrix37 similarity_of_point(const Eigen::Vector3d& position, const Eigen::Vector3d& centre, double extent);
@@ -94,10 +109,12 @@ struct BlockComponent {
   FreeMoves move_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& reference) const;
   FreeMoves move_point(const Eigen::Vector3d& position) const;
   FreeMoves free_part(const Matrix67& similarity) const;
+  // Squares of rotations (rad) and of positions (in extents) weigh alike.
   Eigen::Matrix<double, 6, 1> weights() const;  // diagonal of W
 };
 
-// Holds one frame along `count` directions.
+// Holds one frame along `count` directions. The columns of `directions` are independent combinations of the columns of
+// N_f.
 struct GaugeConstraint {
   std::int64_t frame = -1;
   std::int64_t count = 0;
@@ -111,7 +128,8 @@ struct BlockGauge {
   std::int64_t defect() const;  // sum over the components = number of further right-hand sides
   bool free() const { return defect() > 0; }
 };
-// Finds the datum of the block from all tiles, in tile order.
+// Finds the datum of the block from all tiles, in tile order. The result has the same bits on every rank, as it depends
+// on the gathered parts alone.
 BlockGauge make_gauge(const std::vector<TileGauge>& tiles);
 
 // The component of every frame row of a tile; nullptr: the row is untouched, or the datum of its component is complete.
@@ -119,6 +137,7 @@ std::vector<const BlockComponent*> free_component_of_frame(const BlockGauge& gau
                                                            const TilePlan& plan);
 
 // The part of the datum that one tile adds: its constraints and, if asked for, the rows W N of the frames that it owns.
+// Every frame is owned by one tile of the block, so that each constraint is added once.
 TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
                      const TileState& state, bool with_columns);
 
@@ -129,6 +148,8 @@ struct GaugeReport {
   std::string text = "fixed by priors";
 };
 using UnknownName = std::function<std::string(const UnknownId&)>;
+// `root` has the sums at the root of a sweep with lambda = 0. Without a gauge, as where fronts are eliminated alone,
+// vanished pivots stand for the free datum.
 GaugeReport judge_gauge(
     const SubtreeSums& root, const BlockGauge& gauge = {},
     const UnknownName& name = [](const UnknownId& id) { return describe(id); });

@@ -1,4 +1,9 @@
 // Computes the information of one tile about the datum: how far its priors determine the similarities of each part.
+//
+// For every residual r that is not an image observation, J = dr/dx by the frame, point or mount that it observes, and N
+// the rows of this unknown (gauge.h), the part's matrix grows by (J N)'(J N). Residuals are divided by their sigmas, so
+// that an element about a rotation has the unit 1 / rad^2, and one about a shift is a number of sigmas in an extent,
+// squared. Robust losses are not applied.
 #include <algorithm>
 #include <type_traits>
 
@@ -11,7 +16,8 @@ namespace megablock {
 
 namespace {
 
-constexpr double kScaleGiven = 1e6;    // weight of the scale in a part where held mounts fix it
+// Weight of the scale in a part where held mounts fix it, as if a prior gave it to a thousandth.
+constexpr double kScaleGiven = 1e6;
 constexpr double kAtReference = 1e-9;  // metres: a mount nearer to its rig's reference is not moved by a scale
 
 // Fills the parts of a tile.
@@ -31,6 +37,7 @@ class PartBuilder {
   }
 
  private:
+  // Frames are visited in ascending order, so that the first frame of a part is its lowest one.
   void describe_frames() {
     for (std::size_t f = 0; f < part_.size(); ++f) {
       if (part_[f] < 0) continue;
@@ -68,6 +75,7 @@ class PartBuilder {
   }
   Eigen::Vector3d reference(LocalFrame frame) const { return reference_place(problem_, state_, at(frame.value)); }
   GaugePart& part_of(LocalFrame frame) { return parts_[at(part_[at(frame.value)])]; }
+  // N of a frame, about the centre of its part.
   Matrix67 move(const GaugePart& part, LocalFrame frame) const {
     return similarity_of_frame(state_.frames[at(frame.value)].centre, reference(frame), part.centre, part.extent);
   }
@@ -80,6 +88,7 @@ class PartBuilder {
     if (term.frame < 0) return;
     const LocalFrame frame(term.frame);
     GaugePart& part = part_of(frame);
+    // The length of a base grows by its own length with the scale: d|b| / ds = |b|.
     if (term.base_to >= 0) {
       const Eigen::Vector3d base = reference(LocalFrame(term.base_to)) - reference(frame);
       part.normal(6, 6) += base.squaredNorm() / (term.base_sigma_m * term.base_sigma_m);
@@ -91,9 +100,13 @@ class PartBuilder {
           if constexpr (!std::is_same_v<std::decay_t<decltype(by_frame)>, std::monostate>) add(part, by_frame * moved);
         },
         term.by_frame);
+    // Directions that move held positions are no motions of the whole component (BlockComponent::movable). The sigma
+    // does not matter here, only whether they move.
     if (term.holds_place) part.held += moved.bottomRows<3>().transpose() * moved.bottomRows<3>();
   }
 
+  // Priors of control points. The point moves by dX of gauge.h, and its residual is divided by sigma on each axis; an
+  // infinite sigma adds nothing.
   void add_point_priors() {
     for (const auto& term : problem_.point_priors) {
       const std::int64_t point = term.point.value;
@@ -104,6 +117,8 @@ class PartBuilder {
     }
   }
 
+  // Mounts tell the scale alone: a similarity of the ground turns and shifts no mount. A mount counts in every part
+  // that has images of it.
   void add_mounts() {
     std::vector<std::pair<std::int64_t, std::int32_t>> seen;  // (part, mount)
     for (const TileImage& image : problem_.images)
@@ -121,6 +136,8 @@ class PartBuilder {
     }
   }
 
+  // A free mount that sees points carries the scale of one part to all others that it sees. A mount without kept
+  // observations, or one that a scale does not move, carries nothing.
   void list_free_mounts() {
     std::vector<std::uint8_t> moved(problem_.mounts.size(), 0);
     for (std::size_t m = 0; m < moved.size(); ++m)

@@ -35,7 +35,7 @@ InnerSums InnerSums::from_bytes(const Bytes& bytes) {
 
 namespace {
 
-// Columns 1 and up of an unknown's rows: [6 x defect].
+// Z of a frame or mount: columns 1 and up of its rows, [6 x defect].
 Eigen::MatrixXd columns_of(const Step& unknowns, const UnknownId& id, std::int64_t defect) {
   Eigen::MatrixXd z(6, defect);
   for (std::int64_t k = 0; k < defect; ++k)
@@ -48,7 +48,8 @@ struct ComponentSums {
   Eigen::MatrixXd inverse, k;
 };
 
-// C' = C - Z M^-1 N' - N M^-1 Z' + N M^-1 K M^-1 N', for one diagonal block.
+// Replaces C by C' (inner_constraints.h) in one diagonal block. N has the columns of the component alone, Z those of
+// the whole block.
 template <typename Block>
 void transform(Block& c, const Eigen::MatrixXd& z, const Eigen::MatrixXd& n, const ComponentSums& sums) {
   const Eigen::MatrixXd cross = z * sums.inverse * n.transpose();
@@ -78,6 +79,7 @@ void to_inner_constraints(const BlockGauge& gauge, const InnerSums& sums, std::i
                           const TilePlan& plan, const TileState& state, const Step& unknowns,
                           TileCovariance& covariance) {
   if (!gauge.free()) return;
+  // M is inverted as a whole: components with a common scale share a column, and through it M couples them.
   const Eigen::MatrixXd whole = inverse(sums.m);
   std::vector<ComponentSums> of_component;
   for (const BlockComponent& c : gauge.components) {
