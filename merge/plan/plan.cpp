@@ -1,3 +1,7 @@
+// An unknown of leaves_of(u) leaves goes up the tree with the number of leaves below the present node that touch it. At
+// the lowest node where this number is leaves_of(u), no leaf elsewhere has the unknown, and it is eliminated. The lists
+// of two children are merged in ascending order, so the work is the total size of the separators, and no node looks at
+// the whole table of unknowns.
 #include "merge/plan/plan.h"
 
 #include <algorithm>
@@ -47,6 +51,7 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
     for (const Unknown& u : leaf_unknowns[leaf]) {
       const auto row = static_cast<std::size_t>(find_unknown(table, u.id));
       touched_by_leaf[leaf].push_back({row, 1});
+      // The first leaf that touches an unknown owns it.
       if (leaves_of[row]++ == 0) owned[leaf].push_back(u);
     }
   }
@@ -58,6 +63,7 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
   plan.node_of_leaf.assign(leaf_unknowns.size(), -1);
   std::vector<TouchedList> open(tree.nodes.size());
   for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
+    // Children come before parents, so that `open` of both children is there.
     const MergeTree::Node& source = tree.nodes[i];
     PlanNode& node = plan.nodes[i];
     node.left = source.left;
@@ -117,7 +123,8 @@ FrontCosts front_costs(const EliminationPlan& plan) {
     if (node.leaf >= 0) continue;
     const std::int64_t width = node.front_dimension();
     costs.widest = std::max(costs.widest, width);
-    // The Cholesky factorisation of e columns, the rows below them, and the update.
+    // The Cholesky factorisation of e columns (e^3 / 3), the p rows below them (Y, p e^2), and the update (Y Y', p^2 e;
+    // its lower triangle alone, two operations an element).
     const auto e = static_cast<double>(total_dimension(node.eliminated)), p = static_cast<double>(width) - e;
     costs.operations += e * e * e / 3 + p * e * e + p * p * e;
   }

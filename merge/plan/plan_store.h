@@ -24,7 +24,9 @@ class PlanStore {
   // block.
   void add(std::int64_t tile, TilePlan plan, bool to_scratch);
   bool in_scratch(std::size_t row) const { return slots_[row].in_scratch; }
-  // The reference is valid until another row is read from scratch.
+  // The reference is valid until another row is read from scratch, which overwrites it. Threads that work ahead on the
+  // next tile must therefore not ask for a plan in scratch (MergeTreeRunner::in_memory). Throws StoreError when the
+  // file cannot be read.
   const TilePlan& operator[](std::size_t row) const;
 
  private:

@@ -1,5 +1,6 @@
 // Divides the points of a tile into portions of a few hundred, cell by cell, so that threads share even a tile of few
-// cells evenly.
+// cells evenly. The portions depend on the plan alone. Sums over the points of a portion, added in the order of the
+// portions, therefore have the same bits for any number of threads.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 
 namespace megablock {
 
+// The object keeps the unpacked rows of all points of the tile, four bytes each.
 class PointPortions {
  public:
   explicit PointPortions(const TilePlan& plan) {

@@ -1,4 +1,10 @@
 // Makes the plan of a tile: finds its unknowns, divides it into cells, and gives points and observations to the cells.
+//
+// The cells continue the bisection of the block inside the tile. The graph of the tile's frames, with the number of
+// common points as weights, is bisected down to cells. Each inner node of this tree has a separator, a smallest set of
+// frames that cuts all links between its two halves (partition/tiles/separators.h). A point belongs to a cell by the
+// rule of adjust/problem/owner.h, so that only frames of separators occur in points of two halves. The tile's own
+// separator acts as one more separator above the root of this tree.
 #include "merge/plan/tile_plan.h"
 
 #include <algorithm>
@@ -15,7 +21,8 @@ namespace megablock {
 
 namespace {
 
-// The rows of the problem's tables that occur in a kept residual.
+// The rows of the problem's tables that occur in a kept residual and are unknowns. A frame always is one; a camera
+// needs a free parameter, a mount must be free.
 struct TouchedRows {
   std::vector<std::uint8_t> frames, cameras, mounts;
 };
@@ -32,6 +39,7 @@ void visit_all_terms(const TileProblem& problem, Visit&& visit) {
   }
 }
 
+// The masks say which intrinsics are unknowns here; a tile's own adjustment estimates fewer than the block.
 TouchedRows touched_rows(const TileProblem& problem, const std::vector<ParameterMask>& camera_free) {
   TouchedRows touched{std::vector<std::uint8_t>(problem.frames.size(), 0),
                       std::vector<std::uint8_t>(problem.cameras.size(), 0),
@@ -127,6 +135,7 @@ FrameGraph graph_of(const TileProblem& problem) {
   return graph;
 }
 
+// Numbers the connected parts of the tile in the order of their lowest frames. The root of a set is its lowest member.
 void number_parts(const FrameGraph& graph, TilePlan& plan) {
   DisjointSets sets(static_cast<std::int32_t>(graph.frame_count));
   for (const auto& edge : graph.edges)
@@ -168,7 +177,8 @@ class CellPlanner {
   std::size_t cell_of(LocalFrame frame) const {
     return static_cast<std::size_t>(cell_of_frame_[static_cast<std::size_t>(frame.value)]);
   }
-  // The cell that owns an observation of these frame rows, which may occur several times.
+  // The cell that owns an observation of these frame rows, which may occur several times. A frame counts once for each
+  // observation in it.
   std::size_t owner_of(const std::vector<std::int32_t>& frames) {
     candidates_.clear();
     for (const std::int32_t frame : frames) {
@@ -178,6 +188,8 @@ class CellPlanner {
     return static_cast<std::size_t>(owner_part(candidates_));
   }
 
+  // A cell touches every unknown in the residuals of its points, free cameras and mounts included. These are eliminated
+  // high up in the tile, or sent on.
   void share_points() {
     std::vector<std::int32_t> frames;
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
@@ -199,6 +211,7 @@ class CellPlanner {
   void share_terms() {
     // The prior of a camera or mount goes to the cell of its first image.
     std::vector<std::size_t> camera_cell(problem_.cameras.size(), 0), mount_cell(problem_.mounts.size(), 0);
+    // Backwards, so that the first image is written last.
     for (auto image = problem_.images.rbegin(); image != problem_.images.rend(); ++image)
       camera_cell[image->camera.value] = mount_cell[static_cast<std::size_t>(image->mount)] = cell_of(image->frame);
     std::vector<std::int32_t> frames;
@@ -254,6 +267,7 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
   for (std::size_t row = 0; row < problem.mounts.size(); ++row)
     plan.unknown_of_mount.push_back(position(mount_unknown(problem, row)));
 
+  // The same graph gives the parts of the tile and its cells.
   const FrameGraph graph = graph_of(problem);
   number_parts(graph, plan);
   BisectionTree cells = bisect(graph, cell_max_frames);
@@ -269,6 +283,8 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
     passed[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
   std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, passed);
   for (std::size_t row = 0; row < passed.size(); ++row)
+    // Depth 0 is now the tile's separator, which separator_depths left at -1; the root of the cells has depth 1. Frames
+    // that separate nothing keep -1.
     if (passed[row] || depth[row] >= 0) ++depth[row];
   const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();
   plan.cells = make_plan(cells.tree, lists, plan.boundary);

@@ -16,7 +16,8 @@
 namespace megablock {
 
 // Visits all nodes of a tree, children first. The thread that has visited a leaf goes on to the parent when the sibling
-// is done too, and so on upwards.
+// is done too, and so on upwards. No thread ever waits for another: of two siblings, the thread that is done first
+// takes the next leaf, and the other one goes up.
 class ChildrenFirst {
  public:
   explicit ChildrenFirst(const std::vector<PlanNode>& nodes)  // `nodes` outlives the object
@@ -34,6 +35,8 @@ class ChildrenFirst {
     for (std::int64_t n = leaves_[static_cast<std::size_t>(leaf)];;) {
       visit_unless_failed(n, visit);
       n = nodes_[static_cast<std::size_t>(n)].parent;
+      // Of the two threads that come up here, the second goes on. It must see everything that the first one has written
+      // below (release), hence the order of memory.
       if (n < 0 || open_children_[static_cast<std::size_t>(n)].fetch_sub(1, std::memory_order_acq_rel) > 1) return;
     }
   }
@@ -77,8 +80,10 @@ void visit_children_first(const std::vector<PlanNode>& nodes, Visit&& visit) {
 // the value that visit() returned for the parent, and is nullptr at the root. A value is freed when the subtree of its
 // node is done. Exceptions are handled as above; nodes below a failed one are not visited.
 template <typename Value, typename Visit>
+// So only the values along the paths at work are in memory.
 void visit_parents_first(const std::vector<PlanNode>& nodes, Visit&& visit) {
   std::vector<std::exception_ptr> errors(nodes.size());
+  // `value` lives in the frame of this call until both subtrees are done (taskwait).
   const std::function<void(std::int64_t, const Value*)> descend = [&](std::int64_t n, const Value* parent) {
     const PlanNode& node = nodes[static_cast<std::size_t>(n)];
     try {
