@@ -83,6 +83,8 @@ class ByteReader {
   bool at_end() const { return position_ == size_; }
 
  private:
+  // A count is believed only when so many elements are left, so that a damaged file asks for no memory that it cannot
+  // fill.
   std::size_t count_of(std::size_t size) {
     const auto count = value<std::uint64_t>();
     if (count > (size_ - position_) / size) fail();

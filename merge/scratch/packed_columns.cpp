@@ -1,3 +1,8 @@
+// A column is written in one of the forms of packed_columns.h, and begins with the number of its values. Where a type
+// has two forms, a byte says which follows, and the shorter one is chosen by counting before anything is written. Every
+// form gives back the bits of the values: doubles are compared as bits, and a value becomes a multiple of kPixelUnit
+// only if multiplying back gives the same bits. Unpacking goes through a buffer of one chunk, with no copy of the whole
+// column.
 #include "merge/scratch/packed_columns.h"
 
 #include <algorithm>
@@ -75,6 +80,7 @@ struct Integers {
       high = std::max<std::int64_t>(high, value(i));
     }
     least = static_cast<std::uint64_t>(low);
+    // The width is the next power of two of the bytes that the largest difference needs; 0 where all values are equal.
     const int bits = std::bit_width(static_cast<std::uint64_t>(high) - least);
     width = static_cast<std::uint8_t>(std::bit_ceil(static_cast<unsigned>((bits + 7) / 8)) * (bits > 0));
   }
@@ -123,6 +129,8 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
 }
 
 template <typename Value>
+// The first value, then the differences of neighbours as integers of the least width: in ascending lists these are
+// small.
 void write_steps(std::ostream& file, std::size_t count, Value&& value) {
   const std::int64_t first = count > 0 ? value(0) : 0;
   write(file, first);
@@ -151,6 +159,7 @@ bool same_bits(T a, T b) {
 }
 
 template <typename T>
+// A run is stored as its value and its length.
 constexpr std::size_t kRunBytes = sizeof(T) + sizeof(std::uint32_t);
 
 template <typename T, typename Value>
@@ -171,6 +180,7 @@ void write_runs(std::ostream& file, std::size_t count, Value&& value) {
 }
 
 template <typename T, typename Take>
+// A length that does not fit marks a damaged file.
 void read_runs(std::istream& file, std::size_t count, Take&& take) {
   for (std::size_t i = 0; i < count;) {
     T value;
@@ -183,7 +193,8 @@ void read_runs(std::istream& file, std::size_t count, Take&& take) {
 
 enum class Form : std::uint8_t { kRuns, kEach };
 
-// Whether the value is a whole number of pixel units that 4 bytes can hold.
+// Whether the value is a whole number of pixel units that 4 bytes can hold. Casting a value that 4 bytes cannot hold
+// would be undefined, so its size is tested first; the test is false for NaN.
 bool is_pixels(double value) {
   const double units = value / kPixelUnit;
   return std::abs(units) < 0x1p31 && same_bits(static_cast<std::int32_t>(units) * kPixelUnit, value);
@@ -224,6 +235,7 @@ void write_column(std::ostream& file, const std::vector<double>& values) {
   const std::size_t count = values.size();
   const auto value = [&](std::size_t i) { return values[i]; };
   write_count(file, count);
+  // Runs if they are no longer than 4 bytes a value, the best that the other form can do.
   if (count_runs<double>(count, value) * kRunBytes<double> <= count * sizeof(std::int32_t)) {
     write(file, Form::kRuns);
     return write_runs<double>(file, count, value);

@@ -1,7 +1,8 @@
 // An ascending list of rows of a table, stored as the distances between neighbours, one byte each. A distance of 255
-// and more takes further bytes; this is rare where some dozen lists share the rows of a table. The lists save memory:
-// the plans of all tiles stay in memory while their observations are in scratch, and for a million images their lists
-// of points would take 80 MiB as 32-bit numbers.
+// and more takes further bytes; this is rare where some dozen lists share the rows of a table.
+//
+// The lists save memory: each tile's plan has one for every cell, and for a million images these lists of points would
+// take 80 MiB as 32-bit numbers. A list is read from its beginning only, which is all that sweeps do.
 #pragma once
 
 #include <cassert>

@@ -12,7 +12,8 @@ namespace megablock {
 
 namespace {
 
-// The buffer of a file that may grow to `granted` bytes. For more it asks before each write.
+// The buffer of a file that may grow to `granted` bytes. For more it asks before each write. A refused write reports
+// zero bytes, which the stream takes for a full disk.
 class BoundedBuffer : public std::filebuf {
  public:
   BoundedBuffer(std::int64_t granted, std::function<bool(std::int64_t)> ask)
@@ -54,10 +55,12 @@ void ScratchSpace::spare(const std::string& name) {
   if (bytes_of_.contains(name) && spare_.insert(name).second) spare_bytes_ += bytes_of(name);
 }
 
+// The file is wanted again: its bytes are no longer to be had for others.
 void ScratchSpace::need(const std::string& name) {
   if (spare_.erase(name) > 0) spare_bytes_ -= bytes_of(name);
 }
 
+// Spare files go in the order of their names, and only as many as are in the way.
 bool ScratchSpace::reserve(const std::string& name, std::int64_t bytes) {
   need(name);
   const std::int64_t more = std::max<std::int64_t>(0, bytes - bytes_of(name));
@@ -72,6 +75,8 @@ bool ScratchSpace::reserve(const std::string& name, std::int64_t bytes) {
 
 bool ScratchSpace::write(const std::string& name, const Write& write) {
   if (directory_.empty() || !reserve(name, 0)) return false;
+  // A file may grow to its present size without asking; for every further write the buffer asks for the room, and spare
+  // files give way.
   BoundedBuffer buffer(bytes_of(name), [&](std::int64_t bytes) { return reserve(name, bytes); });
   // An existing file is overwritten, not truncated. At the end it is cut to its new length.
   if (!buffer.open(path(name), std::ios::binary | std::ios::in | std::ios::out))
@@ -124,6 +129,7 @@ void ScratchSpace::remove(const std::string& name) {
 }
 
 void ScratchSpace::keep_only(const std::set<std::string>& names) {
+  // The loop goes over a copy, because remove() changes the table.
   for (const auto& [name, bytes] : std::map(bytes_of_))
     if (!names.contains(name)) remove(name);
 }

@@ -45,13 +45,16 @@ class ScratchSpace {
   // Reserves so many bytes of the budget for a file, or its present size when that is larger. Returns false, and
   // removes the file, when there is no room.
   bool reserve(const std::string& name, std::int64_t bytes);
+  // Replaces `to`. Returns false, and leaves both files, when the system refuses.
   bool rename(const std::string& from, const std::string& to);
   void spare(const std::string& name);  // its contents are not needed any more
   void remove(const std::string& name);
   void keep_only(const std::set<std::string>& names);  // removes all other files
 
  private:
+  // Takes a file off the list of spare ones.
   void need(const std::string& name);
+  // Sets the size of a file in the sums.
   void count(const std::string& name, std::int64_t bytes);
 
   std::string directory_;
