@@ -8,8 +8,8 @@ namespace megablock {
 
 namespace {
 
-// Adds J'J to the lower triangle of C, and J'r to the column behind it, for two residuals. C has as many rows as J has
-// columns.
+// Adds J'J to the lower triangle of C [width x (width + 1)], and J'r to its last column, for the two residuals of an
+// observation. J is stored row by row. The column of r is treated as one more column of J.
 void add_squares(double* c, std::int64_t width, const double* jacobian, const double* residual) {
   const double *first = jacobian, *second = jacobian + width;
   for (std::int64_t j = 0; j <= width; ++j) {
@@ -36,6 +36,8 @@ CellAssembler::CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pai
       numbers_(plan.unknowns.size(), -1),
       pair_blocks_(pair_blocks) {
   rows_.reserve(plan.unknowns.size());
+  // Frames are numbered in the order of their rows in the front. The block of a pair i > j is then below the diagonal
+  // of the front, as it stands in PairBlocks.
   for (const Unknown& u : plan.unknowns) {
     rows_.push_back(front.row_of(u.id));
     if (rows_.back() >= 0 && u.id.kind == UnknownKind::kFrame) frame_rows_.push_back(rows_.back());
@@ -47,6 +49,8 @@ CellAssembler::CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pai
   pair_blocks_.reserve(std::ssize(frame_rows_));
 }
 
+// `equations` has the present batch of points. Only pairs of frames and shared unknowns remain to be done here after
+// reduce(), which has already summed what concerns one frame.
 void CellAssembler::add_points(PointEquations& equations) {
   equations.reduce(frames_);
   const std::vector<PointEquations::Point>& points = equations.points();
@@ -61,6 +65,7 @@ void CellAssembler::add_points(PointEquations& equations) {
   add_sums(equations);
 }
 
+// The sums of the points in their order, on which the bits of the cost depend.
 void CellAssembler::add_sums(const PointEquations& equations) {
   const std::vector<PointEquations::Point>& points = equations.points();
   SubtreeSums& sums = front_.sums();
@@ -80,6 +85,9 @@ void CellAssembler::add_sums(const PointEquations& equations) {
   sums.unknowns += 3 * std::ssize(points);
 }
 
+// Adds what the shared unknowns s of a point contribute: J_s'J_s and J_s'r (summed by camera and mount until finish()),
+// J_s'J_f = sum W_sk G, and -Y_s Y_i' for every unknown i of the point, frames included. The last two go to the front
+// point by point.
 void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
   const PointEquations::Point& point = equations.points()[i];
   const point_kernels::Kernels& kernels = equations.kernels();
@@ -102,6 +110,7 @@ void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
     if (u.camera >= 0) subtract_outer(kernels, {u.camera, u.camera_width, width, shared.by_point}, frame);
     if (u.mount >= 0) subtract_outer(kernels, {u.mount, 6, width, shared.by_point + u.camera_width}, frame);
   }
+  // The frames come first in the list. Pairs of frames are done already, so b begins behind them.
   equations.blocks(i, blocks_);
   for (std::size_t b = at(point.sight_count()); b < blocks_.size(); ++b) {
     const PointEquations::Block& block = blocks_[b];
@@ -113,6 +122,7 @@ void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
   }
 }
 
+// The factor of the lower row block goes to the left, because only the lower triangle of the front is used.
 void CellAssembler::subtract_outer(const point_kernels::Kernels& kernels, const Factor& a, const Factor& b) {
   const std::int64_t row = rows_[at(a.unknown)], column = rows_[at(b.unknown)];
   const bool below = row >= column;
@@ -122,6 +132,7 @@ void CellAssembler::subtract_outer(const point_kernels::Kernels& kernels, const 
                            right.rows);
 }
 
+// K_ab += J_a'J_b and b_a -= J_a'r for all pairs of unknowns of the observation; each pair is visited once.
 void CellAssembler::add_term(const TermResidual& term) {
   for (int a = 0; a < term.block_count; ++a) {
     const auto& block = term.blocks[at(a)];
@@ -145,6 +156,7 @@ void CellAssembler::add_normal(std::int64_t unknown, const Eigen::Ref<const Eige
   Eigen::Map<Eigen::VectorXd>(front_.diagonal() + row, normal.cols()) += normal.diagonal();
 }
 
+// K_ij -= sum Y_i Y_j' of all points of the cell, in one go for each pair.
 void CellAssembler::add_pairs() {
   pair_blocks_.take(std::ssize(frame_rows_), [&](std::int64_t i, std::int64_t j, const double* block) {
     const Front::Place place = front_.place(frame_rows_[at(i)], frame_rows_[at(j)]);
@@ -159,6 +171,7 @@ void CellAssembler::finish(std::vector<double>& diagonal) {
   for (std::size_t u = 0; u < frames_.size(); ++u) {
     if (rows_[u] < 0 || plan_.unknowns[u].id.kind != UnknownKind::kFrame) continue;
     const double* sum = frames_[u].values.data();
+    // The 6 x 6 block of the frame, G'RG, from the sums of its 3 x 3 blocks (cell_assembler.h).
     const auto symmetric = [](const double* lower) {
       Eigen::Matrix3d m;
       m << lower[0], lower[1], lower[3], lower[1], lower[2], lower[4], lower[3], lower[4], lower[5];
@@ -166,6 +179,7 @@ void CellAssembler::finish(std::vector<double>& diagonal) {
     };
     const double* m = sum + point_kernels::kMixed;
     Eigen::Matrix3d mixed;
+    // The trace of [u]x R is 0, since R is symmetric, and so it is of the sum. The last element follows from it.
     mixed << m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], -m[0] - m[4];
     Eigen::Matrix<double, 6, 6> normal;
     normal << symmetric(sum + point_kernels::kByRotation), -mixed, -mixed.transpose(),
@@ -191,6 +205,7 @@ void CellAssembler::finish(std::vector<double>& diagonal) {
     if (u.camera >= 0 && u.mount >= 0)
       add_block(front_, rows_[at(u.mount)], rows_[at(u.camera)], normal.block(camera, 0, mount, camera));
   }
+  // Before any elimination in the front, its diagonal is that of the cell's own residuals.
   std::size_t offset = 0;
   for (std::size_t u = 0; u < rows_.size(); ++u) {
     for (std::int64_t k = 0; k < plan_.unknowns[u].dimension; ++k, ++offset)

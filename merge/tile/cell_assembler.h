@@ -4,9 +4,16 @@
 // For each point (point_equations.h), K_ij -= Y_i Y_j' goes to the front at once where i or j is a shared unknown.
 // Between two frames it goes to a block outside the front (pair_blocks.h). Once per cell these blocks are added to the
 // front, and so are the sums that concern one frame, or the shared unknowns of one camera in one mount. The latter are
-// J'J and -J'r. The sums of a frame run over its points, with T = V_f C^-T: G'(V_f - T T')G, G'(b_f - T z), and the
-// diagonal of J'J (point_kernels::FrameValue). With R = V_f - T T', the first of them has the blocks [u]x R [u]x',
-// -[u]x R and R.
+// J'J and -J'r.
+//
+// The observations of a point in one frame add J_f'J_f = G'V_f G to the block of the frame, and the elimination of the
+// point subtracts Y_f Y_f' = G'T T'G with T = V_f C^-T. Both have G outside, so that only the 3 x 3 matrix R = V_f - T
+// T' is left of them, and the 6 x 6 block is made of three sums over the points:
+//
+//     G'R G = | [u]x R [u]x'   -[u]x R |       right-hand side G'(b_f - T z)
+//             | .                R     |,
+//
+// The diagonal of J'J, which damping needs, is summed beside them (point_kernels::FrameValue).
 #pragma once
 
 #include <vector>
@@ -21,6 +28,7 @@ namespace megablock {
 // diagonal block (row = column) only the lower triangle is read.
 void add_block(Front& front, std::int64_t row, std::int64_t column, const Eigen::Ref<const Eigen::MatrixXd>& block);
 
+// It serves one cell and one front: points and terms are added in the order of the plan, and finish() ends it.
 class CellAssembler {
  public:
   // `pair_blocks` gives the memory for the blocks between two frames.

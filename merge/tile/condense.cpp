@@ -1,3 +1,7 @@
+// Every front is filled in the same order: the points of the cell, its other observations, the left child, the right
+// child. Which thread does it does not matter, so that the bits of a tile do not depend on the number of threads. A
+// thread keeps its working memory for the whole tile: the lanes and tables of PointEquations, the blocks of pairs, and
+// the memory of small fronts, which another front takes up as soon as a child has been added to its parent.
 #include "merge/tile/condense.h"
 
 #include <algorithm>
@@ -14,6 +18,7 @@ namespace megablock {
 
 namespace {
 
+// Fills the front of a cell with all of the tile's residuals that the cell owns.
 void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                const PlanNode& node, PointEquations& equations, PairBlocks& pair_blocks, std::vector<double>& diagonal,
                Front& front) {
@@ -44,6 +49,7 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
           Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).unaryExpr([](double d) {
             return d > 0 ? std::sqrt(d) : 1;
           });
+      // B'B = D^1/2 Q Q'D^1/2 (gauge.h).
       const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
       const Eigen::MatrixXd basis = orthonormal_basis(scaled);
       const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();
@@ -74,6 +80,8 @@ TileFactor TileFactor::read(ByteReader& in) {
   return factor;
 }
 
+// The nodes of the tree share three lists, and each node writes its own entry. An update is freed as soon as the parent
+// has it.
 class TileCondenser::Work {
  public:
   Work(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass, TileDatum datum)
@@ -123,6 +131,7 @@ class TileCondenser::Work {
 void TileCondenser::Work::eliminate(std::int64_t number) {
   const PlanNode& node = nodes_[at(number)];
   OfThread& mine = threads_.mine();
+  // The first right-hand side is -J'r, the others are the columns of the datum.
   Front front(node.eliminated, node.passed, 1 + datum_.columns.columns, &mine.memory);
   if (node.leaf >= 0) {
     std::vector<double>& diagonal = diagonals_[at(node.leaf)];
@@ -187,6 +196,7 @@ TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, con
   for (std::size_t i = nodes.size(); i-- > 0;) {
     const Step& outer = nodes[i].parent < 0 ? boundary : steps[at(nodes[i].parent)];
     steps[i] = back_substitute(factor.nodes[i], outer);
+    // The top front gives the separator as well. Its step is then in the result like any other.
     const UnknownList& own = i + 1 == nodes.size() ? steps[i].unknowns : nodes[i].eliminated;
     const Step part = steps[i].restricted_to(own);
     const std::vector<std::int64_t> rows = row_offsets(own);
@@ -210,6 +220,7 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
   const UnknownMotions motions(plan, step.unknowns.values.data());
   const PointTables tables(problem, plan, state);
   PointEquations equations(problem, state, tables);
+  // The sums follow the portions, so that they have the bits of those in tile_trial.cpp.
   const PointPortions portions(plan);
   for (std::int64_t portion = 0; portion < portions.size(); ++portion) {
     double damping_norm = 0;

@@ -2,8 +2,10 @@
 // unknowns remain. On the way down it gives the step and the covariances of everything in the tile.
 //
 // Inside the tile the bisection goes on to cells of about 16 frames (32 in a tile that is a block of its own). A point
-// belongs to one cell (adjust/problem/owner.h) and is eliminated there. With V = sum J_p'J_p + lambda D_p = C C', W_i =
-// J_i'J_p and Y_i = W_i C^-T,
+// belongs to one cell (adjust/problem/owner.h) and is eliminated there. A point occurs in its own observations alone,
+// so the part of the normal matrix that belongs to the points has 3 x 3 blocks V on its diagonal and nothing else. Each
+// point is therefore eliminated on its own, before everything else (Triggs et al. 2000, "Bundle adjustment", 6.1). With
+// V = sum J_p'J_p + lambda D_p = C C', W_i = J_i'J_p of an unknown i that observes the point, and Y_i = W_i C^-T,
 //
 //     K_ij -= Y_i Y_j',   b_i -= Y_i C^-1 b_p,   x_p = C^-T (C^-1 b_p - sum Y_i' x_i).
 //
@@ -25,6 +27,8 @@ namespace megablock {
 // The factors of the cells of a tile, by node of TilePlan::cells. When it is empty, they are computed again.
 struct TileFactor {
   std::vector<FrontFactor> nodes;
+  // For damping_norm of TileStep. D of a separator unknown is the sum of these of all tiles that touch it, and so is
+  // its part of the norm.
   std::vector<double> diagonal;  // diagonal of J'J over the scalar unknowns of the plan, from the tile's own residuals
   bool empty() const { return nodes.empty(); }
   std::int64_t byte_count() const;
@@ -48,7 +52,8 @@ struct TileDatum {
   Step columns{{}, 0, {}};  // further right-hand sides
 };
 
-// The linearisation and the damping of a sweep.
+// The linearisation and the damping of a sweep. A plain number stands for a sweep with this lambda and without
+// curvature.
 struct Pass {
   double lambda = 0;
   bool curvature = false;  // with the second-order term of the robust losses
@@ -68,7 +73,8 @@ class TileCondenser {
                 TileDatum datum = {});
   ~TileCondenser();
   std::int64_t cells() const;
-  // Condenses a cell and the fronts above it that this completes. Call it once for every cell.
+  // Condenses a cell and the fronts above it that this completes. Call it once for every cell, on any thread. An error
+  // is kept until take() throws it.
   void condense(std::int64_t cell);
   TileCondensation take();  // after the last cell
 
@@ -77,7 +83,9 @@ class TileCondenser {
   std::unique_ptr<Work> work_;
 };
 
-// The step of everything in the tile.
+// The step of everything in the tile. With all x of the block, the predicted decrease of the cost (global_adjustment.h)
+// needs sum D_k x_k^2, D the diagonal of J'J. A tile gives its part of D, so that the sum over all tiles counts every
+// residual once, also where an unknown belongs to several tiles.
 struct TileStep {
   Step unknowns;                        // step of plan.unknowns, with as many columns as that of the separator
   std::vector<Eigen::Vector3d> points;  // [points], zero for points that take no part
@@ -87,11 +95,14 @@ struct TileStep {
 // The step of the unknowns from that of the separator unknowns, by the factors of the tile (tile_trial.h goes on).
 TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, const Step& boundary);
 // The step of unknowns and points; the points are linearised again. Without `factor` the tile is condensed again, with
-// the same bits.
+// the same bits. For tests, and for callers that need the steps of the points themselves; an iteration takes try_step
+// (tile_trial.h).
 TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum = {});
 
-// The posterior covariances of a tile, from the factors of a sweep with lambda = 0.
+// The posterior covariances of a tile, from the factors of a sweep with lambda = 0. The variance factor is one, a
+// priori. Frames and mounts: of PoseIncrement (radians, metres). Points: metres. Cameras: in the units of the camera
+// model.
 struct TileCovariance {
   CovarianceMatrix boundary;                        // as given
   std::vector<Eigen::Matrix<double, 6, 6>> frames;  // [frames]; zero where untouched

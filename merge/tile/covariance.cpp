@@ -1,6 +1,18 @@
-// Computes the covariances of a tile: from the top down through the fronts of its cells, then point by point. It also
-// computes the redundancy numbers of all observations (io/block/observation_statistics.h), which do not depend on how a
-// free datum is held.
+// Computes the covariances of a tile: from the top down through the fronts of its cells (front_covariance.cpp), then
+// point by point. The front of a cell holds all unknowns in the residuals of its points, so it has all the C_ab below.
+//
+// The step of a point is x_p = C^-T (C^-1 b_p - sum_a Y_a'x_a), with Y_a = W_a C^-T and V = C C' (point_equations.h).
+// Given the other unknowns, the point has the covariance V^-1, and this part of its error is independent of them. Hence
+//
+//     C_ap = -sum_b C_ab Y_b C^-1,    C_pp = C^-T (I + sum_a Y_a' sum_b C_ab Y_b) C^-1.
+//
+// A residual r (divided by sigma and weighted by its loss) with the Jacobians J_a by its unknowns, and J_p by its
+// point, has the redundancy number 1 - v, where v is its diagonal element of
+//
+//     J C J' = J_p C_pp J_p' + 2 sum_a J_a C_ap J_p' + sum_ab J_a C_ab J_b'.
+//
+// The redundancy numbers of all observations add up to the degrees of freedom (io/block/observation_statistics.h). They
+// do not depend on how a free datum is held, because a similarity changes no residual.
 #include <limits>
 
 #include "merge/plan/tree_workers.h"
@@ -44,6 +56,8 @@ class CellCovariances {
       row_of_unknown_[at(find_unknown(plan_.unknowns, covariance.unknowns[i].id))] = offsets[i];
     const std::vector<std::int32_t> points = plan_.points[cell].rows();
     for (std::span<const std::int32_t> rest = points; !rest.empty();) {
+      // The points are linearised without damping and without the curvature of the losses, as in the sweep that made
+      // the factors.
       rest = rest.subspan(equations_.linearise(rest, 0));
       equations_.reduce(frame_sums_);
       for (std::size_t i = 0; i < equations_.points().size(); ++i) {
@@ -63,8 +77,7 @@ class CellCovariances {
     return {first, rows, columns, Eigen::OuterStride<>(cell_rows_)};
   }
 
-  // With Y_a = W_a C^-T of the unknowns a in the residuals of the point,
-  //   C_ap = -sum_b C_ab Y_b C^-1,  C_pp = C^-T (I + sum_a Y_a' sum_b C_ab Y_b) C^-1.
+  // C_ap of all unknowns a of the point, into with_point_, and C_pp.
   void add_point(std::size_t i) {
     const Eigen::Matrix3d inverse = equations_.inverse_factor(i);
     Eigen::Matrix3d inner = Eigen::Matrix3d::Identity();
@@ -90,6 +103,7 @@ class CellCovariances {
       const Eigen::Matrix<double, 2, 3> by_point = equations_.by_point(lane);
       const Eigen::Vector2d residual = equations_.residual(lane);
       const int count = equations_.jacobians(lane, jacobians_);
+      // The diagonal of J C J', term by term as at the head. Only the two diagonal elements of each product are formed.
       Eigen::Vector2d variance = (by_point * covariance).cwiseProduct(by_point).rowwise().sum();
       for (int i = 0; i < count; ++i) {
         const auto& a = jacobians_[at(i)];
@@ -117,6 +131,7 @@ class CellCovariances {
     return i;
   }
 
+  // The Jacobian of a prior is 1 / sigma on each axis. An axis of infinite sigma is no observation.
   void add_prior_redundancy(std::int64_t point, const Eigen::Matrix3d& covariance) {
     const std::int64_t row = equations_.prior_row(point);
     if (row < 0) return;
@@ -176,6 +191,7 @@ class CellCovariances {
   std::array<JacobianBlock<IntrinsicJacobian>, 3> jacobians_;  // of one observation
 };
 
+// Goes down the tree of the cells and collects the results of all threads.
 class TileCovarianceBuilder {
  public:
   TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
@@ -194,6 +210,7 @@ class TileCovarianceBuilder {
       result_.cameras.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
     result_.mounts.assign(problem.mounts.size(), Eigen::Matrix<double, 6, 6>::Zero());
     result_.points.assign(problem.points.size(), Eigen::Matrix3d::Zero());
+    // NaN stays where an observation takes no part.
     result_.redundancy_x.assign(problem.kept.size(), std::numeric_limits<float>::quiet_NaN());
     result_.redundancy_y = result_.redundancy_x;
     invert(plan.unknown_of_frame, frame_of_);
@@ -205,6 +222,8 @@ class TileCovarianceBuilder {
     result_.boundary = std::move(boundary);
     take(result_.boundary, plan_.boundary);
     std::vector<ObservationTable> tables(plan_.points.size());  // [cells]
+    // The whole covariance of a front (E and P) serves both of its children and is freed after them. A cell adds its
+    // points as soon as its own is there.
     visit_parents_first<CovarianceMatrix>(plan_.cells.nodes, [&](std::int64_t n, const CovarianceMatrix* parent) {
       const PlanNode& node = plan_.cells.nodes[at(n)];
       const FrontFactor& factor = factor_.nodes[at(n)];
@@ -214,11 +233,13 @@ class TileCovarianceBuilder {
       if (node.leaf >= 0) cells_.mine().add(at(node.leaf), covariance, tables[at(node.leaf)]);
       return covariance;
     });
+    // The tables are added in the order of the cells, so that the bits do not depend on the threads.
     for (const ObservationTable& table : tables) result_.observations.add(table);
     return std::move(result_);
   }
 
  private:
+  // From the unknown of each row of a table to the row of each unknown.
   void invert(const std::vector<std::int64_t>& unknown_of_row, std::vector<std::int64_t>& row_of_unknown) {
     row_of_unknown.assign(plan_.unknowns.size(), -1);
     for (std::size_t row = 0; row < unknown_of_row.size(); ++row)
@@ -246,6 +267,7 @@ class TileCovarianceBuilder {
     }
   }
 
+  // The rows of the update are those of the free parameters; the result has all parameters of the model.
   void take_camera(std::size_t camera, std::int64_t dimension, const std::vector<double>& block) {
     std::vector<int> parameters;
     for (int k = 0; k < result_.cameras[camera].cols(); ++k)

@@ -16,6 +16,8 @@ namespace megablock {
 // point_kernels::kPairStride apart. All are zero when nothing has been added since the last call of take().
 class PairBlocks {
  public:
+  // Makes room for the pairs of so many frames. All blocks must be zero then, as they are after take(): growing may
+  // move their beginning.
   void reserve(std::int64_t frames) {
     const std::int64_t count = point_kernels::pair_number(frames, 0);
     if (count <= std::ssize(used_)) return;

@@ -1,3 +1,17 @@
+// The points of a cell are worked on in batches of whole points, with about 64 observations (ObservationLanes::kUsual),
+// so that everything stays in the first-level cache. A track of more observations is a batch of its own. linearise()
+// goes through these stages, and each kernel (point_kernels.h) does one of them for the whole batch:
+//
+//     add_observations, lanes_.linearise   r, u, J_p of each observation
+//     weigh                                weights of the loss; other camera models and shared unknowns one by one
+//     normal                               records V, b, u of each observation
+//     merge                                records of each group, where a frame has several observations of a point
+//     sum_up                               V and b of each point, with its prior
+//     factorise                            C^-1, z = C^-1 b and C^-T z of each point; vanished pivots are held
+//
+// reduce() then makes Y and the sums of the frames (sweep up, covariances), or steps() the steps of the points (sweep
+// down). Where all observations of a batch have a frame of their own, the record of an observation is that of its
+// group.
 #include "merge/tile/point_equations.h"
 
 #include <algorithm>
@@ -9,6 +23,8 @@
 
 namespace megablock {
 
+// A calibration is a camera in a mount, where at least one of them is free. Images of all frames share its sums of
+// J_s'J_s.
 std::vector<ImageUnknowns> image_unknowns(const TileProblem& problem, const TilePlan& plan,
                                           const std::vector<LaneView>& views) {
   std::vector<ImageUnknowns> list;
@@ -38,6 +54,7 @@ std::vector<std::int64_t> prior_rows(const TileProblem& problem) {
   return rows;
 }
 
+// Frames get eight values each, so that the kernels read whole vectors; the last two are zero.
 UnknownMotions::UnknownMotions(const TilePlan& plan, const double* x)
     : x_(x), offsets_(row_offsets(plan.unknowns)), frames_(plan.unknowns.size()) {
   for (std::size_t u = 0; u < frames_.size(); ++u)
@@ -46,6 +63,7 @@ UnknownMotions::UnknownMotions(const TilePlan& plan, const double* x)
 
 namespace {
 
+// The kernels of the same width as those of the lanes.
 const point_kernels::Kernels& point_kernels_of_processor() {
   const lane_kernels::Kernels* kernels = &lane_kernels_of_processor();
   return kernels == lane_kernels_of_width(8)   ? point_kernels::kAvx512
@@ -82,6 +100,7 @@ PointEquations::PointEquations(const TileProblem& problem, const TileState& stat
       unknowns_(tables.unknowns),
       frames_(tables.frames),
       prior_(tables.prior) {
+  // The buffers are made once, with room for the longest track of the tile.
   int widest = 0;
   for (const ImageUnknowns& u : unknowns_) widest = std::max(widest, u.shared_width);
   all_plain_ = std::ranges::all_of(unknowns_, &ImageUnknowns::plain);
@@ -115,6 +134,7 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
     const std::int64_t point = points[i];
     if (i + kAhead < points.size()) fetch_ahead(points[i + kAhead]);
     const std::int64_t more = problem_.begin[at(point + 1)] - problem_.begin[at(point)];
+    // `more` counts rejected observations too: whether a batch is full is known without reading their flags.
     const bool room = lanes_.size() + more <= ObservationLanes::kUsual && std::ssize(points_) < lanes_.capacity();
     if (!points_.empty() && !room) break;
     add_observations(point);
@@ -163,6 +183,7 @@ void PointEquations::add_observations(std::int64_t point) {
   added.first_sight = sights_;
   const std::int64_t begin = problem_.begin[at(point)], end = problem_.begin[at(point + 1)];
   std::int64_t* rows = rows_.data() + added.first;
+  // The loop has no branch: each row is written, and the place moves on only behind a kept one.
   const std::uint8_t* kept = problem_.kept.data();
   std::int64_t count = 0;
   for (std::int64_t row = begin; row < end; ++row) {
@@ -208,6 +229,8 @@ bool PointEquations::add_lanes(std::int64_t first, std::int64_t count, const Eig
   return ascending;
 }
 
+// Sums rho and rho' |r|^2 of the point, and weighs its observations where the loss asks for it. Nearly all points have
+// no observation in the tail, and the kernels have done everything for them.
 void PointEquations::weigh(Point& point, bool curvature) {
   point.residual_count = 2 * point.observation_count();
   point.shared_begin = std::ssize(shared_);
@@ -256,7 +279,9 @@ void PointEquations::weigh_lane(Point& point, std::int64_t lane, bool curvature)
              weight.weighted(lanes_.by_point(lane), residual));
 }
 
-// Linearises an observation whose camera model or shared unknowns the kernels do not have.
+// Linearises an observation whose camera model or shared unknowns the kernels do not have. It goes through the same
+// formulas (adjust/terms/linearise.h) for this observation alone, and overwrites its lane. An observation that is not
+// finite comes here too, and is refused.
 void PointEquations::linearise_lane(Point& point, std::int64_t lane, bool curvature) {
   const std::int64_t row = rows_[at(lane)], image = problem_.image[at(row)].value;
   const ImageView& view = views_[at(image)];
@@ -282,6 +307,8 @@ void PointEquations::linearise_lane(Point& point, std::int64_t lane, bool curvat
   if (unknowns.shared_width > 0) add_shared(unknowns, view, r, lane, point);
 }
 
+// J_s of the free parameters of the camera, then of the mount, and W_sk. Both stay until the next batch, for the front
+// and for redundancy numbers.
 void PointEquations::add_shared(const ImageUnknowns& unknowns, const ImageView& view, const CameraResidual& r,
                                 std::int64_t lane, Point& point) {
   const int width = unknowns.shared_width;
@@ -292,6 +319,7 @@ void PointEquations::add_shared(const ImageUnknowns& unknowns, const ImageView& 
     if (contains(unknowns.free, k)) jacobian.col(column++) = r.by_intrinsics.col(k);
   if (unknowns.mount >= 0) jacobian.rightCols<6>() = by_mount(view, r);
 
+  // W_sk = J_sk'J_pk, [width x 3] column by column.
   double* w = take(3 * width);
   const Eigen::Matrix<double, 2, 3> by_point = lanes_.by_point(lane);
   for (int j = 0; j < 3; ++j) {
@@ -303,6 +331,7 @@ void PointEquations::add_shared(const ImageUnknowns& unknowns, const ImageView& 
   if (unknowns.mount >= 0) add_to_shared(unknowns.mount, 6, w + unknowns.camera_width, width, point);
 }
 
+// Adds W_sk to W_s of this camera or mount: the point may have several observations of it.
 void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows, Point& point) {
   std::size_t slot = at(point.shared_begin);  // a point has a few of them at most
   while (slot < shared_.size() && shared_[slot].unknown != unknown) ++slot;
@@ -341,6 +370,8 @@ void PointEquations::add_prior(std::size_t i) {
   point.residual_count += (weight.array() > 0).count();
 }
 
+// Kernels work on whole groups of lanes. The lanes behind the last group of observations add to a sum that nobody
+// reads.
 void PointEquations::reduce(std::vector<FrameSum>& sums) {
   FrameSum unused;
   const std::int64_t padded = lane_kernels::padded(sights_);
@@ -359,6 +390,7 @@ void PointEquations::reduce(std::vector<FrameSum>& sums) {
 }
 
 void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out) {
+  // b - sum W_i'x_i: the frames by the kernel, V_f G x_f = -V_f (u x w + t), the shared unknowns here.
   const std::int64_t padded = lane_kernels::padded(sights_);
   for (std::int64_t sight = 0; sight < padded; ++sight)
     motions_[at(sight)] = motions.of_frame(frame_of(std::min(sight, sights_ - 1)));
@@ -381,7 +413,8 @@ void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vec
     for (int k = 0; k < 3; ++k) out[at(points_[i].point)][k] = point_value(kPointOwnStep + k, i);
 }
 
-// The measured coordinates are still in the lanes.
+// The measured coordinates are still in the lanes. Observations of other camera models are projected one by one
+// afterwards, as in the sweep up.
 std::span<const double> PointEquations::squares_of(const SeenImages& images,
                                                    const std::vector<Eigen::Vector3d>& points) {
   bool simple = true;
@@ -420,6 +453,7 @@ Eigen::Vector3d PointEquations::diagonal(std::size_t i) const {
   return {point_value(kPointV, i), point_value(kPointV + 2, i), point_value(kPointV + 5, i)};
 }
 
+// One block for each group, not for each observation: a rig's images of a point in one frame share a block.
 void PointEquations::blocks(std::size_t i, std::vector<Block>& list) const {
   const Point& point = points_[i];
   list.clear();

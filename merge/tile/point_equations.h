@@ -1,6 +1,9 @@
 // One point's part of the normal equations. Condensation, back-substitution and covariances use it. Each of them
 // linearises the observations again, because that is cheaper than storing the linearisation.
 //
+// Residuals r are those of an image observation divided by its sigma (no unit), and J are their derivatives; both carry
+// the weights of the loss (tile_linearisation.h). X is the point and C the centre of the frame, in metres.
+//
 // With u = X - C, the Jacobian J_p of a residual by the point gives the one by the frame, J_f = J_p G, G = -[[u]x I].
 // The observations k of the point in one frame therefore enter by V_f = sum J_pk'J_pk and b_f = -sum J_pk'r_k alone:
 //
@@ -60,7 +63,8 @@ class UnknownMotions {
   std::vector<std::array<double, 8>> frames_;
 };
 
-// Tables of one state that the threads of a tile share.
+// Tables of one state of a tile. They are made once for all points and only read afterwards, so the threads of the tile
+// share them.
 struct PointTables {
   SeenImages images;
   std::vector<ImageUnknowns> unknowns;  // [images]
@@ -69,6 +73,12 @@ struct PointTables {
   PointTables(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 };
 
+// The equations of one batch of points after the other. An object belongs to one thread. linearise() begins a batch;
+// what the other functions return belongs to this batch, and pointers are valid until the next one. The order of the
+// calls is
+//
+//     linearise, reduce, then y, blocks, shared, jacobians       sweep up and covariances
+//     linearise, steps, then squares_of                          sweep down
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
@@ -142,6 +152,7 @@ class PointEquations {
   int jacobians(std::int64_t lane, std::array<JacobianBlock<IntrinsicJacobian>, 3>& blocks) const;
 
  private:
+  // A shared unknown of a point, with the sums over its observations of the point.
   struct SharedPart {
     std::int64_t unknown = -1;
     int dimension = 0;

@@ -1,6 +1,10 @@
 // The loops over lanes of point_equations.h, on raw pointers. Lanes hold observations
 // (adjust/lanes/observation_lanes.h), the observations of a point in one frame (`sight`), or points. Symmetric 3 x 3
 // matrices are stored by the rows of their lower triangle (6 values), and triangular ones in the same way.
+//
+// Two layouts meet here. Where all lanes do the same arithmetic, a value has a column over the lanes (Columns). Where
+// lanes must be gathered (a point sums its observations, a group reads the step of its point), all values of one lane
+// lie together as a record of two lines of the cache, and the kernels transpose records and columns in registers.
 #pragma once
 
 #include <cstdint>
@@ -51,6 +55,8 @@ struct Pairs {
   std::uint8_t* used;
 };
 
+// Each lane does the same operations in the same order in all three versions, so that they give the same bits. Pointers
+// and counts are not checked.
 struct Kernels {
   // Makes the records of observations from residuals, u and J_p (`linearised`: rows of lane_kernels::Value).
   void (*normal)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, double* records);

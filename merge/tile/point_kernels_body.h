@@ -1,5 +1,10 @@
 // The code of the kernels in point_kernels.h, for vectors of any width. Internal to merge/tile/: each
 // point_kernels_*.cpp sets the width and includes it. The formulas are in point_equations.h and cell_assembler.h.
+//
+// A kernel works on kWidth lanes at a time. Counts are multiples of eight, the largest width, so that no kernel has a
+// loop for a remainder; the lanes behind the last one hold values that do no harm. The elements of a vector are one
+// value of several lanes, or several values of one record. Each of them goes through its operations in the order of the
+// source, so that all widths give the same bits (geometry/numbers/lane_vector.h).
 #pragma once
 
 #if MEGABLOCK_LANE_WIDTH == 8
@@ -49,6 +54,7 @@ template <int kCount, typename Record, typename Write>
       [](double* to, const Lanes& row) __attribute__((always_inline)) { store(to, row); });
 }
 
+// V = J_p'J_p and b = -J_p'r; j holds J_p by its two rows. J and r have the weights of the loss by now.
 void normal(const double* linearised, std::int64_t linearised_stride, std::int64_t count, double* records) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
     Lanes r[2], u[3], j[6], values[kRecordSize]{};
@@ -66,7 +72,9 @@ void normal(const double* linearised, std::int64_t linearised_stride, std::int64
   }
 }
 
-// The loop has no branches, because the processor cannot predict which observations belong to one frame.
+// The loop has no branches, because the processor cannot predict which observations belong to one frame. Each record
+// becomes the sum of its group so far and is stored at the place of the group; the last one of a group stays there.
+// Groups never have higher numbers than their observations, so no record is overwritten before it is read.
 void merge(std::int64_t count, const std::int64_t* sight, double* records) {
   constexpr int kLast = kB + 2;  // last value that is summed
   constexpr int kVectors = kRecordSize / kWidth;
@@ -80,6 +88,7 @@ void merge(std::int64_t count, const std::int64_t* sight, double* records) {
     before = sight[i];
 #pragma GCC unroll 64
     for (int k = 0; k < kVectors; ++k) {
+      // The sum goes on within a group and begins anew behind it. u is taken from the present observation in any case.
       const LaneMask kept = reinterpret_cast<LaneMask>(sums[k]) & goes_on & summed[k];
       sums[k] = load(records + i * kRecordSize + k * kWidth) + reinterpret_cast<Lanes>(kept);
       store(records + sight[i] * kRecordSize + k * kWidth, sums[k]);
@@ -98,6 +107,7 @@ void sum(std::int64_t points, const std::int64_t* begin, const double* records, 
   }
 }
 
+// Lanes behind the last point have V = 0: their pivots are held, and no value becomes infinite.
 void factorise(std::int64_t count, double lambda, double floor, const double* sums, const Columns& points,
                double* steps) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
@@ -113,6 +123,9 @@ void factorise(std::int64_t count, double lambda, double floor, const double* su
       held += free ? zero : zero + 1;
       return free ? 1 / square_root(pivot) : zero;  // the row and column of a held pivot become zero
     };
+    // V + lambda diag(V) = C C', row by row, and at once the inverse of the lower triangle C, whose elements are
+    //     i_kk = 1 / c_kk,  i10 = -i11 c10 i00,  i21 = -i22 c21 i11,  i20 = -i22 (c20 i00 + c21 i10).
+    // A held pivot has i_kk = 0, which makes its row and column of C^-1 zero, and so its elements of z and of the step.
     const Lanes i00 = invert(v[0] + lambda * v[0], v[0]);
     const Lanes c10 = v[1] * i00, c20 = v[3] * i00;
     const Lanes i11 = invert(v[2] + lambda * v[2] - c10 * c10, v[2]);
@@ -160,6 +173,7 @@ struct Sights {
   }
 };
 
+// `step` is C^-T z, the step of the point when all frames stay, so that T z is V_f times it.
 void reduce(const double* records, std::int64_t count, const double* const* steps, double* y, double* const* frames) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
     const Sights sights(records + i * kRecordSize);
@@ -171,6 +185,7 @@ void reduce(const double* records, std::int64_t count, const double* const* step
     const Lanes *inverse = of_point, *step = of_point + 6;
     const Lanes zero{};
 
+    // T = V_f C^-T. C^-1 is lower triangular, so that column c has c + 1 terms.
     Lanes t[3][3];  // T: row, column
 #pragma GCC unroll 64
     for (int r = 0; r < 3; ++r)
@@ -180,6 +195,7 @@ void reduce(const double* records, std::int64_t count, const double* const* step
 #pragma GCC unroll 64
         for (int k = 1; k <= c; ++k) t[r][c] += v[lower(r, k)] * inverse[lower(c, k)];
       }
+    // Y = G'T: the rows of the rotation are [u]x T, those of the centre -T.
     Lanes columns[kYSize];
 #pragma GCC unroll 64
     for (int c = 0; c < 3; ++c) {
@@ -221,6 +237,7 @@ void reduce(const double* records, std::int64_t count, const double* const* step
     for (int k = 0; k < 6; ++k) sums[kByCentre + k] = rest[k];
 #pragma GCC unroll 64
     for (int k = 0; k < 3; ++k) {
+      // The diagonal of [u]x V_f [u]x': element k is w'V_f w with w = e_k x u.
       const int m = (k + 1) % 3, n = (k + 2) % 3;
       sums[kDiagonal + k] =
           u[m] * u[m] * v[lower(n, n)] - 2 * u[m] * u[n] * v[lower(m, n)] + u[n] * u[n] * v[lower(m, m)];
@@ -242,6 +259,7 @@ void reduce(const double* records, std::int64_t count, const double* const* step
   }
 }
 
+// V_f (u x w + t) = -V_f G x_f of every group.
 void move(const double* records, std::int64_t count, const double* const* motions, double* out,
           std::int64_t out_stride) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
@@ -260,6 +278,7 @@ void move(const double* records, std::int64_t count, const double* const* motion
   }
 }
 
+// z = C^-1 b, then x = C^-T z. Held rows of C^-1 are zero, and so are their elements of x.
 void solve(std::int64_t count, const Columns& points) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
     Lanes b[3], c[6];
@@ -335,6 +354,7 @@ template <int kRows, int kColumns>
 
 void subtract_product(double* c, std::int64_t c_stride, const double* a, std::int64_t a_stride, std::int64_t rows,
                       const double* b, std::int64_t b_stride, std::int64_t columns) {
+  // The usual numbers of columns are known at compile time, so that their loops are unrolled.
   const auto block = [&]<int kRows>(std::integral_constant<int, kRows>) {
     if (columns == 6) return subtract_block<kRows, 6>(c, c_stride, a, a_stride, b, b_stride);
     if (columns == 8) return subtract_block<kRows, 8>(c, c_stride, a, a_stride, b, b_stride);
@@ -363,6 +383,8 @@ void subtract_product(double* c, std::int64_t c_stride, const double* a, std::in
 
 void subtract_pairs(std::int64_t points, const std::int64_t* begin, const double* y, const std::int64_t* frames,
                     const Pairs& pairs) {
+  // A block has eight rows in memory, of which six are used. Vectors of eight also read the first two values of the
+  // next column of Y, and sum values without meaning into the unused rows.
   constexpr int kRows = kWidth == kPairStride ? kPairStride : 6;  // vectors of 8 values include the unused rows
   const auto subtract = [&](std::int64_t i, std::int64_t j) {
     const std::int64_t number = pair_number(frames[i], frames[j]);

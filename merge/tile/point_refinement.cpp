@@ -1,3 +1,18 @@
+// The cost of a point X at held poses, with its residuals r_k and their derivatives J_k by X (prior included, without a
+// loss), s = |r_k|^2:
+//
+//     f(X) = 1/2 sum rho(s),   b = -f' = -sum rho' J'r,   f'' ~ sum rho' J'J + 2 rho'' (J'r)(J'r)'
+//
+// `reweighted` leaves out the second term. `curved` has it, but with 2 rho'' >= -rho' / s, so that the curvature along
+// a residual, rho' + 2 s rho'', is not negative. The sweeps over the block keep a tenth of rho' there
+// (kLeastCurvature), so that their normal equations stay positive definite; here damping does that. The steps are those
+// of Levenberg and Marquardt,
+//
+//     (curved + mu diag(reweighted)) x = b,   mu /= 10 after a lower cost, mu *= 10 otherwise,
+//
+// and end when the root of the decrement b'V^-1 b, V = `reweighted`, is below the limit, in sigmas of the point as
+// covariances state them. All points of a chunk make one trial at a time, so that their observations fill the lanes
+// together.
 #include "merge/tile/point_refinement.h"
 
 #include <algorithm>
@@ -60,6 +75,7 @@ struct PointCost {
   }
 };
 
+// A place at which the cost of a point is wanted.
 struct Trial {
   std::int64_t point = -1;
   Eigen::Vector3d position;
@@ -176,6 +192,8 @@ class PointRefiner {
     trials_.clear();
     of_trial_.clear();
     for (std::size_t w = 0; w < works_.size(); ++w) {
+      // A point behind a camera starts from the intersection of its rays. If that has a finite cost, it is not done
+      // after all.
       works_[w].done = !works_[w].cost.finite();
       if (!works_[w].done) continue;
       if (const auto position = intersection(works_[w].point)) try_position(w, *position);
@@ -202,6 +220,7 @@ class PointRefiner {
     of_trial_.clear();
     for (std::size_t w = 0; w < works_.size(); ++w) {
       Work& work = works_[w];
+      // The condition is negated, so that a decrement that is no number ends the iteration.
       work.done |= work.steps == kMaxSteps || !(work.cost.decrement_squared() > settled_squared_);
       if (work.done) continue;
       ++work.steps;
@@ -209,6 +228,7 @@ class PointRefiner {
     }
   }
 
+  // Accepts a trial that lowers the cost; an infinite cost never does.
   void judge(std::size_t index, const Eigen::Vector3d& position, const PointCost& cost) {
     Work& work = works_[index];
     if (cost.whole() < work.cost.whole()) {
@@ -223,6 +243,8 @@ class PointRefiner {
     }
   }
 
+  // Intersects the rays of all kept observations in the ground frame. A ray begins at the centre of the camera, C +
+  // R'C_m.
   std::optional<Eigen::Vector3d> intersection(std::int64_t point) {
     rays_.clear();
     for (std::int64_t row = problem_.begin[point]; row < problem_.begin[point + 1]; ++row) {
@@ -269,6 +291,7 @@ void LossSums::add(std::int64_t point, std::span<const double> squares) {
     cost += std::isfinite(s) ? rho : std::numeric_limits<double>::infinity();
     in_tail |= !std::isfinite(s) || second < 0;
   }
+  // The whole point goes to the tail: its cost is computed anew after it has moved.
   if (in_tail)
     tail_.push_back(point);
   else
@@ -284,6 +307,7 @@ double refine_tail(const TileProblem& problem, TileState& state, const SeenImage
     tail.insert(tail.end(), part.tail().begin(), part.tail().end());
   }
   PerThread<PointRefiner> refiners([&] { return std::make_unique<PointRefiner>(problem, state, images, settled); });
+  // Chunks and portions have fixed borders, and their sums are added in order: the bits do not depend on the threads.
   std::vector<double> costs((tail.size() + kAtOnce - 1) / kAtOnce);
   visit_in_parallel(std::ssize(costs), [&](std::int64_t chunk) {
     const auto rest = std::span<const std::int64_t>(tail).subspan(static_cast<std::size_t>(chunk) * kAtOnce);

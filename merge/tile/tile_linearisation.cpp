@@ -6,6 +6,7 @@ namespace megablock {
 
 namespace {
 
+// The columns of the free parameters of a camera, in the order of its unknowns.
 TermResidual::Jacobian free_columns(const LinearTerm::Jacobian& by_parameters, ParameterMask free) {
   TermResidual::Jacobian columns(by_parameters.rows(), count_of(free));
   Eigen::Index column = 0;

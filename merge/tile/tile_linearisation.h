@@ -2,13 +2,19 @@
 // covariances use them; point_equations.h has the residuals with a point.
 //
 // The second derivative of 1/2 rho(|r|^2) by r is rho' (I + 2 rho''/rho' r r'). With s = |r|^2 this is rho' across the
-// residual, and rho' (1 + 2 s rho''/rho') along it: zero for Huber's loss beyond its corner, negative for Cauchy's loss
-// beyond its scale. Normal equations with rho' I alone are iteratively reweighted least squares; they define decrement
-// and covariances. They overestimate the curvature along such residuals, and approach the optimum by a constant factor
-// per step. A sweep with curvature takes the smaller value along the residual, but no less than kLeastCurvature rho',
-// so that the normal equations stay positive definite. It scales J and r by sqrt(rho') and, along r, further by (1 - k)
-// and 1 / (1 - k), where (1 - k)^2 is that value over rho' (Triggs et al. 2000, "Bundle adjustment", 4.3). The gradient
-// stays the same.
+// residual, and rho' (1 + 2 s rho''/rho') along it. With c the scale of the loss, this second factor is
+//
+//     Huber, s > c^2             rho' = c / sqrt(s)         1 + 2 s rho''/rho' = 0
+//     Cauchy                     rho' = 1 / (1 + s / c^2)   (1 - s / c^2) / (1 + s / c^2), negative beyond the scale
+//     Cauchy's tail, s > 4 c^2   rho' = 2 c^2 / s           -1
+//
+// Normal equations with rho' I alone are iteratively reweighted least squares; they define decrement and covariances.
+// They overestimate the curvature along such residuals, and approach the optimum by a constant factor per step. A sweep
+// with curvature takes the smaller value along the residual, but no less than kLeastCurvature rho', so that the normal
+// equations stay positive definite. It scales J and r by sqrt(rho') and, along r, further by (1 - k) and 1 / (1 - k),
+// where (1 - k)^2 is that value over rho' (Triggs et al. 2000, "Bundle adjustment", 4.3). The gradient stays the same.
+// A decrement of 1e-2 took 197, 58 and 185 iterations on three blocks of photographs by reweighting alone, and 3, 4 and
+// 4 with the curvature and the other measures of docs/developer/decisions.md.
 #pragma once
 
 #include <array>
@@ -31,7 +37,8 @@ inline double end_of_squares(const RobustLoss& loss) {
   return loss.has_corner() ? loss.scale * loss.scale : -1;
 }
 
-// The weight of a residual under a loss.
+// The weight of a residual under a loss. Multiplying J by sqrt(rho') (I - along r r') and r by sqrt(rho') / (1 - k)
+// gives J'J with the curvature above and the true gradient rho' J'r.
 struct LossWeight {
   double rho = 0, first = 1;  // of the squared norm
   double root = 1;            // sqrt(rho')
@@ -47,6 +54,7 @@ struct LossWeight {
     along = (1 - left) / squared_norm;
     residual_scale = root / left;
   }
+  // sqrt(rho') (I - along r r') J, for the Jacobian by any unknown. `residual` is r before it is scaled.
   template <typename Jacobian, typename Residual>
   auto weighted(const Jacobian& jacobian, const Residual& residual) const {
     typename Jacobian::PlainObject result = root * jacobian;
