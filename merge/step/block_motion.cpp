@@ -1,3 +1,13 @@
+// With a = C - c the minimum of block_motion.h has separate equations for t, s and phi, because the sum of the a is
+// zero:
+//
+//     t = mean d,    s = sum a.d / sum |a|^2,
+//     (n I + sum (|a|^2 I - a a') / L^2) phi = sum a x d / L^2 - sum w.
+//
+// With L^2 = sum |a|^2 / n, rotations and positions have the same weight in phi. The tiles sum the moments about the
+// ground origin, since the centroid of the block is not known before, and the sums are moved to it afterwards:
+//
+//     sum a a' = sum C C' - n c c',    sum a x d = sum C x d - n c x t,    sum a.d = sum C.d - n c.t.
 #include "merge/step/block_motion.h"
 
 #include <algorithm>
@@ -10,6 +20,7 @@ namespace megablock {
 
 namespace {
 
+// The terms of one frame at C with the step x = (w, d), in the order of MotionSums::kSize.
 MotionSums::Row row_of(const Eigen::Vector3d& c, const PoseIncrement& x) {
   const Eigen::Vector3d w = x.head<3>(), d = x.tail<3>();
   const Eigen::Matrix3d square = c * c.transpose();
@@ -18,8 +29,7 @@ MotionSums::Row row_of(const Eigen::Vector3d& c, const PoseIncrement& x) {
   return row;
 }
 
-// Finds the nearest similarity. The moments are first moved to the centroid, where the shift is independent of the
-// rest.
+// Finds the nearest similarity from the sums of all frames of a component.
 BlockMotion motion_of(const MotionSums::Row& sums) {
   BlockMotion motion;
   const double frames = sums[0];
@@ -31,6 +41,8 @@ BlockMotion motion_of(const MotionSums::Row& sums) {
   const Eigen::Vector3d moment = sums.segment<3>(19) - frames * motion.centre.cross(motion.shift);
   const double growth = sums[22] - frames * motion.centre.dot(motion.shift);
   const double spread = scatter.trace();
+  // A single frame, or frames at one place, have no extent: the rotation then follows from the attitudes, and the scale
+  // stays.
   const double squared_extent = spread > 0 ? spread / frames : 1;
   const Eigen::Matrix3d normal =
       (frames + spread / squared_extent) * Eigen::Matrix3d::Identity() - scatter / squared_extent;
@@ -40,7 +52,8 @@ BlockMotion motion_of(const MotionSums::Row& sums) {
 }
 
 // Removes the components of the motion that would move held positions, and turns the rest about the pivot. The
-// iterations themselves make the removed part of the motion.
+// iterations themselves make the removed part of the motion. `movable` belongs to (phi, t, s) about the component's own
+// centre, in extents; the motion is expressed so first.
 BlockMotion allowed(const BlockComponent& component, const BlockMotion& motion) {
   if (component.movable == Matrix77::Identity()) return motion;
   Eigen::Matrix<double, 7, 1> parameters;
@@ -124,6 +137,7 @@ TileMotion::TileMotion(const BlockGauge& gauge, const std::vector<BlockMotion>& 
 }
 
 Pose TileMotion::Mover::pose(const Pose& before, PoseIncrement increment) const {
+  // The rest of the step: a motion of the whole component has w = -phi.
   increment.head<3>() += motion.rotation;
   increment.tail<3>() -= motion.tangent(before.centre);
   Pose after = pose_update(before, increment);

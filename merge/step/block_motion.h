@@ -9,9 +9,11 @@
 //
 //     min  sum over frames  |w + phi|^2 + |d - t - phi x (C - c) - s (C - c)|^2 / L^2,
 //
-// with c the centroid and L the extent, is therefore split off. It is applied as X -> c + t + (1 + s) Exp(phi) (X' -
-// c), where X' has been moved by the rest of the step. To first order this is the step itself, so that the normal
-// equations are unchanged.
+// with c the centroid of the frames and L their root mean square distance from it, is therefore split off. (w, d) is
+// the step of a frame: rotation (radians, on the right) and centre (metres). The similarity is applied as X -> c + t +
+// (1 + s) Exp(phi) (X' - c), where X' has been moved by the rest of the step; attitudes become R' Exp(-phi), so that
+// the images see a moved point as before. To first order this is the step itself, so that the normal equations are
+// unchanged.
 //
 // The sums over the frames that a tile owns are formed for each tile, and added in tile order.
 #pragma once
@@ -33,6 +35,7 @@ struct MotionSums {
   Bytes to_bytes() const;
   static MotionSums from_bytes(const Bytes& bytes);
 };
+// `step` is that of the tile's unknowns (TileStep::unknowns). The outline of the tile suffices (tile_store.h).
 MotionSums motion_sums(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
                        const TileState& state, const Step& step);
 
@@ -43,12 +46,14 @@ struct BlockMotion {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();     // m
   double scale = 0;                                    // s
 
+  // The movement of a position to first order, metres.
   Eigen::Vector3d tangent(const Eigen::Vector3d& position) const {
     const Eigen::Vector3d arm = position - centre;
     return shift + rotation.cross(arm) + scale * arm;
   }
 };
-// The motion of every component of the block, from the sums of all tiles in tile order.
+// The motion of every component of the block, from the sums of all tiles in tile order. One entry for each of
+// gauge.components.
 std::vector<BlockMotion> block_motions(const BlockGauge& gauge, const std::vector<MotionSums>& tiles);
 
 // Applies a step to a tile, with the motions of the components to which its parts belong. All tiles that hold a frame
@@ -60,6 +65,7 @@ class TileMotion {
              const TileProblem& problem, const TilePlan& plan);
   // Moves everything except the points.
   TileState unknowns(const TileState& state, const Step& step) const;
+  // The new position of a point from its step.
   Eigen::Vector3d point(const TileState& state, std::int64_t point, const Eigen::Vector3d& step) const {
     const Mover& mover = movers_.size() == 1 ? movers_.front() : mover_of(point);
     const Eigen::Vector3d& before = state.points[static_cast<std::size_t>(point)];

@@ -1,3 +1,6 @@
+// Every put() gets a number from `clock_`. The map from these numbers to nodes has the oldest factors first, and they
+// leave memory in this order. Factors that went to scratch are read into `loaded_` when they are asked for, one node at
+// a time, and do not come back to memory: in a sweep down each is needed once.
 #include "merge/step/memory.h"
 
 #include <algorithm>
@@ -46,6 +49,7 @@ void FactorStore::put(std::int64_t node, NodeFactors factors, Loss loss) {
 void FactorStore::make_room() {
   for (auto oldest = node_by_time_.begin();
        bytes_ + others_ > options_.factor_bytes && std::next(oldest) != node_by_time_.end();) {
+    // Factors that find no room in scratch and must not be lost are passed over, and the next younger ones go.
     const std::int64_t node = oldest->second;
     const auto entry = kept_.find(node);
     if (!spill(node, entry->second) && never_lost_.contains(node)) {
@@ -60,6 +64,7 @@ void FactorStore::make_room() {
 }
 
 bool FactorStore::spill(std::int64_t node, const NodeFactors& factors) {
+  // A factor in scratch is never written twice: its file keeps its contents while the node is in memory.
   if (spilled_.contains(node)) return true;
   const std::string name = factor_file(node);
   // The room is reserved before the factors are written, so that no time is lost on factors that find no room.
@@ -96,6 +101,7 @@ void FactorStore::discard(std::int64_t node) {
     time_of_node_.erase(node);
     kept_.erase(entry);
   }
+  // The file stays, and the next sweep writes over it.
   if (spilled_.erase(node) > 0) loaded_ = NodeFactors();
 }
 
@@ -112,7 +118,7 @@ void FactorStore::clear() {
   time_of_node_.clear();
   never_lost_.clear();
   bytes_ = others_ = 0;
-  scratch_full_ = false;
+  scratch_full_ = false;  // the disk may have room in the next sweep
   loaded_ = NodeFactors();
 }
 

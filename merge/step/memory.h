@@ -56,6 +56,7 @@ class FactorStore {
   FactorStore& operator=(const FactorStore&) = delete;
 
   // Factors that fit neither in memory nor in scratch are dropped (kRecompute) or kept in memory all the same (kNever).
+  // Only factors whose recomputation needs no other rank may be dropped.
   enum class Loss { kRecompute, kNever };
   void put(std::int64_t node, NodeFactors factors, Loss loss = Loss::kRecompute);
   // Returns nullptr when the factors were dropped and must be computed again. The pointer is valid until the next put

@@ -9,7 +9,8 @@ namespace megablock {
 
 namespace {
 
-// Visits the tables of a tile that are stored in scratch, except the positions of the points.
+// Visits the tables of a tile that are stored in scratch, except the positions of the points. These have files of their
+// own, because they change in every iteration, and the tables do not. With two tiles, `visit` gets both tables at once.
 template <typename Visit, typename... Problems>
 void visit_tables(Visit&& visit, Problems&... problems) {
   visit(problems.images...);
@@ -67,6 +68,7 @@ void TileStore::add(RankTile tile) {
   const std::int64_t bytes = byte_count(tile);
   Slot& slot = slots_.emplace_back();
   slot.tile = std::move(tile);
+  // The packed size is not known before the tile is packed, so room is asked for with the unpacked one.
   const bool fits = kept_bytes_ + bytes <= options_.tile_bytes;
   if (fits || !options_.scratch->reserve(measurements_of(slot.tile.tile), bytes) || !spill(slot)) {
     kept_bytes_ += bytes;
@@ -101,6 +103,7 @@ RankTile& TileStore::load(std::size_t row) {
   if (!slot.in_scratch || loaded_ == static_cast<std::int64_t>(row)) return slot.tile;
   if (loaded_ >= 0) {  // frees its memory for the next one
     Slot& before = slots_[static_cast<std::size_t>(std::exchange(loaded_, -1))];
+    // The tables of the next tile take over the memory of the last one.
     visit_tables([](auto& from, auto& to) { to.swap(from); }, before.tile.problem, slot.tile.problem);
     if (!before.points_here && !slot.points_here) slot.tile.state.points.swap(before.tile.state.points);
     forget(before);
@@ -143,6 +146,7 @@ void TileStore::accept() {
   for (Slot& slot : slots_) {
     slot.tile.state = std::exchange(slot.trial, {});
     slot.points_here = std::exchange(slot.trial_here, false);
+    // The file of the trial becomes that of the present points; the other one takes the next trial. Nothing is copied.
     if (slot.in_scratch && !slot.points_here) slot.points_file = 1 - slot.points_file;
   }
 }

@@ -59,6 +59,7 @@ class TileStore {
   }
 
   // Stores the state after a step beside the present one. accept() or reject() then decides on the states of all tiles.
+  // The trial of every tile must be put before accept().
   void put_trial(std::size_t row, TileState trial);
   void accept();
   void reject();

@@ -1,3 +1,7 @@
+// The frames, cameras and mounts of the trial state are known before the first point, so that the images of the new
+// state can be prepared once (`seen_`). A portion then takes each batch of points through the whole way: linearise at
+// the old state, solve for the steps, move the points, and evaluate the new residuals in the same lanes. Without a loss
+// there is no tail to refine, and the cost is computed by the common function afterwards.
 #include "merge/step/tile_trial.h"
 
 #include <memory>
@@ -61,6 +65,7 @@ void TileTrialMaker::Work::visit(std::int64_t portion) {
     for (std::size_t i = 0; i < equations.points().size(); ++i) {
       const std::int64_t p = equations.points()[i].point;
       damping_norm += equations.diagonal(i).dot(points[at(p)].cwiseAbs2());
+      // The step of the point was written to the place of its new position; it ends its life here.
       points[at(p)] = motion_.point(state_, p, points[at(p)]);
     }
     if (!robust_) continue;

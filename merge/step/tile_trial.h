@@ -13,8 +13,10 @@
 
 namespace megablock {
 
+// The state after the step, with the points in the tail of the loss at their own optimum.
 struct TileTrial {
   TileState state;
+  // 1/2 sum rho over all observations of the tile; infinite when a point is behind a camera.
   double cost = 0;
   double damping_norm = 0;  // as in TileStep
 };
