@@ -1,3 +1,11 @@
+// The similarity of tile t has seven parameters about the centroid c_t of its frames: the rotation vector phi
+// (radians), the shift v (metres) and the relative scale s. It places a frame with centre C and attitude R at
+//
+//     S_t C = c_t + v + (1 + s) Exp(phi) (C - c_t),    S_t R = R Exp(phi)^-1.
+//
+// About the centroid, small changes of phi and s move the frames to all sides, and v alone moves the tile as a whole. p
+// and a are in metres, r in radians. The last term of the head (tile_alignment.h) has the seven residuals v / a and e
+// phi / a, e s / a, where e is the root mean square distance of the frames from c_t.
 #include "merge/start/tile_alignment.h"
 
 #include <ceres/autodiff_cost_function.h>
@@ -16,6 +24,8 @@ namespace megablock {
 
 namespace {
 
+// The sigmas p and r come from the differences at the start of each round. They shrink as the tiles come together, and
+// the loss then sees smaller outliers.
 constexpr int kRounds = 3;
 constexpr double kLeast = 1e-9;  // m and rad: smaller differences count as agreement to rounding
 
@@ -30,6 +40,7 @@ Eigen::Quaternion<Scalar> turn_of(const Scalar* p) {
   return rotation_exp<Scalar>(Vector3<Scalar>(p[0], p[1], p[2]));
 }
 
+// A frame as a tile holds it, ready to be moved by the tile's parameters.
 struct Placed {
   Eigen::Vector3d arm, centroid;  // arm: from the tile's centroid to the frame
   Eigen::Quaterniond rotation;
@@ -80,6 +91,7 @@ struct TurnResidual {
   }
 };
 
+// The residuals of the last term of the head. This term has no loss: no tile is an outlier of the mean place of all.
 struct StayResidual {
   double weight, extent;
   template <typename Scalar>
@@ -112,6 +124,7 @@ class Aligner {
 
   std::vector<Similarity> run() {
     if (!common_.empty()) {
+      // This is a of the head, the first p. It stays, so that the tiles are held equally in all rounds.
       const double anchor = median_shift();
       for (int round = 0; round < kRounds; ++round) solve(median_shift(), median_turn(), anchor);
     }
@@ -126,6 +139,8 @@ class Aligner {
     return {pose.centre - centroids_[f.tile], centroids_[f.tile], pose.rotation};
   }
 
+  // The tile with most observations of a frame is its home, h of the head; every other tile that holds it gives one
+  // pair.
   void find_common_frames() {
     std::vector<SharedFrame> all;
     for (std::size_t t = 0; t < tiles_.size(); ++t)
@@ -181,6 +196,7 @@ class Aligner {
     }
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    // The order of the sums in Ceres depends on the number of threads.
     options.num_threads = 1;
     options.max_num_iterations = 50;
     options.logging_type = ceres::SILENT;

@@ -39,7 +39,8 @@ std::vector<FrameIndex> shared_frames(const std::vector<AlignmentTile>& tiles) {
 }
 
 // The sigma of a frame falls with the square root of its observations. Only the ratios of the sigmas matter, because
-// each link scales them by its misfits.
+// each link scales them by its misfits. A model holds only frames that another tile holds too: the others would not
+// link anything.
 Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<FrameIndex>& shared) {
   constexpr double kOrder = 1e-6;  // share of the extent, and rad: below any misfit, because links only enlarge sigmas
   Model model;
@@ -55,6 +56,11 @@ Model model_of(const AlignmentTile& tile, std::size_t number, const std::vector<
 }
 
 // Finds the similarity that moves the assembled tiles of a part back to their mean place before the assembly.
+//
+// The mean of rotations with the unit quaternions q_i is the eigenvector of sum q_i q_i' with the largest eigenvalue; q
+// and -q count the same (Markley, Cheng, Crassidis and Oshman 2007, "Averaging quaternions"). Every frame adds the
+// inverse rotation of its tile once. The scale is the ratio of the sums of distances from the mean, and the mean goes
+// to the mean. A similarity fitted to the projection centres would turn at will about a line of them.
 class WayBack {
  public:
   void add(const AlignmentTile& tile, const Similarity& assembled) {
@@ -70,6 +76,7 @@ class WayBack {
     Similarity back;
     if (from_.empty()) return back;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(turns_);
+    // The eigenvalues ascend.
     back.rotation = Eigen::Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3)));
     const Eigen::Vector3d from = mean(from_), to = mean(to_);
     const double size_from = size(from_, from), size_to = size(to_, to);
@@ -110,6 +117,7 @@ std::vector<Similarity> assemble_tiles(const std::vector<AlignmentTile>& tiles) 
   } catch (const ComputeError&) {  // no tile moves; they are aligned afterwards in any case
     return std::vector<Similarity>(tiles.size());
   }
+  // The assembly has an arbitrary datum, one for each part.
   std::map<std::int64_t, WayBack> parts;  // by the number of the part
   for (std::size_t t = 0; t < tiles.size(); ++t) parts[assembled.part[t]].add(tiles[t], assembled.similarity[t]);
   std::map<std::int64_t, Similarity> back;
