@@ -1,3 +1,11 @@
+// With J = | A  B |, A for frames, cameras and mounts and B for the points, B'B has 3 x 3 blocks on its diagonal, and
+// the points are eliminated by their inverses:
+//
+//     (A'A - A'B (B'B)^-1 B'A + G'G) x = A'B (B'B)^-1 B'r - A'r,    G: the rows of the datum, where it is free.
+//
+// The inverse of this matrix is the covariance of all unknowns except the points. Both are moved to inner constraints
+// by S = I - N T, T = (N'WN)^-1 N'W: x to S x, C to S C S' (inner_constraints.h). Here whole matrices are multiplied,
+// without the sums over tiles of the merge.
 #include "merge/checks/monolithic.h"
 
 #include <ceres/crs_matrix.h>
@@ -27,8 +35,7 @@ Eigen::SparseMatrix<double> to_eigen(ceres::CRSMatrix& m) {
                                     m.cols.data(), m.values.data());
 }
 
-// The rows that hold the constrained frames along their directions. Their weight is that of the observations of a
-// frame.
+// The rows G that hold the constrained frames along their directions: B of gauge.h, with the diagonal of J'J.
 DatumRows datum_rows(const MonolithicSystem& system, const TileProblem& problem, const BlockGauge& gauge) {
   const Eigen::VectorXd root = system.diagonal().unaryExpr([](double d) { return d > 0 ? std::sqrt(d) : 1; });
   std::vector<Eigen::Triplet<double>> entries;
@@ -83,8 +90,8 @@ InnerTransformation inner_transformation(const MonolithicSystem& system, const T
   return s;
 }
 
-// The normal equations without the points, sparse: W = N - C' P^-1 C, where P holds the 3 x 3 blocks of the points. And
-// their right side.
+// The normal equations without the points, sparse, and their right side. `coupling` is B'A, `own` is B'B, and `carried`
+// is (B'B)^-1 B'A.
 struct ReducedEquations {
   Eigen::SparseMatrix<double> normal;
   Eigen::VectorXd right;
@@ -157,6 +164,8 @@ Eigen::VectorXd MonolithicSystem::diagonal() const {
   return d;
 }
 
+// The columns are in the order of the parameter blocks that Ceres is given; the points come last. Residuals carry
+// sigmas and losses as Ceres applies them.
 MonolithicSystem monolithic_system(const TileProblem& problem, const TileState& state) {
   CeresTile tile(problem, state);
   ceres::Problem::EvaluateOptions options;
@@ -209,6 +218,7 @@ Eigen::VectorXd monolithic_step(const MonolithicSystem& system, double lambda) {
 
 Eigen::MatrixXd monolithic_covariance(const MonolithicSystem& system, const DatumRows& datum) {
   Eigen::MatrixXd reduced = reduced_equations(system, datum).normal;
+  // The matrix is scaled to a unit diagonal, because rotations, positions and intrinsics have units of their own.
   const Eigen::VectorXd scale = reduced.diagonal().cwiseMax(0).cwiseSqrt().cwiseInverse();
   reduced = scale.asDiagonal() * reduced * scale.asDiagonal();
   const int size = static_cast<int>(reduced.rows());

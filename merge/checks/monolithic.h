@@ -2,6 +2,10 @@
 // derivatives. It uses none of the linearisation and elimination code of this room, so that the agreement of the two is
 // evidence.
 //
+// At a state with the residuals r and the Jacobian J of all observations, the undamped Newton step of the whole block
+// is x = -(J'J)^-1 J'r. At the optimum of the merge it must be zero. Its components are therefore compared with their
+// posterior sigmas, the roots of the diagonal of (J'J)^-1: they say how far the merge has stopped from the optimum.
+//
 // The block must fit in memory. Steps are solved with sparse matrices. Covariances are dense: their dimension is six
 // times the number of frames (2 GiB for 2 500 frames).
 #pragma once

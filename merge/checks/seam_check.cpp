@@ -1,3 +1,24 @@
+// Ranks and minima of singular matrices come from Cholesky factors alone. A positive semidefinite A is scaled to a unit
+// diagonal and factorised with pivoting, P'AP = L L', until the largest pivot that is left is below a tolerance; the
+// number of pivots is its rank, and for b in the range of A the leading rows give b'A^+ b = |L_11^-1 (P'b)_1|^2.
+//
+// A tile against the rest: with C the covariance of the separator unknowns in the block, C^-1 is the sum of S of the
+// tile and of the condensed equations of the rest. At the optimum of the block the gradients cancel, so the rest has
+// -s. Hence
+//
+//     T = s'S^+ s + s'(C^-1 - S)^+ s.
+//
+// C^-1 is never formed. With a root C = F F' the rest is C^-1 - S = F^-T (I - F'S F) F^-1, so that with W = I - F'S F
+//
+//     s'(C^-1 - S)^+ s = (F's)' W^+ (F's),    rank(C^-1 - S) = rank W.
+//
+// Some unknowns u of the tile alone: let x be the separator unknowns of the block and v the difference of the tile in
+// u. The tile has the equations S (x + E v), E the columns of u, and the rest those of x. Eliminating x leaves A v = g
+// with
+//
+//     A = S_uu - S_u C S_u',    g = s_u - S_u C (s - s) = s_u,
+//
+// where S_u C S_u' = (F'S_u')'(F'S_u'): `seen` is F'S, and every u takes only its columns.
 #include "merge/checks/seam_check.h"
 
 #include <cblas.h>
@@ -35,6 +56,7 @@ constexpr double kVisibleTurn = 0.25;
 constexpr double kNoNoise = 0.01;
 constexpr std::size_t kLines = 3;  // lines of one kind; the rest is only counted
 
+// The form q of the head of seam_check.h, as full matrices.
 struct Quadratic {
   Eigen::MatrixXd s;  // full symmetric
   Eigen::VectorXd b;
@@ -93,6 +115,8 @@ struct SemidefiniteFactor {
 // is clearly above zero.
 template <typename Make>
 SemidefiniteFactor semidefinite_factor(const Make& matrix, double tolerance = kRankTolerance) {
+  // All pivots of the unpivoted factorisation above this value leave no doubt about the rank. Otherwise the pivoted one
+  // decides.
   const double plainly_there = std::max(1e-7, tolerance);
   SemidefiniteFactor factor{matrix(), {}, 0};
   const int n = factor.rank = static_cast<int>(factor.lower.rows());
@@ -121,6 +145,7 @@ class CovarianceRoot {
     const Eigen::Index n = total_dimension(c.unknowns);
     const Eigen::Map<const Eigen::MatrixXd> matrix(c.matrix.data(), n, n);
     scale_ = matrix.diagonal().cwiseMax(0).cwiseSqrt();
+    // Held unknowns have variance zero; their scale is zero in both directions.
     const Eigen::VectorXd inverse = scale_of(matrix);
     factor_ =
         semidefinite_factor([&]() -> Eigen::MatrixXd { return inverse.asDiagonal() * matrix * inverse.asDiagonal(); });
@@ -149,6 +174,7 @@ class CovarianceRoot {
   SemidefiniteFactor factor_;
 };
 
+// The probability that a standard normal variable exceeds `deviate`.
 double normal_exceeds(double deviate) { return 0.5 * std::erfc(deviate / std::sqrt(2.0)); }
 
 // The quantiles of one alarm probability, computed once for each number of degrees.
@@ -171,7 +197,8 @@ template <int Size>
 UnknownCheck check_score(const Eigen::Matrix<double, Size, 1>& score, const Eigen::Matrix<double, Size, Size>& own,
                          const Eigen::Matrix<double, Size, Size>& left, double variance_factor, Limits& limits) {
   UnknownCheck check;
-  // In units in which the tile's information has a unit diagonal.
+  // g'A^+ g by the eigenvectors of A, in units in which the tile's information has a unit diagonal. An eigenvalue is
+  // then the share of this information that is left for v. Below kShared it is rounding.
   const Eigen::Matrix<double, Size, 1> scale = scale_of(own);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * left * scale.asDiagonal());
   const Eigen::Matrix<double, Size, 1> along = eigen.vectors.transpose() * scale.cwiseProduct(score);
@@ -205,6 +232,7 @@ std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::Mat
   };
   std::vector<Turn> turns;
   double most = 0;
+  // The limits follow Bonferroni: each kind gets a third of the probability, divided by the number of its tests.
   Limits wholes(probability / kKinds / static_cast<double>(unknowns.size()));
   for (std::size_t u = 0; u < unknowns.size(); ++u) {
     const Eigen::Index row = rows[u], n = unknowns[u].dimension;
@@ -228,6 +256,7 @@ std::vector<UnknownCheck> check_unknowns(const Quadratic& tile, const Eigen::Mat
   Eigen::MatrixXd left = own;
   cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, static_cast<int>(own.rows()), static_cast<int>(seen.rows()), -1,
               seen_turns.data(), static_cast<int>(seen.rows()), 1, left.data(), static_cast<int>(own.rows()));
+  // One product gives A of all rotations; each test takes its block.
   left.triangularView<Eigen::StrictlyUpper>() = left.transpose();
   const auto count = static_cast<double>(turns.size());
   Limits singles(probability / kKinds / count), pairs(probability / kKinds / (0.5 * count * (count - 1)));
@@ -315,6 +344,8 @@ TileCheck check_tile(std::int64_t tile, const UpdateMatrix& condensed, const Cov
   const Quadratic own = unpacked(condensed);
   const LeastSquares alone = least_squares(condensed);
   const SubtreeSums& sums = condensed.sums;
+  // The tile's weighted squares, lowered to their minimum by its inner unknowns and points (the decrement) and by its
+  // separator unknowns (alone).
   check.own_chi2 = (sums.weighted_squares - sums.decrement_squared - alone.value) / variance_factor;
   check.own_degrees =
       sums.residuals - (sums.unknowns - static_cast<std::int64_t>(sums.held.size()) - sums.held_points) - alone.rank;
@@ -357,11 +388,14 @@ std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
     squares += tile.own_chi2;
     degrees += static_cast<double>(tile.own_degrees);
   }
+  // The variance factor of the tile over that of all others that are still in the list.
   const auto ratio = [&](const TileCheck* tile) {
     const auto own = static_cast<double>(tile->own_degrees);
     return tile->own_chi2 / own / std::max(kNoNoise, (squares - tile->own_chi2) / (degrees - own));
   };
-  // The normal deviate of F (Paulson 1942), whose cube root is nearly normally distributed.
+  // The normal deviate of F (E. Paulson, Ann. Math. Stat. 13, 1942), whose cube root is nearly normally distributed:
+  // with f_1 and f_2 degrees of freedom and v_i = 2 / (9 f_i), it is ((1 - v_2) F^(1/3) - (1 - v_1)) / sqrt(v_2 F^(2/3)
+  // + v_1).
   const auto deviate = [&](const TileCheck* tile) {
     const auto own = static_cast<double>(tile->own_degrees);
     const double root = std::cbrt(ratio(tile) / kUsualVarianceRatio);
@@ -370,6 +404,7 @@ std::vector<NoisyTile> noisy_tiles(const std::vector<TileCheck>& tiles) {
   };
   const double probability = kSeamAlarmProbability / static_cast<double>(tiles.size());
   std::vector<NoisyTile> noisy;
+  // The worst tile is taken out before the others are judged, so that its own residuals do not excuse them or it.
   while (left.size() > 1) {
     const auto worst = std::ranges::max_element(left, {}, deviate);
     if (!(normal_exceeds(deviate(*worst)) < probability)) break;
@@ -389,9 +424,11 @@ std::vector<std::string> describe_disagreements(const std::vector<TileCheck>& ti
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& a, const auto& b) { return a.second.excess() > b.second.excess(); });
 
+  // This is twice the logarithm of the likelihood ratio at which a tile is named alone.
   const double decisive = -2 * std::log(kSeamAlarmProbability);
   std::vector<std::string> lines;
   std::size_t more = 0;
+  // Of checks with an unknown in common only the worst is reported.
   std::vector<UnknownCheck> said;
   for (const auto& [tile, check] : all) {
     if (!check.alarm()) break;

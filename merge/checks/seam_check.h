@@ -5,10 +5,13 @@
 //     T = 2 (min(q_a + q_b) - min q_a - min q_b) = s_a'S_a^+ s_a + s_b'S_b^+ s_b - (s_a + s_b)'(S_a + S_b)^+ (s_a +
 //     s_b)
 //
-// is chi-square distributed with rank S_a + rank S_b - rank(S_a + S_b) degrees of freedom. This also holds for singular
-// S (halves without a datum), and for unknowns that only one half has. Some of the common unknowns are eliminated at
-// the node, and s'S^+ s = |z|^2 + s_p'S_p^+ s_p, with z and S_p of the front's factor and update matrix (front.h). The
-// check of a node therefore takes a single further factorisation, that of its update matrix.
+// is chi-square distributed with rank S_a + rank S_b - rank(S_a + S_b) degrees of freedom. Here q(x) = 1/2 x'S x - s'x
+// + const, so that twice its minimum is -s'S^+ s, up to the constant. T is thus the growth of the weighted sum of
+// squares when both halves must have the same values for the common unknowns; such a growth is chi-square distributed
+// with as many degrees of freedom as conditions. This also holds for singular S (halves without a datum), and for
+// unknowns that only one half has. Some of the common unknowns are eliminated at the node, and s'S^+ s = |z|^2 +
+// s_p'S_p^+ s_p, with z and S_p of the front's factor and update matrix (front.h). The check of a node therefore takes
+// a single further factorisation, that of its update matrix.
 #pragma once
 
 #include <array>
