@@ -11,6 +11,7 @@
 
 namespace megablock {
 
+// Bytes of a value: by its own to_bytes(), or as it stands in memory.
 namespace tile_bytes {
 
 template <typename Value>

@@ -24,6 +24,7 @@ void stop(GlobalState& state, GlobalOutcome outcome) {
 }
 
 void accept(GlobalState& state, double gain_ratio) {
+  // This is Nielsen's rule. A gain ratio above 1/2 lowers lambda, one below 1/2 raises it.
   const double x = 2 * gain_ratio - 1;
   state.lambda *= std::max(1.0 / 3, 1 - x * x * x);
   state.nu = 2;
@@ -37,6 +38,8 @@ void reject(GlobalState& state) {
   state.nu *= 2;
   state.floor_decrement = -1;
   state.curvature = 0;
+  // The undamped step has failed, so the next iteration is damped, and its decrement may be small without another
+  // confirming sweep.
   if (state.pass_lambda == 0) state.confirm = 0;
   state.next = GlobalAction::kReject;
 }
@@ -48,7 +51,8 @@ bool negligible(const GlobalState& state, const GlobalOptions& options, double c
          std::abs(change) <= options.function_tolerance * state.cost;
 }
 
-// Starts the next iteration after an accepted or rejected step, or stops.
+// Starts the next iteration after an accepted or rejected step, or stops. Where several reasons apply, the last one
+// below counts.
 void start_pass(GlobalState& state, const GlobalOptions& options) {
   state.pass_lambda = state.lambda;
   state.pass_curvature = state.curvature;
@@ -81,7 +85,10 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
   if (negligible(state, options, 0.5 * state.decrement_squared)) return stop(state, GlobalOutcome::kConverged);
   const double decrement = std::sqrt(state.decrement_squared);
   const bool small = decrement <= options.max_decrement;
+  // The last step was too small for the cost to judge, and the decrement has not fallen since: only rounding is left.
   const bool at_floor = state.floor_decrement >= 0 && decrement >= state.floor_decrement;
+  // Damping makes the decrement smaller. A damped sweep can therefore only ask for an undamped one, which decides.
+  // Single tiles need no confirmation, only a sweep that is hardly damped.
   if (state.pass_lambda == 0) {
     if (small) return stop(state, GlobalOutcome::kConverged);
     if (at_floor) return stop(state, GlobalOutcome::kRoundingFloor);
@@ -101,12 +108,14 @@ void report_down(GlobalState& state, const GlobalOptions&, const DownReport& rep
   state.predicted = 0.5 * (state.decrement_squared + state.pass_lambda * report.damping_norm);
   const double decrease = state.cost - state.trial_cost;
   if (!std::isfinite(state.trial_cost)) return reject(state);
+  // The cost can judge the step.
   if (state.predicted > kUnresolvable * state.cost) {
     state.floor_decrement = -1;
     return decrease > 0 ? accept(state, decrease / state.predicted) : reject(state);
   }
   // The expected decrease is below rounding here, so that the cost can only expose a plainly wrong step.
   if (-decrease > kUnresolvable * kUnresolvable + 1e6 * kEpsilon * state.cost) return reject(state);
+  // The step is taken as if it did what the model promises. The next decrement tells whether it did.
   state.floor_decrement = std::sqrt(state.decrement_squared);
   accept(state, 1);
 }

@@ -2,19 +2,33 @@
 // machine that does not know how sweeps are run: `next_action` says what to do, and the `report_*` functions take the
 // results. The state is a plain struct, so that it can be stored after every accepted iteration and resumed later.
 //
+// With the residuals r, weighted by their losses, at the present state, b = -J'r, H = J'J and D = diag(H), a sweep
+// solves (H + lambda D) x = b. The cost F then decreases, by the quadratic model F - b'x + 1/2 x'H x, by
+//
+//     predicted = b'x - 1/2 x'H x = 1/2 (b'x + lambda x'D x) = 1/2 (|L^-1 b|^2 + lambda x'D x),
+//
+// because H x = b - lambda D x and b'x = b'(H + lambda D)^-1 b = |L^-1 b|^2. The first term comes from the sweep up
+// (SubtreeSums::decrement_squared), the second from the sweep down (TileStep::damping_norm). The gain ratio rho is the
+// true decrease over the predicted one.
+//
 // Damping follows Nielsen (1999): lambda *= max(1/3, 1 - (2 rho - 1)^3) on acceptance, without a floor; on rejection
 // lambda *= max(10 nu, 1e-6 / lambda) and nu *= 2. The tiles are adjusted and aligned beforehand, so lambda starts at
-// 1e-10.
+// 1e-10. The first rejection therefore raises lambda to 1e-6 at once.
 //
 // A sweep up takes the curvature of the robust losses (tile_linearisation.h) while steps decrease the cost as
 // predicted: after a step of gain ratio >= 0.75, until a step has a smaller one or is rejected.
 //
-// The iterations stop on the Newton decrement d^2 = b'H^-1 b = sum |L^-1 b|^2: every unknown is then within d of its
-// own posterior sigma of the optimum. It is measured with lambda = 0 and with the weights of the covariances. When the
-// decrement of a sweep falls below the limit, the same state is condensed once more with lambda = 0, and the decrement
-// of that sweep decides. When it does not confirm convergence and its step is rejected, the next step is damped and
-// tried, however small its decrement is. When the predicted decrease is below 1e3 eps F, the cost F cannot resolve it:
-// the step is accepted, and the iterations go on as long as d falls.
+// The iterations stop on the Newton decrement d^2 = b'H^-1 b = sum |L^-1 b|^2. The undamped step of an unknown k with
+// the posterior sigma sigma_k = sqrt(e_k'H^-1 e_k) is x_k = e_k'H^-1 b, and by Cauchy and Schwarz |x_k| <= sigma_k d:
+// every unknown is then within d of its own posterior sigma of the optimum. The change of the cost bounds nothing of
+// the kind: on a chain of 2 500 frames with control at each kilometre it became small with the block 2.7 sigmas (0.36
+// m) off.
+//
+// The decrement is measured with lambda = 0 and with the weights of the covariances. When the decrement of a sweep
+// falls below the limit, the same state is condensed once more with lambda = 0, and the decrement of that sweep
+// decides. When it does not confirm convergence and its step is rejected, the next step is damped and tried, however
+// small its decrement is. When the predicted decrease is below 1e3 eps F, the cost F cannot resolve it: the step is
+// accepted, and the iterations go on as long as d falls.
 #pragma once
 
 #include <functional>

@@ -9,6 +9,7 @@
 
 namespace megablock {
 
+// It keeps copies of the problems and states beside those of the store, so that callers can read both at any time.
 class MergeInMemory : public TreeRunner {
  public:
   // `problems[t]` and `states[t]` belong to tile t. Unknowns that tiles share must have the same values in all of them.

@@ -1,4 +1,7 @@
 // Gives every node of the merge tree its plan and its rank, and finds the datum of the block.
+//
+// Only small things are gathered on all ranks: the unknowns of every tile, from which each rank makes the same plan of
+// the tree, and the parts of the datum (GaugePart), from which each makes the same datum.
 #include "merge/tree/merge_tree_runner.h"
 
 #include <algorithm>
@@ -10,12 +13,14 @@ namespace megablock {
 
 std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks) {
   std::int64_t total = 0;
+  // One more for each tile, so that tiles without observations are shared out, too.
   for (const std::int64_t count : observations) total += count + 1;
   std::vector<int> rank_of_tile(observations.size(), 0);
   std::int64_t before = 0;
   for (const MergeTree::Node& node : tree.nodes) {
     if (!node.tile.valid()) continue;
     const auto tile = static_cast<std::size_t>(node.tile.value);
+    // A tile goes to the rank in whose share of the sum its middle lies.
     const std::int64_t middle = before + (observations[tile] + 1) / 2;
     rank_of_tile[tile] = static_cast<int>(std::min<std::int64_t>(ranks - 1, middle * ranks / total));
     before += observations[tile] + 1;
@@ -43,6 +48,8 @@ MergeTreeRunner::~MergeTreeRunner() = default;
 
 void MergeTreeRunner::make_plans(const MergeTree& tree, std::size_t tile_count) {
   std::vector<UnknownList> own;
+  // Each tile is read twice here: the plan of a tile needs the plan of the tree, and that needs the unknowns of all
+  // tiles.
   for (std::size_t row = 0; row < tiles_.size(); ++row) own.push_back(tile_unknowns(tiles_.whole(row).problem));
   plan_ = make_plan(tree, gather_by_tile(ranks_, tile_count, tiles_, own));
   on_one_rank_.assign(plan_.nodes.size(), false);
@@ -92,6 +99,7 @@ InnerSums MergeTreeRunner::gather_inner_sums(const std::vector<TileStep>& steps)
     own.push_back(inner_sums(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, steps[row].unknowns));
   }
   const std::vector<InnerSums> all = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own);
+  // Every rank sums in the order of the tiles.
   InnerSums sums = all.front();
   for (std::size_t t = 1; t < all.size(); ++t) sums.add(all[t]);
   return sums;

@@ -5,6 +5,11 @@
 // and child are on different ranks these values travel as messages (tree_communicator.h). All sums are formed in the
 // order of the tiles or of the children, so that the bits do not depend on the ranks.
 //
+// No two ranks wait for each other. A rank visits its nodes by ascending number in a sweep up and by descending number
+// in a sweep down, and children have lower numbers than their parents. Of all nodes that are not done, the first in
+// this order has its values: they were sent when the nodes before it were done, because send() returns at once. Its
+// rank has come to it, and goes on.
+//
 // Tiles lie in a store of their own, partly out of core (merge/step/tile_store.h), and a sweep asks once for each whole
 // tile. Factors wait for the sweep down in memory; beyond the budget they wait in the scratch directory of the rank,
 // and without room there they are computed again (merge/step/memory.h). The factors of a node whose subtree lies on

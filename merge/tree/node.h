@@ -16,7 +16,8 @@ class NodeSolver {
   virtual ~NodeSolver() = default;
 
   // Adds the updates of the children, the left one first, damps the unknowns that are eliminated at `node`, and
-  // eliminates them.
+  // eliminates them. The formulas and the treatment of vanished pivots are those of front.h. The updates are given by
+  // value, so that their memory can be freed during the elimination.
   virtual Front::Result eliminate(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) const = 0;
 
   // The step of all unknowns of the node's front, from the step of its separator unknowns. `parent` has these unknowns

@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::uint64_t kFormat = 1;
 
-// An identifier that Linux draws anew at each start of the machine; empty on other systems.
+// An identifier that Linux draws anew at each start of the machine; empty on other systems. Files that were not forced
+// to the disk may be damaged after the machine has stopped.
 std::string start_of_machine() {
   std::string id;
   std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), id);
@@ -68,6 +69,7 @@ bool PassRecordFiles::write(const PassRecord& record) const {
   const std::string start = start_of_machine();
   const std::vector<std::int64_t> sizes = sizes_of(record);
   if (start.empty() || sizes.empty()) return false;
+  // A new record replaces the old one only when it is whole: renaming is atomic.
   const std::string next = std::string(kRecord) + ".next";
   const bool whole = scratch_->write(next, [&](std::ostream& file) {
     ByteWriter writer(file);
@@ -103,6 +105,7 @@ std::optional<PassRecord> PassRecordFiles::read() const {
     record.seams = reader.values<SeamReport>();
     const auto sizes = reader.values<std::int64_t>();
     if (!reader.at_end() || sizes.empty() || sizes != sizes_of(record)) return std::nullopt;
+    // The budget may be smaller than in the run that was killed.
     if (std::accumulate(sizes.begin(), sizes.end(), static_cast<std::int64_t>(size)) > scratch_->budget())
       return std::nullopt;
     return record;

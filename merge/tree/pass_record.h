@@ -1,6 +1,7 @@
 // Records a sweep up, so that a killed run resumes in the middle of the sweep. The record holds the updates of finished
 // subtrees. The factors of their nodes are in the scratch directory of the rank, or are copied there (memory.h). A
-// resumed sweep has the same bits, because it reads the computed values back.
+// resumed sweep has the same bits, because it reads the computed values back. The hash `pass` covers the state and
+// everything on which these values depend, so that values of another sweep are never mixed in.
 //
 // A record survives the process, but not a restart of the machine, because nothing is forced to the disk. A record of
 // an earlier start of the machine or of another machine is ignored, and the sweep begins again.

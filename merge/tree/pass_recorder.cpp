@@ -36,6 +36,8 @@ PassRecord PassRecorder::begin(const Kind& kind) {
   pass_ = hash_of(at_.state, kind);
   begin_s_ = last_s_ = clock_seconds();
   given_up_ = false;
+  // A record serves one sweep at most: the one with the same state, damping, right-hand sides and seam checks. It is
+  // the first sweep of a resumed run, or none.
   const std::optional<PassRecord> found = std::exchange(found_, std::nullopt);
   if (found && found->pass == pass_) {
     written_.insert(found->subtrees.begin(), found->subtrees.end());
@@ -51,6 +53,8 @@ PassRecord PassRecorder::begin(const Kind& kind) {
 bool PassRecorder::due(std::int64_t bytes, bool leaves) const {
   if (given_up_) return false;
   if (seconds_ <= 0 || stop_requested_()) return true;
+  // An update that leaves this rank's own subtrees cannot be recorded later. Here the time since the beginning of the
+  // sweep decides.
   const double worked = clock_seconds() - (leaves ? begin_s_ : last_s_);
   return worked >= std::max(seconds_, static_cast<double>(bytes) / kBytesPerSecond);
 }
@@ -69,6 +73,7 @@ void PassRecorder::write(PassRecord record) {
   record.pass = pass_;
   record.position = at_.bytes;
   if (!files_.write(record)) return give_up();
+  // They are removed only now, because the former record named them until it was replaced.
   std::erase_if(written_, [&](std::int64_t node) {
     if (std::ranges::binary_search(record.subtrees, node)) return false;
     files_.remove_update(node);

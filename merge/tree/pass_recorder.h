@@ -18,6 +18,8 @@
 
 namespace megablock {
 
+// One object serves all sweeps of a run. Records go to the scratch directory of the rank and are no message between
+// ranks: every rank resumes from its own.
 class PassRecorder {
  public:
   // The position of the global adjustment: a hash of the state at which sweeps linearise and of the distribution of

@@ -1,5 +1,11 @@
 // Computes what the adjusted block needs besides its state: the seam checks, the datum, the covariances, and the checks
 // of the tiles.
+//
+// A sweep up with lambda = 0 makes the factors, with the seam checks on its way. Where the datum is free, this sweep
+// has the right-hand sides W N of inner_constraints.h, and a sweep down of steps gives Z = C W N and the sums M and K.
+// The covariances then come down the tree: each front gets C_PP from its parent and gives C_EE and C_PE
+// (front_covariance.cpp). The covariances of a tile are not kept after its visit, so that those of the whole block are
+// never in memory together.
 #include <algorithm>
 #include <utility>
 
@@ -46,6 +52,7 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
     const RankTile& tile = tiles_.whole(row);
     const TilePlan& plan = tile_plans_[row];
     const Step& step = steps[row].unknowns;
+    // This comes before the covariances of the tile, which take over the memory of `passed`.
     checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability());
     TileCovariance covariance =
         covariance_tile(tile.problem, plan, tile.state, factors.tile, std::move(passed), datum_of(row), step);
@@ -61,6 +68,7 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   for (const ObservationTable& table : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, tables))
     posterior.observations.add(table);
 
+  // Each rank knows the seams of its own nodes; all get all of them, in the order of the nodes.
   ByteWriter writer;
   writer.values(seams_);
   for (const Bytes& bytes : ranks_.gather_all(writer.take())) {

@@ -1,4 +1,8 @@
 // The sweep down: computes the step of every unknown, and the trial state after the step.
+//
+// It has two parts. The first goes down the tree with the factors alone, down to the unknowns of all tiles, and reads
+// no observations. The motion of the whole block (block_motion.h) needs the steps of all frames, so that the ranks meet
+// here. The second part reads each tile once more, for its points and the cost of the trial state.
 #include <utility>
 
 #include "geometry/threads/rounds.h"
@@ -14,6 +18,7 @@ std::vector<TileStep> MergeTreeRunner::steps_down(const Pass& pass) {
   std::vector<TileStep> steps(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
+    // It is empty at the root.
     const Step passed = from_parent<Step>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     const Stopwatch watch(node.leaf < 0 ? seconds_.fronts : seconds_.tiles);
@@ -64,8 +69,11 @@ DownReport MergeTreeRunner::down(const Pass& pass) {
   trial_gauges_.clear();
   try_steps(motions, pass, steps, [&](std::size_t row, TileTrial trial) {
     sums[row] = {trial.damping_norm, trial.cost};
+    // The whole tile is in memory now. If the step is accepted, the next sweep up finds the datum of its state without
+    // reading the tiles.
     trial_gauges_.push_back(tile_gauge(tiles_.outline(row).problem, tile_plans_[row], trial.state));
     tiles_.put_trial(row, std::move(trial.state));
+    // The step of the tile is not needed any more.
     steps[row] = {};
   });
   DownReport report;

@@ -1,4 +1,8 @@
 // The sweep up: condenses tiles and eliminates fronts, children before parents.
+//
+// Nodes are numbered depth first, so that a front is eliminated as soon as both of its children are there. Few updates
+// then wait at a time: those of the left siblings along one path to the root. Tiles take most of the time and are
+// condensed by all threads; between two of them, one thread eliminates the fronts that have become complete.
 #include <algorithm>
 #include <iterator>
 #include <set>
@@ -11,6 +15,7 @@
 
 namespace megablock {
 
+// The tag of the message is the number of the child: each node has one update in a sweep.
 void MergeTreeRunner::deliver_update(std::int64_t node, UpdateMatrix update) {
   const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(node)].parent;
   if (parent < 0 || mine(parent)) {
@@ -30,6 +35,8 @@ UpdateMatrix MergeTreeRunner::child_update(std::int64_t child) {
 }
 
 UpdateMatrix MergeTreeRunner::store_factors(std::int64_t leaf, TileCondensation condensed) {
+  // The least squares of the tile alone are needed at the seam above; its condensed equations, on the way down, for the
+  // check of the tile.
   if (check_seams_) condensed.update.alone = least_squares(condensed.update);
   factors_.put(leaf, {std::move(condensed.factor), {}, check_seams_ ? condensed.update : UpdateMatrix()},
                FactorStore::Loss::kRecompute);
@@ -40,6 +47,7 @@ UpdateMatrix MergeTreeRunner::eliminate_inner(std::int64_t node, UpdateMatrix le
                                               const Pass& pass, bool check_seam_here) {
   const auto n = static_cast<std::size_t>(node);
   const Stopwatch watch(seconds_.fronts);
+  // They are taken out before the updates are moved into the front.
   const LeastSquares left_alone = left.alone, right_alone = right.alone;
   Front::Result result = solver_.eliminate(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
   if (check_seam_here) {
@@ -51,6 +59,8 @@ UpdateMatrix MergeTreeRunner::eliminate_inner(std::int64_t node, UpdateMatrix le
   return std::move(result.update);
 }
 
+// Goes down to the tiles, because the updates of the subtree are no longer there, and stores the factors of all its
+// nodes on the way up. Seams were checked the first time.
 UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   if (plan.leaf >= 0) {
@@ -64,8 +74,9 @@ UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass
 }
 
 // The memory of a front holds the eliminated columns, and the update once as a full matrix and once as a triangle. The
-// covariances need as much. The check of a seam works on a copy of the update. A tile has no front of all its unknowns,
-// because its cells are eliminated in small fronts.
+// check of a seam works on a copy of the update. The covariances need the larger of 2 e^2 and e^2 + 2 p e + p^2 values
+// beside the factor, which is more than this where e is large. A tile has no front of all its unknowns, because its
+// cells are eliminated in small fronts.
 std::int64_t MergeTreeRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
@@ -84,6 +95,7 @@ const NodeFactors& MergeTreeRunner::factors_of(std::int64_t node, const Pass& pa
   if (const NodeFactors* kept = factors_.get(node)) return *kept;
   factors_.note_recomputed();
   condense_again(node, pass);
+  // The factors that were stored last are always in memory.
   return *factors_.get(node);
 }
 
@@ -93,6 +105,8 @@ UpReport MergeTreeRunner::up(const Pass& pass) {
   // The datum belongs to the present state, not to the first one, so that a resumed run gets the same bits.
   gauge_ = gather_gauge();
   last_pass_.reset();
+  // A sweep that may be the last one checks its seams at once. The condition on the curvature is that of the
+  // covariances: their weights are rho' alone.
   check_seams_ = posterior_expected_ && pass.lambda == 0 && !pass.curvature && !gauge_.free();
   const UpReport report = condense_all(pass);
   if (check_seams_) last_pass_ = report.sums;
@@ -105,6 +119,7 @@ std::vector<bool> MergeTreeRunner::nodes_of(const std::vector<std::int64_t>& sub
   for (const std::int64_t top : subtrees) nodes[static_cast<std::size_t>(top)] = true;
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     const std::int64_t parent = plan_.nodes[static_cast<std::size_t>(n)].parent;
+    // Parents have higher numbers, so a parent is marked before its children.
     if (parent >= 0 && nodes[static_cast<std::size_t>(parent)]) nodes[static_cast<std::size_t>(n)] = true;
   }
   return nodes;
@@ -122,10 +137,14 @@ std::vector<bool> MergeTreeRunner::resume(const PassRecord& record) {
   return nodes_of(record.subtrees);
 }
 
+// The factors must be in scratch before the record names them. Updates that wait are written beside it.
 void MergeTreeRunner::record(std::int64_t node, const UpdateMatrix& update) {
+  // Only subtrees of this rank alone can be resumed without the other ranks.
   if (recorder_ == nullptr || !on_one_rank_[static_cast<std::size_t>(node)]) return;
   const std::int64_t bytes = update.byte_count() + pending_update_bytes() + factors_.bytes_without_copy();
   if (!recorder_->due(bytes, update_leaves(node))) return;
+  // The tops of all finished subtrees: this node, the nodes that wait for their parents, and those whose updates have
+  // left this rank's own subtrees.
   std::map<std::int64_t, const UpdateMatrix*> updates{{node, &update}};
   for (const auto& [n, waiting] : updates_)
     if (on_one_rank_[static_cast<std::size_t>(n)]) updates[n] = &waiting;
@@ -145,6 +164,7 @@ void MergeTreeRunner::record(std::int64_t node, const UpdateMatrix& update) {
 }
 
 void MergeTreeRunner::send_update(std::int64_t node, UpdateMatrix update) {
+  // The record comes first, because the delivery moves the update away.
   record(node, update);
   deliver_update(node, std::move(update));
 }
@@ -154,6 +174,7 @@ UpdateMatrix MergeTreeRunner::join_children(std::int64_t n, const Pass& pass) {
   UpdateMatrix left = child_update(node.left), right = child_update(node.right);
   const std::int64_t at_work = pending_update_bytes() + left.byte_count() + right.byte_count() + front_bytes(n);
   peak_front_bytes_ = std::max(peak_front_bytes_, at_work);
+  // What the front needs is taken from the budget of the factors, which go to scratch now if need be.
   factors_.leave_room(at_work);
   return eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
 }
@@ -181,6 +202,7 @@ void MergeTreeRunner::condense_tiles(std::span<const std::int64_t> leaves, const
                      [&](std::int64_t i, std::int64_t cell) { tiles[at(i)]->condense(cell); }, finish,
                      [&](std::int64_t i) { return in_memory(row_of_leaf(leaves[at(i)])); }});
   }
+  // The time that `finish` spent on inner nodes and messages is counted elsewhere.
   seconds_.tiles -= elsewhere;
 }
 
@@ -195,6 +217,7 @@ UpReport MergeTreeRunner::condense_all(const Pass& pass) {
   for (std::int64_t n = 0; n < std::ssize(plan_.nodes); ++n)
     if (mine(n) && plan_.nodes[static_cast<std::size_t>(n)].leaf >= 0 && !done[static_cast<std::size_t>(n)])
       leaves.push_back(n);
+  // A last number behind all nodes, up to which the inner nodes after the last tile are visited.
   leaves.push_back(std::ssize(plan_.nodes));
   std::int64_t next = 0;  // next node to visit
   // Handles the nodes between two tiles: inner nodes, and nodes that the record of a killed run has.
@@ -215,6 +238,8 @@ UpReport MergeTreeRunner::condense_all(const Pass& pass) {
   });
   ranks_.flush_sends();
   const std::int64_t root = plan_.root();
+  // The update of the root has no unknowns left. Its sums are those of the whole block; every rank decides on them
+  // alike.
   const std::string at_root = mine(root) ? updates_.at(root).to_bytes() : std::string();
   updates_.clear();
   return {UpdateMatrix::from_bytes(ranks_.broadcast(at_root, rank_of_node_[static_cast<std::size_t>(root)])).sums};

@@ -19,13 +19,14 @@ namespace {
 // Sigmas. A point that is nearer to its optimum at held poses is left there, because the next step moves the poses on.
 constexpr double kSettled = 1e-2;
 
-// The sweeps over a tree of one leaf.
+// The sweeps over a tree of one leaf. Its leaf is the root, and no unknown is on a separator.
 class LoneTile : public TreeRunner {
  public:
   LoneTile(const TileProblem& problem, const TilePlan& plan, TileState& state)
       : problem_(problem), plan_(plan), state_(state), cost_(evaluate_cost(problem, state)) {}
 
   UpReport up(const Pass& pass) override {
+    // The datum of the present state, as in the sweeps over a block.
     gauge_ = make_gauge({tile_gauge(problem_, plan_, state_)});
     TileCondensation condensed =
         condense_tile(problem_, plan_, state_, pass, tile_datum(gauge_, 0, problem_, plan_, state_, false));
@@ -67,7 +68,8 @@ class LoneTile : public TreeRunner {
 // damping only holds back the weak modes. The same is true where all positions are held and only the attitudes are
 // wrong.
 double initial_lambda(const TileProblem& problem, const TilePlan& plan, double cost) {
-  constexpr double kPoor = 10;  // cost per observation; noise alone costs half of it
+  // The cost per observation. Noise alone costs at most one: half the squares of two residuals of unit variance.
+  constexpr double kPoor = 10;
   constexpr double kFar = 1e-2, kNear = 1e-10;
   const auto held_frames = std::count_if(problem.positions.begin(), problem.positions.end(),
                                          [](const auto& term) { return held(term.prior); });
