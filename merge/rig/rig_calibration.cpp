@@ -1,3 +1,8 @@
+// The whole block is adjusted as one tile. First some tracks are held out (every n-th, and control points too where
+// there are many): the rig calibrated on the others is compared with the start on these, by the residuals of their
+// intersections. Then all observations are adjusted together to the optimum of the global adjustment, which gives
+// result and sigmas. In comparisons the other side is always adjusted as well, with the rig held: frames and points are
+// at their best for each of the two rigs.
 #include "merge/rig/rig_calibration.h"
 
 #include <fmt/core.h>
@@ -29,7 +34,9 @@ BlockState state_of(const Block& block, const BlockState& start, const WholeBloc
   return state;
 }
 
-// Compares the adjusted check points with their given positions.
+// Compares the adjusted check points with their given positions, in metres. `normalised` is the root mean square of the
+// differences over their sigmas, 1 where these are true: the variance of a difference is that of the adjusted point
+// plus that of the given one. Without covariances it is 0.
 std::optional<PointFit> check_points(const Block& block, const WholeBlock& whole,
                                      const std::vector<Eigen::Matrix3d>* covariances) {
   PointFit fit;
@@ -82,6 +89,8 @@ class RigCalibrator {
   }
 
  private:
+  // Control points on one line leave the rotation about it to the images. Off-line there is nothing else that could
+  // tell it, so this is an error there and a warning on-line.
   void check_input() {
     if (options_.mode == CalibrationMode::kOnLine && tracks_->track_count() == 0)
       throw InputError("there are no tie points: on-line calibration needs them; give 'tie_points' or images");
@@ -120,6 +129,7 @@ class RigCalibrator {
 
   // Holds out tracks, adjusts the others, and compares result and start on the tracks that were held out.
   void compare_held_out() {
+    // At least half of the tracks stay in the adjustment.
     const std::int64_t every =
         options_.held_out_share > 0 ? std::llround(std::max(2.0, 1 / options_.held_out_share)) : 0;
     if (every == 0) return;
@@ -141,6 +151,7 @@ class RigCalibrator {
     result_.held_out_px = intersection_sigma_px(left_out, state_of(block_, start_, after), out, options_.adjustment);
     result_.held_out_before_px =
         intersection_sigma_px(left_out, state_of(block_, start_, before), out, options_.adjustment);
+    // The full adjustment starts from here: most of its observations have already been used.
     warm_start_ = state_of(block_, start_, after);
     warm_start_.oriented = start_.oriented;
   }
@@ -169,8 +180,11 @@ class RigCalibrator {
       if (!whole.problem.active(p)) continue;
       ++(whole.problem.points[at(p)].role == PointRole::kControl ? result_.control_points : result_.points);
     }
+    // Residuals less unknowns. Held unknowns take no degree of freedom, and neither do the free directions of the
+    // datum.
     const std::int64_t redundancy =
         sums.residuals - sums.unknowns + std::ssize(sums.held) + sums.held_points + runner.block_gauge().defect();
+    // Image observations alone; their redundancy numbers add up to their part of the degrees of freedom.
     result_.residuals = 2 * sums.observations;
     result_.redundancy = 0;
     for (const ObservationKind kind :
@@ -202,6 +216,7 @@ class RigCalibrator {
     }
   }
 
+  // A rig of a single camera has nothing to calibrate.
   void describe_mounts(const WholeBlock& whole) {
     for (RigIndex rig(0); block_.rigs.contains(rig); ++rig.value) {
       if (block_.rigs[rig].mounts.size() < 2) continue;
@@ -297,6 +312,8 @@ class RigCalibrator {
       warn(mount.name + ": posterior sigma" + weak + "; measure more points, or hold the cameras (--hold-intrinsics)");
   }
 
+  // The result is compared with the rig held at the start, with frames and points adjusted to it. Both use the
+  // observations that the result keeps.
   void compare_with_start(const WholeBlock& whole) {
     const WholeBlock before = adjust_with_rig_held(block_, start_, whole, *tracks_, options_.adjustment);
     const std::vector<ImageFit> fits = fit_by_mount(whole), earlier = fit_by_mount(before);
@@ -323,6 +340,8 @@ class RigCalibrator {
     result_.verification = fit_on(site, result_);
   }
 
+  // Adjusts the other site with the calibration held, and compares its check points: by the adjustment where the datum
+  // is fixed, else after a similarity.
   RigFit fit_on(const VerificationSite& site, const RigCalibration& calibration) const {
     Block block = site.block;
     apply_calibration(calibration, true, block);
@@ -342,6 +361,8 @@ class RigCalibrator {
     return fit;
   }
 
+  // Refuses a result that fits observations it has not seen worse than the start does: those of the other site if there
+  // is one, else those that were held out, and check points.
   void judge() {
     const auto refuse = [&](const char* where, double before, double after, const char* unit) {
       if (!(after > options_.largest_ratio * before) || !result_.refused.empty()) return;

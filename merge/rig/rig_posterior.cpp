@@ -1,3 +1,12 @@
+// The tile is condensed as in a merge, with the free mounts as its separator: frames, cameras and points are
+// eliminated, and the update matrix is S + P over the mounts (rig_posterior.h). A free datum is held by the minimal
+// constraints of gauge.h. They must not hold the scale, which would then seem to be observed. They do not, because the
+// priors of free mounts give it: adjust/calibration/rig_observations.cpp keeps their sigmas below the extent of the
+// rig.
+//
+// A unit vector g, in units U, is the growth of one rig. When the open directions contain it (squared cosine of at
+// least kSame), the scale is undetermined. It is taken out of the open directions, so that mounts are not named for it,
+// and on request out of the covariance, C -> (I - g g') C (I - g g').
 #include "merge/rig/rig_posterior.h"
 
 #include <algorithm>
@@ -34,6 +43,7 @@ UpdateMatrix condense_on_mounts(const TileProblem& problem, const TileState& sta
   return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, false)).update;
 }
 
+// The update matrix unpacked, both triangles.
 Eigen::MatrixXd full(const UpdateMatrix& update) {
   const auto n = static_cast<Eigen::Index>(update.diagonal.size());
   Eigen::MatrixXd matrix(n, n);
@@ -113,6 +123,8 @@ RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, b
     const Eigen::VectorXd scale = scales.col(s), along = directions.transpose() * scale;
     if (along.squaredNorm() < kSame) continue;
     posterior.scale_determined = false;
+    // The part of the open space along the scale goes; the columns are no basis any more, but their squares still add
+    // up to the share of each mount.
     directions -= (directions * along.normalized()) * along.normalized().transpose();
     if (!without_scale) continue;
     covariance -= scale * (scale.transpose() * covariance);

@@ -1,10 +1,12 @@
 // Computes how well the observations of a block determine the mounts of its rigs. From the normal equations it
 // eliminates frames, cameras and points; the free mounts remain.
 //
-// S is this condensed matrix without the priors of the mounts. The observations do not determine a direction whose
-// standard deviation in S is above 0.1 m or 5 degrees. The scale of a rig is the movement of all its free mounts away
-// from its reference; tie points alone never determine it. With P the information of the priors, the covariance is (S +
-// P)^-1. Where the priors only keep the system regular, it is the covariance at the present scale of the rig.
+// S is this condensed matrix without the priors of the mounts, P the information of these priors. Each scalar unknown
+// is measured in units of 0.1 m or 5 degrees; with U the diagonal matrix of the units, an eigenvector of U S U with the
+// eigenvalue e is a direction whose standard deviation is 1 / sqrt(e) units. The observations do not determine the
+// directions with e < 1. The scale of a rig is the movement of all its free mounts away from its reference; tie points
+// alone never determine it. The covariance is (S + P)^-1. Where the priors only keep the system regular, it is the
+// covariance at the present scale of the rig.
 #pragma once
 
 #include <Eigen/Core>
