@@ -14,7 +14,7 @@ include(CMakePackageConfigHelpers)
 set(library_rooms geometry io partition match adjust merge)
 set(package_folder lib/cmake/megablock)
 
-install(TARGETS megablock megablock_pictures RUNTIME DESTINATION bin LIBRARY DESTINATION lib/megablock)
+install(TARGETS megablock megablock_image_codecs RUNTIME DESTINATION bin LIBRARY DESTINATION lib/megablock)
 install(DIRECTORY cluster/templates/ DESTINATION share/megablock)
 install(FILES LICENSE README.md DESTINATION share/doc/megablock)
 install(DIRECTORY docs DESTINATION share/doc/megablock)

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint64_t kFormat = 1;  // fingerprint of the file
 
-using ByKey = std::unordered_map<std::uint64_t, PictureVertical>;
+using ByKey = std::unordered_map<std::uint64_t, FoundVertical>;
 
 ByKey read_found(const JobStore& store, const std::string& file) {
   ByKey found;
@@ -26,13 +26,13 @@ ByKey read_found(const JobStore& store, const std::string& file) {
   while (static_cast<std::uint64_t>(in.tellg()) < end) {
     std::uint64_t key = 0;
     std::size_t length = 0;
-    PictureVertical picture;
-    in >> key >> picture.found >> picture.roll >> picture.segments >> length;
+    FoundVertical vertical;
+    in >> key >> vertical.found >> vertical.roll >> vertical.segments >> length;
     in.get();
-    picture.row.resize(length);
-    in.read(picture.row.data(), static_cast<std::streamsize>(length));
+    vertical.row.resize(length);
+    in.read(vertical.row.data(), static_cast<std::streamsize>(length));
     if (!in) break;
-    found.emplace(key, std::move(picture));
+    found.emplace(key, std::move(vertical));
   }
   return found;
 }
@@ -40,25 +40,25 @@ ByKey read_found(const JobStore& store, const std::string& file) {
 }  // namespace
 
 FoundVerticals::FoundVerticals(const JobStore& store, std::string file, std::vector<std::uint64_t> keys)
-    : store_(store), file_(std::move(file)), keys_(std::move(keys)), pictures_(keys_.size()) {
+    : store_(store), file_(std::move(file)), keys_(std::move(keys)), found_(keys_.size()) {
   const ByKey found = read_found(store_, file_);
   for (std::size_t k = 0; k < keys_.size(); ++k)
-    if (const auto known = found.find(keys_[k]); known != found.end()) pictures_[k] = known->second;
+    if (const auto known = found.find(keys_[k]); known != found.end()) found_[k] = known->second;
 }
 
 std::size_t FoundVerticals::count() const {
   return static_cast<std::size_t>(
-      std::count_if(pictures_.begin(), pictures_.end(), [](const auto& p) { return p.has_value(); }));
+      std::count_if(found_.begin(), found_.end(), [](const auto& p) { return p.has_value(); }));
 }
 
-std::vector<PictureVertical> FoundVerticals::pictures() const {
-  std::vector<PictureVertical> all;
-  for (const auto& picture : pictures_) all.push_back(picture.value());
+std::vector<FoundVertical> FoundVerticals::all() const {
+  std::vector<FoundVertical> all;
+  for (const auto& vertical : found_) all.push_back(vertical.value());
   return all;
 }
 
-void FoundVerticals::add(std::size_t picture, PictureVertical vertical) {
-  pictures_[picture] = std::move(vertical);
+void FoundVerticals::add(std::size_t image, FoundVertical vertical) {
+  found_[image] = std::move(vertical);
   saved_ = false;
 }
 
@@ -70,7 +70,7 @@ void FoundVerticals::save() {
   if (saved_) return;
   std::string text;
   for (std::size_t k = 0; k < keys_.size(); ++k)
-    if (const auto& p = pictures_[k]; p && p->failure.empty())
+    if (const auto& p = found_[k]; p && p->failure.empty())
       text += fmt::format("{} {:d} {:.17g} {} {}\n{}", keys_[k], p->found, p->roll, p->segments, p->row.size(), p->row);
   try {
     store_.write(file_, kFormat, [&](const std::string& path) {

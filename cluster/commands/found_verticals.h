@@ -16,7 +16,7 @@
 
 namespace megablock {
 
-struct PictureVertical {
+struct FoundVertical {
   std::string row;      // of the table, with the end of the line
   std::string failure;  // why the image could not be read; empty when it could
   bool found = false;   // there is a vertical
@@ -31,10 +31,10 @@ class FoundVerticals {
   FoundVerticals(const JobStore& store, std::string file, std::vector<std::uint64_t> keys);
 
   std::size_t count() const;  // number of images that are done
-  bool has(std::size_t picture) const { return pictures_[picture].has_value(); }
-  std::vector<PictureVertical> pictures() const;  // when all are done
+  bool has(std::size_t image) const { return found_[image].has_value(); }
+  std::vector<FoundVertical> all() const;  // when all are done
   // Only one thread at a time may call it.
-  void add(std::size_t picture, PictureVertical vertical);
+  void add(std::size_t image, FoundVertical vertical);
   void save_now_and_then();
   void save();
 
@@ -42,7 +42,7 @@ class FoundVerticals {
   const JobStore& store_;
   std::string file_;
   std::vector<std::uint64_t> keys_;
-  std::vector<std::optional<PictureVertical>> pictures_;  // [keys]
+  std::vector<std::optional<FoundVertical>> found_;  // [keys]
   bool saved_ = true;
   SaveTimes times_;
 };

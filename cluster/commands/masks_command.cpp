@@ -17,7 +17,7 @@
 #include "cluster/terminal/output_check.h"
 #include "io/base/error.h"
 #include "io/base/file_error.h"
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 #include "io/project/project.h"
 #include "io/report/drawing/html.h"
 #include "io/store/job/job_store.h"
@@ -95,7 +95,7 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
   std::vector<cv::Mat> gradients(images.size());
   std::vector<cv::Size> sizes(images.size());
   cv::setNumThreads(1);
-  load_picture_codecs();
+  load_image_codecs();
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::int64_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -114,20 +114,20 @@ Judged judge(const Block& block, const std::vector<ImageIndex>& images, const St
   }
   judged.mask = finder.mask();
   judged.sample =
-      read_picture(block.path_of(images[images.size() / 2]), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+      read_image_file(block.path_of(images[images.size() / 2]), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   return judged;
 }
 
 // The image with the masked regions in red, at most 800 pixels wide.
 std::string preview(const Judged& judged) {
-  cv::Mat picture = judged.sample.empty() ? cv::Mat(judged.mask.size(), CV_8UC3, cv::Scalar::all(128)) : judged.sample;
-  if (picture.size() != judged.mask.size()) cv::resize(picture, picture, judged.mask.size());
-  cv::Mat red(picture.size(), CV_8UC3, cv::Scalar(40, 40, 230)), mixed;
-  cv::addWeighted(picture, 0.45, red, 0.55, 0, mixed);
-  mixed.copyTo(picture, judged.mask == 0);
-  const double factor = 800.0 / std::max(picture.cols, picture.rows);
-  if (factor < 1) cv::resize(picture, picture, {}, factor, factor, cv::INTER_AREA);
-  const auto bytes = encode_picture(".jpg", picture, {cv::IMWRITE_JPEG_QUALITY, 85});
+  cv::Mat overlay = judged.sample.empty() ? cv::Mat(judged.mask.size(), CV_8UC3, cv::Scalar::all(128)) : judged.sample;
+  if (overlay.size() != judged.mask.size()) cv::resize(overlay, overlay, judged.mask.size());
+  cv::Mat red(overlay.size(), CV_8UC3, cv::Scalar(40, 40, 230)), mixed;
+  cv::addWeighted(overlay, 0.45, red, 0.55, 0, mixed);
+  mixed.copyTo(overlay, judged.mask == 0);
+  const double factor = 800.0 / std::max(overlay.cols, overlay.rows);
+  if (factor < 1) cv::resize(overlay, overlay, {}, factor, factor, cv::INTER_AREA);
+  const auto bytes = encode_image(".jpg", overlay, {cv::IMWRITE_JPEG_QUALITY, 85});
   return {bytes.begin(), bytes.end()};
 }
 
@@ -153,7 +153,7 @@ Proposal propose(const Block& block, const Camera& camera, const std::vector<Ima
     return proposal;
   }
   const fs::path file = fs::path(options.output) / mask_file_name(camera.name);
-  const auto bytes = encode_picture(".png", judged.mask);
+  const auto bytes = encode_image(".png", judged.mask);
   const std::string png(bytes.begin(), bytes.end());
   if (!fs::exists(file)) {
     JobStore(options.output).write_text(file.filename().string(), png);
@@ -206,7 +206,7 @@ int propose_masks(MasksOptions options) {
   options.regions.check();
   const Project project = read_project(options.project);
   const Block& block = project.block;
-  if (!has_pictures(block))
+  if (!has_image_files(block))
     throw InputError(options.project +
                      ": the project has no image files, from which masks are found; give 'images' in it");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "mask_proposals").string();

@@ -42,7 +42,7 @@ std::vector<std::string> names_in(const std::map<std::string, Value>& map) {
 // images.
 struct Effect {
   std::vector<std::string> scenes;
-  enum class On { kBoth, kTiePoints, kPictures } on = On::kBoth;
+  enum class On { kBoth, kTiePoints, kRendered } on = On::kBoth;
 };
 
 const Effect kEverything, kTiePoints{{}, Effect::On::kTiePoints};
@@ -96,7 +96,7 @@ class SimulateOptions {
     if (!scenes.empty() && std::find(effect.scenes.begin(), effect.scenes.end(), scene) == effect.scenes.end())
       throw InputError(name + " has no effect on the scene '" + scene + "', only on: " + scenes +
                        "; leave it out, or choose another --scene");
-    if (effect.on == Effect::On::kPictures && !rendered)
+    if (effect.on == Effect::On::kRendered && !rendered)
       throw InputError(name + " has no effect without --rendered; leave it out, or add that");
     if (effect.on == Effect::On::kTiePoints && rendered)
       throw InputError(name + " has no effect with --rendered; leave one of them out");
@@ -137,10 +137,10 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--off-centre", &O::off_centre_m, "Panorama: projection centre ahead of the point it turns about, m [0]",
         kPanorama);
   s.add_switch("--vehicle", &O::vehicle, "Stereopolis, rendered: parts of the vehicle are in the images",
-               {{"stereopolis"}, Effect::On::kPictures}, true);
+               {{"stereopolis"}, Effect::On::kRendered}, true);
   s.add("--repeated-facades", &O::repeated_facades,
         "Street, stereopolis, rendered: share of houses with repeated facades, 0..1 [0]",
-        {kStreets.scenes, Effect::On::kPictures});
+        {kStreets.scenes, Effect::On::kRendered});
   s.add("--mount-position-error", &O::mount_position_error_m,
         "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]", kVehicle);
   s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]", kVehicle);

@@ -17,8 +17,8 @@
 #include "cluster/terminal/output_check.h"
 #include "geometry/numbers/median.h"
 #include "io/base/error.h"
+#include "io/images/image_codec.h"
 #include "io/images/image_header.h"
-#include "io/images/picture_codec.h"
 #include "io/project/inputs/verticals.h"
 #include "io/project/project.h"
 #include "io/store/job/job_store.h"
@@ -68,10 +68,10 @@ VerticalPrior expected_vertical(const Block& block, ImageIndex i) {
 
 // Cameras are held within a sigma of the level two times out of three. In images taken from above, the edges that look
 // upright (rows of fields or trees) lie in any direction.
-std::string remark_on(const std::vector<PictureVertical>& pictures) {
+std::string remark_on(const std::vector<FoundVertical>& verticals) {
   constexpr std::size_t kFewest = 5;
   std::vector<double> rolls;
-  for (const PictureVertical& v : pictures)
+  for (const FoundVertical& v : verticals)
     if (v.found) rolls.push_back(std::abs(v.roll));
   if (rolls.size() < kFewest || median(rolls) < 1) return "";
   return "Most of them are turned farther than cameras are held: images from above show no vertical, but rows of "
@@ -81,12 +81,12 @@ std::string remark_on(const std::vector<PictureVertical>& pictures) {
 namespace {
 
 // One line that names the first images in which no straight edge was found; empty where there are none.
-std::string edgeless_text(const Block& block, const std::vector<PictureVertical>& pictures) {
+std::string edgeless_text(const Block& block, const std::vector<FoundVertical>& verticals) {
   constexpr std::size_t kNamed = 5;
   std::size_t count = 0;
   std::string names;
-  for (std::size_t k = 0; k < pictures.size(); ++k) {
-    if (pictures[k].segments > 0 || !pictures[k].failure.empty() || ++count > kNamed) continue;
+  for (std::size_t k = 0; k < verticals.size(); ++k) {
+    if (verticals[k].segments > 0 || !verticals[k].failure.empty() || ++count > kNamed) continue;
     names += (count > 1 ? ", " : "") + block.name_of(ImageIndex(static_cast<std::int64_t>(k)));
   }
   if (count == 0) return "";
@@ -128,8 +128,8 @@ std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prio
 }
 
 // Finds the verticals of all images. Images in `file` are not read again.
-std::vector<PictureVertical> look_at_pictures(const Block& block, const SegmentOptions& segments, const JobStore& store,
-                                              const std::string& file) {
+std::vector<FoundVertical> look_at_images(const Block& block, const SegmentOptions& segments, const JobStore& store,
+                                          const std::string& file) {
   IndexedVector<CameraIndex, std::uint64_t> masks;
   for (const Camera& camera : block.cameras)
     masks.push_back(camera.mask_path.empty() ? 0 : hash_file(camera.mask_path));
@@ -145,7 +145,7 @@ std::vector<PictureVertical> look_at_pictures(const Block& block, const SegmentO
   FoundVerticals found(store, file, std::move(keys));
   if (found.count() > 0) std::printf("%zu of %zu images were looked at before\n", found.count(), priors.size());
   cv::setNumThreads(1);
-  load_picture_codecs();
+  load_image_codecs();
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::int64_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -153,15 +153,15 @@ std::vector<PictureVertical> look_at_pictures(const Block& block, const SegmentO
     const ImageIndex i(k);
     const ImageVertical v = find_image_vertical(block.path_of(i), block.cameras[block.camera_of(i)], priors[at],
                                                 seed_of(block.image_names[i]), segments);
-    PictureVertical picture{row_of(block, i, v), v.failure, v.found, v.roll, v.segments};
+    FoundVertical vertical{row_of(block, i, v), v.failure, v.found, v.roll, v.segments};
 #pragma omp critical(found_verticals)
     {
-      found.add(at, std::move(picture));
+      found.add(at, std::move(vertical));
       found.save_now_and_then();
     }
   }
   found.save();
-  return found.pictures();
+  return found.all();
 }
 
 int write_verticals(VerticalsOptions options) {
@@ -169,7 +169,7 @@ int write_verticals(VerticalsOptions options) {
   const Project project = read_project(options.project);
   const Block& block = project.block;
   namespace fs = std::filesystem;
-  if (!has_pictures(block))
+  if (!has_image_files(block))
     throw InputError(options.project +
                      ": the project has no image files, from which verticals are found; give 'images' in it");
   if (options.output.empty()) options.output = (fs::path(project.file).parent_path() / "verticals.csv").string();
@@ -177,24 +177,24 @@ int write_verticals(VerticalsOptions options) {
   const fs::path output = fs::absolute(options.output);
 
   const JobStore store(output.parent_path().string());
-  const std::vector<PictureVertical> pictures =
-      look_at_pictures(block, options.segments, store, output.filename().string() + ".found");
+  const std::vector<FoundVertical> verticals =
+      look_at_images(block, options.segments, store, output.filename().string() + ".found");
 
   std::string table = verticals_header() +
                       ",segments,vanishing_points,lines,variance_factor,whole_sigma_roll_deg,whole_sigma_pitch_deg\n";
   int found = 0, failed = 0;
-  for (std::size_t k = 0; k < pictures.size(); ++k) {
-    const PictureVertical& picture = pictures[k];
-    table += picture.row;
-    found += picture.found;
-    if (picture.failure.empty()) continue;
+  for (std::size_t k = 0; k < verticals.size(); ++k) {
+    const FoundVertical& vertical = verticals[k];
+    table += vertical.row;
+    found += vertical.found;
+    if (vertical.failure.empty()) continue;
     ++failed;
     std::fprintf(stderr, "megablock: %s: %s\n", block.name_of(ImageIndex(static_cast<std::int64_t>(k))).c_str(),
-                 picture.failure.c_str());
+                 vertical.failure.c_str());
   }
   store.write_text(output.filename().string(), table);
-  std::printf("%d of %zu images show the vertical: %s\n", found, pictures.size(), options.output.c_str());
-  std::printf("%s%s", edgeless_text(block, pictures).c_str(), remark_on(pictures).c_str());
+  std::printf("%d of %zu images show the vertical: %s\n", found, verticals.size(), options.output.c_str());
+  std::printf("%s%s", edgeless_text(block, verticals).c_str(), remark_on(verticals).c_str());
   std::printf("To use them, give 'verticals: %s' in the project file.\n",
               output.lexically_proximate(fs::path(project.file).parent_path()).c_str());
   return failed > 0 ? kExitFailedUnits : kExitDone;

@@ -20,7 +20,7 @@ namespace megablock {
 VerticalPrior expected_vertical(const Block& block, ImageIndex image);
 
 // Returns a warning when most verticals lie in directions in which no camera is held; otherwise an empty text.
-std::string remark_on(const std::vector<PictureVertical>& pictures);
+std::string remark_on(const std::vector<FoundVertical>& verticals);
 
 void add_verticals(CLI::App& app, std::function<int()>& action);
 

@@ -96,7 +96,7 @@ bool same_origin(const GroundFrame& a, const GroundFrame& b) {
   return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
 }
 
-bool has_pictures(const Block& block) {
+bool has_image_files(const Block& block) {
   for (ImageIndex i(0); block.images.contains(i); ++i.value)
     if (const std::string path = block.path_of(i); !path.empty() && std::filesystem::exists(path)) return true;
   return false;

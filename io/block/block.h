@@ -186,7 +186,7 @@ struct BlockState {
 BlockState initial_state(const Block& block);
 
 // Whether at least one image file exists.
-bool has_pictures(const Block& block);
+bool has_image_files(const Block& block);
 
 // Throws InputError for indices that refer to nothing, sigmas that are negative or not finite, repeated names, and
 // quaternions that are not unit quaternions.

@@ -131,7 +131,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   }
   if (cameras) read_cameras(*cameras, project.block);
   if (const auto masks = top.existing_folder("masks")) {
-    if (!has_pictures(project.block)) refuse_unused(top, "masks", kNoPictures);
+    if (!has_image_files(project.block)) refuse_unused(top, "masks", kNoImageFiles);
     read_masks(*masks, project);
   }
   read_rigs(top, project);

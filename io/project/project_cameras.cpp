@@ -101,7 +101,7 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
 
 namespace {
 
-void read_camera(YamlReader& reader, bool pictures, Camera& camera) {
+void read_camera(YamlReader& reader, bool image_files, Camera& camera) {
   read_intrinsics(reader, camera);
   camera.prior_sigma = default_intrinsic_sigmas(camera);
   if (const auto calibrate = reader.node("calibrate")) {
@@ -112,7 +112,7 @@ void read_camera(YamlReader& reader, bool pictures, Camera& camera) {
       camera.prior_sigma.fill(0);
   }
   if (const auto mask = reader.existing_file("mask")) {
-    if (!pictures) refuse_unused(reader, "mask", kNoPictures);
+    if (!image_files) refuse_unused(reader, "mask", kNoImageFiles);
     camera.mask_path = *mask;
   }
   reader.finish();
@@ -150,10 +150,10 @@ CameraGrouping read_camera_grouping(YamlReader& cameras) {
 }
 
 void read_cameras(YamlReader& cameras, Block& block) {
-  const bool pictures = has_pictures(block);
+  const bool image_files = has_image_files(block);
   for (Camera& camera : block.cameras) {
-    if (auto reader = cameras.mapping("default")) read_camera(*reader, pictures, camera);
-    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, pictures, camera);
+    if (auto reader = cameras.mapping("default")) read_camera(*reader, image_files, camera);
+    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, image_files, camera);
     if (!camera.mask_path.empty()) check_mask(camera, cameras.where());
   }
   for (const std::string& key : cameras.keys())

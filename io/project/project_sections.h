@@ -10,7 +10,7 @@ namespace megablock {
 
 // Throws InputError for a key that would otherwise be ignored without a word: "block.yaml:4: 'masks' is not used with
 // 'block', ...; take it out".
-inline constexpr const char* kNoPictures = "with a 'block' without image files";
+inline constexpr const char* kNoImageFiles = "with a 'block' without image files";
 [[noreturn]] void refuse_unused(const YamlReader& reader, const std::string& key, const std::string& why);
 
 // cameras: the grouping, and values by camera name ("default" for all cameras).

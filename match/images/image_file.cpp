@@ -7,7 +7,7 @@
 #include <system_error>
 #include <vector>
 
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 
 namespace megablock {
 
@@ -95,7 +95,7 @@ GreyImage read_grey_image(const std::string& path) {
   if (is_jpeg(bytes) && !is_complete_jpeg(bytes)) return {{}, "truncated JPEG: the file ends before the image does"};
   try {
     const cv::Mat decoded =
-        decode_picture(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+        decode_image(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
     if (decoded.empty()) return {{}, "not an image, damaged, or of an unsupported format"};
     return {to_eight_bits(decoded), {}};
   } catch (const cv::Exception& e) {

@@ -12,7 +12,7 @@ namespace megablock {
 
 namespace {
 
-std::string size_of(const cv::Mat& picture) { return fmt::format("{} x {}", picture.cols, picture.rows); }
+std::string size_of(const cv::Mat& image) { return fmt::format("{} x {}", image.cols, image.rows); }
 
 std::vector<InterpretationPlane> planes_of(const std::vector<ImageLine>& lines, const Intrinsics& camera) {
   std::vector<InterpretationPlane> planes;
@@ -53,11 +53,11 @@ struct Look {
 
 // The searches to make. For a large image there are two. The first is in the reduced image, with shorter edges, and
 // accepts every vanishing point that is expected by accident at most once per image.
-std::vector<Look> looks_at(const cv::Mat& picture, const SegmentOptions& options, std::uint64_t seed) {
+std::vector<Look> looks_at(const cv::Mat& image, const SegmentOptions& options, std::uint64_t seed) {
   constexpr double kReducedMegapixels = 0.5, kShortestPx = 20, kTimesLarger = 4;
   Look whole{options, {}};
   whole.search.seed = seed;
-  if (std::min(1e-6 * static_cast<double>(picture.total()), options.max_megapixels) < kTimesLarger * kReducedMegapixels)
+  if (std::min(1e-6 * static_cast<double>(image.total()), options.max_megapixels) < kTimesLarger * kReducedMegapixels)
     return {whole};
   Look reduced = whole;
   reduced.segments.max_megapixels = kReducedMegapixels;
@@ -73,11 +73,11 @@ struct EdgesSeen {
   std::optional<Vertical> vertical;
 };
 
-EdgesSeen edges_seen(const cv::Mat& picture, const cv::Mat& mask, const Camera& camera, const VerticalPrior& prior,
+EdgesSeen edges_seen(const cv::Mat& image, const cv::Mat& mask, const Camera& camera, const VerticalPrior& prior,
                      const Look& look) {
   EdgesSeen seen;
   std::vector<InterpretationPlane> planes;
-  const std::vector<LineSegment> segments = find_line_segments(picture, mask, look.segments);
+  const std::vector<LineSegment> segments = find_line_segments(image, mask, look.segments);
   seen.segments = static_cast<int>(segments.size());
   for (const LineSegment& segment : segments)
     if (const auto plane = interpretation_plane(segment.line, camera.intrinsics)) {

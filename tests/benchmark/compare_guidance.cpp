@@ -11,8 +11,8 @@
 #include <cstdlib>
 
 #include "io/block/tracks.h"
-#include "io/images/picture_codec.h"
-#include "io/simulate/pictures/render.h"
+#include "io/images/image_codec.h"
+#include "io/simulate/images/render.h"
 #include "match/features/features.h"
 #include "match/filter/match_filter.h"
 #include "match/pairs/pair_matching.h"
@@ -69,8 +69,8 @@ Town make_town(std::int64_t frames, double repeated, std::uint64_t seed) {
     const RayTable rays(town.block.cameras[camera], town.layout.truth.cameras[camera]);
     for (ImageIndex i(0); town.block.images.contains(i); ++i.value) {
       if (town.block.camera_of(i) != camera) continue;
-      write_picture(file,
-                    render_image(city, rays, true_pose(town, i), o.focal_px, static_cast<std::uint64_t>(i.value)));
+      write_image_file(file,
+                       render_image(city, rays, true_pose(town, i), o.focal_px, static_cast<std::uint64_t>(i.value)));
       town.features[static_cast<std::size_t>(i.value)] = detect_features(file, "", i, {});
     }
   }

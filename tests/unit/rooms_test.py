@@ -16,7 +16,7 @@ geometry/numbers geometry/threads geometry/estimation geometry/transform geometr
 geometry/vanishing geometry/two_view geometry/resection geometry/intersection
 io/base io/text io/block io/images io/images/module io/store/hdf5 io/store/job io/store/units io/project/inputs io/project io/result io/evaluation
 io/exchange/model io/exchange/bal io/exchange/colmap io/exchange/tables io/exchange
-io/simulate/scene io/simulate/streets io/simulate/pictures io/simulate/blocks io/simulate/files
+io/simulate/scene io/simulate/streets io/simulate/images io/simulate/blocks io/simulate/files
 io/report/drawing io/report/sections io/report
 partition/views partition/candidates partition/links partition/tiles partition/diagnostics
 match/images match/features match/nearest match/verification match/filter match/pairs match/tracks

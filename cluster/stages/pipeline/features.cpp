@@ -12,7 +12,7 @@
 #include "cluster/stages/common/units.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 #include "io/store/units/features_file.h"
 #include "match/features/features.h"
 
@@ -117,7 +117,7 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
   const std::int64_t kept = growing.kept();
   part_done(job, kept);
   const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());
-  load_picture_codecs();
+  load_image_codecs();
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
   for (std::int64_t i = kept; i < count; ++i) {
     const ImageIndex image(shard.first + i);

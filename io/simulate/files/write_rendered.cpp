@@ -13,13 +13,13 @@
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "io/block/crs.h"
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 #include "io/project/inputs/control_file.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/project/project.h"
 #include "io/simulate/files/project_text.h"
-#include "io/simulate/pictures/image_file.h"
-#include "io/simulate/pictures/render.h"
+#include "io/simulate/images/image_file.h"
+#include "io/simulate/images/render.h"
 #include "io/store/units/state_file.h"
 
 namespace megablock {
@@ -64,7 +64,7 @@ std::optional<VehicleView> vehicle_seen(const SimulationOptions& options, const 
 
 void write_mask(const VehicleView& vehicle, const fs::path& folder, const Camera& camera) {
   fs::create_directories(folder);
-  write_picture((folder / mask_file_name(name_by_headers(camera))).string(), vehicle.mask());
+  write_image_file((folder / mask_file_name(name_by_headers(camera))).string(), vehicle.mask());
 }
 
 void write_images(const SimulationOptions& options, const Layout& layout, const Block& with_priors,
@@ -83,7 +83,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
       const std::uint64_t seed = Random(options.seed, Random::Purpose::kImage, i).next();
       const Pose& rig = layout.truth.frames[layout.block.images[image].frame];
       const SeenVehicle seen{vehicle ? &*vehicle : nullptr, VehicleView::light_at(city, rig)};
-      const cv::Mat picture =
+      const cv::Mat rendered =
           render_image(city, rays, image_pose(layout, image), layout.truth.cameras[camera][kFocal], seed, seen);
       SimulatedExif exif;
       exif.model = "Simulated " + layout.block.cameras[camera].name;
@@ -92,7 +92,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
       const auto& prior = with_priors.frames[with_priors.images[image].frame].position_prior;
       if (prior) exif.position = georeference.to_geodetic(prior->position);  // position of the antenna
       exif.position_sigma_m = options.gps_sigma_m;
-      write_jpeg((folder / layout.block.name_of(image)).string(), picture, exif);
+      write_jpeg((folder / layout.block.name_of(image)).string(), rendered, exif);
     }
   }
 }

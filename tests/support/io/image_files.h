@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 
 namespace megablock::fixture {
 
@@ -25,9 +25,9 @@ inline std::string read_file(const std::string& path) {
 using Tags = std::map<std::string, std::string>;  // EXIF or XMP keys of Exiv2 and their values
 
 // Writes a grey image. Different values of `shade` give different bytes.
-inline void write_picture(const std::string& path, int width, int height, int shade, const Tags& tags = {}) {
+inline void write_image_file(const std::string& path, int width, int height, int shade, const Tags& tags = {}) {
   std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  megablock::write_picture(path, cv::Mat(height, width, CV_8UC3, cv::Scalar(shade % 256, shade / 256, 90)));
+  megablock::write_image_file(path, cv::Mat(height, width, CV_8UC3, cv::Scalar(shade % 256, shade / 256, 90)));
   auto image = Exiv2::ImageFactory::open(path);
   image->readMetadata();
   static const int registered = [] {

@@ -32,7 +32,7 @@ TEST_F(FoundVerticalsTest, KeepsPicturesByKey) {
   EXPECT_TRUE(second.has(0) && second.has(2));
   second.add(1, {"new.jpg,\n", "", false, 0, 1});
   second.add(3, {"c.jpg,\n", "", false, 0, 1});
-  const std::vector<PictureVertical> all = second.pictures();
+  const std::vector<FoundVertical> all = second.all();
   EXPECT_EQ(all[0].row, "line\nbreak.jpg,\n");
   EXPECT_EQ(all[2].row, "a b.jpg,1\n");
   EXPECT_TRUE(all[2].found);

@@ -10,8 +10,8 @@
 namespace megablock {
 namespace {
 
-PictureVertical found_at(double roll) {
-  PictureVertical picture;
+FoundVertical found_at(double roll) {
+  FoundVertical picture;
   picture.found = true;
   picture.roll = roll;
   return picture;
@@ -19,9 +19,9 @@ PictureVertical found_at(double roll) {
 
 // By the median of five or more.
 TEST(VerticalsCommand, SaysWhereMostAreTurnedTooFar) {
-  const std::vector<PictureVertical> held{found_at(0.1), found_at(-0.8), found_at(0.9), found_at(-4), found_at(3)};
+  const std::vector<FoundVertical> held{found_at(0.1), found_at(-0.8), found_at(0.9), found_at(-4), found_at(3)};
   EXPECT_EQ(remark_on(held), "");
-  std::vector<PictureVertical> fields{found_at(-1.2), found_at(3), found_at(0.2), found_at(-5)};
+  std::vector<FoundVertical> fields{found_at(-1.2), found_at(3), found_at(0.2), found_at(-5)};
   fields.emplace_back().roll = 5;  // shows none
   EXPECT_EQ(remark_on(fields), "");
   fields.push_back(found_at(1.1));

@@ -23,7 +23,7 @@ using fixture::message_of;
 using fixture::read_file;
 using fixture::small_result;
 using fixture::write_file;
-using fixture::write_picture;
+using fixture::write_image_file;
 using ::testing::HasSubstr;
 
 Block every_camera() {
@@ -66,8 +66,8 @@ TEST(CameraModelFiles, KeepEveryModel) {
 class CameraModelProject : public ::testing::Test {
  protected:
   void SetUp() override {
-    write_picture(folder_.path("images/a.jpg"), 1920, 1080, 50);
-    write_picture(folder_.path("images/b.jpg"), 1920, 1080, 60);
+    write_image_file(folder_.path("images/a.jpg"), 1920, 1080, 50);
+    write_image_file(folder_.path("images/b.jpg"), 1920, 1080, 60);
   }
   Camera read(const std::string& camera) {
     write_file(folder_.path("block.yaml"), "images: images\ncameras:\n  default:\n" + camera);

@@ -15,7 +15,7 @@ using fixture::joined;
 using fixture::message_of;
 using fixture::Tags;
 using fixture::write_file;
-using fixture::write_picture;
+using fixture::write_image_file;
 using ::testing::HasSubstr;
 
 TEST(ImageHeader, ReadsCameraTimeAndPosition) {
@@ -35,7 +35,7 @@ TEST(ImageHeader, ReadsCameraTimeAndPosition) {
                        {"Xmp.drone-dji.RtkStdLon", "0.012"},
                        {"Xmp.drone-dji.RtkStdLat", "0.014"},
                        {"Xmp.drone-dji.RtkStdHgt", "0.031"}});
-  write_picture(folder.path("a.jpg"), 64, 48, 1, tags);
+  write_image_file(folder.path("a.jpg"), 64, 48, 1, tags);
   const ImageHeader header = read_image_header(folder.path("a.jpg"));
   EXPECT_EQ(header.width, 64);
   EXPECT_EQ(header.height, 48);
@@ -81,7 +81,7 @@ TEST(ImageHeader, FocalPlaneResolutionRefersToTheImageAsTaken) {
                      {"Exif.Photo.FocalPlaneResolutionUnit", "2"},
                      {"Exif.Photo.PixelXDimension", "4000"},
                      {"Exif.Photo.PixelYDimension", "3000"}};
-  write_picture(folder.path("reduced.jpg"), 180, 135, 1, tags);
+  write_image_file(folder.path("reduced.jpg"), 180, 135, 1, tags);
   const ImageHeader header = read_image_header(folder.path("reduced.jpg"));
   EXPECT_NEAR(header.sensor_width_mm, 0.244 * 25.4, 1e-9);
   EXPECT_NEAR(*focal_px(header), 4.3 / (0.244 * 25.4) * 180, 1e-9);
@@ -90,7 +90,7 @@ TEST(ImageHeader, FocalPlaneResolutionRefersToTheImageAsTaken) {
 TEST(ImageHeader, AnImageWithoutTagsHasOnlyItsSize) {
   ScratchDirectory folder;
   for (const char* name : {"a.jpg", "a.png", "a.tif"}) {
-    write_picture(folder.path(name), 40, 30, 7);
+    write_image_file(folder.path(name), 40, 30, 7);
     const ImageHeader header = read_image_header(folder.path(name));
     EXPECT_EQ(header.width, 40) << name;
     EXPECT_EQ(header.height, 30) << name;
@@ -108,7 +108,7 @@ TEST(ImageHeader, NonsenseInTagsIsAbsence) {
   tags["Exif.Photo.DateTimeOriginal"] = "0000:00:00 00:00:00";
   tags["Exif.Photo.FocalLength"] = "0/0";
   tags["Xmp.drone-dji.GimbalYawDegree"] = "unknown";
-  write_picture(folder.path("a.jpg"), 40, 30, 7, tags);
+  write_image_file(folder.path("a.jpg"), 40, 30, 7, tags);
   const ImageHeader header = read_image_header(folder.path("a.jpg"));
   EXPECT_FALSE(header.position);
   EXPECT_TRUE(std::isnan(header.time_s));
@@ -120,7 +120,7 @@ TEST(ImageHeader, BadFilesGiveAReason) {
   ScratchDirectory folder;
   write_file(folder.path("empty.jpg"), "");
   write_file(folder.path("text.jpg"), "this is no image, only words that go on for a while");
-  write_picture(folder.path("good.jpg"), 400, 300, 7, gps_tags(1, 2, 3));
+  write_image_file(folder.path("good.jpg"), 400, 300, 7, gps_tags(1, 2, 3));
   write_file(folder.path("cut.jpg"), fixture::read_file(folder.path("good.jpg")).substr(0, 90));
   const auto reason = [&](const std::string& name) {
     return message_of<InputError>([&] { read_image_header(folder.path(name)); });

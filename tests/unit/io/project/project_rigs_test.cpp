@@ -11,7 +11,7 @@ namespace {
 using fixture::gps_tags;
 using fixture::message_of;
 using fixture::write_file;
-using fixture::write_picture;
+using fixture::write_image_file;
 using ::testing::HasSubstr;
 
 const char* const kCameras = R"({"right": {"rotation": [0, 1.5707963267948966, 0], "translation": [0.1, 0, 0.2]},
@@ -27,8 +27,8 @@ class ProjectRigs : public ::testing::Test {
     for (const std::string camera : {"left", "right"})
       for (const std::string number : {"1", "2", "3"}) {
         ++shade;
-        write_picture(folder_.path("images/" + camera + "/" + number + ".jpg"), camera == "left" ? 64 : 80, 48, shade,
-                      gps_tags(52.52, 13.4 + 0.001 * shade, 40));
+        write_image_file(folder_.path("images/" + camera + "/" + number + ".jpg"), camera == "left" ? 64 : 80, 48,
+                         shade, gps_tags(52.52, 13.4 + 0.001 * shade, 40));
       }
   }
 

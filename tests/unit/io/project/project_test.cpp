@@ -28,7 +28,7 @@ using fixture::message_of;
 using fixture::read_file;
 using fixture::Tags;
 using fixture::write_file;
-using fixture::write_picture;
+using fixture::write_image_file;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -40,8 +40,8 @@ const Tags kDji = {{"Exif.Image.Make", "DJI"}, {"Exif.Image.Model", "FC300S"}, {
 // Five images on a line to the east, about 76 m apart, at 46.84 N 91.99 W, 250 m.
 void write_line(const ScratchDirectory& folder, int count = 5) {
   for (int i = 0; i < count; ++i)
-    write_picture(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
-                  joined(kDji, gps_tags(46.84, -91.99 + 0.001 * i, 250)));
+    write_image_file(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
+                     joined(kDji, gps_tags(46.84, -91.99 + 0.001 * i, 250)));
 }
 
 Project read_text(const ScratchDirectory& folder, const std::string& text) {
@@ -61,10 +61,10 @@ FrameIndex frame(std::int64_t i) { return FrameIndex(i); }
 
 TEST(Project, ScansImagesInByteOrderAndGroupsThem) {
   ScratchDirectory folder;
-  write_picture(folder.path("images/b/2.JPG"), 64, 48, 1, kDji);
-  write_picture(folder.path("images/B.jpeg"), 64, 48, 2, kDji);
-  write_picture(folder.path("images/a.png"), 64, 48, 3);
-  write_picture(folder.path("images/b/10.jpg"), 32, 48, 4, kDji);
+  write_image_file(folder.path("images/b/2.JPG"), 64, 48, 1, kDji);
+  write_image_file(folder.path("images/B.jpeg"), 64, 48, 2, kDji);
+  write_image_file(folder.path("images/a.png"), 64, 48, 3);
+  write_image_file(folder.path("images/b/10.jpg"), 32, 48, 4, kDji);
   write_file(folder.path("images/readme.txt"), "no image");
   const Project project = read_text(folder, "images: images\n");
   EXPECT_THAT(image_names(project.block), ElementsAre("B.jpeg", "a.png", "b/10.jpg", "b/2.JPG"));
@@ -130,15 +130,15 @@ TEST(Project, GpsOptionsAndOriginOverride) {
 TEST(Project, AccuracyInTheHeaderGivesTheSigmas) {
   ScratchDirectory folder;
   const Tags gps = gps_tags(46.84, -91.99, 250);
-  write_picture(folder.path("images/0_dop.jpg"), 64, 48, 0, joined(gps, {{"Exif.GPSInfo.GPSDOP", "10/1"}}));
-  write_picture(folder.path("images/1_good_dop.jpg"), 64, 48, 1, joined(gps, {{"Exif.GPSInfo.GPSDOP", "9/10"}}));
-  write_picture(folder.path("images/2_rtk.jpg"), 64, 48, 2,
-                joined(gps, {{"Xmp.drone-dji.RtkStdLon", "0.01"},
-                             {"Xmp.drone-dji.RtkStdLat", "0.02"},
-                             {"Xmp.drone-dji.RtkStdHgt", "0.03"}}));
+  write_image_file(folder.path("images/0_dop.jpg"), 64, 48, 0, joined(gps, {{"Exif.GPSInfo.GPSDOP", "10/1"}}));
+  write_image_file(folder.path("images/1_good_dop.jpg"), 64, 48, 1, joined(gps, {{"Exif.GPSInfo.GPSDOP", "9/10"}}));
+  write_image_file(folder.path("images/2_rtk.jpg"), 64, 48, 2,
+                   joined(gps, {{"Xmp.drone-dji.RtkStdLon", "0.01"},
+                                {"Xmp.drone-dji.RtkStdLat", "0.02"},
+                                {"Xmp.drone-dji.RtkStdHgt", "0.03"}}));
   Tags flat = gps;
   flat.erase("Exif.GPSInfo.GPSAltitude");
-  write_picture(folder.path("images/3_flat.jpg"), 64, 48, 3, flat);
+  write_image_file(folder.path("images/3_flat.jpg"), 64, 48, 3, flat);
   const Block block = read_text(folder, "images: images\n").block;
   EXPECT_EQ(block.frames[frame(0)].position_prior->sigma, Eigen::Vector3d(10, 10, 20));
   EXPECT_EQ(block.frames[frame(1)].position_prior->sigma, Eigen::Vector3d(3, 3, 6));
@@ -150,10 +150,10 @@ TEST(Project, AccuracyInTheHeaderGivesTheSigmas) {
 TEST(Project, WrongPositionsAreDroppedAndNamed) {
   ScratchDirectory folder;
   write_line(folder, 8);
-  write_picture(folder.path("images/far.jpg"), 64, 48, 100, gps_tags(46.93, -91.99, 250));
-  write_picture(folder.path("images/null.jpg"), 64, 48, 101, gps_tags(0, 0, 0));
-  write_picture(folder.path("images/swapped.jpg"), 64, 48, 102, gps_tags(-91.99, 46.84, 250));
-  write_picture(folder.path("images/high.jpg"), 64, 48, 103, gps_tags(46.84, -91.99, 9000));
+  write_image_file(folder.path("images/far.jpg"), 64, 48, 100, gps_tags(46.93, -91.99, 250));
+  write_image_file(folder.path("images/null.jpg"), 64, 48, 101, gps_tags(0, 0, 0));
+  write_image_file(folder.path("images/swapped.jpg"), 64, 48, 102, gps_tags(-91.99, 46.84, 250));
+  write_image_file(folder.path("images/high.jpg"), 64, 48, 103, gps_tags(46.84, -91.99, 9000));
   const Project project = read_text(folder, "images: images\n");
   for (const Frame& f : project.block.frames) {
     const bool wrong = f.name == "far.jpg" || f.name == "null.jpg" || f.name == "swapped.jpg";
@@ -173,8 +173,9 @@ TEST(Project, WrongPositionsAreDroppedAndNamed) {
 TEST(Project, SwappedPositionsInsideTheRangesAreTold) {
   ScratchDirectory folder;
   for (int i = 0; i < 5; ++i)
-    write_picture(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i, gps_tags(52.5, 13.4 + 0.001 * i, 30));
-  write_picture(folder.path("images/s.jpg"), 64, 48, 9, gps_tags(13.4, 52.5, 30));
+    write_image_file(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
+                     gps_tags(52.5, 13.4 + 0.001 * i, 30));
+  write_image_file(folder.path("images/s.jpg"), 64, 48, 9, gps_tags(13.4, 52.5, 30));
   EXPECT_THAT(read_text(folder, "images: images\n").warnings, ElementsAre(HasSubstr("look swapped")));
 }
 
@@ -183,8 +184,8 @@ TEST(Project, GimbalAnglesBecomeAttitudesInTheBlock) {
   const Tags nadir = {{"Xmp.drone-dji.GimbalYawDegree", "90"},
                       {"Xmp.drone-dji.GimbalPitchDegree", "-90"},
                       {"Xmp.drone-dji.GimbalRollDegree", "0"}};
-  write_picture(folder.path("images/0.jpg"), 64, 48, 0, joined(nadir, gps_tags(46.84, -91.99, 250)));
-  write_picture(folder.path("images/1.jpg"), 64, 48, 1, joined(nadir, gps_tags(46.93, -91.99, 250)));
+  write_image_file(folder.path("images/0.jpg"), 64, 48, 0, joined(nadir, gps_tags(46.84, -91.99, 250)));
+  write_image_file(folder.path("images/1.jpg"), 64, 48, 1, joined(nadir, gps_tags(46.93, -91.99, 250)));
   const Block block = read_text(folder, "images: images\norigin: [46.84, -91.99, 250]\n").block;
   const AttitudePrior& near = *block.frames[frame(0)].attitude_prior;
   // Nadir with the top of the image to the east: camera x points south, y (down the image) west, z down.
@@ -223,8 +224,8 @@ TEST(Project, BadFilesAndCopiesAreLeftOut) {
 TEST(Project, CameraSettingsOverrideTheHeaders) {
   ScratchDirectory folder;
   write_line(folder, 1);
-  write_picture(folder.path("images/x.jpg"), 100, 80, 50);
-  write_picture(folder.path("mask.png"), 64, 48, 0);
+  write_image_file(folder.path("images/x.jpg"), 100, 80, 50);
+  write_image_file(folder.path("mask.png"), 64, 48, 0);
   const Block block = read_text(folder,
                                 "images: images\n"
                                 "cameras:\n"
@@ -250,12 +251,12 @@ TEST(Project, CameraSettingsOverrideTheHeaders) {
 TEST(Project, MaskFolderIsReadByCameraName) {
   ScratchDirectory folder;
   write_line(folder, 1);
-  write_picture(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 64, 48, 0);
-  write_picture(folder.path("masks/other.png"), 64, 48, 0);
+  write_image_file(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 64, 48, 0);
+  write_image_file(folder.path("masks/other.png"), 64, 48, 0);
   const Project project = read_text(folder, "images: images\nmasks: masks\n");
   EXPECT_EQ(project.block.cameras[CameraIndex(0)].mask_path, folder.path("masks/DJI FC300S 64x48 3.61mm.png"));
   EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("other.png")));
-  write_picture(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 32, 48, 0);
+  write_image_file(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 32, 48, 0);
   EXPECT_THAT(refusal(folder, "images: images\nmasks: masks\n"), HasSubstr("32 x 48"));
 }
 
@@ -285,7 +286,7 @@ TEST(Project, KeepsWhatIsSaidOfPositionsAndAttitudes) {
 
 TEST(Project, WarnsOfSectionsThatActOnNothing) {
   ScratchDirectory folder;
-  write_picture(folder.path("images/a.jpg"), 64, 48, 1);
+  write_image_file(folder.path("images/a.jpg"), 64, 48, 1);
   EXPECT_THAT(
       read_text(folder, "images: images\ngps: {sigma_horizontal_m: 1}\nattitude: {sigma_deg: 1}\n").warnings,
       testing::AllOf(
@@ -471,8 +472,8 @@ TEST(InitProject, WritesWhatTheReaderReads) {
   EXPECT_DOUBLE_EQ(project.block.ground.longitude_deg, -91.988);
   // The origin is in the file: an image added later does not move it.
   for (int i = 0; i < 20; ++i)
-    write_picture(folder.path("images/new" + std::to_string(i) + ".jpg"), 64, 48, 200 + i,
-                  gps_tags(46.86, -91.99, 250));
+    write_image_file(folder.path("images/new" + std::to_string(i) + ".jpg"), 64, 48, 200 + i,
+                     gps_tags(46.86, -91.99, 250));
   EXPECT_DOUBLE_EQ(read_project(options.output).block.ground.latitude_deg, 46.84);
   EXPECT_THAT(message_of<InputError>([&] { init_project(options); }), HasSubstr("exists already"));
 }

@@ -17,7 +17,7 @@
 
 #include "io/base/error.h"
 #include "io/block/tracks.h"
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 #include "match/features/global_descriptor.h"
 #include "tests/support/io/scratch_directory.h"
 
@@ -74,7 +74,7 @@ class Features : public testing::Test {
  protected:
   std::string path(const std::string& name) const { return scratch_.path(name); }
   std::string write(const std::string& name, const cv::Mat& pixels) const {
-    write_picture(path(name), pixels);
+    write_image_file(path(name), pixels);
     return path(name);
   }
   // Copies the first part of a file.
@@ -222,7 +222,8 @@ TEST_F(Features, BadFilesAreFailuresWithAReason) {
 
 TEST_F(Features, ProgressiveJpegsAndTrailingBytesAreComplete) {
   const cv::Mat pixels = noise_texture(400, 300, 50, 7);
-  write_picture(path("progressive.jpg"), pixels, {cv::IMWRITE_JPEG_PROGRESSIVE, 1, cv::IMWRITE_JPEG_RST_INTERVAL, 4});
+  write_image_file(path("progressive.jpg"), pixels,
+                   {cv::IMWRITE_JPEG_PROGRESSIVE, 1, cv::IMWRITE_JPEG_RST_INTERVAL, 4});
   EXPECT_EQ(detect(path("progressive.jpg")).failure, "");
   std::ofstream(path("progressive.jpg"), std::ios::binary | std::ios::app) << "maker's trailer";
   EXPECT_EQ(detect(path("progressive.jpg")).failure, "");

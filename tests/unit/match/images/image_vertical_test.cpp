@@ -11,7 +11,7 @@
 #include <random>
 
 #include "geometry/transform/rotation.h"
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 #include "match/images/line_segments.h"
 #include "tests/support/io/scratch_directory.h"
 
@@ -61,7 +61,7 @@ class ImageVerticalTest : public ::testing::Test {
           }
     cv::GaussianBlur(picture, picture, {}, 0.7);
     const std::string file = scratch_.path(windows ? "windows.png" : "plain.png");
-    write_picture(file, picture);
+    write_image_file(file, picture);
     return file;
   }
 
@@ -98,9 +98,9 @@ TEST_F(ImageVerticalTest, IsFoundInAPicture) {
 // in full for what is found.
 TEST_F(ImageVerticalTest, IsFoundInALargePictureByAllItsEdges) {
   const std::string file = scratch_.path("large.png");
-  cv::Mat picture = read_picture(draw(true), cv::IMREAD_GRAYSCALE);
+  cv::Mat picture = read_image_file(draw(true), cv::IMREAD_GRAYSCALE);
   cv::resize(picture, picture, {}, 2.5, 2.5, cv::INTER_CUBIC);
-  write_picture(file, picture);
+  write_image_file(file, picture);
   camera_.width = 2250;
   camera_.height = 1500;
   camera_.intrinsics = Intrinsics{2000, 1125, 750};
@@ -121,7 +121,7 @@ TEST_F(ImageVerticalTest, ALargePictureOfShortEdgesHasEdges) {
     for (int y = 100; y < 1400; y += 150)
       cv::line(picture, cv::Point(x, y), cv::Point(x + 25, y + 30), cv::Scalar(60), 7, cv::LINE_AA);
   const std::string file = scratch_.path("short.png");
-  write_picture(file, picture);
+  write_image_file(file, picture);
   SegmentOptions reduced;
   reduced.max_megapixels = 0.5;
   reduced.min_length_px = 20;
@@ -145,7 +145,7 @@ TEST_F(ImageVerticalTest, ALargePictureWithoutAVerticalIsLookedAtOnce) {
       cv::line(picture, cv::Point2d(x, y), cv::Point2d(x, y) + along, cv::Scalar(60), 7, cv::LINE_AA);
     }
     const std::string file = scratch_.path("clutter.png");
-    write_picture(file, picture);
+    write_image_file(file, picture);
     const ImageVertical v = find_image_vertical(file, camera_, {}, 1);
     EXPECT_FALSE(v.found);
     EXPECT_GT(v.segments, 20);
@@ -169,7 +169,7 @@ TEST_F(ImageVerticalTest, NoneWithoutEdgesAndForBadFiles) {
   other = camera_;
   other.mask_path = scratch_.path("mask.png");
   EXPECT_NE(find_image_vertical(windows, other, {}, 1).failure.find("mask"), std::string::npos);
-  write_picture(other.mask_path, cv::Mat(600, 900, CV_8U, cv::Scalar(0)));
+  write_image_file(other.mask_path, cv::Mat(600, 900, CV_8U, cv::Scalar(0)));
   const ImageVertical masked = find_image_vertical(windows, other, {}, 1);
   EXPECT_EQ(masked.failure, "");
   EXPECT_EQ(masked.segments, 0);

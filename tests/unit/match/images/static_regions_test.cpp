@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "io/base/error.h"
-#include "io/simulate/pictures/render.h"
+#include "io/simulate/images/render.h"
 
 namespace megablock {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <random>
 
-#include "io/simulate/pictures/vehicle_view.h"
+#include "io/simulate/images/vehicle_view.h"
 #include "partition/tiles/tiles.h"
 
 namespace megablock {

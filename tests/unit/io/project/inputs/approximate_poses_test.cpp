@@ -18,7 +18,7 @@ using fixture::gps_tags;
 using fixture::message_of;
 using fixture::small_result;
 using fixture::write_file;
-using fixture::write_picture;
+using fixture::write_image_file;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -77,8 +77,8 @@ TEST(ApproximatePoses, FramesOfAnotherOriginAreTurned) {
 
 TEST(ApproximatePoses, OfAProjectGiveTheOriginAndTheFrames) {
   ScratchDirectory folder;
-  write_picture(folder.path("images/a.jpg"), 64, 48, 1);
-  write_picture(folder.path("images/b.jpg"), 64, 48, 2);
+  write_image_file(folder.path("images/a.jpg"), 64, 48, 1);
+  write_image_file(folder.path("images/b.jpg"), 64, 48, 2);
   write_file(folder.path("images/broken.jpg"), "");
   write_file(folder.path("poses.csv"),
              "image,latitude_deg,longitude_deg,height_m,gimbal_yaw_deg,gimbal_pitch_deg,gimbal_roll_deg,note\n"

@@ -15,7 +15,7 @@ namespace {
 using fixture::gps_tags;
 using fixture::message_of;
 using fixture::write_file;
-using fixture::write_picture;
+using fixture::write_image_file;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
@@ -25,8 +25,8 @@ class ControlFile : public ::testing::Test {
  protected:
   ControlFile() {
     for (int i = 0; i < 3; ++i)
-      write_picture(folder_.path("images/sub/" + std::to_string(i) + ".jpg"), 200, 100, i,
-                    gps_tags(52.52, 13.40 + 0.0002 * i, 40));
+      write_image_file(folder_.path("images/sub/" + std::to_string(i) + ".jpg"), 200, 100, i,
+                       gps_tags(52.52, 13.40 + 0.0002 * i, 40));
   }
 
   Project read(const std::string& control_name, const std::string& control) {
@@ -217,7 +217,7 @@ TEST_F(ControlFile, SettingsOfTheProjectOverrideTheFile) {
 
 TEST(ControlWithoutGps, GivesTheOrigin) {
   ScratchDirectory folder;
-  write_picture(folder.path("images/0.jpg"), 200, 100, 0);
+  write_image_file(folder.path("images/0.jpg"), 200, 100, 0);
   write_file(folder.path("gcp_list.txt"), "EPSG:32633\n391000 5820000 44 5 6 0.jpg\n391100 5820000 44 8 9 0.jpg\n");
   write_file(folder.path("block.yaml"), "images: images\ncontrol: gcp_list.txt\n");
   const Block block = read_project(folder.path("block.yaml")).block;

@@ -11,7 +11,7 @@
 #include "geometry/numbers/angles.h"
 #include "geometry/transform/rotation.h"
 #include "io/base/error.h"
-#include "io/simulate/pictures/texture.h"
+#include "io/simulate/images/texture.h"
 
 namespace megablock {
 namespace {

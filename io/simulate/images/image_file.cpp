@@ -1,4 +1,4 @@
-#include "io/simulate/pictures/image_file.h"
+#include "io/simulate/images/image_file.h"
 
 #include <algorithm>
 #include <chrono>
@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/base/error.h"
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 
 namespace megablock {
 
@@ -62,7 +62,7 @@ void set_position(Exiv2::ExifData& data, const SimulatedExif& exif) {
 }  // namespace
 
 void write_jpeg(const std::string& path, const cv::Mat& image, const SimulatedExif& exif) {
-  write_picture(path, image, {cv::IMWRITE_JPEG_QUALITY, 95});
+  write_image_file(path, image, {cv::IMWRITE_JPEG_QUALITY, 95});
   try {
     const auto file = Exiv2::ImageFactory::open(path);
     file->readMetadata();

@@ -1,4 +1,4 @@
-#include "io/simulate/pictures/render.h"
+#include "io/simulate/images/render.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -14,7 +14,7 @@
 #include "io/project/inputs/pose_csv.h"
 #include "io/project/project.h"
 #include "io/simulate/files/write_rendered.h"
-#include "io/simulate/pictures/city.h"
+#include "io/simulate/images/city.h"
 #include "io/simulate/scene/scene.h"
 #include "io/simulate/scene/simulation_options.h"
 #include "io/store/units/state_file.h"

@@ -1,8 +1,8 @@
-#include "io/simulate/pictures/vehicle_view.h"
+#include "io/simulate/images/vehicle_view.h"
 
 #include <limits>
 
-#include "io/simulate/pictures/render.h"
+#include "io/simulate/images/render.h"
 
 namespace megablock {
 

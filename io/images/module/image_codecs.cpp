@@ -1,8 +1,8 @@
-// The only source of libmegablock_pictures.so, which gives io/images/picture_codec.h the codecs of OpenCV. It is a
+// The only source of libmegablock_image_codecs.so, which gives io/images/image_codec.h the codecs of OpenCV. It is a
 // library of its own for the reasons stated there.
 #include <opencv2/imgcodecs.hpp>
 
-#include "io/images/picture_codec.h"
+#include "io/images/image_codec.h"
 
 namespace megablock {
 
@@ -10,15 +10,15 @@ namespace {
 
 cv::Mat decode(const std::vector<unsigned char>& file, int flags) { return cv::imdecode(file, flags); }
 
-std::vector<unsigned char> encode(const std::string& extension, const cv::Mat& picture,
+std::vector<unsigned char> encode(const std::string& extension, const cv::Mat& image,
                                   const std::vector<int>& parameters) {
   std::vector<unsigned char> bytes;
-  cv::imencode(extension, picture, bytes, parameters);
+  cv::imencode(extension, image, bytes, parameters);
   return bytes;
 }
 
 }  // namespace
 
-extern "C" PictureCodecs megablock_picture_codecs() { return {decode, encode}; }
+extern "C" ImageCodecs megablock_image_codecs() { return {decode, encode}; }
 
 }  // namespace megablock

@@ -3,8 +3,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "io/simulate/pictures/city.h"
-#include "io/simulate/pictures/vehicle_view.h"
+#include "io/simulate/images/city.h"
+#include "io/simulate/images/vehicle_view.h"
 
 namespace megablock {
 

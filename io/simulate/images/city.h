@@ -1,7 +1,7 @@
 // The surfaces of the rendered scenes (terrain with boxes on it), their intersections with rays, and their colours.
 #pragma once
 
-#include "io/simulate/pictures/texture.h"
+#include "io/simulate/images/texture.h"
 #include "io/simulate/scene/scene.h"
 #include "io/simulate/scene/terrain.h"
 

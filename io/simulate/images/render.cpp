@@ -1,4 +1,4 @@
-#include "io/simulate/pictures/render.h"
+#include "io/simulate/images/render.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "io/simulate/pictures/city.h"
+#include "io/simulate/images/city.h"
 
 #include <algorithm>
 #include <cmath>

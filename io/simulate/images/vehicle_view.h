@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "io/simulate/pictures/city.h"
+#include "io/simulate/images/city.h"
 
 namespace megablock {
 

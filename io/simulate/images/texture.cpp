@@ -1,4 +1,4 @@
-#include "io/simulate/pictures/texture.h"
+#include "io/simulate/images/texture.h"
 
 #include <algorithm>
 #include <cmath>
