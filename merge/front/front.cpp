@@ -84,12 +84,12 @@ class PartialCholesky {
       for (std::size_t h = held_before; h < held.size(); ++h) std::fill_n(&at(end, held[h]), below, 0.0);
     }
     forward_substitute(first, width, held_before);
-    const std::int64_t trailing = e_ - end, passed = n_ - e_;
+    const std::int64_t trailing = e_ - end, separator = n_ - e_;
     if (trailing > 0) {
       cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, blas(trailing), blas(width), -1, &at(end, first), blas(n_),
                   1, &at(end, end), blas(n_));
-      if (passed > 0)
-        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, blas(passed), blas(trailing), blas(width), -1,
+      if (separator > 0)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, blas(separator), blas(trailing), blas(width), -1,
                     &at(e_, first), blas(n_), &at(end, first), blas(n_), 1, &at(e_, end), blas(n_));
     }
   }
@@ -197,12 +197,12 @@ UpdateMatrix UpdateMatrix::read(ByteReader& in) {
 
 std::int64_t FrontFactor::byte_count() const {
   return static_cast<std::int64_t>(sizeof(FrontFactor) + (factor.size() + z.size()) * sizeof(double) +
-                                   (eliminated.size() + passed.size()) * sizeof(Unknown));
+                                   (eliminated.size() + separator.size()) * sizeof(Unknown));
 }
 
 void FrontFactor::write(ByteWriter& out) const {
   out.values(eliminated);
-  out.values(passed);
+  out.values(separator);
   out.value(right_hand_sides);
   out.values(factor);
   out.values(z);
@@ -212,7 +212,7 @@ void FrontFactor::write(ByteWriter& out) const {
 FrontFactor FrontFactor::read(ByteReader& in) {
   FrontFactor f;
   f.eliminated = in.values<Unknown>();
-  f.passed = in.values<Unknown>();
+  f.separator = in.values<Unknown>();
   f.right_hand_sides = in.value<std::int64_t>();
   f.factor = in.values<double>();
   f.z = in.values<double>();
@@ -279,23 +279,23 @@ void FrontMemory::give(std::vector<double> buffer) {
   free_.insert(place, std::move(buffer));
 }
 
-Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides, FrontMemory* memory)
+Front::Front(UnknownList eliminated, UnknownList separator, std::int64_t right_hand_sides, FrontMemory* memory)
     : eliminated_(std::move(eliminated)),
-      passed_(std::move(passed)),
+      separator_(std::move(separator)),
       right_hand_sides_(right_hand_sides),
       memory_(memory) {
   eliminated_rows_ = row_offsets(eliminated_);
-  passed_rows_ = row_offsets(passed_);
+  separator_rows_ = row_offsets(separator_);
   eliminated_dimension_ = eliminated_rows_.back();
-  for (std::int64_t& row : passed_rows_) row += eliminated_dimension_;
-  dimension_ = passed_rows_.back();
+  for (std::int64_t& row : separator_rows_) row += eliminated_dimension_;
+  dimension_ = separator_rows_.back();
   // A full matrix of this size takes 80 GB.
   if (dimension_ > 100000)
     throw ComputeError("merge: a front of " + std::to_string(dimension_) +
                        " unknowns; make tiles smaller or drop weak links between tiles");
-  const std::int64_t passed_dimension = dimension_ - eliminated_dimension_;
+  const std::int64_t separator_dimension = dimension_ - eliminated_dimension_;
   factor_.assign(static_cast<std::size_t>(dimension_ * eliminated_dimension_), 0);
-  const std::int64_t update_size = passed_dimension * passed_dimension;
+  const std::int64_t update_size = separator_dimension * separator_dimension;
   if (memory_) update_ = memory_->take(at(update_size));
   update_.assign(at(update_size), 0);
   rhs_.assign(static_cast<std::size_t>(dimension_ * right_hand_sides_), 0);
@@ -305,7 +305,8 @@ Front::Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand
 std::int64_t Front::row_of(const UnknownId& id) const {
   if (const std::int64_t at = find_unknown(eliminated_, id); at >= 0)
     return eliminated_rows_[static_cast<std::size_t>(at)];
-  if (const std::int64_t at = find_unknown(passed_, id); at >= 0) return passed_rows_[static_cast<std::size_t>(at)];
+  if (const std::int64_t at = find_unknown(separator_, id); at >= 0)
+    return separator_rows_[static_cast<std::size_t>(at)];
   return -1;
 }
 
@@ -396,16 +397,16 @@ Front::Result Front::eliminate(double lambda) && {
     const auto u = static_cast<std::size_t>(after - eliminated_rows_.begin()) - 1;
     update.sums.held.push_back({eliminated_[u].id, cholesky.held[h] - eliminated_rows_[u], cholesky.held_ratio[h]});
   }
-  update.unknowns = passed_;
+  update.unknowns = separator_;
   result.factor.eliminated = std::move(eliminated_);
-  result.factor.passed = std::move(passed_);
+  result.factor.separator = std::move(separator_);
   return result;
 }
 
-Step back_substitute(const FrontFactor& factor, const Step& passed) {
-  const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
+Step back_substitute(const FrontFactor& factor, const Step& separator) {
+  const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.separator), n = e + p;
   const std::int64_t columns = factor.right_hand_sides;
-  const Step outer = factor.passed.empty() ? Step{{}, columns, {}} : passed.restricted_to(factor.passed);
+  const Step outer = factor.separator.empty() ? Step{{}, columns, {}} : separator.restricted_to(factor.separator);
   // x_E = L^-T (z - Y'x_P) for all right-hand sides at once. Held unknowns get zero and change no other, because their
   // rows of z and columns of L and Y are zero but for the one on the diagonal.
   std::vector<double> x = factor.z;
@@ -417,7 +418,7 @@ Step back_substitute(const FrontFactor& factor, const Step& passed) {
                 factor.factor.data(), blas(n), x.data(), blas(e));
   }
   Step step;
-  step.unknowns = unite({&factor.eliminated, &factor.passed});
+  step.unknowns = unite({&factor.eliminated, &factor.separator});
   step.columns = columns;
   step.values.resize(static_cast<std::size_t>(n * columns));
   const auto copy = [&](const UnknownList& list, const std::vector<double>& values, std::int64_t count) {
@@ -428,7 +429,7 @@ Step back_substitute(const FrontFactor& factor, const Step& passed) {
             values[static_cast<std::size_t>(i + c * count)];
   };
   copy(factor.eliminated, x, e);
-  copy(factor.passed, outer.values, p);
+  copy(factor.separator, outer.values, p);
   return step;
 }
 

@@ -93,7 +93,7 @@ struct UpdateMatrix {
 
 // The factors of an eliminated front, for back-substitution and covariances.
 struct FrontFactor {
-  UnknownList eliminated, passed;  // each ascending
+  UnknownList eliminated, separator;  // each ascending
   std::int64_t right_hand_sides = 1;
   std::vector<double> factor;      // [(e + p) x e] column-major: L (lower triangle) above Y
   std::vector<double> z;           // [e x right_hand_sides]
@@ -149,7 +149,8 @@ class FrontMemory {
 class Front {
  public:
   // `memory` may be null; otherwise it outlives the front. Throws ComputeError for more unknowns than a front may have.
-  Front(UnknownList eliminated, UnknownList passed, std::int64_t right_hand_sides = 1, FrontMemory* memory = nullptr);
+  Front(UnknownList eliminated, UnknownList separator, std::int64_t right_hand_sides = 1,
+        FrontMemory* memory = nullptr);
 
   std::int64_t dimension() const { return dimension_; }
   std::int64_t row_of(const UnknownId& id) const;  // first row; -1 when the unknown is not in the front
@@ -179,8 +180,8 @@ class Front {
   Result eliminate(double lambda) &&;
 
  private:
-  UnknownList eliminated_, passed_;
-  std::vector<std::int64_t> eliminated_rows_, passed_rows_;
+  UnknownList eliminated_, separator_;
+  std::vector<std::int64_t> eliminated_rows_, separator_rows_;
   std::int64_t dimension_ = 0, eliminated_dimension_ = 0, right_hand_sides_ = 1;
   std::vector<double> factor_;  // [n x e]
   std::vector<double> update_;  // [p x p]
@@ -195,15 +196,15 @@ struct Front::Result {
 };
 
 // The values of E and P, ascending, from values that include those of P.
-Step back_substitute(const FrontFactor& factor, const Step& passed);
+Step back_substitute(const FrontFactor& factor, const Step& separator);
 
 // The covariance of the unknowns E and P of a front, in three blocks. The whole matrix of a large front is never
 // formed.
 struct FrontCovariance {
-  UnknownList eliminated, passed;  // each ascending
-  std::vector<double> inner;       // C_EE [e x e] column-major, lower triangle
-  std::vector<double> cross;       // C_PE [p x e]
-  std::vector<double> outer;       // C_PP [p x p]
+  UnknownList eliminated, separator;  // each ascending
+  std::vector<double> inner;          // C_EE [e x e] column-major, lower triangle
+  std::vector<double> cross;          // C_PE [p x e]
+  std::vector<double> outer;          // C_PP [p x p]
 
   CovarianceMatrix restricted_to(const UnknownList& wanted) const;  // throws ComputeError when one is missing
   Bytes bytes_of(const UnknownList& wanted) const;                  // bytes of restricted_to(), without forming it
@@ -212,6 +213,6 @@ struct FrontCovariance {
 
 // The covariance of a front from that of P, which has all unknowns of P and no others: C_EE = K_EE^-1 + K_EE^-1 K_EP
 // C_PP K_PE K_EE^-1, C_PE = -C_PP K_PE K_EE^-1. Held unknowns get zero rows.
-FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix passed);
+FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix separator);
 
 }  // namespace megablock

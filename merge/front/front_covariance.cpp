@@ -87,10 +87,10 @@ CovarianceMatrix CovarianceMatrix::from_bytes(const Bytes& bytes) {
 }
 
 FrontCovariance covariance_down(const FrontFactor& factor, CovarianceMatrix given) {
-  if (given.unknowns != factor.passed)
+  if (given.unknowns != factor.separator)
     throw ComputeError("merge: a covariance is not that of the separator unknowns of a front");
-  const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.passed), n = e + p;
-  FrontCovariance covariance{factor.eliminated, factor.passed, {}, {}, std::move(given.matrix)};
+  const std::int64_t e = total_dimension(factor.eliminated), p = total_dimension(factor.separator), n = e + p;
+  FrontCovariance covariance{factor.eliminated, factor.separator, {}, {}, std::move(given.matrix)};
   if (e == 0) return covariance;
 
   // The memory of L^-1 is free again before X and C_PE are allocated.
@@ -126,11 +126,11 @@ class RestrictedCovariance {
  public:
   // Throws ComputeError when one is missing.
   RestrictedCovariance(const FrontCovariance& front, const UnknownList& wanted)
-      : front_(front), e_(total_dimension(front.eliminated)), p_(total_dimension(front.passed)) {
-    const std::vector<std::int64_t> inner = row_offsets(front.eliminated), outer = row_offsets(front.passed);
+      : front_(front), e_(total_dimension(front.eliminated)), p_(total_dimension(front.separator)) {
+    const std::vector<std::int64_t> inner = row_offsets(front.eliminated), outer = row_offsets(front.separator);
     for (const Unknown& u : wanted) {
       const std::int64_t own = find_unknown(front.eliminated, u.id),
-                         other = own < 0 ? find_unknown(front.passed, u.id) : -1;
+                         other = own < 0 ? find_unknown(front.separator, u.id) : -1;
       if (own < 0 && other < 0) throw ComputeError("covariance lacks " + describe(u.id));
       const std::int64_t first = own >= 0 ? inner[at(own)] : outer[at(other)];
       for (std::int64_t k = 0; k < u.dimension; ++k) rows_.push_back({own >= 0, first + k});
@@ -173,6 +173,6 @@ Bytes FrontCovariance::bytes_of(const UnknownList& wanted) const {
   });
 }
 
-CovarianceMatrix FrontCovariance::whole() const { return restricted_to(unite({&eliminated, &passed})); }
+CovarianceMatrix FrontCovariance::whole() const { return restricted_to(unite({&eliminated, &separator})); }
 
 }  // namespace megablock

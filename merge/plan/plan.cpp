@@ -87,7 +87,7 @@ EliminationPlan make_plan(const MergeTree& tree, const std::vector<UnknownList>&
       if (t.leaves == leaves_of[t.unknown]) {
         node.eliminated.push_back(table[t.unknown]);
       } else {
-        node.passed.push_back(table[t.unknown]);
+        node.separator.push_back(table[t.unknown]);
         open[i].push_back(t);
       }
     }
@@ -101,7 +101,7 @@ void EliminationPlan::write(ByteWriter& out) const {
   out.value<std::uint64_t>(nodes.size());
   for (const PlanNode& node : nodes) {
     for (const std::int64_t number : {node.left, node.right, node.parent, node.leaf}) out.value(number);
-    for (const UnknownList* list : {&node.eliminated, &node.passed, &node.owned}) out.values(*list);
+    for (const UnknownList* list : {&node.eliminated, &node.separator, &node.owned}) out.values(*list);
   }
   out.values(node_of_leaf);
 }
@@ -111,7 +111,7 @@ EliminationPlan EliminationPlan::read(ByteReader& in) {
   plan.nodes.resize(in.value<std::uint64_t>());
   for (PlanNode& node : plan.nodes) {
     for (std::int64_t* number : {&node.left, &node.right, &node.parent, &node.leaf}) *number = in.value<std::int64_t>();
-    for (UnknownList* list : {&node.eliminated, &node.passed, &node.owned}) *list = in.values<Unknown>();
+    for (UnknownList* list : {&node.eliminated, &node.separator, &node.owned}) *list = in.values<Unknown>();
   }
   plan.node_of_leaf = in.values<std::int64_t>();
   return plan;

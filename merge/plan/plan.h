@@ -20,11 +20,11 @@ struct PlanNode {
   std::int64_t left = -1, right = -1, parent = -1;  // as in the tree; -1: none
   std::int64_t leaf = -1;                           // leaf number (tile or cell), -1 for inner nodes
   UnknownList eliminated;                           // eliminated here, ascending
-  UnknownList passed;                               // separator unknowns, those of the update matrix, ascending
+  UnknownList separator;                            // separator unknowns, those of the update matrix, ascending
   // What must be counted once for each unknown of the block (constraints and sums of the datum, the motion of the
   // block) is left to the leaf that owns it.
   UnknownList owned;  // leaves: touched here and by no leaf with a lower number
-  std::int64_t front_dimension() const { return total_dimension(eliminated) + total_dimension(passed); }
+  std::int64_t front_dimension() const { return total_dimension(eliminated) + total_dimension(separator); }
 };
 
 struct EliminationPlan {

@@ -257,7 +257,7 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
   TilePlan plan;
   plan.unknowns = unknowns;
   plan.camera_free = camera_free;
-  plan.boundary = node.passed;
+  plan.boundary = node.separator;
   plan.owned = node.owned;
   const auto position = [&](const Unknown& u) { return find_unknown(plan.unknowns, u.id); };
   for (std::size_t row = 0; row < problem.frames.size(); ++row)
@@ -278,14 +278,14 @@ TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const Unknown
   std::size_t cell_count = 0;
   for (const MergeTree::Node& n : cells.tree.nodes) cell_count += n.left < 0 && n.right < 0;
   // The frames of the tile's separator count as removed, because they lie above the root of the cells.
-  std::vector<std::uint8_t> passed(problem.frames.size(), 0);
-  for (std::size_t row = 0; row < passed.size(); ++row)
-    passed[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
-  std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, passed);
-  for (std::size_t row = 0; row < passed.size(); ++row)
+  std::vector<std::uint8_t> separator(problem.frames.size(), 0);
+  for (std::size_t row = 0; row < separator.size(); ++row)
+    separator[row] = find_unknown(plan.boundary, frame_unknown(problem, row).id) >= 0;
+  std::vector<std::int32_t> depth = separator_depths(graph, cells.leaf_of_node, cells.tree, separator);
+  for (std::size_t row = 0; row < separator.size(); ++row)
     // Depth 0 is now the tile's separator, which separator_depths left at -1; the root of the cells has depth 1. Frames
     // that separate nothing keep -1.
-    if (passed[row] || depth[row] >= 0) ++depth[row];
+    if (separator[row] || depth[row] >= 0) ++depth[row];
   const std::vector<UnknownList> lists = CellPlanner(problem, plan, cells.leaf_of_node, depth, cell_count).run();
   plan.cells = make_plan(cells.tree, lists, plan.boundary);
   for (PlanNode& cell : plan.cells.nodes) cell.owned = {};  // only the `owned` lists of tiles are used

@@ -35,7 +35,7 @@ UpdateMatrix condense_on_mounts(const TileProblem& problem, const TileState& sta
   PlanNode node;
   node.leaf = 0;
   for (const Unknown& u : tile_unknowns(problem)) {
-    (u.id.kind == UnknownKind::kMount ? node.passed : node.eliminated).push_back(u);
+    (u.id.kind == UnknownKind::kMount ? node.separator : node.eliminated).push_back(u);
     node.owned.push_back(u);
   }
   const TilePlan plan = make_tile_plan(problem, node);

@@ -68,7 +68,7 @@ class FactorStore {
   void leave_room(std::int64_t bytes);
   void clear();
 
-  // For records of a sweep (pass_record.h). bytes_without_copy(): bytes in memory that have no copy in scratch.
+  // For records of a sweep (sweep_record.h). bytes_without_copy(): bytes in memory that have no copy in scratch.
   // copy_to_scratch() copies them there, and returns false when there is no room. nodes_in_scratch(): nodes whose
   // factors are in scratch. adopt(), after clear(), takes over the factors of these nodes that an earlier run left
   // there.

@@ -18,10 +18,10 @@ namespace megablock {
 class TileTrialMaker::Work {
  public:
   Work(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile, const TileProblem& problem,
-       const TilePlan& plan, const TileState& state, const Pass& pass, const TileStep& step, double settled)
+       const TilePlan& plan, const TileState& state, const Sweep& sweep, const TileStep& step, double settled)
       : problem_(problem),
         state_(state),
-        pass_(pass),
+        sweep_(sweep),
         settled_(settled),
         robust_(problem.image_loss.kind != RobustLoss::Kind::kNone),
         motion_(gauge, motions, tile, problem, plan),
@@ -40,7 +40,7 @@ class TileTrialMaker::Work {
  private:
   const TileProblem& problem_;
   const TileState& state_;
-  const Pass pass_;
+  const Sweep sweep_;
   const double settled_;
   const bool robust_;
   const TileMotion motion_;
@@ -60,7 +60,7 @@ void TileTrialMaker::Work::visit(std::int64_t portion) {
   double damping_norm = 0;
   LossSums loss(problem_.image_loss);
   for (std::span<const std::int32_t> rest = portions_[portion]; !rest.empty();) {
-    rest = rest.subspan(equations.linearise(rest, pass_));
+    rest = rest.subspan(equations.linearise(rest, sweep_));
     equations.steps(unknowns_, points);
     for (std::size_t i = 0; i < equations.points().size(); ++i) {
       const std::int64_t p = equations.points()[i].point;
@@ -86,8 +86,8 @@ TileTrial TileTrialMaker::Work::take() {
 
 TileTrialMaker::TileTrialMaker(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
                                const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const Pass& pass, const TileStep& step, double settled)
-    : work_(std::make_unique<Work>(gauge, motions, tile, problem, plan, state, pass, step, settled)) {}
+                               const Sweep& sweep, const TileStep& step, double settled)
+    : work_(std::make_unique<Work>(gauge, motions, tile, problem, plan, state, sweep, step, settled)) {}
 
 TileTrialMaker::~TileTrialMaker() = default;
 
@@ -98,9 +98,9 @@ void TileTrialMaker::visit(std::int64_t portion) { work_->visit(portion); }
 TileTrial TileTrialMaker::take() { return work_->take(); }
 
 TileTrial try_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
-                   const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                   const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                    const TileStep& step, double settled) {
-  TileTrialMaker trial(gauge, motions, tile, problem, plan, state, pass, step, settled);
+  TileTrialMaker trial(gauge, motions, tile, problem, plan, state, sweep, step, settled);
   visit_in_parallel(trial.portions(), [&](std::int64_t portion) { trial.visit(portion); });
   return trial.take();
 }

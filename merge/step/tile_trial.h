@@ -22,7 +22,7 @@ struct TileTrial {
 };
 // `step` holds the step of the unknowns alone, from solve_tile_unknowns.
 TileTrial try_step(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
-                   const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                   const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                    const TileStep& step, double settled = kPointSettled);
 
 // The same in portions, for threads that may work on other tiles as well (geometry/threads/rounds.h).
@@ -30,7 +30,7 @@ class TileTrialMaker {
  public:
   // All arguments except the pass outlive the object.
   TileTrialMaker(const BlockGauge& gauge, const std::vector<BlockMotion>& motions, std::int64_t tile,
-                 const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+                 const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                  const TileStep& step, double settled = kPointSettled);
   ~TileTrialMaker();
   std::int64_t portions() const;

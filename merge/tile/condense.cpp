@@ -19,16 +19,16 @@ namespace megablock {
 namespace {
 
 // Fills the front of a cell with all of the tile's residuals that the cell owns.
-void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                const PlanNode& node, PointEquations& equations, PairBlocks& pair_blocks, std::vector<double>& diagonal,
                Front& front) {
   CellAssembler assembler(plan, front, pair_blocks);
   const std::vector<std::int32_t> points = plan.points[at(node.leaf)].rows();
   for (std::span<const std::int32_t> rest = points; !rest.empty();) {
-    rest = rest.subspan(equations.linearise(rest, pass));
+    rest = rest.subspan(equations.linearise(rest, sweep));
     assembler.add_points(equations);
   }
-  visit_terms(problem, plan, state, pass, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
+  visit_terms(problem, plan, state, sweep, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
   assembler.finish(diagonal);
 }
 
@@ -84,11 +84,11 @@ TileFactor TileFactor::read(ByteReader& in) {
 // has it.
 class TileCondenser::Work {
  public:
-  Work(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass, TileDatum datum)
+  Work(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep, TileDatum datum)
       : problem_(problem),
         plan_(plan),
         state_(state),
-        pass_(pass),
+        sweep_(sweep),
         datum_(std::move(datum)),
         nodes_(plan.cells.nodes),
         tree_(nodes_),
@@ -117,7 +117,7 @@ class TileCondenser::Work {
   const TileProblem& problem_;
   const TilePlan& plan_;
   const TileState& state_;
-  const Pass pass_;
+  const Sweep sweep_;
   const TileDatum datum_;
   const std::vector<PlanNode>& nodes_;
   ChildrenFirst tree_;
@@ -132,11 +132,11 @@ void TileCondenser::Work::eliminate(std::int64_t number) {
   const PlanNode& node = nodes_[at(number)];
   OfThread& mine = threads_.mine();
   // The first right-hand side is -J'r, the others are the columns of the datum.
-  Front front(node.eliminated, node.passed, 1 + datum_.columns.columns, &mine.memory);
+  Front front(node.eliminated, node.separator, 1 + datum_.columns.columns, &mine.memory);
   if (node.leaf >= 0) {
     std::vector<double>& diagonal = diagonals_[at(node.leaf)];
     diagonal.assign(at(total_dimension(plan_.unknowns)), 0);
-    fill_cell(problem_, plan_, state_, pass_, node, mine.equations, mine.pair_blocks, diagonal, front);
+    fill_cell(problem_, plan_, state_, sweep_, node, mine.equations, mine.pair_blocks, diagonal, front);
   }
   for (std::int64_t child : {node.left, node.right}) {
     if (child < 0) continue;
@@ -145,8 +145,8 @@ void TileCondenser::Work::eliminate(std::int64_t number) {
     updates_[at(child)] = UpdateMatrix();
   }
   add_datum(datum_, node.eliminated, front);
-  if (at(number) + 1 == nodes_.size()) add_datum(datum_, node.passed, front);
-  Front::Result eliminated = std::move(front).eliminate(pass_.lambda);
+  if (at(number) + 1 == nodes_.size()) add_datum(datum_, node.separator, front);
+  Front::Result eliminated = std::move(front).eliminate(sweep_.lambda);
   updates_[at(number)] = std::move(eliminated.update);
   factors_[at(number)] = std::move(eliminated.factor);
 }
@@ -163,9 +163,9 @@ TileCondensation TileCondenser::Work::take() {
   return result;
 }
 
-TileCondenser::TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
-                             TileDatum datum)
-    : work_(std::make_unique<Work>(problem, plan, state, pass, std::move(datum))) {}
+TileCondenser::TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state,
+                             const Sweep& sweep, TileDatum datum)
+    : work_(std::make_unique<Work>(problem, plan, state, sweep, std::move(datum))) {}
 
 TileCondenser::~TileCondenser() = default;
 
@@ -176,8 +176,8 @@ void TileCondenser::condense(std::int64_t cell) { work_->condense(cell); }
 TileCondensation TileCondenser::take() { return work_->take(); }
 
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const Pass& pass, const TileDatum& datum) {
-  TileCondenser tile(problem, plan, state, pass, datum);
+                               const Sweep& sweep, const TileDatum& datum) {
+  TileCondenser tile(problem, plan, state, sweep, datum);
   visit_in_parallel(tile.cells(), [&](std::int64_t cell) { tile.condense(cell); });
   return tile.take();
 }
@@ -212,10 +212,10 @@ TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, con
   return result;
 }
 
-TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum) {
   TileStep step = solve_tile_unknowns(
-      plan, factor.empty() ? condense_tile(problem, plan, state, pass, datum).factor : factor, boundary);
+      plan, factor.empty() ? condense_tile(problem, plan, state, sweep, datum).factor : factor, boundary);
   step.points.assign(problem.points.size(), Eigen::Vector3d::Zero());
   const UnknownMotions motions(plan, step.unknowns.values.data());
   const PointTables tables(problem, plan, state);
@@ -225,7 +225,7 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
   for (std::int64_t portion = 0; portion < portions.size(); ++portion) {
     double damping_norm = 0;
     for (std::span<const std::int32_t> rest = portions[portion]; !rest.empty();) {
-      rest = rest.subspan(equations.linearise(rest, pass));
+      rest = rest.subspan(equations.linearise(rest, sweep));
       equations.steps(motions, step.points);
       for (std::size_t i = 0; i < equations.points().size(); ++i)
         damping_norm += equations.diagonal(i).dot(step.points[at(equations.points()[i].point)].cwiseAbs2());

@@ -54,22 +54,22 @@ struct TileDatum {
 
 // The linearisation and the damping of a sweep. A plain number stands for a sweep with this lambda and without
 // curvature.
-struct Pass {
+struct Sweep {
   double lambda = 0;
   bool curvature = false;  // with the second-order term of the robust losses
-  Pass(double damping, bool with_curvature = false) : lambda(damping), curvature(with_curvature) {}
+  Sweep(double damping, bool with_curvature = false) : lambda(damping), curvature(with_curvature) {}
 };
 
 // Linearises at `state`, and eliminates the points and inner unknowns of the tile. Throws ComputeError when a kept
 // observation is behind its camera.
 TileCondensation condense_tile(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                               const Pass& pass, const TileDatum& datum = {});
+                               const Sweep& sweep, const TileDatum& datum = {});
 
 // The same in portions, for threads that may work on other tiles as well (geometry/threads/rounds.h).
 class TileCondenser {
  public:
   // Problem, plan and state outlive the object.
-  TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+  TileCondenser(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                 TileDatum datum = {});
   ~TileCondenser();
   std::int64_t cells() const;
@@ -97,7 +97,7 @@ TileStep solve_tile_unknowns(const TilePlan& plan, const TileFactor& factor, con
 // The step of unknowns and points; the points are linearised again. Without `factor` the tile is condensed again, with
 // the same bits. For tests, and for callers that need the steps of the points themselves; an iteration takes try_step
 // (tile_trial.h).
-TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                          const TileFactor& factor, const Step& boundary, const TileDatum& datum = {});
 
 // The posterior covariances of a tile, from the factors of a sweep with lambda = 0. The variance factor is one, a

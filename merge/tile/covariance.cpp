@@ -228,7 +228,7 @@ class TileCovarianceBuilder {
       const PlanNode& node = plan_.cells.nodes[at(n)];
       const FrontFactor& factor = factor_.nodes[at(n)];
       const CovarianceMatrix& outer = parent ? *parent : result_.boundary;
-      CovarianceMatrix covariance = covariance_down(factor, outer.restricted_to(factor.passed)).whole();
+      CovarianceMatrix covariance = covariance_down(factor, outer.restricted_to(factor.separator)).whole();
       take(covariance, node.eliminated);
       if (node.leaf >= 0) cells_.mine().add(at(node.leaf), covariance, tables[at(node.leaf)]);
       return covariance;

@@ -128,7 +128,7 @@ PointEquations::PointEquations(const TileProblem& problem, const TileState& stat
 
 constexpr std::size_t kAhead = 8;  // points
 
-std::size_t PointEquations::linearise(std::span<const std::int32_t> points, const Pass& pass) {
+std::size_t PointEquations::linearise(std::span<const std::int32_t> points, const Sweep& sweep) {
   clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::int64_t point = points[i];
@@ -140,11 +140,11 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
     add_observations(point);
   }
   lanes_.linearise();
-  for (Point& point : points_) weigh(point, pass.curvature);
+  for (Point& point : points_) weigh(point, sweep.curvature);
   kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), records_.data());
   if (sights_ < lanes_.size()) kernels_->merge(lanes_.size(), sight_of_lane_.data(), records_.data());
   sum_up();
-  kernels_->factorise(padded_points(), pass.lambda, kPivotTolerance * (1 + pass.lambda), sums_.data(),
+  kernels_->factorise(padded_points(), sweep.lambda, kPivotTolerance * (1 + sweep.lambda), sums_.data(),
                       {point_values_.data(), lanes_.capacity()}, steps_.data());
   return points_.size();
 }

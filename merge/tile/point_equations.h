@@ -111,7 +111,7 @@ class PointEquations {
 
   // Linearises the kept observations of the first of these points, of as many as there is room for, and factorises
   // their matrices V. Returns the number of points. Throws ComputeError when an observation lies behind its camera.
-  std::size_t linearise(std::span<const std::int32_t> points, const Pass& pass);
+  std::size_t linearise(std::span<const std::int32_t> points, const Sweep& sweep);
   const std::vector<Point>& points() const { return points_; }  // the present points, those of the last linearise()
 
   // After linearise(): computes Y of all unknowns in the residuals of the points, and adds the contributions of the

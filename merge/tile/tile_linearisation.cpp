@@ -29,14 +29,14 @@ void add_block(const LinearTerm::Block& block, const TilePlan& plan, TermResidua
 
 }  // namespace
 
-void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                  std::size_t cell, const std::function<void(const TermResidual&)>& visit) {
   const TermVisit visit_weighted = [&](const LinearTerm& term) {
     TermResidual out;
     out.residual = term.residual;
     out.kinds = term.kinds;
     for (int b = 0; b < term.block_count; ++b) add_block(term.blocks[static_cast<std::size_t>(b)], plan, out);
-    out.weight(term.loss, pass);
+    out.weight(term.loss, sweep);
     visit(out);
   };
   const auto types = observation_types();

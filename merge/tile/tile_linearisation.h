@@ -85,9 +85,9 @@ struct TermResidual {
     blocks[static_cast<std::size_t>(block_count)].unknown = unknown;
     blocks[static_cast<std::size_t>(block_count++)].jacobian = jacobian;
   }
-  void weight(const RobustLoss& loss, const Pass& pass) {
+  void weight(const RobustLoss& loss, const Sweep& sweep) {
     const double squares = residual.squaredNorm();
-    const LossWeight w(loss, squares, pass.curvature);
+    const LossWeight w(loss, squares, sweep.curvature);
     rho = w.rho;
     weighted_squares = w.first * squares;
     for (int b = 0; b < block_count; ++b) {
@@ -99,7 +99,7 @@ struct TermResidual {
 };
 
 // Calls `visit` for every observation without a point that belongs to a cell.
-void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Pass& pass,
+void visit_terms(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
                  std::size_t cell, const std::function<void(const TermResidual&)>& visit);
 
 }  // namespace megablock

@@ -40,22 +40,22 @@ void reject(GlobalState& state) {
   state.curvature = 0;
   // The undamped step has failed, so the next iteration is damped, and its decrement may be small without another
   // confirming sweep.
-  if (state.pass_lambda == 0) state.confirm = 0;
+  if (state.sweep_lambda == 0) state.confirm = 0;
   state.next = GlobalAction::kReject;
 }
 
 // Whether a change of the cost is too small to continue. With strong damping a small change says nothing, because the
 // damping keeps the steps small.
 bool negligible(const GlobalState& state, const GlobalOptions& options, double change) {
-  return options.function_tolerance > 0 && state.pass_lambda <= kHardlyDamped &&
+  return options.function_tolerance > 0 && state.sweep_lambda <= kHardlyDamped &&
          std::abs(change) <= options.function_tolerance * state.cost;
 }
 
 // Starts the next iteration after an accepted or rejected step, or stops. Where several reasons apply, the last one
 // below counts.
-void start_pass(GlobalState& state, const GlobalOptions& options) {
-  state.pass_lambda = state.lambda;
-  state.pass_curvature = state.curvature;
+void start_sweep(GlobalState& state, const GlobalOptions& options) {
+  state.sweep_lambda = state.lambda;
+  state.sweep_curvature = state.curvature;
   state.next = GlobalAction::kUp;
   if (negligible(state, options, state.cost - state.trial_cost)) stop(state, GlobalOutcome::kConverged);
   if (state.lambda > kMaxLambda) stop(state, GlobalOutcome::kFailed);
@@ -73,7 +73,7 @@ void GlobalOptions::check() const {
 GlobalState start_global(const GlobalOptions& options) {
   options.check();
   GlobalState state;
-  state.lambda = state.pass_lambda = options.initial_lambda;
+  state.lambda = state.sweep_lambda = options.initial_lambda;
   return state;
 }
 
@@ -89,14 +89,14 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
   const bool at_floor = state.floor_decrement >= 0 && decrement >= state.floor_decrement;
   // Damping makes the decrement smaller. A damped sweep can therefore only ask for an undamped one, which decides.
   // Single tiles need no confirmation, only a sweep that is hardly damped.
-  if (state.pass_lambda == 0) {
+  if (state.sweep_lambda == 0) {
     if (small) return stop(state, GlobalOutcome::kConverged);
     if (at_floor) return stop(state, GlobalOutcome::kRoundingFloor);
-  } else if (small && !options.confirm && state.pass_lambda <= kHardlyDamped) {
+  } else if (small && !options.confirm && state.sweep_lambda <= kHardlyDamped) {
     return stop(state, GlobalOutcome::kConverged);
   } else if ((small || at_floor) && state.confirm != 0) {
-    state.pass_lambda = 0;  // this undamped iteration decides on convergence
-    state.pass_curvature = 0;
+    state.sweep_lambda = 0;  // this undamped iteration decides on convergence
+    state.sweep_curvature = 0;
     return;
   }
   state.next = GlobalAction::kDown;
@@ -105,7 +105,7 @@ void report_up(GlobalState& state, const GlobalOptions& options, const UpReport&
 void report_down(GlobalState& state, const GlobalOptions&, const DownReport& report) {
   ++state.iterations;
   state.trial_cost = report.trial_cost;
-  state.predicted = 0.5 * (state.decrement_squared + state.pass_lambda * report.damping_norm);
+  state.predicted = 0.5 * (state.decrement_squared + state.sweep_lambda * report.damping_norm);
   const double decrease = state.cost - state.trial_cost;
   if (!std::isfinite(state.trial_cost)) return reject(state);
   // The cost can judge the step.
@@ -122,20 +122,20 @@ void report_down(GlobalState& state, const GlobalOptions&, const DownReport& rep
 
 void report_accepted(GlobalState& state, const GlobalOptions& options) {
   ++state.accepted;
-  start_pass(state, options);
+  start_sweep(state, options);
 }
 
-void report_rejected(GlobalState& state, const GlobalOptions& options) { start_pass(state, options); }
+void report_rejected(GlobalState& state, const GlobalOptions& options) { start_sweep(state, options); }
 
 void adjust_globally(TreeRunner& runner, const GlobalOptions& options, GlobalState& state,
                      const std::function<void(const GlobalState&)>& on_iteration) {
   while (state.next != GlobalAction::kStop) {
     switch (state.next) {
       case GlobalAction::kUp:
-        report_up(state, options, runner.up(next_pass(state)));
+        report_up(state, options, runner.up(next_sweep(state)));
         break;
       case GlobalAction::kDown:
-        report_down(state, options, runner.down(next_pass(state)));
+        report_down(state, options, runner.down(next_sweep(state)));
         break;
       case GlobalAction::kAccept:
         runner.accept();

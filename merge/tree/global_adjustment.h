@@ -62,7 +62,7 @@ struct DownReport {
 };
 
 enum class GlobalAction : std::int32_t {
-  kUp = 0,      // linearise at the current state, condense and eliminate with `next_pass`
+  kUp = 0,      // linearise at the current state, condense and eliminate with `next_sweep`
   kDown = 1,    // back-substitute, form the trial state, evaluate its cost
   kAccept = 2,  // the trial state becomes the current state (then call report_accepted); checkpoint here
   kReject = 3,  // forget the trial state (then call report_rejected)
@@ -81,7 +81,7 @@ struct GlobalState {
   GlobalAction next = GlobalAction::kUp;
   GlobalOutcome outcome = GlobalOutcome::kRunning;
   double lambda = 1e-10, nu = 2;
-  double pass_lambda = 1e-10;  // of the current sweep: lambda, or 0 for a confirming sweep
+  double sweep_lambda = 1e-10;  // of the current sweep: lambda, or 0 for a confirming sweep
   double cost = 0, initial_cost = -1;
   double decrement_squared = 0;  // of the last sweep up
   // The decrement before a step that the cost could not resolve; -1: it resolved the last step.
@@ -91,13 +91,13 @@ struct GlobalState {
   std::int32_t accepted = 0;
   // 1: the last step decreased the cost as predicted, and the next one takes the curvature of the losses
   std::int32_t curvature = 0;
-  std::int32_t pass_curvature = 0;  // of the current sweep; 0 for a confirming sweep
-  std::int32_t confirm = 1;         // 0: a confirming sweep failed at the current state and its step was rejected
+  std::int32_t sweep_curvature = 0;  // of the current sweep; 0 for a confirming sweep
+  std::int32_t confirm = 1;          // 0: a confirming sweep failed at the current state and its step was rejected
 };
 
 GlobalState start_global(const GlobalOptions& options);
 inline GlobalAction next_action(const GlobalState& state) { return state.next; }
-inline Pass next_pass(const GlobalState& state) { return {state.pass_lambda, state.pass_curvature != 0}; }
+inline Sweep next_sweep(const GlobalState& state) { return {state.sweep_lambda, state.sweep_curvature != 0}; }
 void report_up(GlobalState& state, const GlobalOptions& options, const UpReport& report);
 void report_down(GlobalState& state, const GlobalOptions& options, const DownReport& report);
 void report_accepted(GlobalState& state, const GlobalOptions& options);
@@ -108,8 +108,8 @@ void report_rejected(GlobalState& state, const GlobalOptions& options);
 class TreeRunner {
  public:
   virtual ~TreeRunner() = default;
-  virtual UpReport up(const Pass& pass) = 0;      // at the current state
-  virtual DownReport down(const Pass& pass) = 0;  // after up(pass)
+  virtual UpReport up(const Sweep& sweep) = 0;      // at the current state
+  virtual DownReport down(const Sweep& sweep) = 0;  // after up(pass)
   virtual void accept() = 0;
   virtual void reject() = 0;
 };

@@ -39,10 +39,10 @@ void MergeInMemory::read_states() {
   for (std::size_t t = 0; t < states_.size(); ++t) states_[t] = tiles_.outline(t).state;
 }
 
-DownReport MergeInMemory::down(const Pass& pass) {
-  pass_ = pass;
+DownReport MergeInMemory::down(const Sweep& sweep) {
+  sweep_ = sweep;
   steps_.clear();
-  return runner_.down(pass);
+  return runner_.down(sweep);
 }
 
 void MergeInMemory::accept() {
@@ -61,7 +61,7 @@ UpReport MergeInMemory::final_up() {
 
 const std::vector<TileStep>& MergeInMemory::steps() const {
   for (std::size_t t = steps_.size(); t < problems_.size(); ++t)
-    steps_.push_back(solve_tile_down(problems_[t], tile_plans_[t], states_[t], pass_, TileFactor(),
+    steps_.push_back(solve_tile_down(problems_[t], tile_plans_[t], states_[t], sweep_, TileFactor(),
                                      unknown_steps_[t].restricted_to(tile_plans_[t].boundary), runner_.datum_of(t)));
   return steps_;
 }

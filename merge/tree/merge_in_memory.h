@@ -17,8 +17,8 @@ class MergeInMemory : public TreeRunner {
   MergeInMemory(const MergeTree& tree, std::vector<TileProblem> problems, std::vector<TileState> states,
                 MemoryOptions memory = {}, const NodeSolver& solver = dense_node_solver());
 
-  UpReport up(const Pass& pass) override { return runner_.up(pass); }
-  DownReport down(const Pass& pass) override;
+  UpReport up(const Sweep& sweep) override { return runner_.up(sweep); }
+  DownReport down(const Sweep& sweep) override;
   void accept() override;
   void reject() override { runner_.reject(); }
 
@@ -49,7 +49,7 @@ class MergeInMemory : public TreeRunner {
   std::vector<TileProblem> problems_;
   std::vector<TileState> states_;
   std::vector<TilePlan> tile_plans_;
-  Pass pass_ = 0;                        // of the last down()
+  Sweep sweep_ = 0;                      // of the last down()
   std::vector<Step> unknown_steps_;      // [tiles] of the last down()
   mutable std::vector<TileStep> steps_;  // [tiles] with the points; made when they are first asked for
   MergeTreeRunner::Posterior posterior_;

@@ -36,7 +36,7 @@
 #include "merge/tile/condense.h"
 #include "merge/tree/global_adjustment.h"
 #include "merge/tree/node.h"
-#include "merge/tree/pass_recorder.h"
+#include "merge/tree/sweep_recorder.h"
 #include "merge/tree/tree_communicator.h"
 
 namespace megablock {
@@ -61,15 +61,15 @@ class MergeTreeRunner : public TreeRunner {
                   const MemoryOptions& memory, const NodeSolver& solver = dense_node_solver());
   ~MergeTreeRunner() override;
 
-  UpReport up(const Pass& pass) override;
-  DownReport down(const Pass& pass) override;
+  UpReport up(const Sweep& sweep) override;
+  DownReport down(const Sweep& sweep) override;
   void accept() override;
   void reject() override;
 
   // Records sweeps up from now on. The first sweep resumes where the record of a killed run ends. A record holds
   // subtrees that are on this rank alone; nodes that join several ranks are computed again. `recorder` outlives the
   // runner.
-  void record_passes(PassRecorder& recorder) { recorder_ = &recorder; }
+  void record_sweeps(SweepRecorder& recorder) { recorder_ = &recorder; }
 
   // Says that the next sweep with lambda = 0 may be the last one. That sweep stores the data of the posterior, so that
   // the posterior needs no sweep of its own. This does not work for a block with a free datum, whose covariances need
@@ -110,7 +110,7 @@ class MergeTreeRunner : public TreeRunner {
   void deliver_update(std::int64_t node, UpdateMatrix update);
   // Sends each child its part of the values of a front; receives the values of a node from its parent (sweep_values.h).
   template <typename Values>
-  void pass_down(std::int64_t node, const Values& front);
+  void send_down(std::int64_t node, const Values& front);
   template <typename Values>
   Values from_parent(std::int64_t node);
   std::size_t row_of_leaf(std::int64_t leaf) const {  // row of this node's tile in tiles_
@@ -123,39 +123,39 @@ class MergeTreeRunner : public TreeRunner {
                              TileCondensation condensed);  // stores its factors and returns its update
   // Condenses the tiles of these nodes, ascending, and calls `visit` for one tile after the other.
   using VisitCondensation = std::function<void(std::size_t i, TileCondensation)>;
-  void condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass, const VisitCondensation& visit);
-  UpdateMatrix join_children(std::int64_t node, const Pass& pass);
+  void condense_tiles(std::span<const std::int64_t> leaves, const Sweep& sweep, const VisitCondensation& visit);
+  UpdateMatrix join_children(std::int64_t node, const Sweep& sweep);
   void send_update(std::int64_t node, UpdateMatrix update);  // records it as well
-  UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Pass& pass,
+  UpdateMatrix eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right, const Sweep& sweep,
                                bool check_seam_here);
   // The bytes of the front of a node during its elimination or the sweep down; the bytes of all updates and values that
   // wait for a parent or a child.
   std::int64_t front_bytes(std::int64_t node) const;
   std::int64_t pending_update_bytes() const;
   // Condenses again the subtree of a node, which is on this rank alone.
-  UpdateMatrix condense_again(std::int64_t node, const Pass& pass);
-  const NodeFactors& factors_of(std::int64_t node, const Pass& pass);
+  UpdateMatrix condense_again(std::int64_t node, const Sweep& sweep);
+  const NodeFactors& factors_of(std::int64_t node, const Sweep& sweep);
   // Marks the nodes of these subtrees. The result has one entry for each node.
   std::vector<bool> nodes_of(const std::vector<std::int64_t>& subtrees) const;
   // Takes over the finished part of the sweep of a killed run. Returns the nodes that are done.
-  std::vector<bool> resume(const PassRecord& record);
+  std::vector<bool> resume(const SweepRecord& record);
   // Records the sweep after the front of a node is eliminated, if a record is due.
   void record(std::int64_t node, const UpdateMatrix& update);
   // Whether the parent of the node joins several ranks, or there is no parent: then the update leaves the subtrees of
   // this rank.
   bool update_leaves(std::int64_t node) const;
   // Runs a sweep up with the datum in gauge_.
-  UpReport condense_all(const Pass& pass);
+  UpReport condense_all(const Sweep& sweep);
   void make_plans(const MergeTree& tree, std::size_t tile_count);
   void find_gauges();
   double seam_probability() const;  // of a false alarm at one seam
   BlockGauge gather_gauge() const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
   // Runs a sweep down with the present factors. Returns the steps of the unknowns of this rank's tiles, without points.
-  std::vector<TileStep> steps_down(const Pass& pass);
+  std::vector<TileStep> steps_down(const Sweep& sweep);
   // Forms the trial states of these steps and calls `visit` for one tile after the other.
   using VisitTrial = std::function<void(std::size_t row, TileTrial)>;
-  void try_steps(const std::vector<BlockMotion>& motions, const Pass& pass, const std::vector<TileStep>& steps,
+  void try_steps(const std::vector<BlockMotion>& motions, const Sweep& sweep, const std::vector<TileStep>& steps,
                  const VisitTrial& visit);
 
   TreeCommunicator& ranks_;
@@ -169,13 +169,13 @@ class MergeTreeRunner : public TreeRunner {
   std::vector<bool> on_one_rank_;                 // [nodes]: the whole subtree is this rank's
   FactorStore factors_;                           // of this rank's nodes
   std::map<std::int64_t, UpdateMatrix> updates_;  // waiting for their parent on this rank
-  PassRecorder* recorder_ = nullptr;
+  SweepRecorder* recorder_ = nullptr;
   std::vector<std::int64_t> left_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
   bool with_columns_ = false;  // the sweep has the further right-hand sides of a free datum
   bool check_seams_ = false;
   bool posterior_expected_ = false;
-  std::optional<SubtreeSums> last_pass_;  // sums of a sweep at the present state that stored the data of the posterior
+  std::optional<SubtreeSums> last_sweep_;  // sums of a sweep at the present state that stored the data of the posterior
   std::vector<SeamReport> seams_;
   SweepSeconds seconds_;
   std::int64_t peak_front_bytes_ = 0;

@@ -10,7 +10,7 @@ namespace {
 class DenseNodeSolver final : public NodeSolver {
  public:
   Front::Result eliminate(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) const override {
-    Front front(node.eliminated, node.passed, std::max(left.right_hand_sides, right.right_hand_sides));
+    Front front(node.eliminated, node.separator, std::max(left.right_hand_sides, right.right_hand_sides));
     for (UpdateMatrix* child : {&left, &right}) {
       front.add(*child);
       *child = UpdateMatrix();  // frees its memory
@@ -20,8 +20,8 @@ class DenseNodeSolver final : public NodeSolver {
   Step back_substitute(const FrontFactor& factor, const Step& parent) const override {
     return megablock::back_substitute(factor, parent);
   }
-  FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix passed) const override {
-    return covariance_down(factor, std::move(passed));
+  FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix separator) const override {
+    return covariance_down(factor, std::move(separator));
   }
 };
 

@@ -25,7 +25,7 @@ class NodeSolver {
   virtual Step back_substitute(const FrontFactor& factor, const Step& parent) const = 0;
 
   // The covariance of the node's front from the covariance of its separator unknowns.
-  virtual FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix passed) const = 0;
+  virtual FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix separator) const = 0;
 };
 
 // Keeps the whole front in the memory of this process (front.h). Stateless.

@@ -18,8 +18,8 @@ namespace megablock {
 MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& visit) {
   Posterior posterior;
   check_seams_ = true;
-  if (last_pass_) {
-    posterior.sums = *std::exchange(last_pass_, std::nullopt);
+  if (last_sweep_) {
+    posterior.sums = *std::exchange(last_sweep_, std::nullopt);
   } else {
     find_gauges();  // frames, cameras and mounts may have moved with other tiles
     gauge_ = gather_gauge();
@@ -38,24 +38,24 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   std::vector<ObservationTable> tables(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
-    CovarianceMatrix passed = from_parent<CovarianceMatrix>(n);
+    CovarianceMatrix separator = from_parent<CovarianceMatrix>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     factors_.leave_room(pending_update_bytes() + front_bytes(n));
     const NodeFactors& factors = factors_of(n, 0);
     if (node.leaf < 0) {
-      const FrontCovariance covariance = solver_.covariance(factors.front, std::move(passed));
+      const FrontCovariance covariance = solver_.covariance(factors.front, std::move(separator));
       factors_.discard(n);
-      pass_down(n, covariance);
+      send_down(n, covariance);
       continue;
     }
     const std::size_t row = row_of_leaf(n);
     const RankTile& tile = tiles_.whole(row);
     const TilePlan& plan = tile_plans_[row];
     const Step& step = steps[row].unknowns;
-    // This comes before the covariances of the tile, which take over the memory of `passed`.
-    checks[row] = check_tile(tile.tile, factors.condensed, passed, seam_probability());
+    // This comes before the covariances of the tile, which take over the memory of `separator`.
+    checks[row] = check_tile(tile.tile, factors.condensed, separator, seam_probability());
     TileCovariance covariance =
-        covariance_tile(tile.problem, plan, tile.state, factors.tile, std::move(passed), datum_of(row), step);
+        covariance_tile(tile.problem, plan, tile.state, factors.tile, std::move(separator), datum_of(row), step);
     factors_.discard(n);
     if (with_columns_)
       to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);

@@ -14,33 +14,33 @@
 
 namespace megablock {
 
-std::vector<TileStep> MergeTreeRunner::steps_down(const Pass& pass) {
+std::vector<TileStep> MergeTreeRunner::steps_down(const Sweep& sweep) {
   std::vector<TileStep> steps(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
     // It is empty at the root.
-    const Step passed = from_parent<Step>(n);
+    const Step separator = from_parent<Step>(n);
     const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
     const Stopwatch watch(node.leaf < 0 ? seconds_.fronts : seconds_.tiles);
     if (node.leaf < 0) {
-      pass_down(n, solver_.back_substitute(factors_of(n, pass).front, passed));
+      send_down(n, solver_.back_substitute(factors_of(n, sweep).front, separator));
       continue;
     }
     const std::size_t row = row_of_leaf(n);
-    steps[row] = solve_tile_unknowns(tile_plans_[row], factors_of(n, pass).tile, passed);
+    steps[row] = solve_tile_unknowns(tile_plans_[row], factors_of(n, sweep).tile, separator);
   }
   ranks_.flush_sends();
   return steps;
 }
 
-void MergeTreeRunner::try_steps(const std::vector<BlockMotion>& motions, const Pass& pass,
+void MergeTreeRunner::try_steps(const std::vector<BlockMotion>& motions, const Sweep& sweep,
                                 const std::vector<TileStep>& steps, const VisitTrial& visit) {
   const Stopwatch watch(seconds_.tiles);
   std::vector<std::unique_ptr<TileTrialMaker>> trials(tiles_.size());
   const auto prepare = [&](std::int64_t row) {
     const RankTile& tile = tiles_.whole(at(row));
     trials[at(row)] = std::make_unique<TileTrialMaker>(gauge_, motions, tile.tile, tile.problem, tile_plans_[at(row)],
-                                                       tile.state, pass, steps[at(row)]);
+                                                       tile.state, sweep, steps[at(row)]);
     return trials[at(row)]->portions();
   };
   visit_in_rounds({std::ssize(trials), prepare,
@@ -49,13 +49,13 @@ void MergeTreeRunner::try_steps(const std::vector<BlockMotion>& motions, const P
                    [&](std::int64_t row) { return in_memory(at(row)); }});
 }
 
-DownReport MergeTreeRunner::down(const Pass& pass) {
+DownReport MergeTreeRunner::down(const Sweep& sweep) {
   struct Sums {
     double damping_norm = 0, trial_cost = 0;
   };
   const Stopwatch watch(seconds_.all);
-  last_pass_.reset();  // factors that are computed again lack what the posterior needs
-  std::vector<TileStep> steps = steps_down(pass);
+  last_sweep_.reset();  // factors that are computed again lack what the posterior needs
+  std::vector<TileStep> steps = steps_down(sweep);
   std::vector<MotionSums> own;
   for (std::size_t row = 0; row < tiles_.size(); ++row) {
     const RankTile& tile = tiles_.outline(row);
@@ -67,7 +67,7 @@ DownReport MergeTreeRunner::down(const Pass& pass) {
       block_motions(gauge_, gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, own));
   std::vector<Sums> sums(tiles_.size());
   trial_gauges_.clear();
-  try_steps(motions, pass, steps, [&](std::size_t row, TileTrial trial) {
+  try_steps(motions, sweep, steps, [&](std::size_t row, TileTrial trial) {
     sums[row] = {trial.damping_norm, trial.cost};
     // The whole tile is in memory now. If the step is accepted, the next sweep up finds the datum of its state without
     // reading the tiles.
@@ -85,7 +85,7 @@ DownReport MergeTreeRunner::down(const Pass& pass) {
 }
 
 void MergeTreeRunner::accept() {
-  last_pass_.reset();
+  last_sweep_.reset();
   tiles_.accept();
   gauges_ = std::move(trial_gauges_);
 }

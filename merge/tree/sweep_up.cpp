@@ -44,12 +44,12 @@ UpdateMatrix MergeTreeRunner::store_factors(std::int64_t leaf, TileCondensation 
 }
 
 UpdateMatrix MergeTreeRunner::eliminate_inner(std::int64_t node, UpdateMatrix left, UpdateMatrix right,
-                                              const Pass& pass, bool check_seam_here) {
+                                              const Sweep& sweep, bool check_seam_here) {
   const auto n = static_cast<std::size_t>(node);
   const Stopwatch watch(seconds_.fronts);
   // They are taken out before the updates are moved into the front.
   const LeastSquares left_alone = left.alone, right_alone = right.alone;
-  Front::Result result = solver_.eliminate(plan_.nodes[n], std::move(left), std::move(right), pass.lambda);
+  Front::Result result = solver_.eliminate(plan_.nodes[n], std::move(left), std::move(right), sweep.lambda);
   if (check_seam_here) {
     result.update.alone = least_squares(result.update);
     seams_.push_back(check_seam(node, left_alone, right_alone, result, seam_probability()));
@@ -61,16 +61,16 @@ UpdateMatrix MergeTreeRunner::eliminate_inner(std::int64_t node, UpdateMatrix le
 
 // Goes down to the tiles, because the updates of the subtree are no longer there, and stores the factors of all its
 // nodes on the way up. Seams were checked the first time.
-UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass) {
+UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Sweep& sweep) {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
   if (plan.leaf >= 0) {
     const Stopwatch watch(seconds_.tiles);
     const std::size_t row = row_of_leaf(node);
     const RankTile& tile = tiles_.whole(row);
-    return store_factors(node, condense_tile(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row)));
+    return store_factors(node, condense_tile(tile.problem, tile_plans_[row], tile.state, sweep, datum_of(row)));
   }
-  UpdateMatrix left = condense_again(plan.left, pass), right = condense_again(plan.right, pass);
-  return eliminate_inner(node, std::move(left), std::move(right), pass, false);
+  UpdateMatrix left = condense_again(plan.left, sweep), right = condense_again(plan.right, sweep);
+  return eliminate_inner(node, std::move(left), std::move(right), sweep, false);
 }
 
 // The memory of a front holds the eliminated columns, and the update once as a full matrix and once as a triangle. The
@@ -79,7 +79,7 @@ UpdateMatrix MergeTreeRunner::condense_again(std::int64_t node, const Pass& pass
 // cells are eliminated in small fronts.
 std::int64_t MergeTreeRunner::front_bytes(std::int64_t node) const {
   const PlanNode& plan = plan_.nodes[static_cast<std::size_t>(node)];
-  const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.passed);
+  const std::int64_t e = total_dimension(plan.eliminated), p = total_dimension(plan.separator);
   const std::int64_t rests = check_seams_ ? 2 : 1;
   return static_cast<std::int64_t>(sizeof(double)) * ((e + p) * e + rests * p * p + p * p / 2);
 }
@@ -91,25 +91,25 @@ std::int64_t MergeTreeRunner::pending_update_bytes() const {
   return bytes;
 }
 
-const NodeFactors& MergeTreeRunner::factors_of(std::int64_t node, const Pass& pass) {
+const NodeFactors& MergeTreeRunner::factors_of(std::int64_t node, const Sweep& sweep) {
   if (const NodeFactors* kept = factors_.get(node)) return *kept;
   factors_.note_recomputed();
-  condense_again(node, pass);
+  condense_again(node, sweep);
   // The factors that were stored last are always in memory.
   return *factors_.get(node);
 }
 
-UpReport MergeTreeRunner::up(const Pass& pass) {
+UpReport MergeTreeRunner::up(const Sweep& sweep) {
   const Stopwatch watch(seconds_.all);
   ++seconds_.sweeps_up;
   // The datum belongs to the present state, not to the first one, so that a resumed run gets the same bits.
   gauge_ = gather_gauge();
-  last_pass_.reset();
+  last_sweep_.reset();
   // A sweep that may be the last one checks its seams at once. The condition on the curvature is that of the
   // covariances: their weights are rho' alone.
-  check_seams_ = posterior_expected_ && pass.lambda == 0 && !pass.curvature && !gauge_.free();
-  const UpReport report = condense_all(pass);
-  if (check_seams_) last_pass_ = report.sums;
+  check_seams_ = posterior_expected_ && sweep.lambda == 0 && !sweep.curvature && !gauge_.free();
+  const UpReport report = condense_all(sweep);
+  if (check_seams_) last_sweep_ = report.sums;
   check_seams_ = false;
   return report;
 }
@@ -130,7 +130,7 @@ bool MergeTreeRunner::update_leaves(std::int64_t node) const {
   return parent < 0 || !on_one_rank_[static_cast<std::size_t>(parent)];
 }
 
-std::vector<bool> MergeTreeRunner::resume(const PassRecord& record) {
+std::vector<bool> MergeTreeRunner::resume(const SweepRecord& record) {
   factors_.adopt(record.factors);
   seams_ = record.seams;
   std::ranges::copy_if(record.subtrees, std::back_inserter(left_), [&](std::int64_t n) { return update_leaves(n); });
@@ -151,7 +151,7 @@ void MergeTreeRunner::record(std::int64_t node, const UpdateMatrix& update) {
   if (!factors_.copy_to_scratch() || !recorder_->write_updates(updates)) return recorder_->give_up();
   if (update_leaves(node)) left_.push_back(node);
 
-  PassRecord record;
+  SweepRecord record;
   std::set<std::int64_t> subtrees(left_.begin(), left_.end());
   for (const auto& [n, waiting] : updates) subtrees.insert(n);
   record.subtrees.assign(subtrees.begin(), subtrees.end());
@@ -169,26 +169,26 @@ void MergeTreeRunner::send_update(std::int64_t node, UpdateMatrix update) {
   deliver_update(node, std::move(update));
 }
 
-UpdateMatrix MergeTreeRunner::join_children(std::int64_t n, const Pass& pass) {
+UpdateMatrix MergeTreeRunner::join_children(std::int64_t n, const Sweep& sweep) {
   const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
   UpdateMatrix left = child_update(node.left), right = child_update(node.right);
   const std::int64_t at_work = pending_update_bytes() + left.byte_count() + right.byte_count() + front_bytes(n);
   peak_front_bytes_ = std::max(peak_front_bytes_, at_work);
   // What the front needs is taken from the budget of the factors, which go to scratch now if need be.
   factors_.leave_room(at_work);
-  return eliminate_inner(n, std::move(left), std::move(right), pass, check_seams_);
+  return eliminate_inner(n, std::move(left), std::move(right), sweep, check_seams_);
 }
 
 // One thread makes records, sends messages and eliminates the fronts of inner nodes, in the order of the nodes. The
 // other threads work ahead on the next tile meanwhile.
-void MergeTreeRunner::condense_tiles(std::span<const std::int64_t> leaves, const Pass& pass,
+void MergeTreeRunner::condense_tiles(std::span<const std::int64_t> leaves, const Sweep& sweep,
                                      const VisitCondensation& visit) {
   std::vector<std::unique_ptr<TileCondenser>> tiles(leaves.size());
   double elsewhere = 0;
   const auto prepare = [&](std::int64_t i) {
     const std::size_t row = row_of_leaf(leaves[at(i)]);
     const RankTile& tile = tiles_.whole(row);
-    tiles[at(i)] = std::make_unique<TileCondenser>(tile.problem, tile_plans_[row], tile.state, pass, datum_of(row));
+    tiles[at(i)] = std::make_unique<TileCondenser>(tile.problem, tile_plans_[row], tile.state, sweep, datum_of(row));
     return tiles[at(i)]->cells();
   };
   const auto finish = [&](std::int64_t i) {
@@ -206,12 +206,12 @@ void MergeTreeRunner::condense_tiles(std::span<const std::int64_t> leaves, const
   seconds_.tiles -= elsewhere;
 }
 
-UpReport MergeTreeRunner::condense_all(const Pass& pass) {
+UpReport MergeTreeRunner::condense_all(const Sweep& sweep) {
   updates_.clear();
   factors_.clear();
   seams_.clear();
   left_.clear();
-  const PassRecord before = recorder_ ? recorder_->begin({pass, check_seams_, with_columns_}) : PassRecord();
+  const SweepRecord before = recorder_ ? recorder_->begin({sweep, check_seams_, with_columns_}) : SweepRecord();
   const std::vector<bool> done = resume(before);
   std::vector<std::int64_t> leaves;
   for (std::int64_t n = 0; n < std::ssize(plan_.nodes); ++n)
@@ -225,13 +225,13 @@ UpReport MergeTreeRunner::condense_all(const Pass& pass) {
     for (; next < leaf; ++next) {
       if (!mine(next)) continue;
       if (!done[static_cast<std::size_t>(next)])
-        send_update(next, join_children(next, pass));
+        send_update(next, join_children(next, sweep));
       else if (std::ranges::binary_search(before.subtrees, next))
         deliver_update(next, recorder_->read_update(next));
     }
   };
   advance_to(leaves.front());
-  condense_tiles(std::span(leaves).first(leaves.size() - 1), pass, [&](std::size_t i, TileCondensation condensed) {
+  condense_tiles(std::span(leaves).first(leaves.size() - 1), sweep, [&](std::size_t i, TileCondensation condensed) {
     factors_.leave_room(pending_update_bytes());
     send_update(next++, store_factors(leaves[i], std::move(condensed)));
     advance_to(leaves[i + 1]);

@@ -12,10 +12,10 @@ namespace megablock {
 // because the values of its root are broadcast. A sweep down has ended on all ranks before the next sweep up begins,
 // because its sums are gathered.
 template <typename Values>
-void MergeTreeRunner::pass_down(std::int64_t n, const Values& front) {
+void MergeTreeRunner::send_down(std::int64_t n, const Values& front) {
   const PlanNode& node = plan_.nodes[static_cast<std::size_t>(n)];
   for (const std::int64_t child : {node.left, node.right}) {
-    Bytes bytes = front.bytes_of(plan_.nodes[static_cast<std::size_t>(child)].passed);
+    Bytes bytes = front.bytes_of(plan_.nodes[static_cast<std::size_t>(child)].separator);
     if (mine(child))
       downward_[child] = std::move(bytes);
     else

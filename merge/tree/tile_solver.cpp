@@ -25,20 +25,20 @@ class LoneTile : public TreeRunner {
   LoneTile(const TileProblem& problem, const TilePlan& plan, TileState& state)
       : problem_(problem), plan_(plan), state_(state), cost_(evaluate_cost(problem, state)) {}
 
-  UpReport up(const Pass& pass) override {
+  UpReport up(const Sweep& sweep) override {
     // The datum of the present state, as in the sweeps over a block.
     gauge_ = make_gauge({tile_gauge(problem_, plan_, state_)});
     TileCondensation condensed =
-        condense_tile(problem_, plan_, state_, pass, tile_datum(gauge_, 0, problem_, plan_, state_, false));
+        condense_tile(problem_, plan_, state_, sweep, tile_datum(gauge_, 0, problem_, plan_, state_, false));
     factor_ = std::move(condensed.factor);
     return {std::move(condensed.update.sums)};
   }
 
-  DownReport down(const Pass& pass) override {
+  DownReport down(const Sweep& sweep) override {
     const TileStep step = solve_tile_unknowns(plan_, factor_, Step());
     const std::vector<BlockMotion> motions =
         block_motions(gauge_, {motion_sums(gauge_, 0, problem_, plan_, state_, step.unknowns)});
-    TileTrial trial = try_step(gauge_, motions, 0, problem_, plan_, state_, pass, step, kSettled);
+    TileTrial trial = try_step(gauge_, motions, 0, problem_, plan_, state_, sweep, step, kSettled);
     trial_ = std::move(trial.state);
     trial_cost_ = trial.cost;
     return {trial.damping_norm, trial_cost_};

@@ -130,8 +130,8 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
   const MergePosition start =
       found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false)), {}};
   const MemoryOptions memory = memory_of_rank(job);
-  PassRecorder recorder(memory.scratch, job.options.record_s, stop_requested);
-  const std::optional<MergePosition> within = checkpoint.find_pass(start, recorder);
+  SweepRecorder recorder(memory.scratch, job.options.record_s, stop_requested);
+  const std::optional<MergePosition> within = checkpoint.find_sweep(start, recorder);
   clear_scratch(job, true);  // a killed run may have had more ranks
   TileStore tiles(memory);
   Adjusted adjusted;
@@ -142,13 +142,13 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
 
   MergePosition& position = adjusted.position;
   position = within ? *within : start;
-  recorder.set_position([&] { return checkpoint.of_pass(position); });
+  recorder.set_position([&] { return checkpoint.of_sweep(position); });
   std::int32_t saved = position.global.accepted;
   for (;;) {
     const bool last = position.round >= most_rounds(job.settings.merge);
     const GlobalOptions options = options_of(job.settings.merge, frames, last);
     MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
-    runner.record_passes(recorder);
+    runner.record_sweeps(recorder);
     return_freed_memory();  // memory from which the plans were made
     if (last) runner.expect_posterior();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {

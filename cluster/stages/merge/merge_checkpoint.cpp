@@ -148,21 +148,21 @@ void MergeCheckpoint::load_tile(RankTile& tile) const {
   tile.state.points = snapshot.points;
 }
 
-PassRecorder::Position MergeCheckpoint::of_pass(const MergePosition& position) const {
+SweepRecorder::Position MergeCheckpoint::of_sweep(const MergePosition& position) const {
   Hasher hasher;
   hasher.add(fingerprint(folder(position))).add(job_.ranks.size());
   return {hasher.value(), Bytes(reinterpret_cast<const char*>(&position), sizeof position)};
 }
 
-std::optional<MergePosition> MergeCheckpoint::find_pass(const MergePosition& start, PassRecorder& recorder) {
-  recorder.keep_found(of_pass(start).state);
+std::optional<MergePosition> MergeCheckpoint::find_sweep(const MergePosition& start, SweepRecorder& recorder) {
+  recorder.keep_found(of_sweep(start).state);
   ByteWriter writer;
   writer.bytes(recorder.found() ? recorder.found()->position : Bytes());
   writer.value(recorder.found() ? recorder.found()->tiles : 0);
   std::optional<MergePosition> furthest;
   std::int64_t tiles = 0;
   const auto order = [](const GlobalState& state) {
-    return std::tuple(state.iterations, state.pass_lambda == 0, state.next == GlobalAction::kStop);
+    return std::tuple(state.iterations, state.sweep_lambda == 0, state.next == GlobalAction::kStop);
   };
   for (const Bytes& bytes : job_.ranks.gather_all(writer.take())) {
     ByteReader reader(bytes);

@@ -10,7 +10,7 @@
 #include "cluster/process/progress.h"
 #include "merge/tree/global_adjustment.h"
 #include "merge/tree/merge_tree_runner.h"
-#include "merge/tree/pass_recorder.h"
+#include "merge/tree/sweep_recorder.h"
 
 namespace megablock {
 
@@ -36,11 +36,11 @@ class MergeCheckpoint {
   // Deletes all checkpoints, when the result is written. Rank 0 calls it.
   void clear();
 
-  // For records of sweeps (pass_recorder.h). of_pass(): the position in the form that a record holds. find_pass() is
+  // For records of sweeps (sweep_recorder.h). of_pass(): the position in the form that a record holds. find_pass() is
   // collective: it gives the furthest position of all ranks' records of a sweep from the state of `start`, which is the
   // last checkpoint or the beginning. Other records are dropped.
-  PassRecorder::Position of_pass(const MergePosition& position) const;
-  std::optional<MergePosition> find_pass(const MergePosition& start, PassRecorder& recorder);
+  SweepRecorder::Position of_sweep(const MergePosition& position) const;
+  std::optional<MergePosition> find_sweep(const MergePosition& start, SweepRecorder& recorder);
 
  private:
   std::string folder(const MergePosition& position) const;

@@ -12,6 +12,7 @@
 #include "cluster/process/process_memory.h"
 #include "geometry/similarity/similarity.h"
 #include "geometry/transform/rotation.h"
+#include "io/store/units/adjustment_file.h"
 #include "io/store/units/tracks_file.h"
 #include "merge/start/tile_alignment.h"
 #include "merge/start/tile_assembly.h"

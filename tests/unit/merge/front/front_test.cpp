@@ -29,7 +29,8 @@ struct Dense {
     const Eigen::MatrixXd j = Eigen::MatrixXd::NullaryExpr(90, 48, [&] { return normal(random); });
     k = j.transpose() * j;
     b = j.transpose() * Eigen::VectorXd::NullaryExpr(90, [&] { return normal(random); });
-    for (std::int64_t f = 0; f < 8; ++f) (f % 2 == 1 ? eliminated : passed).push_back({{UnknownKind::kFrame, 0, f}, 6});
+    for (std::int64_t f = 0; f < 8; ++f)
+      (f % 2 == 1 ? eliminated : separator).push_back({{UnknownKind::kFrame, 0, f}, 6});
   }
   UpdateMatrix child() const {
     UpdateMatrix update;
@@ -50,20 +51,20 @@ struct Dense {
   }
   Eigen::MatrixXd k;
   Eigen::VectorXd b;
-  UnknownList eliminated, passed;
+  UnknownList eliminated, separator;
 };
 
 TEST(FrontTest, UpdateMatrixIsTheSchurComplementWithAndWithoutMemoryOfOthers) {
   const Dense dense;
-  const Eigen::MatrixXd pp = dense.block(dense.passed, dense.passed, dense.k),
-                        pe = dense.block(dense.passed, dense.eliminated, dense.k),
+  const Eigen::MatrixXd pp = dense.block(dense.separator, dense.separator, dense.k),
+                        pe = dense.block(dense.separator, dense.eliminated, dense.k),
                         ee = dense.block(dense.eliminated, dense.eliminated, dense.k);
   const Eigen::MatrixXd schur = pp - pe * ee.ldlt().solve(pe.transpose());
   FrontMemory memory;
   memory.give(std::vector<double>(3000, 5.0));  // what an earlier front left must not show
   memory.give(std::vector<double>(10, 5.0));
   for (FrontMemory* shared : {static_cast<FrontMemory*>(nullptr), &memory, &memory}) {
-    Front front(dense.eliminated, dense.passed, 1, shared);
+    Front front(dense.eliminated, dense.separator, 1, shared);
     front.add(dense.child());
     const Front::Result result = std::move(front).eliminate(0);
     ASSERT_EQ(result.update.matrix.size(), 24U * 25 / 2);
@@ -77,16 +78,16 @@ TEST(FrontTest, CovariancesByPartsAreThoseOfTheInverse) {
   const Dense dense;
   Eigen::MatrixXd inverse = dense.k.inverse();
   inverse = 0.5 * (inverse + inverse.transpose().eval());  // to the bit
-  Front front(dense.eliminated, dense.passed);
+  Front front(dense.eliminated, dense.separator);
   front.add(dense.child());
   const FrontFactor factor = std::move(front).eliminate(0).factor;
-  const Eigen::MatrixXd outer = dense.block(dense.passed, dense.passed, inverse);
+  const Eigen::MatrixXd outer = dense.block(dense.separator, dense.separator, inverse);
   const FrontCovariance covariance =
-      covariance_down(factor, {dense.passed, std::vector<double>(outer.data(), outer.data() + outer.size())});
+      covariance_down(factor, {dense.separator, std::vector<double>(outer.data(), outer.data() + outer.size())});
   const CovarianceMatrix whole = covariance.whole();
   ASSERT_EQ(whole.unknowns, frames(0, 8));
   EXPECT_LT((Eigen::Map<const Eigen::MatrixXd>(whole.matrix.data(), 48, 48) - inverse).cwiseAbs().maxCoeff(), 1e-12);
-  const UnknownList some = {dense.eliminated[2], dense.passed[3]};
+  const UnknownList some = {dense.eliminated[2], dense.separator[3]};
   const CovarianceMatrix part = covariance.restricted_to(some);
   EXPECT_LT((Eigen::Map<const Eigen::MatrixXd>(part.matrix.data(), 12, 12) - dense.block(some, some, inverse))
                 .cwiseAbs()
@@ -107,7 +108,7 @@ TEST(FrontTest, CostsCountInnerNodesAlone) {
   plan.nodes[0].leaf = 0;
   plan.nodes[0].eliminated = frames(0, 1000);
   plan.nodes[1].eliminated = frames(0, 2);  // 12 eliminated, 18 passed
-  plan.nodes[1].passed = frames(2, 5);
+  plan.nodes[1].separator = frames(2, 5);
   plan.nodes[2].eliminated = frames(2, 5);
   const FrontCosts costs = front_costs(plan);
   EXPECT_EQ(costs.widest, 30);

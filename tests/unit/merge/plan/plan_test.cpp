@@ -30,7 +30,7 @@ TEST(Plan, SidesOfANodeShareTheFramesOfSeparatorsOnly) {
   for (std::size_t n = 0; n < plan.nodes.size(); ++n) {
     if (plan.nodes[n].leaf >= 0) continue;
     const auto side = [&](std::int64_t child) -> const UnknownList& {
-      return plan.nodes[static_cast<std::size_t>(child)].passed;
+      return plan.nodes[static_cast<std::size_t>(child)].separator;
     };
     for (const Unknown& u : side(plan.nodes[n].left)) {
       if (!among(side(plan.nodes[n].right), u)) continue;

@@ -14,9 +14,9 @@ void expect_parts(const SimulationOptions& options, const RobustLoss& loss) {
   TiledBlock block(simulate_block(options), 12, {}, 0.05);
   for (TileProblem& problem : block.problems) problem.image_loss = loss;
   MergeInMemory runner(block.tiles.tree, block.problems, block.states);
-  const Pass pass(1e-3, true);
-  runner.up(pass);
-  runner.down(pass);
+  const Sweep sweep(1e-3, true);
+  runner.up(sweep);
+  runner.down(sweep);
   std::vector<MotionSums> sums;
   for (std::size_t t = 0; t < runner.problems().size(); ++t)
     sums.push_back(motion_sums(runner.block_gauge(), static_cast<std::int64_t>(t), runner.problems()[t],
@@ -32,7 +32,7 @@ void expect_parts(const SimulationOptions& options, const RobustLoss& loss) {
     TileStep alone;  // without the points
     alone.unknowns = step.unknowns;
     const TileTrial trial = try_step(runner.block_gauge(), motions, static_cast<std::int64_t>(t), problem, plan,
-                                     runner.states()[t], pass, alone);
+                                     runner.states()[t], sweep, alone);
     EXPECT_EQ(trial.cost, cost);
     EXPECT_EQ(trial.state.points, expected.points);
     EXPECT_GT(trial.damping_norm, 0);

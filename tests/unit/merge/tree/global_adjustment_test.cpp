@@ -294,8 +294,8 @@ TEST(GlobalController, GoesOnDampedWhereTheUndampedStepFails) {
   undamped.sums.decrement_squared = 1e-2;
   report_up(state, {}, damped);
   ASSERT_EQ(state.next, GlobalAction::kUp);
-  EXPECT_EQ(next_pass(state).lambda, 0);
-  EXPECT_FALSE(next_pass(state).curvature);
+  EXPECT_EQ(next_sweep(state).lambda, 0);
+  EXPECT_FALSE(next_sweep(state).curvature);
   report_up(state, {}, undamped);
   ASSERT_EQ(state.next, GlobalAction::kDown);
   report_down(state, {}, {0.0, 200.0});
@@ -303,12 +303,12 @@ TEST(GlobalController, GoesOnDampedWhereTheUndampedStepFails) {
   report_rejected(state, {});
   report_up(state, {}, damped);
   ASSERT_EQ(state.next, GlobalAction::kDown);  // the damped step, small as it is
-  EXPECT_GT(next_pass(state).lambda, 0);
+  EXPECT_GT(next_sweep(state).lambda, 0);
   report_down(state, {}, {0.0, 100 - 1e-11});
   ASSERT_EQ(state.next, GlobalAction::kAccept);
   report_accepted(state, {});
   report_up(state, {}, damped);
-  EXPECT_EQ(next_pass(state).lambda, 0);
+  EXPECT_EQ(next_sweep(state).lambda, 0);
 }
 
 TEST(GlobalController, TakesTheCurvatureOfTheLossesWhileItsModelHolds) {
@@ -317,15 +317,15 @@ TEST(GlobalController, TakesTheCurvatureOfTheLossesWhileItsModelHolds) {
   up.sums.cost = 100;
   up.sums.decrement_squared = 2;
   report_up(state, {}, up);
-  EXPECT_FALSE(next_pass(state).curvature);
+  EXPECT_FALSE(next_sweep(state).curvature);
   report_down(state, {}, {0.0, 99.0});
   report_accepted(state, {});
-  EXPECT_TRUE(next_pass(state).curvature);
+  EXPECT_TRUE(next_sweep(state).curvature);
   up.sums.cost = 99;
   report_up(state, {}, up);
   report_down(state, {}, {0.0, 98.9});  // a tenth of what was promised
   report_accepted(state, {});
-  EXPECT_FALSE(next_pass(state).curvature);
+  EXPECT_FALSE(next_sweep(state).curvature);
 }
 
 // Without confirmation a pass may stop, unless damping makes its decrement small.
@@ -343,7 +343,7 @@ TEST(GlobalController, StopsUnconfirmedWhereItIsHardlyDamped) {
   state = start_global(options);
   report_up(state, options, up);
   ASSERT_EQ(state.next, GlobalAction::kUp);
-  EXPECT_EQ(next_pass(state).lambda, 0);
+  EXPECT_EQ(next_sweep(state).lambda, 0);
   report_up(state, options, up);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged);
 }

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "merge/tree/pass_recorder.h"
+#include "merge/tree/sweep_recorder.h"
 #include "merge/tree/tree_communicator.h"
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/merge/tiled_block.h"
@@ -37,8 +37,8 @@ class ScratchBudgetTest : public testing::Test {
     std::int64_t tiles_in_scratch = 0, spilled = 0, recomputed = 0;
   };
   End run(const MemoryOptions& memory, const std::function<void()>& look) {
-    PassRecorder recorder(memory.scratch, 0);
-    recorder.set_position([] { return PassRecorder::Position{1, "somewhere"}; });
+    SweepRecorder recorder(memory.scratch, 0);
+    recorder.set_position([] { return SweepRecorder::Position{1, "somewhere"}; });
     recorder.keep_found(1);
     TileStore tiles(memory);
     for (std::size_t t = 0; t < block_.problems.size(); ++t)
@@ -46,7 +46,7 @@ class ScratchBudgetTest : public testing::Test {
     End end;
     for (int round = 0; round < 2; ++round) {
       MergeTreeRunner runner(ranks_, block_.tiles.tree, std::vector<int>(tiles.size(), 0), tiles, memory);
-      runner.record_passes(recorder);
+      runner.record_sweeps(recorder);
       GlobalState state = start_global({});
       adjust_globally(runner, {}, state, [&](const GlobalState&) { look(); });
       runner.posterior([&](const RankTile&, const TileCovariance&) { look(); });

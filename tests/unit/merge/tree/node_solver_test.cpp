@@ -14,7 +14,7 @@ class EigenNodeSolver final : public NodeSolver {
  public:
   Front::Result eliminate(const PlanNode& node, UpdateMatrix left, UpdateMatrix right, double lambda) const override {
     ++eliminated;
-    Front front(node.eliminated, node.passed, std::max(left.right_hand_sides, right.right_hand_sides));
+    Front front(node.eliminated, node.separator, std::max(left.right_hand_sides, right.right_hand_sides));
     front.add(left);
     front.add(right);
     const Eigen::Index e = front.eliminated_dimension(), n = front.dimension(), p = n - e;
@@ -30,7 +30,7 @@ class EigenNodeSolver final : public NodeSolver {
     const Eigen::MatrixXd z = solved.solve(b.topRows(e));
 
     Front::Result result;
-    result.factor = {node.eliminated, node.passed, sides, {}, {z.data(), z.data() + z.size()}, {}};
+    result.factor = {node.eliminated, node.separator, sides, {}, {z.data(), z.data() + z.size()}, {}};
     Eigen::MatrixXd both(n, e);
     both << lower, y;
     result.factor.factor.assign(both.data(), both.data() + both.size());
@@ -38,7 +38,7 @@ class EigenNodeSolver final : public NodeSolver {
         Eigen::MatrixXd(Eigen::Map<const Eigen::MatrixXd>(front.update(), p, p).selfadjointView<Eigen::Lower>()) -
         y * y.transpose();
     const Eigen::MatrixXd rhs = b.bottomRows(p) - y * z;
-    result.update.unknowns = node.passed;
+    result.update.unknowns = node.separator;
     result.update.right_hand_sides = sides;
     for (Eigen::Index j = 0; j < p; ++j)
       for (Eigen::Index i = j; i < p; ++i) result.update.matrix.push_back(rest(i, j));
@@ -52,8 +52,8 @@ class EigenNodeSolver final : public NodeSolver {
   Step back_substitute(const FrontFactor& factor, const Step& parent) const override {
     return dense_node_solver().back_substitute(factor, parent);
   }
-  FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix passed) const override {
-    return dense_node_solver().covariance(factor, std::move(passed));
+  FrontCovariance covariance(const FrontFactor& factor, CovarianceMatrix separator) const override {
+    return dense_node_solver().covariance(factor, std::move(separator));
   }
   mutable int eliminated = 0;
 };

@@ -1,6 +1,6 @@
 // Records a sweep up, so that a killed run resumes in the middle of the sweep. The record holds the updates of finished
 // subtrees. The factors of their nodes are in the scratch directory of the rank, or are copied there (memory.h). A
-// resumed sweep has the same bits, because it reads the computed values back. The hash `pass` covers the state and
+// resumed sweep has the same bits, because it reads the computed values back. The hash `sweep` covers the state and
 // everything on which these values depend, so that values of another sweep are never mixed in.
 //
 // A record survives the process, but not a restart of the machine, because nothing is forced to the disk. A record of
@@ -20,9 +20,9 @@
 
 namespace megablock {
 
-struct PassRecord {
+struct SweepRecord {
   std::uint64_t state = 0;             // hash of the state at which the sweep linearises
-  std::uint64_t pass = 0;              // hash of this state and of the kind of the sweep
+  std::uint64_t sweep = 0;             // hash of this state and of the kind of the sweep
   Bytes position;                      // position of the global adjustment, as its owner writes it
   std::int64_t tiles = 0;              // number of tiles in the finished subtrees
   std::vector<std::int64_t> subtrees;  // top nodes of the finished subtrees; no subtree contains another
@@ -31,9 +31,9 @@ struct PassRecord {
 };
 
 // The record of one rank in its scratch directory.
-class PassRecordFiles {
+class SweepRecordFiles {
  public:
-  explicit PassRecordFiles(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
+  explicit SweepRecordFiles(std::shared_ptr<ScratchSpace> scratch) : scratch_(std::move(scratch)) {}
 
   // Writes the update of a subtree. Call it before writing the record that names the subtree. Returns false when there
   // is no room.
@@ -44,17 +44,17 @@ class PassRecordFiles {
 
   // Replaces the whole record. Returns false when there is no room, or when the system does not tell when the machine
   // was started.
-  bool write(const PassRecord& record) const;
+  bool write(const SweepRecord& record) const;
   // Returns nothing when there is no record or when it is of another start of the machine; also when files that it
   // names are missing, have another size, or exceed the budget of the scratch directory.
-  std::optional<PassRecord> read() const;
+  std::optional<SweepRecord> read() const;
   void remove() const;  // the record alone
-  void remove_files_of(const PassRecord& record) const;
+  void remove_files_of(const SweepRecord& record) const;
   // Removes all files of the scratch directory except those of this record.
-  void keep_only(const std::optional<PassRecord>& record) const;
+  void keep_only(const std::optional<SweepRecord>& record) const;
 
  private:
-  std::vector<std::int64_t> sizes_of(const PassRecord& record) const;  // sizes of its files; empty when one is missing
+  std::vector<std::int64_t> sizes_of(const SweepRecord& record) const;  // sizes of its files; empty when one is missing
 
   std::shared_ptr<ScratchSpace> scratch_;
 };

@@ -1,5 +1,5 @@
 // Records of a sweep up: they are read back as they were written, and incomplete records are ignored.
-#include "merge/tree/pass_record.h"
+#include "merge/tree/sweep_record.h"
 
 #include <gtest/gtest.h>
 
@@ -48,10 +48,10 @@ class PassRecordTest : public testing::Test {
     ASSERT_TRUE(files_.write_update(5, made_up_update(0.2)));
     ASSERT_TRUE(files_.write(record()));
   }
-  static PassRecord record() {
-    PassRecord record;
+  static SweepRecord record() {
+    SweepRecord record;
     record.state = 11;
-    record.pass = 12;
+    record.sweep = 12;
     record.position = "where it stands";
     record.tiles = 3;
     record.subtrees = {2, 5};
@@ -66,14 +66,14 @@ class PassRecordTest : public testing::Test {
   std::string path() const { return scratch_.path("pass.bin"); }
 
   ScratchDirectory scratch_;
-  PassRecordFiles files_;
+  SweepRecordFiles files_;
 };
 
 TEST_F(PassRecordTest, ComesBack) {
   const auto found = files_.read();
   ASSERT_TRUE(found);
   EXPECT_EQ(found->state, 11U);
-  EXPECT_EQ(found->pass, 12U);
+  EXPECT_EQ(found->sweep, 12U);
   EXPECT_EQ(found->position, "where it stands");
   EXPECT_EQ(found->tiles, 3);
   EXPECT_EQ(found->subtrees, record().subtrees);
@@ -132,9 +132,9 @@ TEST_F(PassRecordTest, IsKeptAloneAndWithinTheBudget) {
   for (const std::string& file :
        {factor(0), factor(1), factor(2), scratch_.path("update-2.bin"), scratch_.path("update-5.bin")})
     all += static_cast<std::int64_t>(std::filesystem::file_size(file));
-  EXPECT_FALSE(PassRecordFiles(space(all - 1)).read());
+  EXPECT_FALSE(SweepRecordFiles(space(all - 1)).read());
   const auto enough = space(all);
-  const PassRecordFiles files(enough);
+  const SweepRecordFiles files(enough);
   const auto found = files.read();
   ASSERT_TRUE(found);
   files.keep_only(found);
@@ -168,7 +168,7 @@ TEST_F(PassRecordTest, EndsWithTheMachine) {
 }
 
 TEST_F(PassRecordTest, AFullDiskHasNone) {
-  const PassRecordFiles nowhere(std::make_shared<ScratchSpace>());
+  const SweepRecordFiles nowhere(std::make_shared<ScratchSpace>());
   EXPECT_FALSE(nowhere.write_update(2, made_up_update(1)));
   EXPECT_FALSE(nowhere.write(record()));
   FactorStore small({1 << 20, std::make_shared<ScratchSpace>(scratch_.path("small"), 1000)});  // less than one

@@ -1,4 +1,4 @@
-#include "merge/tree/pass_recorder.h"
+#include "merge/tree/sweep_recorder.h"
 
 #include <algorithm>
 #include <utility>
@@ -12,34 +12,35 @@ namespace {
 
 constexpr double kBytesPerSecond = 20e6;
 
-std::uint64_t hash_of(std::uint64_t state, const PassRecorder::Kind& kind) {
+std::uint64_t hash_of(std::uint64_t state, const SweepRecorder::Kind& kind) {
   Hasher hasher;
-  hasher.add(state).add(kind.pass.lambda).add(kind.pass.curvature).add(kind.seams).add(kind.columns);
+  hasher.add(state).add(kind.sweep.lambda).add(kind.sweep.curvature).add(kind.seams).add(kind.columns);
   return hasher.value();
 }
 
 }  // namespace
 
-PassRecorder::PassRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds, std::function<bool()> stop_requested)
+SweepRecorder::SweepRecorder(std::shared_ptr<ScratchSpace> scratch, double seconds,
+                             std::function<bool()> stop_requested)
     : files_(std::move(scratch)),
       seconds_(seconds),
       stop_requested_(std::move(stop_requested)),
       found_(files_.read()) {}
 
-void PassRecorder::keep_found(std::uint64_t state) {
+void SweepRecorder::keep_found(std::uint64_t state) {
   if (found_ && found_->state != state) found_.reset();
   files_.keep_only(found_);
 }
 
-PassRecord PassRecorder::begin(const Kind& kind) {
+SweepRecord SweepRecorder::begin(const Kind& kind) {
   at_ = position_();
-  pass_ = hash_of(at_.state, kind);
+  sweep_ = hash_of(at_.state, kind);
   begin_s_ = last_s_ = clock_seconds();
   given_up_ = false;
   // A record serves one sweep at most: the one with the same state, damping, right-hand sides and seam checks. It is
   // the first sweep of a resumed run, or none.
-  const std::optional<PassRecord> found = std::exchange(found_, std::nullopt);
-  if (found && found->pass == pass_) {
+  const std::optional<SweepRecord> found = std::exchange(found_, std::nullopt);
+  if (found && found->sweep == sweep_) {
     written_.insert(found->subtrees.begin(), found->subtrees.end());
     return *found;
   }
@@ -50,7 +51,7 @@ PassRecord PassRecorder::begin(const Kind& kind) {
   return {};
 }
 
-bool PassRecorder::due(std::int64_t bytes, bool leaves) const {
+bool SweepRecorder::due(std::int64_t bytes, bool leaves) const {
   if (given_up_) return false;
   if (seconds_ <= 0 || stop_requested_()) return true;
   // An update that leaves this rank's own subtrees cannot be recorded later. Here the time since the beginning of the
@@ -59,7 +60,7 @@ bool PassRecorder::due(std::int64_t bytes, bool leaves) const {
   return worked >= std::max(seconds_, static_cast<double>(bytes) / kBytesPerSecond);
 }
 
-bool PassRecorder::write_updates(const std::map<std::int64_t, const UpdateMatrix*>& updates) {
+bool SweepRecorder::write_updates(const std::map<std::int64_t, const UpdateMatrix*>& updates) {
   for (const auto& [node, update] : updates) {
     if (written_.contains(node)) continue;
     if (!files_.write_update(node, *update)) return false;
@@ -68,9 +69,9 @@ bool PassRecorder::write_updates(const std::map<std::int64_t, const UpdateMatrix
   return true;
 }
 
-void PassRecorder::write(PassRecord record) {
+void SweepRecorder::write(SweepRecord record) {
   record.state = at_.state;
-  record.pass = pass_;
+  record.sweep = sweep_;
   record.position = at_.bytes;
   if (!files_.write(record)) return give_up();
   // They are removed only now, because the former record named them until it was replaced.

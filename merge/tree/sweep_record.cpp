@@ -1,4 +1,4 @@
-#include "merge/tree/pass_record.h"
+#include "merge/tree/sweep_record.h"
 
 #include <filesystem>
 #include <fstream>
@@ -27,7 +27,7 @@ constexpr const char* kRecord = "pass.bin";
 std::string update_file(std::int64_t node) { return "update-" + std::to_string(node) + ".bin"; }
 
 // The files that the record names.
-std::vector<std::string> files_of(const PassRecord& record) {
+std::vector<std::string> files_of(const SweepRecord& record) {
   std::vector<std::string> files;
   for (const std::int64_t node : record.subtrees) files.push_back(update_file(node));
   for (const std::int64_t node : record.factors) files.push_back(factor_file(node));
@@ -36,14 +36,14 @@ std::vector<std::string> files_of(const PassRecord& record) {
 
 }  // namespace
 
-bool PassRecordFiles::write_update(std::int64_t node, const UpdateMatrix& update) const {
+bool SweepRecordFiles::write_update(std::int64_t node, const UpdateMatrix& update) const {
   return scratch_->write(update_file(node), [&](std::ostream& file) {
     ByteWriter writer(file);
     update.write(writer);
   });
 }
 
-UpdateMatrix PassRecordFiles::read_update(std::int64_t node) const {
+UpdateMatrix SweepRecordFiles::read_update(std::int64_t node) const {
   UpdateMatrix update;
   scratch_->read(update_file(node), [&](std::istream& file, std::size_t size) {
     ByteReader reader(file, size);
@@ -52,9 +52,9 @@ UpdateMatrix PassRecordFiles::read_update(std::int64_t node) const {
   return update;
 }
 
-void PassRecordFiles::remove_update(std::int64_t node) const { scratch_->remove(update_file(node)); }
+void SweepRecordFiles::remove_update(std::int64_t node) const { scratch_->remove(update_file(node)); }
 
-std::vector<std::int64_t> PassRecordFiles::sizes_of(const PassRecord& record) const {
+std::vector<std::int64_t> SweepRecordFiles::sizes_of(const SweepRecord& record) const {
   std::vector<std::int64_t> sizes;
   for (const std::string& file : files_of(record)) {
     std::error_code error;
@@ -65,7 +65,7 @@ std::vector<std::int64_t> PassRecordFiles::sizes_of(const PassRecord& record) co
   return sizes;
 }
 
-bool PassRecordFiles::write(const PassRecord& record) const {
+bool SweepRecordFiles::write(const SweepRecord& record) const {
   const std::string start = start_of_machine();
   const std::vector<std::int64_t> sizes = sizes_of(record);
   if (start.empty() || sizes.empty()) return false;
@@ -76,7 +76,7 @@ bool PassRecordFiles::write(const PassRecord& record) const {
     writer.value(kFormat);
     writer.bytes(start);
     writer.value(record.state);
-    writer.value(record.pass);
+    writer.value(record.sweep);
     writer.bytes(record.position);
     writer.value(record.tiles);
     writer.values(record.subtrees);
@@ -87,7 +87,7 @@ bool PassRecordFiles::write(const PassRecord& record) const {
   return whole && scratch_->rename(next, kRecord);
 }
 
-std::optional<PassRecord> PassRecordFiles::read() const {
+std::optional<SweepRecord> SweepRecordFiles::read() const {
   std::error_code error;
   const auto size = std::filesystem::file_size(scratch_->path(kRecord), error);
   std::ifstream file(scratch_->path(kRecord), std::ios::binary);
@@ -95,9 +95,9 @@ std::optional<PassRecord> PassRecordFiles::read() const {
   try {
     ByteReader reader(file, size);
     if (reader.value<std::uint64_t>() != kFormat || reader.bytes() != start_of_machine()) return std::nullopt;
-    PassRecord record;
+    SweepRecord record;
     record.state = reader.value<std::uint64_t>();
-    record.pass = reader.value<std::uint64_t>();
+    record.sweep = reader.value<std::uint64_t>();
     record.position = reader.bytes();
     record.tiles = reader.value<std::int64_t>();
     record.subtrees = reader.values<std::int64_t>();
@@ -114,13 +114,13 @@ std::optional<PassRecord> PassRecordFiles::read() const {
   }
 }
 
-void PassRecordFiles::remove() const { scratch_->remove(kRecord); }
+void SweepRecordFiles::remove() const { scratch_->remove(kRecord); }
 
-void PassRecordFiles::remove_files_of(const PassRecord& record) const {
+void SweepRecordFiles::remove_files_of(const SweepRecord& record) const {
   for (const std::string& file : files_of(record)) scratch_->remove(file);
 }
 
-void PassRecordFiles::keep_only(const std::optional<PassRecord>& record) const {
+void SweepRecordFiles::keep_only(const std::optional<SweepRecord>& record) const {
   if (!record) return scratch_->keep_only({});
   const std::vector<std::string> files = files_of(*record);
   std::set<std::string> kept(files.begin(), files.end());
