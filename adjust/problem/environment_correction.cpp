@@ -1,3 +1,14 @@
+// Takes refraction and the curvature of the earth out of measured pixels. The formulas are in
+// geometry/camera/environment.h; this file finds the two numbers that they need for every observation.
+//
+// The correction turns the ray of a pixel in its vertical plane. It depends on h_C, the height of the camera above sea
+// level, and on h_X, that of the point: refraction on both heights, curvature on h_C - h_X. In a topocentric ground
+// frame with its origin at the height h_0, heights are those above a sphere,
+//
+//     h(X) = |X - M| - R,   M = (0, 0, -(R + h_0)),   down(X) = (M - X) / |M - X|,
+//
+// with R the radius of the earth (kEarthRadiusM). In the flat frame of a map projection they are h(X) = z and down =
+// -z. The corrections are small and smooth, so that heights and attitudes of start values suffice.
 #include "adjust/problem/environment_correction.h"
 
 #include <algorithm>
@@ -13,8 +24,8 @@ namespace megablock {
 
 namespace {
 
-// Heights and verticals at places of the ground frame. In a flat frame they are those of the frame, in a topocentric
-// one those of the sphere below its origin.
+// Heights and verticals at places of the ground frame. The flat frame is that of a block with earth_curvature: its z is
+// the height already. A frame without georeference has no height of its origin; its sphere touches z = 0.
 class Level {
  public:
   Level(const EnvironmentOptions& options, const GroundFrame& ground)
@@ -31,7 +42,8 @@ class Level {
   Eigen::Vector3d centre_;  // of the earth
 };
 
-// The heights of the points. Unknown ones get the median of the known ones, or NaN when none is known.
+// The heights of the points, metres. Unknown ones get the median of the known ones, or NaN when none is known. The
+// pixel of a NaN height is not finite, and correct_measurements() leaves it as measured.
 std::vector<double> point_heights(const Level& level, const std::vector<Eigen::Vector3d>& points) {
   std::vector<double> heights, known;
   for (const Eigen::Vector3d& point : points) {
@@ -90,6 +102,8 @@ void correct_measurements(const EnvironmentOptions& options, const GroundFrame& 
       const double height = level.height(camera.centre);
       const EnvironmentEffect effect{options.refraction ? refraction_constant(height, heights[p]) : 0,
                                      options.earth_curvature ? curvature_constant(height - heights[p]) : 0};
+      // The ray that is corrected is the measured one, so that the correction does not depend on how well the pose
+      // fits.
       const Eigen::Vector2d pixel =
           geometric_pixel(effect, at.cameras[image.camera.value], {problem.x[o], problem.y[o]},
                           camera.rotation * level.down(camera.centre));

@@ -1,3 +1,6 @@
+// The candidates are sorted by depth, the deepest first, and then by tile. Runs of equal depth and tile are then the
+// observations of one tile in frames of that depth. Only the runs of the greatest depth compete. The result does not
+// depend on the order of the observations.
 #include "adjust/problem/owner.h"
 
 #include <algorithm>
@@ -15,6 +18,7 @@ std::int64_t owner_part(std::vector<OwnerCandidate>& frames) {
   for (auto run = frames.begin(); run != frames.end() && run->depth == frames.front().depth;) {
     auto next = run;
     while (next != frames.end() && next->part == run->part && next->depth == run->depth) ++next;
+    // Strictly more: of equal runs the first one, which has the lower number, stays.
     if (next - run > most) {
       most = next - run;
       best = run->part;

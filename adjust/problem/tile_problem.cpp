@@ -1,3 +1,11 @@
+// The robust losses rho(s) of the squared norm s = |r|^2, in sigmas, with c the scale:
+//
+//     Huber          s up to c^2,   2 c sqrt(s) - c^2 beyond                    rho' = c / sqrt(s)
+//     Cauchy         c^2 log(1 + s / c^2)                                        rho' = 1 / (1 + s / c^2)
+//     Cauchy's tail  Huber up to 4 c^2,   3 c^2 + 2 c^2 log(s / 4 c^2) beyond    rho' = 2 c^2 / s
+//
+// Value and slope are continuous at every corner: at s = 4 c^2 both parts of the last one have rho = 3 c^2 and rho' =
+// 1/2. rho' is the weight of an observation. rho'' is negative for all of them beyond the corner.
 #include "adjust/problem/tile_problem.h"
 
 #include <algorithm>
@@ -13,6 +21,8 @@ namespace megablock {
 
 std::array<double, 3> RobustLoss::evaluate_beyond(double squared_norm) const {
   const double s = squared_norm, b = scale * scale, end_of_line = 4 * b;  // for Cauchy's tail
+  // Ceres holds the first derivative above zero in the same way. A weight of zero would take the observation out of the
+  // normal equations.
   constexpr double kTiny = std::numeric_limits<double>::min();
   if (kind == Kind::kHuber || (kind == Kind::kCauchyTail && s <= end_of_line)) {
     const double r = std::sqrt(s);
@@ -27,6 +37,7 @@ std::array<double, 3> RobustLoss::evaluate_beyond(double squared_norm) const {
   return {b * std::log(sum), std::max(kTiny, inverse), -inverse * inverse / b};
 }
 
+// One ray determines two coordinates of a point. The prior of a control point may determine the third.
 bool TileProblem::active(std::int64_t point) const {
   int count = 0;
   for (std::int64_t row = begin[point]; row < begin[point + 1]; ++row) {
@@ -46,6 +57,7 @@ void ObservationOptions::check() const {
   require_within(vertical_loss.scale, kInSigmas, "vertical_loss_scale");
 }
 
+// The images count, and not the frames: a frame that sees the point with three cameras has three candidates.
 TileIndex owner_tile(const Block& block, const Tiles& tiles, const ImageIndex* begin, const ImageIndex* end) {
   std::vector<OwnerCandidate> candidates;
   candidates.reserve(static_cast<std::size_t>(end - begin));
@@ -74,6 +86,8 @@ Tiles single_tile(const Block& block) {
   return tiles;
 }
 
+// Only lower rows are compared, so that one pair of mounts does not count twice. 1e-9 m tells mounts at the same place,
+// whose distance says nothing of the scale.
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount) {
   if (problem.mount_free[mount]) return false;
   for (std::size_t other = 0; other < mount; ++other)
