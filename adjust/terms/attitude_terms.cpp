@@ -16,6 +16,7 @@ FrameResidual3 linearise_attitude(const Pose& frame, const AttitudePrior& prior)
   const RotationDifference difference = rotation_difference(frame.rotation, prior.rotation_cw);
   FrameResidual3 result;
   result.residual = weight.cwiseProduct(difference.value);
+  // By the rotation, then by the centre.
   result.by_frame << weight.asDiagonal() * difference.by_rotation, Eigen::Matrix3d::Zero();
   return result;
 }

@@ -1,3 +1,12 @@
+// Builds the problem of a tile in three steps. The tables come first: the images of the tracks and control points that
+// the tile owns, then every frame, camera and mount that any observation touches. The tables ascend by the index in the
+// block, so that a row is found by bisection and the unknowns have the same order in every run. The observations then
+// name rows of these tables.
+//
+// Every observation of the block belongs to exactly one tile, because the tiles' normal equations are added up
+// (merge/). An observation that concerns one frame belongs to the tile of that frame. One of several frames belongs to
+// owner_tile(). Priors of cameras and mounts, which all tiles share, belong to the tile of the first oriented image
+// that uses them.
 #include "adjust/terms/build_problem.h"
 
 #include <algorithm>
@@ -13,7 +22,8 @@ namespace megablock {
 
 namespace {
 
-// If a prior concerns half of a mount (only its rotation or only its position), the other half is held by these sigmas.
+// A mount prior has a sigma for its rotation and one for its position. Where one of them is zero, that half is held by
+// these sigmas, because a mount is held or free as a whole (mount_free).
 constexpr double kHeldRotationRad = 1e-7;
 constexpr double kHeldPositionM = 1e-6;
 
@@ -75,6 +85,7 @@ class TileBuilder {
   }
   const Mount& mount(const MountId& id) const { return block_.rigs[id.rig].mounts[static_cast<std::size_t>(id.mount)]; }
 
+  // A control point belongs to the tile that would own a track of the same images.
   void select_control_points() {
     std::vector<ImageIndex> measured;
     for (std::size_t row = 0; row < block_.control_points.size(); ++row) {
@@ -92,6 +103,7 @@ class TileBuilder {
       for (const ImageMeasurement& m : block_.control_points[static_cast<std::size_t>(row)].measurements)
         images.push_back(m.image);
     make_distinct(images);
+    // Images without a pose have no row. Their observations get the row -1 and are never kept.
     std::erase_if(images, [&](ImageIndex image) { return !oriented(image); });
 
     std::vector<FrameIndex>& frames = problem_.frames;
@@ -102,6 +114,8 @@ class TileBuilder {
       problem_.mounts.push_back(mount_of(image));
       problem_.cameras.push_back(block_.camera_of(image));
     }
+    // A frame without observations of the tile's tracks still has a row where a prior or another frame refers to it.
+    // Its observations count once, here.
     for (const FrameIndex frame : rows_.frames)
       if (has_prior(block_.frames[frame])) frames.push_back(frame);
     for (std::size_t row : rows_.relative_poses) {
@@ -132,6 +146,8 @@ class TileBuilder {
     for (CameraIndex camera : problem_.cameras) problem_.camera_free.push_back(free_mask(block_.cameras[camera]));
     for (const MountId& id : problem_.mounts) {
       problem_.mount_free.push_back(mount(id).held() ? 0 : 1);
+      // The merge takes the place of a frame at the held first mount of its rig, and the scale of a mount about it
+      // (merge/datum/gauge.cpp).
       problem_.reference_of_mount.push_back(state_.mounts[id.rig].front().centre);
     }
     for (FrameIndex frame : frames)
@@ -141,11 +157,13 @@ class TileBuilder {
 
   static ParameterMask free_mask(const Camera& camera) {
     ParameterMask mask = 0;
+    // A sigma of zero holds a parameter; a finite one is a prior; an infinite one leaves it free.
     for (int k = 0; k < camera.intrinsics.size(); ++k)
       if (camera.prior_sigma[static_cast<std::size_t>(k)] != 0) mask |= mask_of(k);
     return mask;
   }
 
+  // `kept` begins with 1 where the image has a row, that is, a pose.
   void add_observation(ImageIndex image, double x, double y, double sigma) {
     const std::int32_t row = row_of(image_table_, image);
     problem_.image.push_back(LocalImage(row));
@@ -170,9 +188,12 @@ class TileBuilder {
     for (const ImageMeasurement& m : control.measurements)
       add_observation(m.image, m.pixel.x(), m.pixel.y(), m.sigma_px);
     problem_.begin.push_back(problem_.observation_count());
+    // A check point is intersected like a tie point. Its known position is compared in the end, and must not act
+    // before.
     if (control.role != PointRole::kControl) return;
     TileProblem::PointTerm term{point, control.position, control.sigma};
     for (int axis = 0; axis < 3; ++axis) {
+      // A position of 0 with an infinite sigma gives the residual 0, where NaN would spoil the sums.
       if (!std::isnan(control.position[axis])) continue;  // unknown height
       term.position[axis] = 0;
       term.sigma[axis] = std::numeric_limits<double>::infinity();
@@ -180,6 +201,7 @@ class TileBuilder {
     problem_.point_priors.push_back(term);
   }
 
+  // Frames of other tiles have rows here too, but their priors belong to their own tile.
   void add_frame_priors() {
     for (std::size_t f = 0; f < problem_.frames.size(); ++f) {
       if (tiles_.tile_of_frame[problem_.frames[f]] != tile_) continue;
@@ -225,6 +247,7 @@ class TileBuilder {
     for (const std::size_t row : rows_.verticals) {
       const SeenVertical& vertical = block_.verticals[row];
       const Pose& frame = state_.frames[block_.images[vertical.image].frame];
+      // The direction of down is that at the frame's start position; it changes by an arc second over thirty metres.
       problem_.verticals.push_back(vertical_term(vertical, ground, frame.centre));
       problem_.verticals.back().image = LocalImage(row_of(image_table_, vertical.image));
     }
@@ -244,6 +267,7 @@ class TileBuilder {
   void add_mount_priors() {
     for (const MountId& id : rows_.mounts) {
       const Mount& m = mount(id);
+      // A held mount is no unknown, and a free one has no prior.
       if (m.held() || (std::isinf(m.rotation_sigma_rad) && std::isinf(m.position_sigma_m))) continue;
       problem_.mount_priors.push_back({row_of(problem_.mounts, id), m.pose,
                                        m.rotation_sigma_rad > 0 ? m.rotation_sigma_rad : kHeldRotationRad,
@@ -290,6 +314,7 @@ namespace {
 void find_first_users(const Block& block, const BlockState& state, const Tiles& tiles, RowsOfTiles& rows) {
   IndexedVector<CameraIndex, std::uint8_t> camera_seen(block.cameras.size(), 0);
   std::vector<std::vector<std::uint8_t>> mount_seen;
+  // The search ends as soon as every camera and mount has its tile. In a large block of few cameras that is soon.
   std::size_t open = block.cameras.size();
   for (const Rig& rig : block.rigs) {
     mount_seen.emplace_back(rig.mounts.size(), 0);
@@ -320,6 +345,7 @@ void find_first_users(const Block& block, const BlockState& state, const Tiles& 
 
 }  // namespace
 
+// One pass over each table of the block, for all tiles at once. Tiles would otherwise each read the whole block.
 RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles) {
   check_sizes(block, state, tiles);
   RowsOfTiles rows(static_cast<std::size_t>(tiles.tile_count));
@@ -338,6 +364,7 @@ RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Til
   for (const auto& [key, measurements] : block.frame_measurements) {
     for (std::size_t row = 0; row < measurements.size(); ++row) {
       const FrameMeasurement& m = measurements[row];
+      // A number between two parts of the block that have no common datum says nothing about either.
       if (!state.oriented[m.from] || !state.oriented[m.to] || tiles.component[m.from] != tiles.component[m.to])
         continue;
       const TileIndex tile = owner_tile(tiles, m.from, m.to);

@@ -76,6 +76,8 @@ Eigen::Matrix<Scalar, 2, 1> corrected_pixel(int order, const Intrinsics& plain, 
   return pixel;
 }
 
+// The image observation. The perspective models are written as templates and give the pixel with its derivatives. A
+// model that corrects the measured pixel gives the pixel only implicitly (corrected_pixel).
 struct ImageMeasured {
   CameraModel model;
   Eigen::Vector2d measured;
@@ -97,6 +99,7 @@ struct ImageMeasured {
   // Returns false where the model has no pixel for the point.
   template <typename Scalar>
   bool project_point(const Scalar* camera, const Vector3<Scalar>& point, Eigen::Matrix<Scalar, 2, 1>& pixel) const {
+    // The default model is Brown's. It goes without the table, and without the detour by the plain value.
     if (model == CameraModel()) {
       if (!(point.z() > Scalar(0))) return false;
       pixel = BrownModel::project<Scalar>(0, camera, point);
@@ -118,6 +121,7 @@ struct ImageMeasured {
   }
 };
 
+// r = (C + R' l - P) / sigma.
 struct PositionMeasured {
   PositionPrior prior;
   template <typename Scalar>
@@ -128,6 +132,7 @@ struct PositionMeasured {
   }
 };
 
+// r = Log(R R_0') / sigma.
 struct AttitudeMeasured {
   AttitudePrior prior;
   template <typename Scalar>
@@ -139,6 +144,7 @@ struct AttitudeMeasured {
   }
 };
 
+// r = Log(R_to R_from' R_m') / sigma and (R_from (C_to - C_from) - T_m) / sigma.
 struct RelativeMeasured {
   TileProblem::RelativeTerm term;
   template <typename Scalar>
@@ -155,7 +161,8 @@ struct RelativeMeasured {
   }
 };
 
-// The residual of line_terms.h. Both parts are zero where nothing is observed (linearise_line).
+// The residual of line_terms.h. Both parts are zero where nothing is observed (linearise_line): 1e-12 is the square of
+// the smallest sine of line_terms.cpp.
 template <typename Scalar>
 Scalar off_direction(const TileProblem::LineTerm& term, const Vector3<Scalar>& direction) {
   const Vector3<Scalar> normal = term.middle.cast<Scalar>().cross(direction);
@@ -164,6 +171,7 @@ Scalar off_direction(const TileProblem::LineTerm& term, const Vector3<Scalar>& d
   return direction.dot(term.across.cast<Scalar>()) * term.weight / sqrt(squares);
 }
 
+// v = R z.
 struct VerticalLine {
   TileProblem::LineTerm term;
   template <typename Scalar>
@@ -175,6 +183,7 @@ struct VerticalLine {
   }
 };
 
+// v = R d, d = N x z / |N x z|, N = R_o' n_o.
 struct HorizontalLine {
   TileProblem::LineTerm term;
   template <typename Scalar>
@@ -200,6 +209,7 @@ struct VerticalSeen {
     const Vector3<Scalar> ground = term.ground.cast<Scalar>();
     const Vector3<Scalar> in_rig = rotation_of(frame) * ground;
     const Vector3<Scalar> down = rotation_of(mount) * in_rig;
+    // The bound keeps the root finite where the image looks up. linearise_vertical() has the same bound.
     const Scalar sum = term.seen.cast<Scalar>().dot(down) + Scalar(1);
     const Scalar stretch = sqrt(Scalar(2) / (sum > Scalar(1e-9) ? sum : Scalar(1e-9)));
     for (int i = 0; i < 2; ++i) {
@@ -214,6 +224,7 @@ struct VerticalSeen {
   }
 };
 
+// r = (X - X_0) / sigma. An axis without a sigma has an infinite one and gives r = 0.
 struct PointKnown {
   TileProblem::PointTerm term;
   template <typename Scalar>
@@ -223,6 +234,7 @@ struct PointKnown {
   }
 };
 
+// r = (k - k_0) / sigma. A parameter that is held, or has no prior, gives r = 0 and counts for nothing.
 struct IntrinsicsKnown {
   TileProblem::IntrinsicTerm term;
   template <typename Scalar>
@@ -236,6 +248,7 @@ struct IntrinsicsKnown {
   }
 };
 
+// r = Log(R R_0') / sigma, (C - C_0) / sigma.
 struct MountKnown {
   TileProblem::MountTerm term;
   template <typename Scalar>

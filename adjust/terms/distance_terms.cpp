@@ -44,6 +44,7 @@ class KnownDistances final : public ObservationType {
     const Eigen::Vector3d base = state.frames[term.to.value].centre - state.frames[term.from.value].centre;
     const double length = base.norm();
     Eigen::Matrix<double, 1, 6> by_to = Eigen::Matrix<double, 1, 6>::Zero();
+    // Centres at the same place get no derivative. The residual stays, so that the statistics show it.
     if (length > kShortestBase) by_to.tail<3>() = base.transpose() / (length * term.sigma);
     LinearTerm out;
     out.set_residual(Eigen::Matrix<double, 1, 1>((length - term.value) / term.sigma));

@@ -31,6 +31,7 @@ class IntrinsicPriors final : public ObservationType {
                  const TermVisit& visit) const override {
     const TileProblem::IntrinsicTerm& term = problem.intrinsic_priors[row];
     const auto camera = static_cast<std::int32_t>(term.camera.value);
+    // Each parameter with a prior is one scalar observation.
     for (int k = 0; k < term.value.size(); ++k) {
       const double weight = intrinsic_prior_weight(term, k);
       if (weight == 0) continue;

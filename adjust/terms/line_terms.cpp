@@ -1,3 +1,9 @@
+// The mathematics of the residual is in line_terms.h. The weight w is found here.
+//
+// The two ends of a segment are measured with sigma_px across the segment. The pixel beside an end, one pixel across,
+// has a ray at the distance `radians_per_px` from the ray of the end, so that an end is good to sigma_px *
+// radians_per_px radians. The residual is half the difference of two such distances, (a'n - b'n) / 2. Its sigma is that
+// of an end divided by the square root of two, and w is the inverse of it.
 #include "adjust/terms/line_terms.h"
 
 #include <algorithm>
@@ -24,6 +30,8 @@ struct Segment {
 std::optional<Segment> segment_of(const Block& block, const KnownLine::Measurement& measured) {
   const Mount& mount = block.mount_of(measured.image);
   const Intrinsics& camera = block.cameras[mount.camera].intrinsics;
+  // One pixel at right angles to the segment. The scale of the camera is taken at both ends, because that of a
+  // wide-angle image changes over the image.
   const Eigen::Vector2d across =
       Eigen::Vector2d(measured.first.y() - measured.second.y(), measured.second.x() - measured.first.x()).normalized();
   std::array<Eigen::Vector3d, 4> rays;
@@ -69,6 +77,7 @@ std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& stat
   const GroundVertical ground(block.ground);
   for (const KnownLine& line : block.lines) {
     const bool vertical = line.direction == KnownLine::Direction::kVertical;
+    // The last measurement in an oriented frame: for a horizontal line the frame that shows its plane.
     std::optional<Segment> before;
     FrameIndex before_frame;
     for (const KnownLine::Measurement& measured : line.measurements) {
@@ -77,6 +86,8 @@ std::vector<BlockLineTerm> line_terms(const Block& block, const BlockState& stat
       const auto segment = segment_of(block, measured);
       if (!segment) continue;
       const TileIndex owner = owner_tile(tiles, frame, !vertical && before ? before_frame : frame);
+      // A vertical line gives one observation for each measurement. A horizontal one gives an observation for two
+      // successive measurements in different frames, since a single image does not show the direction of a line.
       if (owner == tile && (vertical || (before && before_frame != frame))) {
         BlockLineTerm& added = terms.emplace_back();
         added.frame = frame;
@@ -113,6 +124,7 @@ LineResidual linearise_line(const Pose& frame, const Pose& other, const TileProb
     by_other = -(Eigen::Matrix3d::Identity() - direction * direction.transpose()) / length * skew<double>(up) *
                skew<double>(normal);
   }
+  // dr/dw = (dr/dv)(-R [d]x) by the frame, and (dr/dv) R (dd/dw_o) by the other one.
   const OffDirection off = off_direction(term, rotation * direction);
   result.residual = off.residual;
   result.by_frame.head<3>() = -off.by_direction * rotation * skew<double>(direction);

@@ -1,3 +1,5 @@
+// Puts the derivatives of linearise.h together for a single observation. The kernels of adjust/lanes compute the same
+// for many observations at once, with the same formulas.
 #include "adjust/terms/linearise.h"
 
 namespace megablock {

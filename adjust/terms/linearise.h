@@ -33,6 +33,7 @@ struct alignas(64) ImageView {
     return reprojection(*intrinsics, in_camera(point - centre), measured);
   }
 };
+// One view for each image of the problem, [images]. The views refer to the cameras of `state`.
 std::vector<ImageView> image_views(const TileProblem& problem, const TileState& state);  // [images]
 
 // The residual of an image observation, with the derivatives from which all others follow.
@@ -53,6 +54,8 @@ inline bool linearise_in_camera(const ImageView& view, const Eigen::Vector3d& po
     result.by_camera = inverse_sigma * projection.by_point;
     if (with_intrinsics) result.by_intrinsics = inverse_sigma * projection.by_intrinsics;
   };
+  // Brown's model has by far the most observations. Its own function is inlined here; the table of the models is asked
+  // for the others only.
   if (k.model().kind == CameraModelKind::kBrown) {
     ProjectionJacobian projection;
     if (!BrownModel::linearise(k.data(), result.in_camera, with_intrinsics, projection)) return false;
@@ -70,6 +73,8 @@ inline Eigen::Matrix<double, 2, 6> by_pose(const Eigen::Matrix<double, 2, 3>& by
   for (int i = 0; i < 2; ++i) result.row(i) << u.cross(by_point.row(i).transpose()).transpose(), -by_point.row(i);
   return result;
 }
+// The mount sees the point of the rig from its own centre: u = X_rig - C_m = R_m' X_cam, and the derivative by X_rig is
+// J R_m with J that by X_cam.
 inline Eigen::Matrix<double, 2, 6> by_mount(const ImageView& view, const CameraResidual& r) {
   return by_pose(r.by_camera * view.mount_rotation, view.mount_rotation.transpose() * r.in_camera);
 }
@@ -95,6 +100,8 @@ struct FrameResidual3 {
   Eigen::Vector3d residual;
   Eigen::Matrix<double, 3, 6> by_frame;
 };
+// The residuals of observed positions and attitudes, with the derivatives by (w, d) of the frame: position_terms.cpp
+// and attitude_terms.cpp.
 FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior);
 FrameResidual3 linearise_attitude(const Pose& frame, const AttitudePrior& prior);
 
@@ -102,12 +109,14 @@ struct RelativeResidual {
   Eigen::Matrix<double, 6, 1> residual;
   Eigen::Matrix<double, 6, 6> by_from, by_to;
 };
+// Rotation (3), then base (3): relative_terms.cpp.
 RelativeResidual linearise_relative(const Pose& from, const Pose& to, const TileProblem::RelativeTerm& term);
 
 struct MountResidual {
   Eigen::Matrix<double, 6, 1> residual;
   Eigen::Matrix<double, 6, 6> by_mount;
 };
+// Rotation (3), then centre (3): mount_priors.cpp.
 MountResidual linearise_mount(const Pose& mount, const TileProblem::MountTerm& term);
 
 // The residuals of priors that are linear in their unknowns; their derivative is the inverse sigma. Axes with infinite

@@ -26,6 +26,7 @@ class PointPriors final : public ObservationType {
     if (!problem.active(term.point.value)) return;
     LinearTerm out;
     out.set_residual(point_prior_residual(state.points[static_cast<std::size_t>(term.point.value)], term));
+    // No block of derivatives: the point takes its equations from the prior itself.
     out.number = static_cast<int>(term.sigma.array().isFinite().count());
     out.kinds = {kControlHorizontal, kControlHorizontal, kControlHeight};
     visit(out);

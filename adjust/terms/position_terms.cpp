@@ -45,6 +45,8 @@ class Positions final : public ObservationType {
     const TileProblem::PositionTerm& term = problem.positions[row];
     TermDatum datum;
     datum.frame = term.frame.value;
+    // A held position has a sigma of nanometres. With its own weight it would make every other information about the
+    // datum look like nothing (comparable() in io/block/held_priors.h).
     datum.by_frame = linearise_position(state.frames[term.frame.value], comparable(term.prior)).by_frame;
     datum.holds_place = held(term.prior);
     return datum;
@@ -53,6 +55,8 @@ class Positions final : public ObservationType {
     return loss_of(problem, problem.positions[row]);
   }
   void scale_sigmas(TileProblem& problem, const SigmaScales& scales) const override {
+    // GNSS heights are worse than horizontal positions, and their errors have other causes. They have a factor of their
+    // own.
     const double horizontal = scales[kPositionHorizontal];
     for (TileProblem::PositionTerm& term : problem.positions)
       term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);

@@ -16,6 +16,8 @@ RelativeResidual linearise_relative(const Pose& from, const Pose& to, const Tile
   const double rotation_weight = 1 / term.rotation_sigma_rad, position_weight = 1 / term.position_sigma_m;
   const Eigen::Vector3d base = to.centre - from.centre;
   const Eigen::Vector3d rotation = rotation_log<double>(to.rotation * (term.pose.rotation * from.rotation).conjugate());
+  // J_r^-1 of Log E turns a change on the right of E into one of its logarithm. With R_to Exp(w), E = R_to R_from' R_m'
+  // becomes E Exp(R_m R_from w), and with R_from Exp(w) it becomes E Exp(-R_m R_from w).
   const Eigen::Matrix3d by_rotation =
       rotation_weight * right_jacobian_inverse(rotation) * term.pose.rotation.toRotationMatrix() * from_rotation;
 
@@ -26,6 +28,7 @@ RelativeResidual linearise_relative(const Pose& from, const Pose& to, const Tile
   result.by_to.topLeftCorner<3, 3>() = by_rotation;
   result.by_from.topLeftCorner<3, 3>() = -by_rotation;
   result.by_to.bottomRightCorner<3, 3>() = position_weight * from_rotation;
+  // R_from Exp(w) b = R_from b - R_from [b]x w.
   result.by_from.bottomLeftCorner<3, 3>() = -position_weight * from_rotation * skew<double>(base);
   result.by_from.bottomRightCorner<3, 3>() = -position_weight * from_rotation;
   return result;
@@ -59,6 +62,7 @@ class RelativePoses final : public ObservationType {
     const TileProblem::RelativeTerm& term = problem.relatives[row];
     TermDatum datum;
     datum.frame = term.from.value;
+    // Both frames move as one body: only the scale changes the residual.
     datum.base_to = term.to.value;
     datum.base_sigma_m = term.position_sigma_m;
     return datum;

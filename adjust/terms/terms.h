@@ -106,6 +106,7 @@ class ObservationType {
   virtual void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
                          const TermVisit& visit) const = 0;
   virtual TermDatum datum(const TileProblem&, const TileState&, std::size_t) const { return {}; }
+  // The loss of a row, for Ceres: the same as linearise() gives with the row.
   virtual RobustLoss loss(const TileProblem&, std::size_t) const { return {}; }
   // Multiplies the sigmas of all rows, if they may be estimated (observation_statistics.h says which).
   virtual void scale_sigmas(TileProblem&, const SigmaScales&) const {}

@@ -1,3 +1,5 @@
+// The mathematics is in vertical_terms.h. Names: `ground` is g, `seen` is d, `down` is v, `stretch` is s, `across` is W
+// v, `in_rig` is u.
 #include "adjust/terms/vertical_terms.h"
 
 #include <Eigen/Cholesky>
@@ -24,6 +26,8 @@ TileProblem::VerticalTerm vertical_term(const SeenVertical& seen, const GroundVe
   TileProblem::VerticalTerm term;
   term.ground = ground.down(centre);
   term.seen = seen.down;
+  // The covariance of a unit vector is singular along the vector. Only its part in the tangent plane B of d is
+  // decomposed: L L' = B' S B and W = L^-1 B'.
   const Eigen::Matrix<double, 3, 2> plane = tangent_plane(seen.down);
   const Eigen::LLT<Eigen::Matrix2d> cholesky(plane.transpose() * seen.covariance * plane);
   term.weight = cholesky.matrixL().solve(plane.transpose());
@@ -45,6 +49,7 @@ void take_plumb_lines(const Block& block, const BlockState& places, TileProblem&
 
 VerticalResidual linearise_vertical(const Pose& frame, const Pose& mount, const Intrinsics& camera,
                                     const TileProblem::VerticalTerm& term) {
+  // 1 + d'v vanishes where the image looks in the opposite direction. The bound keeps s finite there.
   constexpr double kOpposite = 1e-9;
   const Eigen::Matrix3d mount_rotation = mount.rotation.toRotationMatrix();
   const Eigen::Vector3d in_rig = frame.rotation * term.ground, down = mount_rotation * in_rig;
@@ -57,8 +62,10 @@ VerticalResidual linearise_vertical(const Pose& frame, const Pose& mount, const 
     result.residual -=
         term.by_camera * (Eigen::Map<const Eigen::VectorXd>(camera.data(), term.camera.size()) - term.camera);
   Eigen::Matrix<double, 2, 3> by_down = stretch * term.weight;
+  // ds/dv = -s / (2 (1 + d'v)) d', and zero where the bound holds s.
   if (sum > kOpposite) by_down -= stretch / (2 * bounded) * across * term.seen.transpose();
   const Eigen::Matrix3d turned = mount_rotation * frame.rotation.toRotationMatrix();
+  // dr/dw = (dr/dv) (-R_m R_f [g]x), and with u = R_f g for the mount -(dr/dv) R_m [u]x. Centres do not matter.
   result.by_frame << -by_down * turned * skew(term.ground), Eigen::Matrix<double, 2, 3>::Zero();
   result.by_mount << -by_down * mount_rotation * skew(in_rig), Eigen::Matrix<double, 2, 3>::Zero();
   return result;
@@ -112,6 +119,7 @@ class SeenVerticals final : public ObservationType {
     const TileProblem::VerticalTerm& term = problem.verticals[row];
     TermDatum datum;
     datum.frame = image_of(problem, term).frame.value;
+    // A mount turns with its rig, so that a similarity of the ground acts on the frame alone.
     datum.by_frame = linearise_vertical(problem, state, term).by_frame;
     return datum;
   }
