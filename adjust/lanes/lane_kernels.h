@@ -5,11 +5,13 @@
 
 namespace megablock::lane_kernels {
 
-// The kernels work on groups of lanes; counts are multiples of this.
+// The kernels work on groups of lanes; counts are multiples of this, the widest vector of any processor. All kernels
+// thus process the same lanes.
 constexpr std::int64_t kGroup = 8;
 constexpr std::int64_t padded(std::int64_t count) { return (count + kGroup - 1) / kGroup * kGroup; }
 
-// How many doubles describe the image and the observation of a lane.
+// How many doubles describe the image and the observation of a lane. Both are multiples of kGroup: the kernels read
+// them by vectors of any width and transpose these into lanes.
 constexpr int kViewSize = 24;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [8], unused
 constexpr int kRecordSize = 8;  // point [3], measured x and y [2], inverse sigma, unused [2]
 

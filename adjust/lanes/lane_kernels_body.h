@@ -1,5 +1,22 @@
 // The code of the kernels, for vectors of any width. Internal to adjust/lanes/: each lane_kernels_*.cpp sets the width
-// and includes it. The formulas are in linearise.h and geometry/camera/models/brown.h.
+// and includes it. The formulas are those of linearise.h and of geometry/camera/models/brown.h, written out:
+//
+//     u = X - C,   X_cam = R u - t,   (x, y) = (X_cam.x, X_cam.y) / depth,   r2 = x^2 + y^2,
+//     radial = 1 + k1 r2 + k2 r2^2 + k3 r2^3,   slope = d radial / d r2,
+//     distorted_x = x radial + 2 p1 x y + p2 (r2 + 2 x^2),   distorted_y = y radial + p1 (r2 + 2 y^2) + 2 p2 x y,
+//     residual = w (c + f distorted - measured)
+//
+// The derivatives of the residual by X_cam are, with scale = w f / depth,
+//
+//     | xx     cross  xz |     xx    = scale d distorted_x / dx,   yy = scale d distorted_y / dy,
+//     | cross  yy     yz |     cross = scale d distorted_x / dy = scale d distorted_y / dx,
+//                              xz = -x xx - y cross,   yz = -x cross - y yy,
+//
+// because x and y do not change along the ray. That by the point X is this matrix times R; those by the poses follow
+// from it and from u (by_pose in linearise.h).
+//
+// Lanes behind the camera are computed like the others and then set to NaN, since a branch would have to hold for all
+// lanes of a vector.
 #pragma once
 
 #include "adjust/lanes/lane_kernels.h"

@@ -1,3 +1,5 @@
+// Keeps the lanes in the layout that the kernels read, and chooses the kernels. A vector needs kGroup lanes: pad()
+// fills the last group with copies of the first lane, whose values nobody reads.
 #include "adjust/lanes/observation_lanes.h"
 
 namespace megablock {
@@ -17,6 +19,7 @@ const lane_kernels::Kernels* lane_kernels_of_width(int width) {
         __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
     return has ? &kAvx512 : nullptr;
   }
+  // The file is compiled with -mavx2 and -mfma, so that the processor must have both.
   if (width == 4) return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kAvx2 : nullptr;
   return &kPortable;
 }
@@ -27,6 +30,7 @@ const lane_kernels::Kernels& lane_kernels_of_processor() {
   return kPortable;
 }
 
+// The layout of the kernels: rotation by rows, centre, shift, parameters of Brown's model.
 LaneView::LaneView(const ImageView& view) {
   const Intrinsics& k = *view.intrinsics;
   simple = k.model().kind == CameraModelKind::kBrown;
@@ -42,6 +46,7 @@ SeenImages::SeenImages(const TileProblem& problem, const TileState& state)
     : views(image_views(problem, state)), lanes(views.begin(), views.end()) {}
 
 void AlignedValues::resize(std::int64_t count) {
+  // A vector that crosses the border of a cache line takes two accesses.
   constexpr std::uintptr_t kLine = 64;
   storage_.resize(static_cast<std::size_t>(count) + kLine / sizeof(double));
   const auto address = reinterpret_cast<std::uintptr_t>(storage_.data());

@@ -56,6 +56,7 @@ class ResidualSquares {
     }
     lanes_.clear();
   }
+  // The kernels know Brown's model only; other cameras are projected one observation at a time.
   double squares(std::int64_t point, std::int64_t row, std::int64_t lane) const {
     const std::int64_t image = problem_.image[row].value;
     if (images_.lanes[image].simple) return lanes_.residual(lane).squaredNorm();

@@ -1,3 +1,6 @@
+// Sums in a fixed order: image observations by point and row, then the other types in the order of
+// observation_types_of_cost(). Costs of two states are compared to tell whether an iteration has improved a tile, so
+// that they must not differ by the order of their sums.
 #include "adjust/lanes/tile_cost.h"
 
 #include <cmath>
@@ -15,6 +18,7 @@ double image_cost(const TileProblem& problem, const TileState& state) {
   const SeenImages seen(problem, state);
   ResidualSquares residuals(problem, state, seen);
   residuals.visit(residuals.active_points(), [&](std::int64_t, std::int64_t, double squares) {
+    // A state that puts a kept observation behind its camera has an infinite cost, so that no search accepts it.
     sum += std::isfinite(squares) ? problem.image_loss.evaluate(squares)[0] : std::numeric_limits<double>::infinity();
   });
   return sum;
