@@ -1,3 +1,7 @@
+// Poses in Ceres. A block is x = (q, C), the tangent increment (w, d) is that of pose_update: q Exp(w), C + d. The
+// Jacobian of Plus at 0 is the 7 x 6 matrix dq/dw = Q' / 4 above, with Q = quaternion_to_tangent(q), and the identity
+// below. Since dw/dq dq/dw = I, a cost function that knows its derivative J by (w, d) may hand Ceres J_w Q for the
+// quaternion: Ceres multiplies by dq/dw and gets J_w again. AnalyticImage does so.
 #include "adjust/tile/ceres_problem.h"
 
 #include <ceres/cost_function.h>
@@ -72,6 +76,7 @@ class AnalyticImage : public ceres::CostFunction {
     *mutable_parameter_block_sizes() = {kPoseBlock, kPoseBlock, parameter_count(model), 3};
   }
 
+  // Returns false, for Ceres an invalid step, where the camera cannot project the point.
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
     Intrinsics intrinsics(model_);
     std::copy_n(blocks[2], intrinsics.size(), intrinsics.begin());
@@ -140,6 +145,8 @@ std::unique_ptr<ceres::LossFunction> ceres_loss(const RobustLoss& loss) {
   return nullptr;
 }
 
+// Losses and manifolds are shared by thousands of residuals and owned by CeresTile. The checks of Ceres take longer
+// than the addition of a residual.
 ceres::Problem::Options problem_options() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -164,6 +171,8 @@ ceres::CostFunction* automatic_image(const residual::ImageMeasured& image) {
 
 }  // namespace
 
+// The blocks lie in one allocation in the order frames, mounts, cameras, points. Residuals are added by point and row,
+// then by type, so that a problem has the same bits in every run.
 CeresTile::CeresTile(const TileProblem& problem, const TileState& state, const CeresOptions& options)
     : frame_count_(std::ssize(state.frames)),
       mount_count_(std::ssize(state.mounts)),
@@ -219,6 +228,7 @@ void CeresTile::add_others(const TileProblem& problem) {
   for (const ObservationType* type : observation_types()) {
     for (std::size_t row = 0; row < type->count(problem); ++row) {
       const TermUnknowns term = type->unknowns(problem, row);
+      // The prior of a point that takes no part would be a problem of its own.
       if (term.point >= 0 && !point_used_[term.point]) continue;
       std::vector<double*> blocks;
       for (int f = 0; f < term.frame_count; ++f) blocks.push_back(frame(term.frame[static_cast<std::size_t>(f)]));
@@ -238,6 +248,7 @@ ceres::LossFunction* CeresTile::loss(const RobustLoss& loss) {
   return losses_.emplace_back(loss, ceres_loss(loss)).second.get();
 }
 
+// Only blocks that have a residual are in the problem, and only these can be held.
 void CeresTile::hold_parameters(const TileProblem& problem, const TileState& state,
                                 const std::vector<ParameterMask>& camera_free) {
   for (std::int64_t f = 0; f < frame_count_; ++f)
@@ -267,6 +278,8 @@ bool CeresTile::unknown(const double* block) const {
   return ceres_->HasParameterBlock(block) && !ceres_->IsParameterBlockConstant(block);
 }
 
+// Points come last in the one allocation of all blocks. The comparison of pointers is that of std::less_equal, which is
+// defined for pointers of any origin.
 bool CeresTile::is_point(const double* block) const {
   const std::less_equal<const double*> not_after;
   return not_after(values_.data() + points_begin_, block);

@@ -1,3 +1,6 @@
+// The cost of a proposed point X is that of MSAC, sum over the rays of min(r_i(X)^2, t^2), with r_i the length of the
+// residual of ray i in sigmas and t the threshold. In contrast to a count of inliers it prefers the better of two
+// points with the same number of rays (P. Torr and A. Zisserman, "MLESAC", CVIU 78, 2000).
 #include "adjust/tile/consistent_rays.h"
 
 #include <algorithm>
@@ -23,6 +26,8 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(std::size_t rays, std:
       for (std::size_t b = a + 1; b < rays; ++b) result.emplace_back(a, b);
     return result;
   }
+  // The seed is the number of the point, so that the pairs do not depend on the order or the thread in which points
+  // come.
   std::mt19937_64 random(seed);
   while (result.size() < kMaxPairs) {
     const std::size_t a = random() % rays, b = random() % rays;
@@ -48,6 +53,8 @@ std::optional<ConsistentRays> refine_part(std::span<const PointView> views, Eige
   for (int round = 0; round < kRounds; ++round) {
     std::vector<PointView> used;
     for (std::size_t i = 0; i < views.size(); ++i) {
+      // The proposal comes from two rays and has their errors. In the first round rays pass somewhat beyond the
+      // threshold.
       passing[i] = residual_sigmas(views[i], point) <= (round == 0 ? kTwoRayFactor * threshold : threshold);
       if (passing[i]) used.push_back(views[i]);
     }

@@ -1,3 +1,16 @@
+// The mathematics is in datum.h. Names: a component's `centre` is c, its `extent` is L, `normal` is the sum (J S)'(J
+// S), and move() gives the columns of S that act on a point or a frame, in the order phi, t, s:
+//
+//     dC = -[C - c]x phi + L t + (C - c) s,      dw = -phi
+//
+// All seven are numbers without unit (rad, parts of L, parts of the scale), so that the eigenvalues of the 7 x 7 matrix
+// can be compared.
+//
+// The minimal constraint. Let V be the eigenvectors of the free directions and M the 12 x 7 matrix by which a
+// similarity moves two frames, rotations in radians and centres in units of L. The constraint is V' M' m = 0 for the
+// increments m of the two frames since the start, with a weight of 1e3. Of all solutions that differ by a free
+// similarity it selects the one whose two frames have moved least along it. The two frames are the first one and the
+// one farthest from it, because the rotation and the scale show best there.
 #include "adjust/tile/datum.h"
 
 #include <ceres/autodiff_cost_function.h>
@@ -80,6 +93,8 @@ struct Component {
   }
 };
 
+// The scale of a component that sees a rig: known where two held mounts of the rig are apart, and by the priors of free
+// mounts. Every mount that the component sees counts once.
 void add_mounts(const TileProblem& problem, const TileState& state, Components& components,
                 std::vector<Component>& all) {
   // Pairs of a component and a mount that it sees.
@@ -88,9 +103,11 @@ void add_mounts(const TileProblem& problem, const TileState& state, Components& 
   std::sort(seen.begin(), seen.end());
   seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
   for (const auto& [component, mount] : seen) {
+    // A held base gives the scale. It counts as a scale that is known to 1e-3, which is firm beside kNull.
     if (rig_gives_scale(problem, state, static_cast<std::size_t>(mount))) all[component].normal(6, 6) += 1e6;
     for (const auto& term : problem.mount_priors) {
       if (term.mount != mount) continue;
+      // A scale of 1 + s moves the centre of the mount by s C_m. The prior of the mount resists this.
       PoseIncrement scaled = PoseIncrement::Zero();
       scaled.tail<3>() = state.mounts[mount].centre;
       all[component].normal(6, 6) += (linearise_mount(state.mounts[mount], term).by_mount * scaled).squaredNorm();
@@ -102,6 +119,7 @@ void add_term(const TermDatum& term, const TileState& state, Component& c) {
   const Pose& frame = state.frames[term.frame];
   if (term.base_to >= 0) {
     const Eigen::Vector3d base = state.frames[term.base_to].centre - frame.centre;
+    // The residual (|b| - d) / sigma, or (b - T) / sigma, changes by |b| / sigma for a scale of one.
     c.normal(6, 6) += base.squaredNorm() / (term.base_sigma_m * term.base_sigma_m);
     return;
   }
@@ -138,6 +156,7 @@ std::vector<Component> find_components(const TileProblem& problem, const TileSta
     for (std::int32_t f : c.frames) c.centre += state.frames[f].centre / static_cast<double>(c.frames.size());
     double squares = 0;
     for (std::int32_t f : c.frames) squares += (state.frames[f].centre - c.centre).squaredNorm();
+    // The extent is 1 where all centres coincide; t is then in metres.
     if (squares > 0) c.extent = std::sqrt(squares / static_cast<double>(c.frames.size()));
   }
   return all;
@@ -149,6 +168,7 @@ DatumDefect defect_of(const Component& c, const TileState& state) {
   const SymmetricEigen eigen = symmetric_eigen(c.normal);
   constexpr double kNull = 1e-11;  // share of the largest eigenvalue; the matrix itself has errors of 1e-15
   const double threshold = kNull * eigen.values(6);
+  // The eigenvalues are ascending: the free directions are the first ones.
   while (defect.dimension < 7 && eigen.values(defect.dimension) <= threshold) ++defect.dimension;
   if (defect.dimension == 0) return defect;
 
@@ -213,6 +233,7 @@ std::vector<DatumDefect> datum_defects(const TileProblem& problem, const TileSta
 void constrain_datum(const std::vector<DatumDefect>& defects, CeresTile& tile) {
   for (const DatumDefect& defect : defects) {
     double *a = tile.frame(defect.first.value), *b = tile.frame(defect.second.value);
+    // Ceres takes no residual of the same block twice. A component of one frame gets no constraint.
     if (a == b || !tile.problem().HasParameterBlock(a) || !tile.problem().HasParameterBlock(b)) continue;
     auto* constraint = new DatumConstraint{defect.constraints, from_block(a), from_block(b)};
     tile.problem().AddResidualBlock(

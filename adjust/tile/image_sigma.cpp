@@ -1,3 +1,6 @@
+// The estimate is a fixed point: s = g(s), where g(s) is the weighted sum of squares over the redundancy of those
+// residuals that a screening with the sigma s would keep, with the robust weights at s. The residuals are computed
+// once; an iteration only sums them again.
 #include "adjust/tile/image_sigma.h"
 
 #include <algorithm>
@@ -12,6 +15,7 @@ namespace {
 constexpr double kFinestPx = 0.02;               // tie points are never observed more precisely
 constexpr std::int64_t kFewestRedundancy = 100;  // the estimate is then good to 7 %
 
+// Unknowns other than points, whether or not priors hold them: see the head of the header.
 std::int64_t unknowns_of(const TileProblem& problem) {
   std::int64_t count = 6 * std::ssize(problem.frames);
   for (const ParameterMask mask : problem.camera_free) count += count_of(mask);
@@ -25,6 +29,7 @@ struct SquaredResiduals {
   std::int64_t points = 0;
 };
 
+// Residuals of control points are left out: their sigmas are stated one by one.
 SquaredResiduals squared_residuals(const TileProblem& problem, const TileState& state) {
   const std::vector<ImageView> views = image_views(problem, state);
   SquaredResiduals result;
@@ -47,7 +52,9 @@ ImageResiduals summed(const SquaredResiduals& squares, const RobustLoss& loss, d
   ImageResiduals result;
   result.points = squares.points;
   for (const double squared : squares.values) {
+    // A residual that is not finite fails the test as well.
     if (!(weight * squared <= largest)) continue;
+    // rho' is the robust weight at this sigma; the sum is in px^2.
     result.weighted_squares += loss.evaluate(weight * squared)[1] * squared;
     ++result.observations;
   }

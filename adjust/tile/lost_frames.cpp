@@ -1,3 +1,5 @@
+// A frame is judged only by points that others hold in place: two other frames intersect such a point without it. The
+// points that only the frame and one other observe follow the frame and agree with any pose of it.
 #include "adjust/tile/lost_frames.h"
 
 #include <algorithm>
@@ -10,6 +12,8 @@ namespace megablock {
 
 namespace {
 
+// A pose has six unknowns and a sample of three points satisfies itself. Twelve observations that agree, and three
+// tenths of all, are far more than agree with a wrong pose by accident.
 constexpr std::size_t kMinAgreeing = 12;
 constexpr double kMinShare = 0.3;
 
@@ -45,6 +49,7 @@ class Resection {
       : problem_(problem), state_(state), point_of_row_(point_of_row), threshold_(threshold) {}
 
   std::optional<Pose> find(const std::vector<std::int64_t>& rows, std::uint64_t seed) const {
+    // Scoring every sample by 300 observations is enough to find the pose. All observations then judge it.
     constexpr std::size_t kMaxSights = 300;
     std::vector<RigSight> sights;
     const std::size_t stride = 1 + (rows.size() - 1) / kMaxSights;
@@ -79,6 +84,7 @@ class Resection {
         rig_ray(state_.mounts[image.mount], state_.cameras[image.camera.value], {problem_.x[row], problem_.y[row]});
     if (!ray) return std::nullopt;
     const std::int64_t point = point_of_row_[row];
+    // The points count as exact: thresholds here are many times their errors.
     return RigSight{*ray, state_.points[point], Eigen::Matrix3d::Zero(), 1 / problem_.inverse_sigma[row], point};
   }
 
@@ -94,12 +100,15 @@ std::vector<LocalFrame> recover_lost_frames(const TileProblem& problem, TileStat
   std::vector<std::int64_t> point_of_row;
   const std::vector<std::vector<std::int64_t>> rows = rows_of_frames(problem, point_of_row);
   const Resection resection(problem, state, point_of_row, threshold_sigmas);
+  // All frames are sought before any of them moves, so that the result does not depend on their order.
   std::vector<std::optional<Pose>> found(rows.size());
   for (std::size_t f = 0; f < rows.size(); ++f) {
     if (rows[f].size() < kMinAgreeing) continue;
     const std::size_t now = resection.agreeing(state.frames[f], rows[f]);
+    // The frame is not lost.
     if (static_cast<double>(now) >= kMinShare * static_cast<double>(rows[f].size())) continue;
     found[f] = resection.find(rows[f], static_cast<std::uint64_t>(problem.frames[f].value));
+    // A pose that explains no more than the present one is no gain.
     if (found[f] && resection.agreeing(*found[f], rows[f]) <= now) found[f].reset();
   }
   std::vector<LocalFrame> frames;

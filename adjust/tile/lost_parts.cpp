@@ -1,3 +1,14 @@
+// The part as one rig. Let X = G(X_now) be the movement of the ground that puts a part where it belongs. A ray of the
+// part's frames, taken in the ground axes of the present poses, is a ray of a rig whose pose relative to the correct
+// ground is sought: X_now = R (X - C). Resection of this rig from the points of the standing frames gives (R, C), and
+//
+//     X = R' X_now + C,   R_frame <- R_frame R,   C_frame <- R' C_frame + C
+//
+// brings the frames and the points of the part to the correct ground.
+//
+// Sets of frames. The graph of frames is weighted by tracks: shared by two frames, and kept by both. It is contracted
+// as long as two sets keep half or more of the tracks that they share, with the sums over all pairs of their frames. A
+// single pair of frames with few tracks would decide by accident; hence the least number of shared tracks.
 #include "adjust/tile/lost_parts.h"
 
 #include <algorithm>
@@ -11,6 +22,8 @@ namespace megablock {
 
 namespace {
 
+// A part of two frames is a matter of single frames (lost_frames.h). Thirty observations that agree, and three tenths
+// of all, are far more than agree with a wrong pose by accident.
 constexpr std::size_t kFewestOfPart = 3, kFewestAgreeing = 30;
 constexpr double kAgreeingShare = 0.3;
 
@@ -35,6 +48,7 @@ std::int32_t frame_of(const TileProblem& problem, std::int64_t row) {
 Agreements agreements_of_frames(const TileProblem& problem) {
   const std::int64_t enough = std::max<std::int64_t>(20'000, 40 * std::ssize(problem.frames));
   const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / enough);
+  // A sorted list of pairs is summed in one run; to add every pair to a map would take a search for each.
   std::vector<std::pair<FramePair, bool>> pairs;
   std::map<std::int64_t, bool> frames;  // frames of a track, and whether one of its observations there is kept
   for (std::int64_t p = 0; p < problem.point_count(); p += stride) {
@@ -62,6 +76,7 @@ std::vector<std::vector<std::int64_t>> parts_of(const TileProblem& problem) {
   const auto count = static_cast<std::int64_t>(problem.frames.size());
   DisjointSets sets(count);
   Agreements open = agreements_of_frames(problem);
+  // Uniting two sets adds up their tracks with a third one, so that others may hang together then.
   for (bool changed = true; changed;) {
     changed = false;
     Agreements between;  // between the present sets
@@ -120,6 +135,7 @@ class PartFinder {
       if (!problem_.kept[row]) continue;
       if (of_part(row)) continue;
       const std::int32_t frame = frame_of(problem_, row);
+      // A point that another part keeps too may stand where that part stands.
       if (!stands_[static_cast<std::size_t>(frame)]) return false;
       several = several || (first >= 0 && frame != first);
       first = frame;

@@ -1,7 +1,15 @@
 // Intersects and screens single points at held poses.
 //
-// When all kept rays of a point pass the test at the current point, only rejected rays that pass as well come back.
-// Otherwise the largest consistent set of its rays is kept (consistent_rays.h).
+// A point is judged in three steps.
+//
+//     1. If all kept rays pass the threshold at the present point, the point stands. Every ray is tested there, so that
+//        rejected rays that pass come back.
+//     2. Otherwise the largest consistent set of all its rays is sought (consistent_rays.h), kept or rejected before.
+//        It becomes the kept set, and its intersection the point.
+//     3. A point whose kept rays meet below min_intersection_deg is left out, because its distance is open.
+//
+// The points do not depend on each other, because poses and cameras are held. Threads share them, and the result has
+// the same bits for any number of threads.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -53,6 +61,7 @@ class PointSettler {
     load(p);
     const Eigen::Vector3d before = state_.points[p];
     const auto kept = std::count(kept_.begin(), kept_.end(), 1);
+    // The prior of a control point replaces a ray.
     const bool enough = kept >= (prior_[p] ? 1 : 2);
     double longest = 0;  // longest residual of the rays kept before
     residuals_.clear();
@@ -63,6 +72,7 @@ class PointSettler {
     if (enough && longest <= threshold) {
       for (std::size_t i = 0; i < views_.size(); ++i) kept_[i] = residuals_[i] <= threshold;
     } else if (!settle_by_parts(p, threshold)) {
+      // A single ray has no set to be consistent with. It is tested against the position that the prior holds.
       if (prior_[p] && before.allFinite() && views_.size() == 1)
         kept_[0] = residuals_[0] <= threshold;
       else
@@ -114,6 +124,7 @@ class PointSettler {
     return true;
   }
 
+  // The least squares intersection of the kept rays, to a thousandth of a sigma.
   std::optional<Eigen::Vector3d> intersect_kept() const {
     std::vector<PointView> used;
     for (std::size_t i = 0; i < views_.size(); ++i)
@@ -123,6 +134,7 @@ class PointSettler {
     return refined->position;
   }
 
+  // The largest consistent set of all rays, with its intersection as the point. False where no two rays agree.
   bool settle_by_parts(std::int64_t p, double threshold) {
     const auto part = find_consistent_rays(views_, threshold, static_cast<std::uint64_t>(problem_.points[p].index));
     if (!part) return false;
@@ -133,6 +145,7 @@ class PointSettler {
 
   // Rejects rays that meet at too small an angle, because they do not fix the distance of the point.
   void hold_out_narrow(std::int64_t p) {
+    // A control point has its distance from its prior.
     if (prior_[p] == nullptr && !meet_wider_than(views_, kept_, state_.points[p], cos_min_angle_))
       std::fill(kept_.begin(), kept_.end(), 0);
   }
@@ -149,8 +162,9 @@ class PointSettler {
   std::vector<double> residuals_;  // sigmas
 };
 
-// The residuals, in sigmas of the images, that the attitude priors of frames with held positions allow. The poses of
-// such frames are the priors themselves.
+// The residuals, in sigmas of the images, that the attitude priors of frames with held positions allow: four sigmas of
+// the worst attitude times the longest focal length. The poses of such frames are the priors themselves, so that an
+// attitude error turns a whole image, and its rays miss each other by much more than an observation.
 double allowed_by_attitudes(const TileProblem& problem, const TileState& state) {
   constexpr double kWide = 4;  // sigmas of the attitudes
   std::vector<std::uint8_t> placed(problem.frames.size(), 0);
@@ -169,6 +183,7 @@ namespace {
 // Calls settle(PointSettler&, point) for each point. Points do not depend on each other.
 template <typename Settle>
 void settle_points(TileProblem& problem, TileState& state, const AdjustOptions& options, const Settle& settle) {
+  // Points are given to threads in portions, so that the sharing costs nothing beside the work.
   constexpr std::int64_t kAtOnce = 1024;
   PerThread<PointSettler> settlers(
       [&] { return std::make_unique<PointSettler>(problem, state, options.min_intersection_deg); });

@@ -11,7 +11,6 @@ namespace megablock {
 // The factor is 1 for kinds whose sigmas are not estimated, and for a redundancy below 30, where it would not be good
 // to 13 %. No sigma falls below the stated one, because an error that neighbouring frames share, as in trajectories,
 // hardly shows in residuals.
-// residuals.
 SigmaScales next_sigma_scales(const SigmaScales& now, const ObservationTable& table);
 
 // Multiplies the sigmas of the observations of the problem.

@@ -1,3 +1,9 @@
+// Solves a tile with Ceres, the reference of the tests. The points are eliminated first (group 0 of the ordering):
+// their 3 x 3 blocks are independent of one another, and the Schur complement has the unknowns of frames, cameras and
+// mounts alone.
+//
+// sigma0^2 = sum of weighted squares / (residuals - unknowns + datum defect). The defect counts because the unknowns
+// along free directions of the datum are fixed by constraints and not by observations.
 #include <ceres/ceres.h>
 #include <fmt/core.h>
 
@@ -51,8 +57,11 @@ ceres::Solver::Options solver_options(CeresTile& tile, std::size_t frames, const
   result.num_threads = 1;
   result.max_num_iterations = options.max_iterations;
   result.function_tolerance = options.function_tolerance;
+  // Of the three limits of Ceres only the share of the cost decides. That of the gradient depends on the units of the
+  // unknowns.
   result.gradient_tolerance = 0;
   result.parameter_tolerance = 1e-14;
+  // A step that puts a kept point behind its camera is invalid for Ceres, which then shortens the step.
   result.max_num_consecutive_invalid_steps = 20;
   result.initial_trust_region_radius = 1e6;  // start values are good, and weak directions need long steps
   result.logging_type = ceres::SILENT;
@@ -83,6 +92,7 @@ void describe_solution(const TileProblem& problem, const TileState& state, std::
 AdjustSummary solve_with_ceres(const TileProblem& problem, TileState& state, const SolveOptions& options) {
   AdjustSummary result;
   CeresTile tile(problem, state, {CeresOptions::Derivatives::kAnalytic, options.camera_free});
+  // The free directions are those of the start. The constraints hold two frames there, along these directions alone.
   const std::vector<DatumDefect> defects = datum_defects(problem, state);
   constrain_datum(defects, tile);
   if (tile.unknown_blocks().empty()) throw ComputeError("the tile has no observations to adjust");

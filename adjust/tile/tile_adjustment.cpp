@@ -1,3 +1,25 @@
+// The adjustment of one tile, in the order of run():
+//
+//     approach()   from start values to residuals of a few pixels, with a loss that forgets
+//     recover()    parts and frames that still stand apart are put back
+//     screening    every observation is tested, kept or rejected, with falling thresholds; a rough solution follows
+//     solve_fine() the solution with the losses of the problem, and once more where the last test changed much
+//
+// The test. |r|, the length of the residual of an image observation in sigmas, has a Rayleigh distribution where the
+// a-priori sigma is right: P(|r| > t) = exp(-t^2 / 2), with the median sqrt(2 ln 2) = 1.1774. The final threshold of 4
+// sigmas thus rejects 3 good observations of 10 000. The thresholds fall geometrically from 8 times that:
+//
+//     t_i = 8^(1 - i / (n - 1)) max_residual_sigmas,   i = 0 .. n - 1,   n = screening_rounds
+//
+// The a-priori sigma is a guess. Thresholds are multiplied by max(1, s / sqrt(q)), where s is the median residual over
+// 1.1774, and q the mean redundancy of an observation: the residuals of an adjustment are shorter than the errors by
+// sqrt(q). A factor below one is not taken, so that a tile of very good observations does not reject the tails of its
+// own distribution.
+//
+// Tolerances. A Newton step lowers the cost F = 1/2 sum |r|^2 by half its squared length in sigmas of the unknowns. F
+// is about the number of image observations, because each has two numbers with a mean square of one. To stop where a
+// step moves every one of n frame unknowns by k of its sigmas, an iteration must end when it lowers the cost by less
+// than the share 1/2 k^2 n / observations.
 #include "adjust/tile/tile_adjustment.h"
 
 #include <fmt/core.h>
@@ -29,6 +51,8 @@ namespace {
 
 // The lengths of kept image residuals, in a-priori sigmas. Of many points only every n-th is used.
 std::vector<double> residual_lengths(const TileProblem& problem, const TileState& state) {
+  // The median of a sample is good enough to set a threshold. The sample is every n-th point, so that it is the same in
+  // every run.
   constexpr std::int64_t kEnough = 20'000;  // points
   const std::int64_t stride = std::max<std::int64_t>(1, problem.point_count() / kEnough);
   const std::vector<ImageView> views = image_views(problem, state);
@@ -64,7 +88,9 @@ double robust_sigma(const TileProblem& problem, const TileState& state, const Ad
   return robust_sigma(residual_lengths(problem, state), options);
 }
 
-// The mean redundancy of an image residual. Least squares shortens residuals by its square root.
+// The mean redundancy q of a number of an image observation: one minus unknowns over observed numbers. The residuals of
+// least squares are shorter than the errors by sqrt(q). Cameras and mounts are left out: they are few. The lower bound
+// keeps the threshold of a hardly redundant tile within twice the usual one.
 double redundancy(const TileProblem& problem) {
   std::int64_t observations = 0, points = 0;
   for (std::int64_t p = 0; p < problem.point_count(); ++p) {
@@ -98,6 +124,8 @@ class TileAdjuster {
       // From 8 times to once the final threshold.
       const double left = 1 - static_cast<double>(round) / (options_.screening_rounds - 1);
       screen(options_.max_residual_sigmas * std::pow(8, left));
+      // When the rough solutions fit already, further rounds with wider thresholds change no verdict, and the fine
+      // solution follows at once.
       if (fits()) break;
       chosen_.assign(chosen_.size(), 1);
       solve_rough(Stage::kAll);
@@ -130,6 +158,7 @@ class TileAdjuster {
     const double widest = 8 * options_.max_residual_sigmas * (dense ? kApart : 1);
     triangulate_points(problem_, state_, options_);
     chosen_ = active_points();
+    // Below 2 in 1 000 changed verdicts the tracks count as consistent.
     const std::int64_t settled = active_observations() / 500;
     bool falling = true;
     for (int round = 0; round < kMaxRounds; ++round) {
@@ -138,10 +167,13 @@ class TileAdjuster {
       const std::int64_t changed = screen_observations(problem_, state_, threshold, options_, chosen_);
       if (!falling && changed <= settled) break;
       solve_rough(Stage::kFocal, dense ? kFew : kMany);
+      // The rounds go on while they still pay: residuals beyond two sigmas that a round shortens by three tenths or
+      // more.
       const double next = robust_sigma(problem_, state_, options_);
       falling = next >= 2 && next <= 0.7 * sigma;
       if (!dense && !falling) break;  // the later rounds use the same tracks
     }
+    // The tracks that did not take part come back with all their observations and are intersected at the new poses.
     std::vector<std::uint8_t> others(chosen_.size());
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
       others[p] = !chosen_[p];
@@ -178,6 +210,8 @@ class TileAdjuster {
     return true;
   }
 
+  // Every point that a recovered frame observes takes part from now on. The chosen tracks were the longest of the
+  // frames as they stood, and may hardly touch the recovered ones.
   void choose_points_of(const std::vector<LocalFrame>& frames) {
     std::vector<std::uint8_t> wanted(problem_.frames.size(), 0);
     for (const LocalFrame frame : frames) wanted[frame.value] = 1;
@@ -198,6 +232,8 @@ class TileAdjuster {
   // Selects enough tracks for each frame, the longest first, distributed over its images. Returns whether there are
   // more.
   bool select_long_tracks() {
+    // An image of a rig gets its share of the tracks of its frame. A tile that would keep more than half of its
+    // observations anyway is not dense: choosing would save nothing.
     constexpr std::int64_t kEnough = 200, kFewest = 20;  // tracks of a frame, tracks of an image
     std::vector<std::int64_t> images(problem_.frames.size(), 0);
     for (const TileImage& image : problem_.images) ++images[image.frame.value];
@@ -229,6 +265,8 @@ class TileAdjuster {
 
   // Estimates the sigma of the observations. Returns whether the weights have changed enough to matter.
   bool adopt_image_sigma() {
+    // A start needs only rough weights, and another solution of the whole tile for two per cent of the sigma would cost
+    // more than it gives.
     const double settled = options_.only_start ? 0.05 : 0.02;
     const double before = problem_.image_sigma_px;
     if (options_.estimate_image_sigma) estimate_image_sigma(problem_, state_, options_);
@@ -264,8 +302,11 @@ class TileAdjuster {
       if (!chosen_[p])
         std::fill(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0);
     const RobustLoss loss = problem_.image_loss, attitude_loss = problem_.attitude_loss;
+    // Cauchy's scale of s sigmas makes the loss as wide as the residuals are. A narrower one has several minima while
+    // the tile is metres away from its optimum (docs/developer/decisions.md, "Tiles on their own").
     problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_, options_))};
     problem_.attitude_loss = attitude_loss.from_afar();
+    // The tolerance of the head, with k = 0.5 and the observations that take part here.
     const double near = 0.5 * kNear * kNear * frame_unknowns() / static_cast<double>(active_observations());
     solve({std::min(iterations, options_.max_iterations), std::max(kFlat, near), camera_free(stage)});
     problem_.image_loss = loss;
@@ -277,6 +318,8 @@ class TileAdjuster {
   // a start, it iterates until a step would move the frames by less than a tenth of their sigmas.
   AdjustSummary solve_fine() {
     constexpr double kResolved = 0.01, kNear = 0.1;
+    // The tolerance of the head, with k = 0.1 for a start. Otherwise a further iteration must lower the cost by less
+    // than kResolved in all.
     const double cost = static_cast<double>(std::max<std::int64_t>(1, problem_.observation_count()));
     const double tolerance = options_.only_start ? std::max(kResolved, 0.5 * kNear * kNear * frame_unknowns()) / cost
                                                  : std::min(1e-6, kResolved / cost);
@@ -297,6 +340,8 @@ class TileAdjuster {
     for (std::size_t c = 0; c < result.size(); ++c) {
       for (int k = 0; k < state_.cameras[c].size(); ++k) {
         const ParameterRank rank = parameter_rank(state_.cameras[c].model(), k);
+        // High powers of the radius, and a principal point that is confused with a rotation, take up the bend of a tile
+        // that few images determine. They need more images than the focal length.
         const bool first = rank == ParameterRank::kLeading;
         const int needed = first                          ? options_.min_images_focal
                            : rank == ParameterRank::kHigh ? options_.min_images_radial3

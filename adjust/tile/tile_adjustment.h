@@ -62,6 +62,7 @@ struct AdjustSummary {
   std::string text;  // one line
 };
 
+// When the solver of a tile ends, and which cameras it estimates.
 struct SolveOptions {
   int max_iterations = 50;
   double function_tolerance = 1e-6;        // ends when a step lowers the cost by a smaller share

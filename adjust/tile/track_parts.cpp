@@ -1,3 +1,5 @@
+// The parts of a track are found one after the other: the largest consistent set of the observations that are left
+// (consistent_rays.h), until less than two are left, or what is found is no point of its own.
 #include "adjust/tile/track_parts.h"
 
 #include <algorithm>
@@ -70,6 +72,8 @@ class TrackPartFinder {
     }
   }
 
+  // Rejected observations of a good track may intersect close to its point. If more than half of the earlier
+  // observations fit the new point within the threshold, it is the same ground point.
   bool same_point(const Eigen::Vector3d& point) const {
     const auto passing = std::count_if(taken_.begin(), taken_.end(), [&](const PointView& view) {
       return residual_sigmas(view, point) <= threshold_;
@@ -90,6 +94,7 @@ class TrackPartFinder {
 
 TrackParts find_track_parts(const TileProblem& problem, const TileState& state, double threshold_sigmas,
                             const AdjustOptions& options) {
+  // The rows of tie points come first and are those of the track file; control points follow.
   std::int64_t rows = 0;
   for (std::int64_t p = 0; p < problem.point_count(); ++p)
     if (problem.points[p].role == PointRole::kTie) rows = problem.begin[p + 1];
@@ -107,6 +112,7 @@ std::vector<std::int64_t> rows_of_split(const TrackSet& tracks, const TrackParts
   std::vector<std::int64_t> rows(parts.size());
   for (std::size_t row = 0; row < rows.size(); ++row) rows[row] = static_cast<std::int64_t>(row);
   for (std::size_t t = 0; t < tracks.id.size(); ++t)
+    // The order within a part stays that of the images.
     std::stable_sort(rows.begin() + tracks.begin[t], rows.begin() + tracks.begin[t + 1],
                      [&](std::int64_t a, std::int64_t b) {
                        return parts[static_cast<std::size_t>(a)] < parts[static_cast<std::size_t>(b)];
@@ -114,6 +120,7 @@ std::vector<std::int64_t> rows_of_split(const TrackSet& tracks, const TrackParts
   return rows;
 }
 
+// A part begins where the number of the part changes within a track.
 TrackSet split_tracks(const TrackSet& tracks, const TrackParts& parts) {
   const std::vector<std::int64_t> rows = rows_of_split(tracks, parts);
   TrackSet split;
