@@ -1,3 +1,14 @@
+// Closing triangles. For the links S_ab (b -> a), S_bc (c -> b) and S_ac (c -> a), errors as steps in the models b, c,
+// c respectively, the loop is
+//
+//     S_ac^-1 S_ab S_bc = E(T xi_ab + xi_bc - xi_ac),   T = step_through(S_bc),
+//
+// and its squared length in its covariance is chi-square with seven degrees of freedom. A wrong link agrees with
+// itself: only loops reveal it. In a block whose stated errors are too small, no triangle would close; the limit is
+// therefore multiplied by the factor by which the median exceeds that of chi-square (inflation()).
+//
+// The width of the loss in average_links() is the value that chi-square(7) exceeds with one per cent, inflated in the
+// same way. A good link, with squares of about 7, keeps half of its weight; one of ten times the width a hundredth.
 #include "adjust/models/linked_models.h"
 
 #include <fmt/core.h>
@@ -23,7 +34,7 @@ namespace {
 double chi_square_median(int degrees) { return chi_square_quantile(0.5, degrees); }
 
 // With M: x -> s R x + t from another frame, a step xi in the target frame of M is this matrix times xi in the other
-// frame.
+// frame: M^-1 E(w, q, d) M = E(R'w, q, R'(w x t + q t + d) / s).
 Block7 step_through(const Similarity& m) {
   const Eigen::Matrix3d back = m.rotation.conjugate().toRotationMatrix();
   Block7 result = Block7::Zero();
@@ -55,6 +66,7 @@ void find_links(LinkedModels& linked, const LinkOptions& options) {
     for (std::size_t i = 0; i < place.entries.size(); ++i)
       for (std::size_t j = i + 1; j < place.entries.size(); ++j) {
         SharedRows& rows = shared[{place.entries[i].model, place.entries[j].model}];
+        // Every two models that share a place are candidates for a link. Places are ascending, and so are their rows.
         (place.image ? rows.images : rows.points).emplace_back(place.entries[i].row, place.entries[j].row);
       }
   for (const auto& [models, rows] : shared)
@@ -100,6 +112,7 @@ std::vector<double> trust(const LinkedModels& linked, const LinkOptions& options
     for (const std::size_t l : t.links) ++count[l], closed[l] += t.squares <= limit;
   std::vector<double> result(linked.links.size());
   for (std::size_t l = 0; l < linked.links.size(); ++l)
+    // As in rotation_averaging.cpp, one half is added for an open triangle.
     result[l] = linked.links[l].agreeing * (closed[l] + 0.5) / (count[l] + 1);
   return result;
 }
@@ -120,6 +133,7 @@ void chain(LinkedModels& linked, const LinkOptions& options) {
   for (std::int32_t first = 0; first < std::ssize(linked.models); ++first) {
     if (linked.reference[nth(first)] >= 0) continue;
     linked.reference[nth(first)] = first;
+    // The frame of the part is that of its first model as given, not the one about its centroid.
     linked.similarity[nth(first)].translation = linked.centre[nth(first)];
     for (std::vector<std::int32_t> open{first}; !open.empty();) {
       const std::int32_t from = open.back();
@@ -178,6 +192,7 @@ void LinkedModels::find_parts() {
   for (const ModelLink& link : links)
     if (link.kept) joined.unite(link.a, link.b);
   for (std::int32_t m = 0; m < std::ssize(models); ++m) reference[nth(m)] = joined.find(m);
+  // A part keeps its shape: all of its models move by the similarity that takes its lowest model to where it was given.
   std::vector<Similarity> back(models.size());
   for (std::int32_t m = 0; m < std::ssize(models); ++m)
     if (reference[nth(m)] == m)
@@ -185,6 +200,7 @@ void LinkedModels::find_parts() {
   for (std::int32_t m = 0; m < std::ssize(models); ++m)
     similarity[nth(m)] = reference[nth(m)] == m ? Similarity{1, Eigen::Quaterniond::Identity(), centre[nth(m)]}
                                                 : back[nth(reference[nth(m)])] * similarity[nth(m)];
+  // A place that models of two parts share is a place of each part; with a single model it says nothing.
   std::vector<SharedPlace> split;
   for (const SharedPlace& place : places) {
     std::map<std::int32_t, SharedPlace> parts;
@@ -197,6 +213,7 @@ void LinkedModels::find_parts() {
   places = std::move(split);
 }
 
+// Models are sorted by number first. Everything after that goes by rows, and has the same bits in any order of input.
 LinkedModels link_models(const std::vector<Model>& models, const LinkOptions& options) {
   LinkedModels linked;
   linked.given.resize(models.size());
@@ -228,8 +245,11 @@ void average_links(LinkedModels& linked, const LinkOptions& options) {
     for (std::size_t l = 0; l < linked.links.size(); ++l) {
       const ModelLink& link = linked.links[l];
       const SimilarityStep e = gap(linked, link);
+      // The weight of Geman and McClure. It has no corner, so that weights change smoothly from one iteration to the
+      // next.
       const double weight = std::pow(1 + squares[l] / width, -2);
       const Block7 through = step_through(link.similarity), weighted = weight * link.information;
+      // e changes by xi_b - T xi_a, so that the rows of b have P and those of a -T'P.
       equations.add(link.b, link.b, weighted);
       equations.add(link.a, link.a, through.transpose() * weighted * through);
       equations.add(link.b, link.a, -weighted * through);

@@ -1,3 +1,9 @@
+// Puts the assembly back into the coordinates that were given. Inside, a model has coordinates about its centroid c_m,
+// so that rotation, scale and shift of a step are nearly uncorrelated, and models may have any numbering. With S the
+// similarity about the centroids,
+//
+//     given model -> common frame:  X = S (x - c_m),
+//     a step about the origin of b as one about its centroid:  w, q as they are,  d + w x c_b + q c_b.
 #include "adjust/models/model_assembly.h"
 
 #include <cmath>
@@ -40,11 +46,13 @@ AssembledModels assembled(const LinkedModels& linked, const PlaceAdjustment& adj
     const std::size_t row = nth(linked.given[m]);
     Similarity whole = linked.similarity[m];
     whole.translation -= whole.scale * (whole.rotation * linked.centre[m]);
+    // The reference is the identity by definition; its bits would differ by the rounding of the shift to and fro.
     if (linked.reference[m] == static_cast<std::int32_t>(m)) whole = Similarity();
     result.similarity[row] = whole;
     result.part[row] = linked.models[nth(linked.reference[m])].number;
     if (adjusted.covariance.empty()) continue;
     Block7 to_common = Block7::Identity();
+    // A step's d is in units and axes of the model, the shift of similarity.h in those of the common frame.
     to_common.bottomRightCorner<3, 3>() = whole.scale * whole.rotation.toRotationMatrix();
     result.covariance[row] =
         covariance_about_origin(whole, linked.centre[m], to_common * adjusted.covariance[m] * to_common.transpose());

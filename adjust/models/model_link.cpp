@@ -1,3 +1,10 @@
+// The test of a link. The squared residual of a place, or of an attitude, is chi-square with three degrees of freedom;
+// the limit is the value that it exceeds with `rejection_probability`. The first limit is kSampleReach^2 times as large
+// and falls by a factor of four in each round: the similarity of three places is inexact away from them.
+//
+// With `scale_sigmas` the variances are known up to a factor for places and one for attitudes. Both follow from
+// medians. Of m equations, 7 are used up by the similarity, so that the median of a squared residual is expected to be
+// chi^2_0.5(3) (m - 7) / m.
 #include "adjust/models/model_link.h"
 
 #include <Eigen/Cholesky>
@@ -81,6 +88,8 @@ class LinkEstimator {
   Solutions<Similarity, 4> solve(const std::array<std::size_t, 3>& rows) const {
     Solutions<Similarity, 4> found;
     for (const Similarity& s : by_places_.solve(rows)) found.push_back(s);
+    // An image that both models hold gives the rotation. Its centre and another place give the scale by their distance,
+    // and the shift. Two places are then enough, which matters where models share few images.
     for (std::size_t k = 0; k < 3; ++k)
       if (const Turn* of_image = turn(rows[k])) {
         const SimilarityPair &here = places_[rows[k]], &there = places_[rows[(k + 1) % 3]];
@@ -136,6 +145,7 @@ class LinkEstimator {
       for (std::size_t i = 0; i < size(); ++i) {
         if (!agrees[i]) continue;
         const SimilarityPair& place = places_[i];
+        // z = S^-1 x_a. The weight holds the variance of both places in the units of b.
         const Eigen::Vector3d z = s.rotation.conjugate() * (place.to - s.translation) / s.scale;
         const double weight = 1 / (place_factor_ * (place.sigma_from * place.sigma_from +
                                                     place.sigma_to * place.sigma_to / (s.scale * s.scale)));
@@ -159,6 +169,7 @@ class LinkEstimator {
       const SimilarityStep step =
           size.cwiseInverse().asDiagonal() * factor.solve(size.cwiseInverse().asDiagonal() * right);
       s = move_in_model(s, step);
+      // The length of the step in the metric of its own normal equations, sqrt(xi' N xi), has the unit of one sigma.
       constexpr double kSettled = 1e-6;  // sigmas
       if (step.dot(information * step) < kSettled * kSettled) break;
     }
@@ -205,6 +216,8 @@ class LinkEstimator {
 // The number of equations that a link needs.
 int fewest(const LinkOptions& options) { return 7 + options.min_redundancy; }
 
+// The best sample, with its inliers. With known sigmas the threshold is kSampleReach times the limit of a place; with
+// sigmas up to a factor it is found a contrario, or is the extent of what is shared.
 std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimator, const LinkOptions& options,
                                                     double limit, std::uint64_t seed) {
   constexpr double kMiss = 1e-6;  // probability that every sample contains a wrong point
@@ -218,6 +231,7 @@ std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimat
   }
   const double extent = estimator.extent();
   if (!(extent > 0)) return std::nullopt;
+  // A place that is off by a tenth of what the models share says nothing.
   sampling.max_threshold = 0.1 * extent;
   const auto found = ransac(estimator, sampling);
   if (found && estimator.equations(found->consensus.inlier) >= fewest(options)) return found;
@@ -228,6 +242,8 @@ std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimat
   return ransac(estimator, sampling);
 }
 
+// A robust start, then rounds of least squares over the inliers and a new test, until the inliers rest at the final
+// limit. Empty where they become too few.
 std::optional<ModelLink> fit_link(LinkEstimator& estimator, const LinkOptions& options, std::uint64_t seed) {
   constexpr int kRounds = 12;
   if (estimator.equations() < fewest(options)) return std::nullopt;
@@ -244,6 +260,7 @@ std::optional<ModelLink> fit_link(LinkEstimator& estimator, const LinkOptions& o
   ModelLink link;
   for (int round = 0; round < kRounds; ++round) {
     if (!estimator.adjust(agrees, 10, s, link.information)) return std::nullopt;
+    // The factors are held in the second half. Factors and inliers that follow each other might not come to rest.
     if (options.scale_sigmas && round < kRounds / 2) estimator.take_factors(s, agrees);
     // The limit becomes narrower in every round.
     const double factor = std::max(1.0, kSampleReach / std::pow(2, round));

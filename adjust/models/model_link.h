@@ -2,11 +2,9 @@
 // (Kalantari 2009, chapter 9: similarity from three points).
 //
 // A model is a set of points and images in a frame of its own, free in place, attitude and scale. Steps of a similarity
-// A model is a set of points and images in a frame of its own, free in place, attitude and scale. Steps of a similarity
 // S (model -> common frame) are taken in the model's own frame and units, xi = (w, q, d):
 //
-//     S E(xi),   E(xi): x -> x + w x x + q x + d            so that    S^-1 X  moves by  -(w x z + q z + d),  z = S^-1
-//     X
+//     S E(xi),   E(xi): x -> x + w x x + q x + d;    S^-1 X moves by -(w x z + q z + d),   z = S^-1 X
 //
 // Nothing then depends on the frames of the models. For a link b -> a the residuals are taken in b: of a point or
 // projection centre S^-1 x_a - x_b, with variance sigma_b^2 + sigma_a^2 / s^2; of an image's attitude Log(R' Q_a' Q_b),

@@ -1,3 +1,15 @@
+// Elimination of the places. With J = by_model_step(z) the derivative of S^-1 X by the step of its model, z = S^-1 X,
+// the residual r of an entry changes by J xi + (R'/s) dX. The normal matrix of X is (sum 1 / (s sigma)^2) I, the
+// `weight` of its Mean, and the eliminated equations are
+//
+//     N_mm += w J'J,   N_mn -= B_m B_n' / weight,   B_m = w / s J'R',   w = 1 / sigma^2
+//
+// X itself is the weighted mean of S x, so that the right side has no term of X. Attitudes are treated in the same way:
+// Log(Q'A R) changes by w + R' da.
+//
+// The test of an entry. The residual of an entry from the weighted mean of all has the variance sigma^2 (1 - w / sum
+// w). Its square over that is chi-square with three degrees of freedom, up to the factor by which all stated sigmas are
+// too small (inflation()).
 #include "adjust/models/place_adjustment.h"
 
 #include <algorithm>
@@ -23,6 +35,7 @@ class PlaceEquations {
     SimilarityEquations equations(linked_.held());
     result_.converged = false;
     while (result_.iterations < options_.max_iterations && !result_.converged) {
+      // Verdicts stay in the second half, so that the iteration comes to an end.
       const std::int64_t changed = result_.iterations < options_.max_iterations / 2 ? screen() : 0;
       ++result_.iterations;
       factorise(equations);
@@ -41,6 +54,7 @@ class PlaceEquations {
     Eigen::Quaterniond rotation;
     double weight = 0, rotation_weight = 0;
   };
+  // X = sum w S x / sum w with w = 1 / (s sigma)^2. The attitude starts at that of the first kept entry.
   Mean mean(const SharedPlace& place) const {
     Mean m{Eigen::Vector3d::Zero(), Eigen::Quaterniond::Identity(), 0, 0};
     for (const auto& e : place.entries) {
@@ -51,6 +65,7 @@ class PlaceEquations {
       m.rotation_weight += rotation_weight(e);
     }
     m.position /= m.weight;
+    // The mean of rotations that differ by little: three iterations bring it to rounding.
     for (int iteration = 0; iteration < 3 && place.image; ++iteration) {
       Eigen::Vector3d turn = Eigen::Vector3d::Zero();
       for (const auto& e : place.entries)
@@ -82,6 +97,7 @@ class PlaceEquations {
     double place = 0, turn = 0;
   };
   Misfit misfit(const SharedPlace::Entry& e, const Mean& m) const {
+    // A single entry has no residual and no variance.
     constexpr double kAlone = 1e-12;
     const double free = std::max(kAlone, 1 - weight(e) / m.weight);
     Misfit result{(in_model(e, m.position) - e.position).squaredNorm() / (e.sigma * e.sigma * free)};
@@ -115,6 +131,7 @@ class PlaceEquations {
     for (SharedPlace& place : linked_.places) {
       const std::vector<SharedPlace::Entry> before = place.entries;
       for (auto& e : place.entries) e.kept = true;
+      // One outlier pulls the mean, so that good entries may fail as well. Only the worst one is left out at a time.
       for (std::size_t left = place.entries.size(); left > 1;) {
         const Mean m = mean(place);
         SharedPlace::Entry* worst = nullptr;
@@ -127,6 +144,7 @@ class PlaceEquations {
         }
         if (worst == nullptr) break;
         worst->kept = false;
+        // An entry alone says nothing of two models.
         if (--left == 1)
           for (auto& e : place.entries) e.kept = false;
       }
@@ -160,6 +178,7 @@ class PlaceEquations {
             common[{place.entries[i].model, place.entries[j].model}] += place.image ? 6 : 3;
     DisjointSets joined(static_cast<std::int32_t>(linked_.models.size()));
     for (const auto& [pair, equations] : common)
+      // A similarity has seven unknowns.
       if (equations >= 7) joined.unite(pair.first, pair.second);
     bool split = false;
     for (ModelLink& link : linked_.links) {
@@ -184,6 +203,9 @@ class PlaceEquations {
     }
   }
 
+  // Adds the reduced equations of every place with kept entries, at the present similarities, and counts squares and
+  // redundancy: a place of n entries has 3 (n - 1) equations, or 6 (n - 1) with attitudes; a model that is not held has
+  // seven unknowns.
   void linearise(SimilarityEquations& equations) {
     equations.clear();
     result_.weighted_squares = 0;
@@ -211,6 +233,7 @@ class PlaceEquations {
         WeightedRows row{e.model, w / s.scale * by_step.transpose() * back, Eigen::Matrix<double, 7, 3>::Zero()};
         result_.weighted_squares += w * r.squaredNorm();
         if (place.image) {
+          // Attitudes are free of position and scale: they add to the rotation of the model alone.
           const double v = rotation_weight(e);
           const Eigen::Vector3d turn = turn_in_model(e, m.rotation);
           own.topLeftCorner<3, 3>().diagonal().array() += v;

@@ -71,6 +71,7 @@ inline std::vector<SharedPlace> shared_places(const std::vector<Model>& models) 
     for (std::int32_t i = 0; i < std::ssize(models[nth(m)].images); ++i)
       keys.push_back({models[nth(m)].images[nth(i)].number, m, i, true});
   }
+  // Points before images, then by number and model: entries of one place are then neighbours.
   std::sort(keys.begin(), keys.end());
   for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
     SharedPlace place;

@@ -35,7 +35,7 @@ class SimilarityEquations {
     blocks_.clear();
     std::fill(right_.begin(), right_.end(), SimilarityStep::Zero());
   }
-  // Adds a block with the rows of m and the columns of n.
+  // Adds a block with the rows of m and the columns of n. Callers add both (m, n) and (n, m); the lower one is kept.
   void add(std::int32_t m, std::int32_t n, const Block7& block) {
     if (row_[nth(m)] < row_[nth(n)] || row_[nth(n)] < 0) return;  // the lower triangle
     blocks_.try_emplace({row_[nth(m)], row_[nth(n)]}, Block7::Zero()).first->second += block;
@@ -56,6 +56,8 @@ class SimilarityEquations {
     factor_.compute(matrix);
     constexpr double kOpen = 1e-14;  // smallest share of a diagonal element that the elimination may leave
     const Eigen::VectorXd diagonal = matrix.diagonal();
+    // The pivots come in the order of the elimination. A similarity is open where a pivot is nothing but the rounding
+    // of its diagonal element.
     const auto& row = factor_.permutationPinv().indices();
     for (int i = 0; i < diagonal.size(); ++i) {
       if (factor_.vectorD()(i) > kOpen * diagonal(row[i])) continue;
@@ -109,6 +111,9 @@ class SimilarityEquations {
     Eigen::VectorXd diagonal;
     double operator()(int i, int j) const { return i == j ? diagonal(i) : below.coeff(std::max(i, j), std::min(i, j)); }
   };
+  // Works in place, from the last column to the first: the columns after j hold Z already, column j still holds L.
+  // `sum` is Z_RR L_Rj. Of Z_RR only the lower triangle is stored, so that an entry (b, a) adds to sum[a] and to
+  // sum[b].
   SelectedInverse selected_inverse() const {
     SelectedInverse z{factor_.matrixL().nestedExpression(), factor_.vectorD().cwiseInverse()};
     using Column = Eigen::SparseMatrix<double>::InnerIterator;
