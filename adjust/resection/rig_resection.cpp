@@ -1,3 +1,14 @@
+// The cost of a pose is
+//
+//     sum min(|r_i|^2, t^2) + |d|^2,
+//
+// with r_i the whitened residuals (rig_sights.h), t = max_error_sigmas, and d the whitened difference from the
+// approximate pose. A good residual of two numbers has |r| > 4 with the probability exp(-8) = 0.0003. The truncated
+// cost is what RANSAC and the refinement have in common, so that a refined pose can be compared with a sample.
+//
+// Three points have up to eight poses, and points near a critical surface leave two poses with nearly equal residuals.
+// The best sixteen samples are therefore all refined. Poses whose costs differ by less than nine are equally good: a
+// difference of log-likelihoods of 4.5 is odds of 90. Two such poses at different places are refused.
 #include "adjust/resection/rig_resection.h"
 
 #include <fmt/core.h>
@@ -55,6 +66,7 @@ Pose refine(std::span<const RigSight> sights, const Approximate& known, Pose pos
   const auto value_at = [&](const Pose& p) {
     return cost(sights, p, limit_squared) + departure(known, p).squaredNorm();
   };
+  // The damping begins nearly at Gauss-Newton, since the start is near.
   double damping = 1e-6, current = value_at(pose);
   for (int iteration = 0; iteration < 30 && damping < 1e6; ++iteration) {
     PoseIncrement right;
@@ -98,6 +110,7 @@ std::vector<Pose> best_poses(std::span<const RigSight> sights, const RigResectio
   return poses;
 }
 
+// Observations are counted by points: two cameras of a rig that see one point do not make two.
 std::size_t distinct_points(std::span<const RigSight> sights, const std::vector<std::uint8_t>* agrees = nullptr) {
   std::set<std::int64_t> ids;
   for (std::size_t i = 0; i < sights.size(); ++i)
@@ -112,6 +125,7 @@ double line_ratio_of(std::span<const RigSight> sights, const std::vector<std::ui
   return line_ratio(points);
 }
 
+// The largest angle between two inlier points, seen from the rig. It is the smallest cosine.
 double largest_angle_deg(std::span<const RigSight> sights, const std::vector<std::uint8_t>& agrees, const Pose& pose) {
   std::vector<Eigen::Vector3d> units;
   for (std::size_t i = 0; i < sights.size(); ++i)
@@ -137,6 +151,7 @@ std::vector<Candidate> equally_good(std::span<const RigSight> sights, const Appr
   std::vector<Candidate> distinct;
   for (const Candidate& candidate : refined) {
     if (candidate.cost > refined.front().cost + kClear) break;
+    // Poses within 10 cm and 0.3 degrees are the same solution before its last iterations.
     const auto same = [&](const Candidate& other) {
       return (other.pose.centre - candidate.pose.centre).norm() < 0.1 &&
              rotation_angle(other.pose.rotation, candidate.pose.rotation) < 0.005;
@@ -146,6 +161,8 @@ std::vector<Candidate> equally_good(std::span<const RigSight> sights, const Appr
   return distinct;
 }
 
+// Tests the pose: enough inlier points, not on one line, and a covariance within the bound. Fills in everything except
+// the pose.
 void assess(std::span<const RigSight> sights, const Approximate& known, const RigResectionOptions& options,
             RigResection& result) {
   const double limit_squared = options.max_error_sigmas * options.max_error_sigmas;
@@ -163,11 +180,13 @@ void assess(std::span<const RigSight> sights, const Approximate& known, const Ri
   if (result.points < needed)
     throw ComputeError(
         fmt::format("only {} of {} points agree with one pose, {} are needed", result.points, all, needed));
+  // The inliers may lie on a line although all points together do not.
   if (line_ratio_of(sights, result.agrees) < options.min_line_ratio)
     throw ComputeError("the points lie on one line, about which the rig could turn freely; measure one off the line");
   PoseIncrement right;
   const PoseNormal normal = normal_matrix(sights, known, result.pose, limit_squared, right);
   result.covariance = normal.ldlt().solve(PoseNormal::Identity());
+  // Points near a critical surface pass every test of residuals; only the covariance shows them.
   const double sigma = std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace());
   if (!(sigma <= options.max_position_sigma_m) || !(result.covariance.diagonal().array() >= 0).all())
     throw ComputeError(
@@ -204,6 +223,7 @@ RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOpti
   const std::vector<Candidate> candidates = equally_good(sights, known, found, limit_squared);
   RigResection result;
   result.pose = candidates.front().pose;
+  // A pose that is refused for its points or its precision has a better reason than the number of its rivals.
   assess(sights, known, options, result);
   if (candidates.size() > 1)
     throw ComputeError(

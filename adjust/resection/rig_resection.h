@@ -18,6 +18,8 @@
 
 namespace megablock {
 
+// Points on one line do not determine the rotation about it, and points within 20 degrees determine the pose weakly
+// (Cannelle 2013). The first is refused, the second is warned of.
 struct RigResectionOptions {
   double max_error_sigmas = 4;   // length of the whitened residual of an inlier
   int samples = 500;             // samples of three points; fewer when there are fewer triplets or the result is clear

@@ -1,3 +1,10 @@
+// Whitening. The covariance of a residual is C = sigma^2 I + (J R) C_X (J R)', with its Cholesky factor
+//
+//     L = | a 0 |,   a = sqrt(C_00), b = C_10 / a, c = sqrt(C_11 - b^2),   L^-1 v = (v_0 / a, (v_1 - b v_0 / a) / c).
+//         | b c |
+//
+// The residual and its derivative are multiplied by L^-1. The dependence of C on the pose is left out of the
+// derivative: it is of second order where residuals are small.
 #include "adjust/resection/rig_sights.h"
 
 #include <Eigen/Cholesky>
@@ -41,6 +48,7 @@ void add_normal_equations(std::span<const RigSight> sights, const Pose& pose, do
 
 Solutions<Pose, 8> RigSightEstimator::solve(const std::array<std::size_t, 3>& rows) const {
   const RigSight &a = sights_[rows[0]], &b = sights_[rows[1]], &c = sights_[rows[2]];
+  // Two cameras of a rig may see the same point. Two of its rays do not make two points of a sample.
   if (a.id == b.id || a.id == c.id || b.id == c.id) return {};
   return solve_gp3p({a.ray.origin, b.ray.origin, c.ray.origin}, {a.ray.direction, b.ray.direction, c.ray.direction},
                     {a.point, b.point, c.point});
