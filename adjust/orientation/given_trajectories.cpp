@@ -1,3 +1,13 @@
+// The elimination of a chain of n frames, in the notation of given_trajectories.h. With y_k the right side and x_k the
+// step of frame k (six numbers), frame k is eliminated when the equations of the frames before it have been added:
+//
+//     carried:     S_k and y_k                           (`normal`, `right`)
+//     eliminated:  s_k = S_k^-1 y_k,  B_k = S_k^-1 C_k   (`solved`, `by_next`)
+//     next:        S_k+1 = D_k+1 - C_k' B_k,  y_k+1 = b_k+1 - C_k' s_k
+//     back:        x_k = s_k - B_k x_k+1
+//
+// s_k and B_k take 42 numbers a frame. They are kept for one piece of 256 frames only; on the way back each piece is
+// eliminated again from the equations carried to its beginning. The price is one more elimination.
 #include "adjust/orientation/given_trajectories.h"
 
 #include <Eigen/Cholesky>
@@ -17,6 +27,7 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+// Cauchy's loss with the scale of the other losses: three sigmas.
 constexpr RobustLoss kForgetting{RobustLoss::Kind::kCauchy, 3};
 constexpr std::ptrdiff_t kNone = -1;
 
@@ -26,7 +37,7 @@ struct Trajectory {
   std::vector<std::size_t> ties;  // [frames - 1]
 };
 
-// The rows that tie a frame to its neighbours in its trajectory.
+// The rows that tie a frame to its neighbours in its trajectory: none, one (an end) or two.
 struct Neighbours {
   std::array<std::ptrdiff_t, 2> row{kNone, kNone};
   bool full() const { return row[1] != kNone; }
@@ -40,6 +51,8 @@ IndexedVector<FrameIndex, Neighbours> neighbours_of(const Block& block, const Bl
   const auto apart = [&](std::size_t row) {
     return std::abs(block.relative_poses[row].to.value - block.relative_poses[row].from.value);
   };
+  // Frames of one pass are neighbours in the block's order. Ties to a nearer frame are therefore the odometry, and ties
+  // to a frame far away are closures, which the chain cannot hold.
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return apart(a) < apart(b); });
   IndexedVector<FrameIndex, Neighbours> neighbours(block.frames.size(), Neighbours());
   for (const std::size_t row : order) {
@@ -73,6 +86,7 @@ struct Agreement {
   double squares = 0;
   std::int64_t components = 0;
   void add(double squared_norm, int count) {
+    // The loss damps outliers: a few wrong positions do not make a good trajectory worth adjusting.
     squares += kForgetting.evaluate(squared_norm)[0];
     components += count;
   }
@@ -112,6 +126,7 @@ class TrajectoryAdjuster {
       for (int step = 0; step < kMostSteps; ++step) {
         solve(loss);
         const double next = cost_of(trial_, loss);
+        // A step that does not lower the cost is not taken. The poses stay as they are.
         if (!(next < cost)) break;
         std::swap(poses_, trial_);
         if (next > 0.999 * cost) break;
@@ -150,6 +165,7 @@ class TrajectoryAdjuster {
     const RelativePose& tie = block_.relative_poses[trajectory_.ties[k]];
     const TileProblem::RelativeTerm term{LocalFrame(0), LocalFrame(1), tie.pose, tie.rotation_sigma_rad,
                                          tie.position_sigma_m};
+    // The chain may run against the direction of a tie.
     const bool forward = tie.from == trajectory_.frames[k];
     const RelativeResidual r = linearise_relative(forward ? here : next, forward ? next : here, term);
     return {r.residual, forward ? r.by_from : r.by_to, forward ? r.by_to : r.by_from};
@@ -167,6 +183,7 @@ class TrajectoryAdjuster {
     return sum;
   }
 
+  // N += w J'J, y -= w J'r.
   static void add_prior(const FrameResidual3& r, const RobustLoss& loss, Carried& sum) {
     const double weight = loss.evaluate(r.residual.squaredNorm())[1];
     sum.normal.noalias() += weight * r.by_frame.transpose() * r.by_frame;
@@ -184,6 +201,7 @@ class TrajectoryAdjuster {
     Matrix6 coupling = Matrix6::Zero();
     if (k + 1 < poses_.size()) {
       const Tie tie = tie_at(k);
+      // The weight of iterative reweighting, rho' of the squared residual.
       const double weight = loss.evaluate(tie.residual.squaredNorm())[1];
       carried.normal.noalias() += weight * tie.by_this.transpose() * tie.by_this;
       carried.right.noalias() -= weight * tie.by_this.transpose() * tie.residual;
@@ -192,6 +210,7 @@ class TrajectoryAdjuster {
       next.right.noalias() = -weight * tie.by_next.transpose() * tie.residual;
     }
     carried.normal.diagonal() *= 1 + kDamping;
+    // S_k of the head, with the observations of frame k and its tie to the next one in it.
     const Eigen::LDLT<Matrix6> factor(carried.normal);
     const Eliminated result{factor.solve(carried.right), factor.solve(coupling)};
     next.normal.noalias() -= coupling.transpose() * result.by_next;
@@ -215,6 +234,7 @@ class TrajectoryAdjuster {
       for (std::size_t k = p * kPiece; k < std::min((p + 1) * kPiece, poses_.size()); ++k)
         piece.push_back(eliminate(k, loss, beginning[p]));
       for (std::size_t i = piece.size(); i-- > 0;) {
+        // x_k = s_k - B_k x_k+1.
         next = piece[i].solved - piece[i].by_next * next;
         trial_[p * kPiece + i] = pose_update(poses_[p * kPiece + i], next);
       }
@@ -232,6 +252,7 @@ void adjust_trajectory(const Block& block, const ObservationOptions& use, const 
   std::vector<Pose> given;
   for (const FrameIndex frame : trajectory.frames) given.push_back(state.frames[frame]);
   TrajectoryAdjuster adjuster(block, use, trajectory, std::move(given));
+  // Relative poses alone have no datum, and nothing to be compared with.
   if (!adjuster.observed()) return;
   const double before = adjuster.mean_square();
   if (before <= limit) return;
@@ -260,6 +281,7 @@ GivenTrajectoryChange adjust_trajectories(const Block& block, const ObservationO
     for (const FrameIndex frame : trajectory.frames) done[frame] = 1;
     adjust_trajectory(block, use, trajectory, options.max_mean_square, state, change);
   };
+  // A chain starts at its end. A ring has none and is cut at its lowest frame, so that one of its ties does not count.
   for (const bool rings : {false, true})  // chains with ends first, then rings
     for (FrameIndex f(0); neighbours.contains(f); ++f.value) {
       const Neighbours& own = neighbours[f];

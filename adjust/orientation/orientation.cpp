@@ -1,3 +1,15 @@
+// The steps of run(), and what each of them leaves for the next one:
+//
+//     average()          rotations of the frames from those of the pairs; pairs that disagree are dropped
+//     first_centres()    directions and lengths of the baselines, and centres from them, up to a similarity
+//     check_verticals()  wrong verticals are set aside; the first two steps are repeated with the others
+//     to_ground()        a similarity to the observed positions; the centres are solved once more with them
+//     position()         centres and points from the rays alone, rotations held
+//     adjust()           three adjustments of everything, with limits of 25, 10 and 4 px
+//
+// Errors are angles between rays, so that points need not be projected; a limit in pixels is divided by the smallest
+// focal length. The limits fall with the errors that are left: averaged rotations are good to a degree, the coarse
+// adjustments to some pixels.
 #include "adjust/orientation/orientation.h"
 
 #include <algorithm>
@@ -52,6 +64,7 @@ class Orientation {
     if (!in_ground_) move(similarity_to_free_frame(graph_, values_, known_angles_, metric_rigs()));
   }
 
+  // Frames without a pose get the reason of the last step that lost them.
   OrientationResult result(const BlockState& start) const {
     OrientationResult result;
     result.state = start;
@@ -88,12 +101,15 @@ class Orientation {
     std::vector<RelativeRotation> relative;
     for (const auto& edge : graph_.edges) {
       const auto &a = graph_.images[row(edge.a)], &b = graph_.images[row(edge.b)];
+      // R_ab turns camera a into camera b. Between the frames it is M_b' R_ab M_a, with M the rotation of a mount.
       relative.push_back({a.frame, b.frame, b.mount.rotation.conjugate() * edge.rotation * a.mount.rotation,
                           edge.inliers, edge.rotation_sigma});
     }
     return relative;
   }
 
+  // Given poses are held (sigma 0); attitudes are priors of their own sigma. Edges farther than max_rotation_error_deg
+  // from the average take no part in what follows.
   void average() {
     const std::vector<RelativeRotation> relative = relative_rotations();
     std::vector<std::optional<RotationPrior>> priors(graph_.frames.size());
@@ -102,6 +118,7 @@ class Orientation {
       if (frame.given)
         priors[f] = {frame.given->rotation, 0.0};
       else if (frame.attitude)
+        // A sigma of zero would hold the rotation; 1e-4 rad is far below the errors of averaged rotations.
         priors[f] = {frame.attitude->rotation_cw, std::max(1e-4, frame.attitude->sigma_rad.norm())};
     }
     const AveragedRotations averaged =
@@ -133,6 +150,8 @@ class Orientation {
 
   // Sets aside the verticals that contradict the rotations averaged without them, the positions or the attitudes.
   // Returns whether any are left.
+  // The verticals are judged by rotations that were averaged without them; verticals that confirm each other through
+  // the average would judge themselves.
   bool check_verticals() {
     std::vector<SeenDown> seen;
     std::vector<std::size_t> images;
@@ -169,6 +188,8 @@ class Orientation {
     double variance = 0, count = 0;
     for (const auto& frame : graph_.frames) {
       if (!frame.given && !frame.attitude) continue;
+      // The mean of n attitudes has their mean variance over n. The mounting is the same for all of them, and is not
+      // averaged out.
       if (!frame.given) variance += frame.attitude->sigma_rad.squaredNorm();
       ++count;
     }
@@ -194,10 +215,12 @@ class Orientation {
     for (const Baseline& baseline : baselines_) {
       const auto &a = graph_.images[row(baseline.a)], &b = graph_.images[row(baseline.b)];
       Eigen::Vector3d offset = scale * baseline.length * baseline.direction;
+      // A baseline joins two cameras; the difference of two frames lacks the arms of their mounts, in ground axes.
       if (!known.empty())
         offset += rotations_[row(a.frame)]->conjugate() * a.mount.centre -
                   rotations_[row(b.frame)]->conjugate() * b.mount.centre;
       differences.push_back(
+          // The length of a baseline follows from ratios of depths, so that its error grows with the length.
           {a.frame, b.frame, offset, std::hypot(kRelativeSigma, baseline.sigma) * scale * baseline.length});
     }
     auto priors = known;
@@ -206,6 +229,8 @@ class Orientation {
     const bool linked = !baselines_.empty();
     for (std::size_t f = 0; f < centres.size(); ++f) {
       values_.frames[f].reset();
+      // Without any baseline solve_centres() puts all free nodes at the origin. Only the frames with priors then have a
+      // centre.
       if (rotations_[f] && centres[f] && (linked || priors[f])) values_.frames[f] = Pose{*rotations_[f], *centres[f]};
     }
   }
@@ -214,12 +239,14 @@ class Orientation {
   void to_ground() {
     if (!any_position_) return;
     intersect(3 * kDegree, 1 * kDegree);
+    // The median distance of the points tells an aerial block from a street, where positions on a line leave it open.
     const double distance =
         median_of_kept([](const Eigen::Vector3d&, const Eigen::Vector3d& inside) { return inside.norm(); });
     const auto similarity = similarity_to_ground(graph_, values_, distance, known_angles_);
     if (!similarity) return;
     in_ground_ = true;
     for (auto& rotation : rotations_)
+      // R takes axes of the ground now; X_old = S' (X - t) / s leads to R S'.
       if (rotation) rotation = (*rotation * similarity->rotation.conjugate()).normalized();
     for (Baseline& baseline : baselines_) baseline.direction = similarity->rotation * baseline.direction;
     std::vector<std::optional<CentrePrior>> priors(graph_.frames.size());
@@ -228,6 +255,7 @@ class Orientation {
       const auto& node = graph_.frames[f];
       if (node.given) rotations_[f] = node.given->rotation;
       if (node.position && rotations_[f]) {
+        // The antenna is at C + R' l.
         const Eigen::Vector3d arm = rotations_[f]->conjugate() * node.position->lever_arm;
         priors[f] = CentrePrior{node.position->position - arm, node.position->sigma};
         start[f] = priors[f]->position;
@@ -239,6 +267,8 @@ class Orientation {
   }
 
   void position() {
+    // The second run has half the limit and half the sigma of the rays, because the first one has removed the bend of
+    // the centres from the baselines.
     for (const auto& [limit, sigma] : {std::pair(3.0, 0.01), std::pair(1.5, 0.005)}) {
       intersect(limit * kDegree, 1 * kDegree);
       PositioningOptions positioning;
@@ -261,8 +291,12 @@ class Orientation {
       if (oriented() < 2) throw ComputeError("fewer than two images could be oriented");
       CoarseOptions coarse;
       coarse.observations = options_.observations;
+      // Observations at the limit have three times Cauchy's scale, and a tenth of the weight.
       coarse.loss_scale_px = limit * smallest_focal() / 3;
+      // The next round changes what takes part, so that the first two need not converge.
       if (round.limit_px > 4) coarse.function_tolerance = 1e-3;
+      // The three rounds estimate the focal length of unknown cameras, then every focal length and one radial term,
+      // then two.
       coarse.camera_free = free_intrinsics(round.radial_terms, round.limit_px >= 25);
       adjust_coarsely(block_, graph_, coarse, values_);
       check_focals();
@@ -298,6 +332,7 @@ class Orientation {
       }
       if (found == 0) return;
       intersect(limit, 1 * kDegree);
+      // Frames that come in and go out again would let the loop go on without end.
       if (drop_weak_frames() >= found) return;
     }
   }
@@ -436,6 +471,7 @@ OrientationResult orient_component(const Block& block, const BlockState& start, 
     return start.oriented[frame] ||
            (options.observations.use_position_priors && block.frames[frame].position_prior.has_value());
   };
+  // Positions join parts without any assembly, and given poses are held: such blocks are oriented as a whole.
   if (options.part_frames > 0 && std::ssize(frames) > options.part_frames &&
       std::none_of(frames.begin(), frames.end(), placed))
     return orient_in_parts(block, start, frames, pairs, tracks, options);

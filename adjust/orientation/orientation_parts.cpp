@@ -1,3 +1,12 @@
+// The cut. With d(f) the distance in links of frame f from a frame at the rim, the half of the frames with the smallest
+// d is one part and the rest the other. The rim is the frame farthest from an arbitrary one, so that for a long block
+// the cut goes across it. Both halves are cut again until they have at most `part_frames` frames. Every part then takes
+// in the frames that are linked to its core; neighbouring parts share these, and the similarity between two parts
+// follows from the poses that both have of them.
+//
+// The parts are independent models: each has a position, an attitude and a scale of its own. adjust/models finds them.
+// A frame keeps the pose of the part whose core holds it, because it lies at the rim of all other parts, where poses
+// are worst.
 #include "adjust/orientation/orientation_parts.h"
 
 #include <fmt/core.h>
@@ -35,6 +44,7 @@ std::vector<std::int32_t> by_distance(const PartLinks& links, const std::vector<
     for (const std::int32_t f : ring)
       for (const std::int32_t g : links[row(f)])
         if (left.erase(g) > 0) next.push_back(g);
+    // A set that falls into pieces is searched piece by piece, so that every frame has its place in the order.
     if (next.empty() && !left.empty()) {
       next.push_back(*left.begin());
       left.erase(left.begin());
@@ -44,6 +54,7 @@ std::vector<std::int32_t> by_distance(const PartLinks& links, const std::vector<
   return order;
 }
 
+// Halves `set` until its pieces have at most `most` frames, and appends them to `cores`.
 void cut(const PartLinks& links, const std::vector<std::int32_t>& set, std::size_t most,
          std::vector<std::vector<std::int32_t>>& cores) {
   if (set.size() <= most) {
@@ -66,10 +77,12 @@ constexpr double kCentreSigma = 1e-3, kRotationSigma = 2e-4;
 std::vector<OrientationPart> orientation_parts(const Block& block, const std::vector<FrameIndex>& frames,
                                                const std::vector<VerifiedPair>& pairs, int part_frames) {
   std::vector<FrameIndex> by_name = frames;
+  // Names, unlike indices, do not depend on the order in which images were listed.
   std::sort(by_name.begin(), by_name.end(),
             [&](FrameIndex a, FrameIndex b) { return block.frames[a].name < block.frames[b].name; });
   std::map<FrameIndex, std::int32_t> number;
   for (std::size_t f = 0; f < by_name.size(); ++f) number[by_name[f]] = static_cast<std::int32_t>(f);
+  // Only pairs with a relative orientation link frames: a part must hold together by what orientation uses.
   PartLinks links(by_name.size());
   for (const VerifiedPair& pair : pairs) {
     if (pair.model == PairModel::kNone) continue;
@@ -166,6 +179,8 @@ class PartwiseOrientation {
           part, {}, std::move(found.state.cameras), std::move(found.failed), std::move(found.verticals_aside)};
       for (const FrameIndex frame : part.frames)
         oriented.poses.push_back(found.state.oriented[frame] ? std::optional(found.state.frames[frame]) : std::nullopt);
+      // The graph without tracks is made again, because orient_component() does not hand its own out. It tells what the
+      // part knows of the ground.
       OrientationGraph graph = make_orientation_graph(block_, start_, part.frames, own, TrackSet(), options_);
       leave_out(oriented.verticals_aside, graph);
       oriented.known = known_angles(graph);
@@ -179,6 +194,7 @@ class PartwiseOrientation {
     std::map<FrameIndex, std::vector<std::size_t>> parts_of;  // ascending
     for (std::size_t p = 0; p < parts.size(); ++p)
       for (const FrameIndex frame : parts[p].frames) parts_of[frame].push_back(p);
+    // A pair belongs to every part that holds both of its frames.
     std::vector<std::vector<std::size_t>> rows(parts.size());
     std::vector<std::size_t> both;
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
@@ -193,6 +209,8 @@ class PartwiseOrientation {
     return rows;
   }
 
+  // Only images are shared: the parts have points of their own. Their sigmas are known up to a factor, which the links
+  // take from their misfits.
   void assemble() {
     std::vector<Model> models;
     for (const OrientedPart& oriented : parts_) {
@@ -203,6 +221,7 @@ class PartwiseOrientation {
       models.push_back(std::move(model));
     }
     AssemblyOptions options;
+    // The poses are only start values; nobody reads their covariances.
     options.covariances = false;
     options.links.scale_sigmas = true;
     assembled_ = assemble_models(models, options);
@@ -314,11 +333,16 @@ class PartwiseOrientation {
       const auto weight = static_cast<double>(parts_[p].part.core);
       const Eigen::Quaterniond& rotation = assembled_.similarity[p].rotation;
       up += weight * (rotation * Eigen::Vector3d::UnitZ());
+      // The mean of rotations is the eigenvector of the largest eigenvalue of sum w q q', which does not depend on the
+      // signs of the quaternions (F. Markley, Y. Cheng, J. Crassidis and Y. Oshman, "Averaging quaternions", JGCD 30,
+      // 2007).
       squares += weight * rotation.coeffs() * rotation.coeffs().transpose();
     }
     if (ground.known == GroundAngles::kLevel) ground.turn = rotation_between(up, Eigen::Vector3d::UnitZ());
     if (ground.known == GroundAngles::kAll) {
       ground.turn.coeffs() = symmetric_eigen(squares).vectors.col(3);
+      // The similarities turn the axes of a part, which are those of the ground, into the assembled frame. The way back
+      // is the conjugate.
       ground.turn = ground.turn.conjugate();
     }
     return ground;
@@ -327,6 +351,8 @@ class PartwiseOrientation {
   void to_free_frame(BlockState& state) const {
     const Ground ground = this->ground();
     const OrientationGraph graph = make_orientation_graph(block_, start_, frames_, pairs_, TrackSet(), options_);
+    // First the known angles, then the rest of the free frame: similarity_to_free_frame() keeps the angles that are
+    // known.
     const Similarity level{1, ground.turn, Eigen::Vector3d::Zero()};
     OrientationValues values;
     bool metric = false;

@@ -1,3 +1,10 @@
+// With E = R_to (R_m R_from)' the angle |Log E| says how far a relative pose is contradicted. Frames that fulfilled
+// relative poses join form groups. A contradicted relative pose between two groups predicts the pose of its frame in
+// the smaller group from the larger one, and the movement of the ground
+//
+//     X -> C_after + T (X - C_before),   T = R_after' R_before,   R -> R T',
+//
+// brings the whole group along.
 #include "adjust/orientation/turned_stretches.h"
 
 #include <algorithm>
@@ -12,7 +19,8 @@ namespace {
 
 std::size_t row_of(FrameIndex frame) { return static_cast<std::size_t>(frame.value); }
 
-// The pose of `to` that fulfils the relative pose with the given pose of `from`, and the reverse.
+// The pose of `to` that fulfils the relative pose with the given pose of `from`, and the reverse: R_to = R_m R_from,
+// C_to = C_from + R_from'T.
 Pose predicted_to(const RelativePose& relative, const Pose& from) {
   return {relative.pose.rotation * from.rotation, from.centre + from.rotation.conjugate() * relative.pose.centre};
 }
@@ -62,6 +70,7 @@ class StretchTurner {
     return state_.oriented[relative.from] && state_.oriented[relative.to];
   }
 
+  // Both limits must be exceeded: many sigmas, and an angle that no adjustment leaves by noise.
   bool contradicted(const RelativePose& relative) const {
     const double angle = angle_between(state_.frames[relative.to].rotation,
                                        relative.pose.rotation * state_.frames[relative.from].rotation);
@@ -75,6 +84,7 @@ class StretchTurner {
   void join(std::size_t a, std::size_t b) {
     a = find(a), b = find(b);
     if (a == b) return;
+    // The smaller list is appended to the larger one, so that every frame is copied at most log2(n) times.
     if (members_[a].size() < members_[b].size()) std::swap(a, b);
     group_[b] = a;
     members_[a].insert(members_[a].end(), members_[b].begin(), members_[b].end());
@@ -129,6 +139,7 @@ class StretchTurner {
   std::int64_t try_to_move(const RelativePose& relative) {
     if (!both_oriented(relative) || find(row_of(relative.from)) == find(row_of(relative.to)) || !contradicted(relative))
       return 0;
+    // The larger group is more likely right: most frames are not turned.
     const bool move_to = members_[find(row_of(relative.to))].size() <= members_[find(row_of(relative.from))].size();
     const FrameIndex frame = move_to ? relative.to : relative.from;
     const Pose& before = state_.frames[frame];
@@ -137,6 +148,8 @@ class StretchTurner {
     const Movement movement(before, after);
     const std::vector<FrameIndex>& frames = members_[find(row_of(frame))];
     const auto stay = [](const Pose& pose) { return pose; };
+    // The initial orientation knows nothing of the adjustment that turned the stretch, and is good to some degrees. It
+    // confirms a true turn by tens of degrees, and does not confirm a wrong relative pose.
     if (distance(frames, movement) > 0.5 * distance(frames, stay) || !keeps_positions(frames, movement)) return 0;
     for (const FrameIndex member : frames) state_.frames[member] = movement(state_.frames[member]);
     const auto count = static_cast<std::int64_t>(frames.size());

@@ -1,3 +1,12 @@
+// The test. The rotation vector e from one direction to another is at right angles to both. A small error dx of a
+// direction d turns it by d x dx, so that the covariance of e is [d]x C [d]x'. That matrix is singular along d; adding
+// d d' makes it regular and changes nothing, because e has no part along d. e' (..)^-1 e is then chi-square with two
+// degrees of freedom.
+//
+// The comparison. All pairs of n verticals would be too many, and rotations far apart in the graph are hardly known.
+// Vicinity gives each node the 1st, 2nd, 3rd, 5th, 7th, 10th ... nearest node with a vertical, by the variance of the
+// path between them (Dijkstra). Two disjoint-set forests then hold the verticals that were compared (regions) and those
+// that agree (groups).
 #include "adjust/orientation/vertical_check.h"
 
 #include <Eigen/LU>
@@ -85,12 +94,15 @@ class Vicinity {
     double variance = 0;  // of the rotation to it, along the best path
   };
   std::vector<Near> of(std::int32_t start) {
+    // The search ends after 256 nodes with verticals, of which sixteen are compared at most, or after 2 000 nodes of
+    // any kind. Its cost does not grow with the block.
     constexpr std::size_t kReached = 256, kVisited = 2000;
     std::vector<Near> near{{start, 0}};
     std::size_t reached = 0, wanted = 1, visited = 0;
     using Open = std::pair<double, std::int32_t>;
     std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
     const auto reach = [&](std::int32_t node, double variance) {
+      // `round_` says for which start `best_` holds, so that the array need not be cleared for every node.
       if (variance > kFarthest * kFarthest || (round_[row(node)] == start && best_[row(node)] <= variance)) return;
       round_[row(node)] = start;
       best_[row(node)] = variance;
@@ -145,6 +157,7 @@ class VerticalJudge {
   }
 
  private:
+  // Verticals that are compared are of one region, whether they agree or not: a group is measured against its region.
   void compare(std::size_t i, std::size_t j, double variance) {
     const bool one = agree(shown_[i], shown_[j], variance);
     const auto a = static_cast<std::int64_t>(i), b = static_cast<std::int64_t>(j);
@@ -162,11 +175,14 @@ class VerticalJudge {
     std::size_t all = members.size(), agreeing = 0;
     const std::vector<std::size_t>* largest = nullptr;
     for (const auto& [first, group] : groups) {
+      // Where positions or attitudes tell what is down, a group is judged by them alone. The size of a wrong group
+      // counts for nothing then.
       if (down && !is_down(group, *down)) {
         for (const std::size_t i : group) verdicts[i] = VerticalVerdict::kAgainstGround;
         all -= group.size();
         continue;
       }
+      // `agreeing` counts the verticals that agree with any other, in this or another group.
       if (group.size() >= kFewest) agreeing += group.size();
       if (!largest || group.size() > largest->size()) largest = &group;
     }
@@ -225,6 +241,7 @@ std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eig
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!rotation[row(seen[i].node)]) continue;
     const Eigen::Matrix3d to_world = rotation[row(seen[i].node)]->conjugate().toRotationMatrix();
+    // Directions in the common axes of the averaged rotations: R'd, covariances R'S R.
     shown.push_back({i, seen[i].node, seen[i].camera, to_world * seen[i].direction,
                      to_world * seen[i].covariance * to_world.transpose(), to_world * seen[i].by_camera});
   }
@@ -233,6 +250,7 @@ std::vector<VerticalVerdict> judge_verticals(const std::vector<std::optional<Eig
   VerticalJudge judge(std::move(shown));
   judge.compare(rotation.size(), edges, kept);
   const std::vector<VerticalVerdict> found = judge.verdicts(down);
+  // Where every vertical that could be compared is wrong, those that could not be compared are probably wrong too.
   const bool none = !found.empty() && std::count(found.begin(), found.end(), VerticalVerdict::kBelieved) == 0;
   std::vector<VerticalVerdict> verdicts(seen.size(), none ? VerticalVerdict::kNoConsensus : VerticalVerdict::kBelieved);
   for (std::size_t i = 0; i < found.size(); ++i) verdicts[index[i]] = found[i];
@@ -289,6 +307,7 @@ std::vector<SetAsideVertical> against_given_poses(const Block& block) {
     by_pose.down = same_direction(by_pose.direction, down, by_pose.covariance);
     judged.push_back(by_pose);
   }
+  // A single direction that is shared by four fifths and is not down says that the world of the poses is tilted.
   const bool level = judged.size() < 2 || 5 * most_alike(judged) < 4 * judged.size();
   std::vector<SetAsideVertical> aside;
   for (const JudgedByPose& one : judged)
@@ -304,6 +323,7 @@ bool given_poses_join(const Block& block, ImageIndex a, const AxisDirection& see
   const auto rotation_a = given_rotation(block, a), rotation_b = given_rotation(block, b);
   if (!rotation_a || !rotation_b) return true;
   const Eigen::Matrix3d relative = (*rotation_b * rotation_a->conjugate()).toRotationMatrix();
+  // The errors of both given poses, and of both walls.
   const double variance = 2 * (kApproximate * kApproximate + kLeaning * kLeaning);
   return same_direction(
       relative * seen_a.direction, seen_b.direction,

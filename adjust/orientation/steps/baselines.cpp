@@ -1,3 +1,18 @@
+// The formulas of the three steps of baselines.h. For a common track with the rays a, b (unit, ground axes) and the
+// base t = C_b - C_a:
+//
+//     d_a a - d_b b = t,   n = a x b,   d_a = (t x b)'n / n'n,   d_b = (t x a)'n / n'n
+//     |t'n| / |t x a| = sine of the angle by which b misses the plane of t and a
+//
+// Step 1 minimises sum w (t'n)^2 with w = (1 + x^2)^-2 / |t x a|^2, the weight of Geman and McClure for the angle x in
+// units of 1.5 times the median angle. |t x a| is bounded by 0.02, since the plane is undetermined at the epipole.
+//
+// Step 2. Two baselines e, f at one image see the same distance D of a track there, in units of their lengths l. So
+// log(l_f / l_e) = log(D / l_e) - log(D / l_f), of which the median over the common tracks is taken. Logarithms make
+// the equations linear, and errors of scale equal for long and short baselines.
+//
+// Step 3 is linear in the centres. Axes are independent, with the same pattern and Cauchy weights from the length of
+// the whole residual.
 #include "adjust/orientation/steps/baselines.h"
 
 #include <Eigen/SparseCholesky>
@@ -57,7 +72,9 @@ double epipolar_angle(const CommonTrack& c, const Eigen::Vector3d& t) {
 // The unit direction of the baseline. Its sign puts most points in front. Empty when the rays do not determine it.
 std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>& common,
                                                   const Eigen::Vector3d& start) {
+  // The smallest width of the loss. Exact rays would otherwise have a width of zero.
   constexpr double kSmallest = 0.02 * kDegree;
+  // Iterates eigenvector and weights. Without a start all weights are one in the first iteration.
   const auto refine = [&](std::optional<Eigen::Vector3d> t) {
     for (int iteration = 0; iteration < 15; ++iteration) {
       double scale = kSmallest;
@@ -83,11 +100,14 @@ std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>
     }
     return *t;
   };
+  // Cauchy's loss of 0.2 degrees. It is fixed, so that two results with scales of their own can be compared.
   const auto cost = [&](const Eigen::Vector3d& t) {
     double sum = 0;
     for (const auto& c : common) sum += std::log1p(std::pow(epipolar_angle(c, t) / (0.2 * kDegree), 2));
     return sum;
   };
+  // Two starts: all equations with equal weights, and the base of the pair. The first one fails where many matches are
+  // wrong, the second where the pair took a wrong twin.
   Eigen::Vector3d best = refine(std::nullopt);
   if (start.squaredNorm() > 0)
     if (const Eigen::Vector3d other = refine(start); cost(other) < cost(best)) best = other;
@@ -101,6 +121,7 @@ std::optional<Eigen::Vector3d> baseline_direction(const std::vector<CommonTrack>
     if (da < 0 && db < 0) ++backward;
   }
   if (backward > forward) best = -best;
+  // The direction must put half of the tracks before both images, or it is none.
   if (2 * std::max(forward, backward) < static_cast<int>(common.size())) return std::nullopt;
   return best;
 }
@@ -117,11 +138,13 @@ struct MeasuredBaseline {
   std::vector<Depth> depth_a, depth_b;  // ascending by track
 };
 
+// Depths in units of the base, as logarithms, at both ends.
 void measure_depths(const std::vector<CommonTrack>& common, MeasuredBaseline& baseline) {
   constexpr double kSmallestAngle = 1 * kDegree, kLargestError = 1.5 * kDegree;
   for (const auto& c : common) {
     const Eigen::Vector3d n = c.a.cross(c.b);
     const double n2 = n.squaredNorm();
+    // The distance of a track whose rays meet at less than a degree is too inexact.
     if (n2 < std::pow(std::sin(kSmallestAngle), 2) || epipolar_angle(c, baseline.direction) > kLargestError) continue;
     const double da = baseline.direction.cross(c.b).dot(n) / n2, db = baseline.direction.cross(c.a).dot(n) / n2;
     if (!(da > 0 && db > 0)) continue;
@@ -145,6 +168,8 @@ void keep_best(std::size_t images, std::size_t limit, std::vector<MeasuredBaseli
       const auto np = baselines[p].depth_a.size(), nq = baselines[q].depth_a.size();
       return np != nq ? np > nq : p < q;
     });
+    // A baseline stays if it is among the best of either of its images, so that no image loses all of its baselines to
+    // images with better ones.
     for (std::size_t i = 0; i < std::min(limit, list.size()); ++i) keep[list[i]] = 1;
   }
   std::vector<MeasuredBaseline> kept;
@@ -159,6 +184,8 @@ struct LengthRatio {
   double logarithm, tracks;
 };
 
+// Every two baselines at an image, with at least kFewestTracks common tracks. Depths are ascending by track, so that
+// two lists are merged.
 std::vector<LengthRatio> length_ratios(std::size_t images, const std::vector<MeasuredBaseline>& baselines) {
   struct End {
     std::int32_t baseline;
@@ -184,6 +211,7 @@ std::vector<LengthRatio> length_ratios(std::size_t images, const std::vector<Mea
         }
         if (differences.size() >= kFewestTracks)
           result.push_back({list[i].baseline, list[j].baseline, median(differences),
+                            // A ratio counts by its tracks; those of fifty and more count alike.
                             static_cast<double>(std::min<std::size_t>(differences.size(), 50))});
       }
   return result;
@@ -195,6 +223,7 @@ std::vector<std::optional<double>> solve_lengths(std::size_t count, const std::v
   for (const auto& r : ratios) sets.unite(r.e, r.f);
   std::vector<std::int32_t> size(count, 0);
   for (std::size_t e = 0; e < count; ++e) ++size[row(sets.find(static_cast<std::int32_t>(e)))];
+  // Ratios leave a common scale open: one baseline of the largest part has the length 1.
   const auto largest = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
 
   std::vector<std::int32_t> unknown(count, -1);
@@ -212,6 +241,7 @@ std::vector<std::optional<double>> solve_lengths(std::size_t count, const std::v
     for (const auto& r : ratios) {
       if (sets.find(r.e) != largest) continue;
       const double error = r.logarithm - (value_of(r.f) - value_of(r.e));
+      // L1 by reweighting. The bound of 0.01, one per cent of a length, keeps the weight finite.
       const double weight = r.tracks / (iteration == 0 ? 1 : std::max(0.01, std::abs(error)));
       const std::int32_t e = unknown[row(r.e)], f = unknown[row(r.f)];
       if (e >= 0) entries.emplace_back(e, e, weight), right[e] -= weight * r.logarithm;
@@ -241,6 +271,7 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
   std::vector<MeasuredBaseline> baselines;
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const auto& edge = graph.edges[e];
+    // A pair without a base (rotation only) has no direction to refine.
     if (!usable[e] || !rotations[row(edge.a)] || !rotations[row(edge.b)] || edge.baseline.squaredNorm() == 0) continue;
     const auto common = common_tracks(image_rays[row(edge.a)], image_rays[row(edge.b)]);
     if (common.size() < kFewestTracks) continue;
@@ -250,6 +281,7 @@ std::vector<Baseline> measure_baselines(const OrientationGraph& graph,
     measure_depths(common, baseline);
     if (baseline.depth_a.size() >= kFewestTracks) baselines.push_back(std::move(baseline));
   }
+  // The ratios are quadratic in the baselines of an image.
   constexpr std::size_t kBaselinesPerImage = 20;
   keep_best(graph.images.size(), kBaselinesPerImage, baselines);
 
@@ -282,6 +314,8 @@ class CentreNetwork {
     bool any_prior = false;
     for (std::int32_t i = 0; i < nodes; ++i) {
       ++size[row(sets.find(i))];
+      // Without a prior the sum of all equations leaves a shift open; the lowest node of the largest part is then held
+      // at the origin.
       if (priors[row(i)]) anchored[row(sets.find(i))] = 1, any_prior = true;
     }
     const auto origin = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
@@ -307,6 +341,7 @@ class CentreNetwork {
       of_difference.push_back(weight((centre_[row(d.b)] - centre_[row(d.a)] - d.offset).norm() / d.sigma));
     for (std::size_t i = 0; i < priors_.size(); ++i)
       if (priors_[i])
+        // Cauchy's scale is three sigmas for positions, one sigma for baselines.
         of_prior[i] = weight((centre_[i] - priors_[i]->position).cwiseQuotient(priors_[i]->sigma).norm() / 3);
     std::vector<Eigen::Vector3d> next = centre_;
     for (int axis = 0; axis < 3; ++axis)
@@ -338,6 +373,7 @@ class CentreNetwork {
  private:
   double weight(double error) const { return weighted_ ? 1 / (1 + error * error) : 1; }  // Cauchy
 
+  // The normal equations of one axis: a graph Laplacian of the differences, plus the priors on its diagonal.
   bool solve_axis(int axis, const std::vector<double>& of_difference, const std::vector<double>& of_prior,
                   std::vector<Eigen::Vector3d>& next) const {
     std::vector<Eigen::Triplet<double>> entries;

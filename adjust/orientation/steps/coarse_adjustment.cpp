@@ -1,3 +1,7 @@
+// Puts the graph into the tables of a tile and solves it with Ceres once. Screening is not done here:
+// intersect_tracks() has tested the observations, and the loss forgets those that are far off. Cauchy's loss for
+// positions and verticals stands in for those of the project, because start values are worse than what these losses are
+// made for.
 #include "adjust/orientation/steps/coarse_adjustment.h"
 
 #include <ceres/ordered_groups.h>
@@ -35,6 +39,8 @@ void add_frames(const OrientationGraph& graph, const OrientationValues& values, 
   }
 }
 
+// Parameters that are free and have a finite sigma keep their prior; mounts are held, and every image has a row of its
+// own for its mount.
 void add_cameras(const Block& block, const OrientationGraph& graph, const OrientationValues& values,
                  const CoarseOptions& options, CoarseTile& tile) {
   tile.problem.cameras = graph.cameras;
@@ -47,6 +53,7 @@ void add_cameras(const Block& block, const OrientationGraph& graph, const Orient
     for (int p = 0; p < camera.intrinsics.size(); ++p) {
       const auto k = static_cast<std::size_t>(p);
       const double sigma = camera.prior_sigma[k];
+      // Parameters that are held here need no prior.
       const bool stated = sigma > 0 && std::isfinite(sigma) && contains(options.camera_free[c], p);
       term.sigma[k] = stated ? sigma : std::numeric_limits<double>::infinity();
       any |= stated;
@@ -81,6 +88,8 @@ void add_verticals(const Block& block, const OrientationGraph& graph, CoarseTile
   }
 }
 
+// Points with a position and their kept observations. An observation without a frame, or behind its camera, is left
+// out.
 void add_points(const OrientationGraph& graph, const OrientationValues& values, double inverse_sigma,
                 CoarseTile& tile) {
   TileProblem& problem = tile.problem;
@@ -94,6 +103,7 @@ void add_points(const OrientationGraph& graph, const OrientationValues& values, 
       if (!camera) continue;
       const Intrinsics& intrinsics =
           values.cameras[static_cast<std::size_t>(graph.images[static_cast<std::size_t>(image)].camera)];
+      // Ceres refuses a start at which a residual cannot be evaluated.
       if (!project(intrinsics, to_inside(*camera, *values.points[t])).allFinite()) continue;
       problem.image.push_back(LocalImage(image));
       problem.x.push_back(graph.observations[o].pixel.x());
@@ -117,6 +127,7 @@ void adjust_coarsely(const Block& block, const OrientationGraph& graph, const Co
   add_cameras(block, graph, values, options, tile);
   add_verticals(block, graph, tile);
   add_points(graph, values, 1 / options.observations.image_sigma_px, tile);
+  // The scale is given in pixels; the residuals of a tile are in sigmas.
   tile.problem.image_loss = {RobustLoss::Kind::kCauchy, options.loss_scale_px / options.observations.image_sigma_px};
   tile.problem.position_loss = {RobustLoss::Kind::kCauchy, 3.0};
   tile.problem.vertical_loss = {RobustLoss::Kind::kCauchy, 3.0};

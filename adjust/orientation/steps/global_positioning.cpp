@@ -1,3 +1,9 @@
+// With u = (X - C - o) / |X - C - o|, where o is the arm of the camera in its frame (ground axes), the residual of an
+// observation is (v - u) / sigma, and
+//
+//     by C:  (I - u u') / (|X - C - o| sigma),   by X: the negative of it.
+//
+// Points are eliminated first, as in adjust/tile/solve.cpp.
 #include "adjust/orientation/steps/global_positioning.h"
 
 #include <ceres/loss_function.h>
@@ -61,6 +67,7 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
                        const PositioningOptions& options, OrientationValues& values) {
   ceres::Problem::Options problem_options;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  // The scales are in sigmas, of rays and of positions.
   ceres::CauchyLoss ray_loss(2.0), position_loss(3.0);
   ceres::Problem problem(problem_options);
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -73,6 +80,7 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
       const auto& image = graph.images[static_cast<std::size_t>(graph.observations[o].image)];
       auto& frame = values.frames[static_cast<std::size_t>(image.frame)];
       const Pose camera = camera_pose(*frame, image.mount);
+      // Rotations are held, so that the arm of a camera is a constant in ground axes.
       problem.AddResidualBlock(new SightResidual(camera.rotation.conjugate() * rays[o], camera.centre - frame->centre,
                                                  1 / options.ray_sigma_rad),
                                &ray_loss, frame->centre.data(), point);
@@ -85,6 +93,7 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
     double* centre = frame->centre.data();
     ordering->AddElementToGroup(centre, 1);
     const auto& prior = graph.frames[f].position;
+    // Given frames are held, so that the others come into their datum.
     if (graph.frames[f].given)
       problem.SetParameterBlockConstant(centre);
     else if (prior && options.use_positions)
@@ -100,6 +109,7 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
   solver.dense_linear_algebra_library_type = ceres::LAPACK;
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_iterations;
+  // A coarse adjustment follows.
   solver.function_tolerance = 1e-4;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;

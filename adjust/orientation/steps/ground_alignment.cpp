@@ -1,3 +1,13 @@
+// Which angles does a similarity from the centres of frames to known positions determine? Positions in all directions
+// determine three; positions on one line leave the rotation about it open, and their noise alone would choose it. With
+// the similarity (s, R, t), the axis a of the line and what is known of the angles, R becomes
+//
+//     kAll     the first axes are those of the ground: R without its twist about R'a
+//     kLevel   the rotation about the vertical that brings the line to its direction; off a line, the twist of R about
+//              the vertical
+//     kNone    R turned about a until the direction that should be down is as low as it can be
+//
+// The shift is chosen anew so that the centroid of the positions stays in place.
 #include "adjust/orientation/steps/ground_alignment.h"
 
 #include <algorithm>
@@ -43,6 +53,8 @@ Eigen::Quaterniond without_twist(const Eigen::Quaterniond& rotation, const Eigen
   return rotation * twist.normalized().conjugate();
 }
 
+// The mean of a direction over images that look to all sides is short. A mean that is shorter than 0.7 across the line
+// does not say what is down; if both are long, the distance of the points decides between an aerial block and a street.
 Eigen::Vector3d which_points_down(const OrientationGraph& graph, const OrientationValues& values,
                                   const Similarity& similarity, const Eigen::Vector3d& line, double distance_m) {
   MeanAxes axes = mean_axes(graph, values);
@@ -66,6 +78,8 @@ double median_of(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+// The centres of oriented frames and the positions that are known of them, with sigmas that allow for the bend of the
+// first centres over the block: a twentieth of the median distance from its middle, in squares with the stated sigma.
 KnownPositions known_positions(const OrientationGraph& graph, const OrientationValues& values) {
   KnownPositions known;
   for (std::size_t f = 0; f < graph.frames.size(); ++f) {
@@ -118,6 +132,7 @@ std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, co
   const auto covariance = similarity_covariance(*similarity, known.from, weights);
   if (!covariance) return std::nullopt;
   const Eigen::Vector3d here = similarity->rotation.conjugate() * down;
+  // here = R' down. R Exp(w) changes it by [here]x w.
   const Eigen::Matrix3d by_turn = skew(here);
   return AxisDirection{here, by_turn * covariance->topLeftCorner<3, 3>() * by_turn.transpose()};
 }
@@ -145,6 +160,8 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   const SymmetricEigen3 eigen = symmetric_eigen3(spread);
   const double length = std::sqrt(std::max(0.0, eigen.values(2)));
   const double width = std::sqrt(std::max(0.0, eigen.values(1)));
+  // The width of a line of n positions is its noise. A noise of sigma gives a mean width with an error of sigma /
+  // sqrt(n); twice that is significant.
   const bool line = count < 3 || width < std::max(0.03 * length, 2 * known.stated_sigma / std::sqrt(count));
   if (!line && known_angles != GroundAngles::kLevel) return similarity;
 
@@ -183,6 +200,7 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
     if (!frame) continue;
     const Eigen::Vector3d d = frame->centre - mean;
     spread += d * d.transpose();
+    // Of frames that are equally far the first one stays, whatever the rounding.
     if (d.squaredNorm() > farthest.squaredNorm() * (1 + 1e-6)) farthest = d;
   }
   double baselines = 0, links = 0;
@@ -192,12 +210,15 @@ Similarity similarity_to_free_frame(const OrientationGraph& graph, const Orienta
     if (a && b) baselines += (a->centre - b->centre).norm(), ++links;
   }
 
+  // The mean baseline between linked frames becomes one unit: a free block has no metre.
   Similarity result;
   if (!keep_scale && baselines > 0) result.scale = links / baselines;
   if (known != GroundAngles::kAll) {
     const SymmetricEigen3 eigen = symmetric_eigen3(spread);
     const MeanAxes axes = mean_axes(graph, values);
     const bool line = eigen.values(1) < 1e-3 * eigen.values(2);
+    // The normal of the plane of the centres is up or down. Images look down or have y downwards, which tells the two
+    // apart. Centres on a line have no plane; up is then against the mean y axis, at right angles to the line.
     Eigen::Vector3d up = line ? Eigen::Vector3d(-axes.down) : Eigen::Vector3d(eigen.vectors.col(0));
     if (up.dot(axes.view + axes.down) > 0) up = -up;
     Eigen::Vector3d east = farthest.normalized();

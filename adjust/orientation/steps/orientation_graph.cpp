@@ -1,3 +1,6 @@
+// The graph must be the same however the block lists its images, so that everything is sorted by names and contents:
+// images and frames by name, cameras by their first image, edges by their ends, tracks by their length and then by
+// their observations.
 #include "adjust/orientation/steps/orientation_graph.h"
 
 #include <algorithm>
@@ -21,6 +24,8 @@ struct Rows {
   IndexedVector<FrameIndex, std::int32_t> frame;
 };
 
+// Numbers the images of the component by name. Frames and cameras are numbered by the first image that belongs to them,
+// so that their numbers follow from names as well. Returns the numbers by the indices of the block.
 Rows add_frames_and_images(const Block& block, const BlockState& start, const std::vector<FrameIndex>& frames,
                            const OrientationOptions& options, OrientationGraph& graph) {
   Rows rows;
@@ -54,6 +59,8 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
       if (start.oriented[frame]) {
         constexpr double kSigma = 0.01;  // metres
         node.given = start.frames[frame];
+        // A given pose serves as a known position, for the similarity to the ground. A centimetre is far below the
+        // errors of first centres.
         node.position = PositionPrior{node.given->centre, Eigen::Vector3d::Constant(kSigma), Eigen::Vector3d::Zero()};
       }
       graph.frames.push_back(std::move(node));
@@ -87,11 +94,14 @@ std::optional<OrientationGraph::Relative> relative_of(const PairOrientation& sto
   relative.rotation = turned ? rotation.conjugate() : rotation;
   relative.baseline = turned ? translation : Eigen::Vector3d(-(rotation.conjugate() * translation));
   if (!(relative.baseline.norm() > 0.5)) relative.baseline.setZero();
+  // The diagonal of the stored covariance (upper triangle by rows), averaged: three angles of the rotation, and two of
+  // the base, whose covariance has rank two.
   relative.rotation_sigma = std::sqrt(std::max(0.0, (of_rotation[0] + of_rotation[3] + of_rotation[5]) / 3));
   relative.baseline_sigma = std::sqrt(std::max(0.0, (of_base[0] + of_base[3] + of_base[5]) / 2));
   return relative;
 }
 
+// Pairs without a rotation, and pairs of one frame, whose orientation its mounts give, are no edges.
 void add_edges(const std::vector<VerifiedPair>& pairs, const Rows& rows, OrientationGraph& graph) {
   for (const VerifiedPair& pair : pairs) {
     if (pair.model == PairModel::kNone) continue;
@@ -125,6 +135,8 @@ struct SortedTrack {
   }
 };
 
+// Chooses tracks greedily: the longest first, until every pair of images has its number of them. A track counts for all
+// of its pairs.
 void add_tracks(const TrackSet& tracks, const Rows& rows, std::int64_t tracks_per_pair, OrientationGraph& graph) {
   std::vector<SortedTrack> candidates;
   for (std::size_t t = 0; t < tracks.id.size(); ++t) {
@@ -136,6 +148,7 @@ void add_tracks(const TrackSet& tracks, const Rows& rows, std::int64_t tracks_pe
     std::sort(track.rows.begin(), track.rows.end());
     candidates.push_back(std::move(track));
   }
+  // The longest tracks come first: they connect most images, and each pair takes its share of them.
   std::sort(candidates.begin(), candidates.end());
 
   std::unordered_map<std::uint64_t, std::int64_t> used;  // per pair of images
@@ -146,6 +159,7 @@ void add_tracks(const TrackSet& tracks, const Rows& rows, std::int64_t tracks_pe
       for (std::size_t j = i + 1; j < track.rows.size(); ++j) {
         const std::uint64_t key =
             static_cast<std::uint64_t>(track.rows[i][0]) << 32 | static_cast<std::uint64_t>(track.rows[j][0]);
+        // A track is wanted if any pair of its images still lacks tracks.
         if (used[key]++ < tracks_per_pair) wanted = true;
       }
     constexpr std::size_t kFewTracks = 20000;  // a block of few pairs can afford more tracks of each pair

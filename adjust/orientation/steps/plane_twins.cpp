@@ -1,3 +1,10 @@
+// In the notation of plane_twins.h, R and t are of the orientation of an edge (rotation a -> b, base in camera b), S
+// and u of its twin. p = t - (t'u) u lies in the plane of t and u and is at right angles to u. It gives n ~ (S - R)' p.
+// For the twin, (R - S)' (u - (t'u) t) gives v. p't and m are positive, so that both normals come out with their sign.
+//
+// The choice is a vote. Each edge of an image asks the strongest edges of the same image how well their normals agree
+// with its own two. An edge changes over where the votes for its other normal are clearly more, and the votes are
+// counted again with the new choices.
 #include "adjust/orientation/steps/plane_twins.h"
 
 #include <algorithm>
@@ -54,6 +61,7 @@ void choose_twins_by_planes(OrientationGraph& graph, std::size_t witnesses) {
     const auto normals = normals_of(edge);
     if (!normals) continue;
     seen[row(edge.a)].push_back({e, *normals});
+    // The normals in the axes of image b.
     seen[row(edge.b)].push_back({e, {edge.rotation * (*normals)[0], edge.twin.rotation * (*normals)[1]}});
   }
   const auto stronger = [&](const SeenNormals& one, const SeenNormals& other) {
@@ -63,6 +71,7 @@ void choose_twins_by_planes(OrientationGraph& graph, std::size_t witnesses) {
   for (std::vector<SeenNormals>& of_image : seen) std::sort(of_image.begin(), of_image.end(), stronger);
   // In the first iteration the better fitting normal of each witness counts, later the chosen one.
   std::vector<std::uint8_t> by_twin(graph.edges.size(), 0);
+  // All edges vote with the choices of the round before. The order of the edges then does not matter.
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::array<double, 2>> votes(graph.edges.size(), {0, 0});
     for (const std::vector<SeenNormals>& of_image : seen)

@@ -1,3 +1,5 @@
+// The error of an observation is the angle between its ray and the direction of the point, so that all cameras of a rig
+// and all camera models are treated alike.
 #include "adjust/orientation/steps/resection.h"
 
 #include <algorithm>
@@ -28,6 +30,7 @@ std::optional<Pose> resect_frame(const OrientationGraph& graph, const std::vecto
                                  std::int32_t frame, double max_error_rad, int min_points,
                                  const OrientationValues& values) {
   const std::vector<RaySight> sights = sights_of(graph, rays, frame, values);
+  // A sample of three has several poses; a fourth point decides between them.
   if (static_cast<int>(sights.size()) < std::max(min_points, 4)) return std::nullopt;
   const ResectionEstimator estimator(sights);
   RansacOptions sampling;

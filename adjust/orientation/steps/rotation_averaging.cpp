@@ -1,3 +1,22 @@
+// The mathematics is in rotation_averaging.h; here are its parts and their weights.
+//
+//     likely_ones()         leaves out verticals, and weakens edges, that contradict the others
+//     tree_start()          rotations along the maximum spanning tree of trust()
+//     turn_to_...()         one common rotation, to the priors or to the verticals
+//     Averager              reweighted least squares
+//     average_rotations()   drops edges that are far from the average, and averages again
+//
+// The variance of an edge with n inliers is v = kVariance / (1 + n) + sigma^2. kVariance gives 100 inliers a sigma of
+// half a degree: errors of calibration and outliers do not show in the covariance sigma^2 of the matches
+// (docs/developer/decisions.md, "Pairs of images").
+//
+// With e = |Log(R_j' R_ij R_i)|, the weights of the equations w_j - w_i = e are
+//
+//     L1             1 / (sqrt(v) max(e, kSmallest))
+//     Geman-McClure  1 / (v (1 + e^2 / s^2)^2),   s^2 = kScale^2 + (kSigmas^2) v
+//
+// L1 is convex in its linearised form and comes first; Geman and McClure's loss forgets what is far off, and would
+// forget good edges of a poor start.
 #include "adjust/orientation/steps/rotation_averaging.h"
 
 #include <Eigen/SparseCholesky>
@@ -83,6 +102,7 @@ Likely likely_ones(std::int32_t nodes, const Edges& edges, const Verticals& vert
   };
   for (const RelativeRotation& edge : edges) {
     if (!tested(edge)) continue;
+    // An edge with verticals at both ends tests both of them. Which of the two is wrong shows at their other edges.
     for (const std::int32_t node : {edge.a, edge.b}) {
       all[row(node)] += edge.inliers;
       if (agrees(edge)) agreeing[row(node)] += edge.inliers;
@@ -90,6 +110,7 @@ Likely likely_ones(std::int32_t nodes, const Edges& edges, const Verticals& vert
   }
   Likely likely{edges, {}};
   for (const KnownVertical& v : verticals)
+    // A vertical without any tested edge has 0 >= 0 and stays.
     if (agreeing[row(v.node)] >= kFewest * all[row(v.node)])
       likely.verticals.push_back(v);
     else
@@ -119,6 +140,7 @@ std::vector<double> trust(std::int32_t nodes, const Edges& edges) {
       if (rotation_angle(to_c, to_c_by_b) < kClosed) ++closed;
       ++i, ++j;
     }
+    // With one half added for an open triangle, a single closed one is not trusted without reserve.
     result[e] = effective_inliers(edge) * (closed + 0.5) / (triangles + 1);
   }
   return result;
@@ -158,12 +180,14 @@ std::vector<Eigen::Quaterniond> tree_start(std::int32_t nodes, const Edges& edge
   DisjointSets sets(nodes);
   std::int32_t first_held = -1;
   for (std::int32_t i = 0; i < nodes; ++i)
+    // Paths between held nodes must not enter the tree: their rotations are known.
     if (held(priors, row(i))) first_held < 0 ? void(first_held = i) : void(sets.unite(first_held, i));
   std::vector<std::uint8_t> in_tree(edges.size(), 0);
   for (std::int32_t e : order)
     if (sets.unite(edges[row(e)].a, edges[row(e)].b)) in_tree[row(e)] = 1;
 
   const auto neighbours = adjacency(nodes, edges, in_tree);
+  // R_n = R_in R_i from node to node, from the held nodes or, without any, from the first active one.
   std::vector<Eigen::Quaterniond> rotation(row(nodes), Eigen::Quaterniond::Identity());
   std::vector<std::uint8_t> done(row(nodes), 0);
   std::vector<std::int32_t> queue;
@@ -208,6 +232,7 @@ void turn_to_priors(const Priors& priors, const std::vector<std::uint8_t>& activ
   const std::size_t stride = 1 + candidates.size() / 100;
   for (std::size_t i = stride; i < candidates.size(); i += stride)
     if (const double c = cost(candidates[i]); c < best_cost) best = candidates[i], best_cost = c;
+  // The mean by reweighting: with E = G' c the error of candidate c, G moves by the weighted mean of Log E.
   for (int iteration = 0; iteration < 50; ++iteration) {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     double weights = 0;
@@ -234,6 +259,8 @@ void turn_to_verticals(const Verticals& verticals, const std::vector<std::uint8_
     if (active[row(v.node)]) seen.push_back({rotation[row(v.node)].conjugate() * v.seen, v.ground});
   if (seen.empty()) return;
   constexpr double kSpread = 5 * kDegree;
+  // A single vertical leaves the turn about itself open; the smallest rotation is taken. The averaging then refines the
+  // two level angles.
   const auto turn_of = [](const Seen& s) { return rotation_between(s.to, s.from); };
   const auto cost = [&](const Eigen::Quaterniond& g) {
     double sum = 0;
@@ -316,15 +343,20 @@ class Averager {
     for (std::size_t i = 0; i < rotation_.size(); ++i)
       if (active_[i] && !held(priors_, i) && priors_[i]) {
         const Eigen::Vector3d e = rotation_log<double>(rotation_[i].conjugate() * priors_[i]->rotation);
+        // The weight of a prior, 1 / (sigma^2 + e^2), is that of Cauchy's loss with the scale of one sigma.
         const double sigma = priors_[i]->sigma_rad;
         equations.push_back({-1, static_cast<std::int32_t>(i), 1 / (sigma * sigma + e.squaredNorm()), e});
       }
     Eigen::MatrixX3d step = Eigen::MatrixX3d::Zero(std::ssize(rotation_), 3);
     if (verticals_.empty()) {
+      // Without verticals the three axes have the same matrix, and one factor solves all of them.
       solve(level_, equations, 0, 3, step);
     } else {
+      // Verticals add to the diagonal of the axes x and y only. The heading has another matrix and its own numbers,
+      // since it needs a gauge where verticals fix the level.
       solve(heading_, equations, 2, 1, step);
       for (const KnownVertical& v : verticals_) {
+        // w = g x now, brought from the sine of the angle to the angle itself.
         const Eigen::Vector3d now = rotation_[row(v.node)].conjugate() * v.seen, cross = v.ground.cross(now);
         const double angle = std::atan2(cross.norm(), v.ground.dot(now));
         const Eigen::Vector3d e = cross.norm() > 0 ? Eigen::Vector3d(angle / cross.norm() * cross) : cross;
@@ -362,10 +394,12 @@ class Averager {
       const std::int32_t b = system.unknown[row(equation.b)];
       add(a, equation.weight, -equation.error);
       add(b, equation.weight, equation.error);
+      // The lower triangle of the graph Laplacian: the factorisation reads no more.
       if (a >= 0 && b >= 0) entries.emplace_back(std::max(a, b), std::min(a, b), -equation.weight);
     }
     Eigen::SparseMatrix<double> normal(system.count, system.count);
     normal.setFromTriplets(entries.begin(), entries.end());
+    // The weights change with each iteration, the pattern does not.
     if (!system.analysed) system.solver.analyzePattern(normal), system.analysed = true;
     system.solver.factorize(normal);
     if (system.solver.info() != Eigen::Success) return;
@@ -412,10 +446,12 @@ AveragedRotations average_rotations(std::int32_t nodes, const Edges& measured, c
     for (std::size_t e = 0; e < edges.size(); ++e) {
       if (!active[row(edges[e].a)]) continue;
       const Eigen::Quaterniond average = rotation[row(edges[e].b)] * rotation[row(edges[e].a)].conjugate();
+      // An edge that was dropped may come back when the average has moved.
       const std::uint8_t keep = rotation_angle(average, edges[e].rotation) <= max_error_rad;
       changed |= keep != result.kept[e];
       result.kept[e] = keep;
     }
+    // Nodes that only dropped edges connected are no longer averaged.
     active = reachable(nodes, edges, result.kept, priors);
     if (!changed) break;
   }

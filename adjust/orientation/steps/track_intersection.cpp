@@ -1,3 +1,10 @@
+// The error of a ray is the angle between it and the direction of the point. The cost of a proposed point is the
+// truncated sum of min(angle^2, limit^2). A proposal is the midpoint of the shortest connection of two rays:
+//
+//     n = a x b,   d_a = (base x b)'n / n'n,   d_b = (base x a)'n / n'n,   both positive in front of the images.
+//
+// The point is then refined with the rays within the limit. The distance of the point from a ray, divided by its
+// distance from the camera, is the angle, so that intersect_rays() with the weights 1 / distance^2 minimises angles.
 #include "adjust/orientation/steps/track_intersection.h"
 
 #include <algorithm>
@@ -21,6 +28,8 @@ struct TrackRays {
   std::vector<std::size_t> rows;  // of the observations
 };
 
+// atan2 of sine and cosine is exact for small angles and tells a point behind the camera, whose angle exceeds 90
+// degrees.
 double angle_from(const Ray& ray, const Eigen::Vector3d& point) {
   const Eigen::Vector3d to_point = point - ray.origin;
   return std::atan2(ray.direction.cross(to_point).norm(), ray.direction.dot(to_point));
@@ -71,6 +80,7 @@ std::optional<Hypothesis> best_pair(const std::vector<Ray>& rays, double limit) 
 
 // Least squares of the angles, which weights each ray by its inverse squared distance.
 std::optional<Eigen::Vector3d> refine(Eigen::Vector3d point, const std::vector<Ray>& rays, double limit) {
+  // The second iteration has the rays and the weights of the first point.
   for (int iteration = 0; iteration < 2; ++iteration) {
     std::vector<Ray> agreeing;
     for (const Ray& ray : rays)
@@ -105,6 +115,7 @@ void intersect_tracks(const OrientationGraph& graph, const std::vector<Eigen::Ve
   std::vector<std::optional<Pose>> cameras;
   for (std::size_t i = 0; i < graph.images.size(); ++i)
     cameras.push_back(values.camera(graph, static_cast<std::int32_t>(i)));
+  // All points are found anew: an observation that was left out at worse poses comes back.
   values.points.assign(static_cast<std::size_t>(graph.track_count()), std::nullopt);
   values.kept.assign(graph.observations.size(), 0);
   TrackRays track;

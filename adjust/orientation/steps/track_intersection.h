@@ -1,6 +1,5 @@
-// Intersects tracks at given poses, and finds their outliers. Up to 30 pairs of rays give a
-// point each, and the point with the smallest truncated sum of squares wins. Errors are angles between rays, so points
-// need not be projected.
+// Intersects tracks at given poses, and finds their outliers. Up to 30 pairs of rays give a point each, and the point
+// with the smallest truncated sum of squares wins. Errors are angles between rays, so points need not be projected.
 #pragma once
 
 #include <Eigen/Core>
