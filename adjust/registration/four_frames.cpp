@@ -1,3 +1,13 @@
+// The normal equations. With A_i the derivative of a residual by its point, B_i that by the pose of its frame (6
+// numbers) and w_i its weight,
+//
+//     P = sum w A'A,   p = -sum w A'r,   K = sum w A'B (3 x 18)
+//     N = sum w B'B - K' P^-1 K,   y = -sum w B'r - K' P^-1 p
+//
+// over the points, plus the equations of the pairs. The unknowns are the poses of B, C and D, six each; A is held,
+// which is the datum. The pairs give the scale.
+//
+// Weights: 0 beyond the threshold t, and Cauchy's 1 / (1 + r^2 / (t/2)^2) within it.
 #include "adjust/registration/four_frames.h"
 
 #include <Eigen/Cholesky>
@@ -11,6 +21,7 @@ namespace megablock {
 
 namespace {
 
+// A held pair is a pair with sigmas far below those of any registration.
 constexpr double kHeldRotation = 1e-9, kHeldPosition = 1e-7;  // sigmas of a held pair, rad and m
 constexpr double kFarthest = 500;                             // largest distance of a point from its frame, metres
 
@@ -19,6 +30,7 @@ double inverse_or(double sigma, double held) { return 1 / (sigma > 0 ? sigma : h
 // The point nearest to the rays (geometry/intersection/triangulation.h, with equal weights), in the axes of A.
 std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const std::array<Pose, 4>& poses,
                                              std::int32_t first, std::int32_t last) {
+  // sum (I - d d') (X - o) = 0, over the rays from o in the direction d.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   int count = 0;
@@ -37,6 +49,7 @@ std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const 
 
 }  // namespace
 
+// All poses become relative to A, which is the identity from now on: numbers stay small wherever the block lies.
 FourFrames::FourFrames(const std::array<Pose, 4>& frames, const std::vector<FourFrameTrack>& tracks,
                        const PairRegistrationOptions& options)
     : tracks_(tracks),
@@ -73,6 +86,7 @@ std::optional<FourFrames::Intersection> FourFrames::intersect(const FourFrameTra
       const auto r = ray_residual(view.ray, to_inside(pose, *point));
       if (!r) return std::nullopt;
       const Eigen::Matrix<double, 2, 3> by_point = r->by_point * pose.rotation.toRotationMatrix();
+      // Cauchy's weight, so that one wrong ray does not carry the point away.
       const double w = 1 / (1 + r->pixels.squaredNorm() / (scale_px * scale_px));
       normal += w * by_point.transpose() * by_point;
       right -= w * by_point.transpose() * r->pixels;
@@ -87,6 +101,8 @@ std::optional<FourFrames::Intersection> FourFrames::intersect(const FourFrameTra
 }
 
 void FourFrames::add_track(const FourFrameTrack& track, double threshold_px) {
+  // Points are refined at the present poses before they are eliminated, so that hardly any residual is left in their
+  // own equations.
   const auto intersection = intersect(track, 0, 3, 0.5 * threshold_px);
   if (!intersection) return;
   struct Row {
@@ -107,6 +123,7 @@ void FourFrames::add_track(const FourFrameTrack& track, double threshold_px) {
     rows.push_back({view.frame - 1, w * inverse_variance_, r->pixels, r->by_point * pose.rotation.toRotationMatrix(),
                     r->by_point * in_rig_by_pose(pose, intersection->point)});
   }
+  // A point that only one pass keeps says nothing about the other. Two rays give the point and one number of the pose.
   if (!pass[0] || !pass[1] || rows.size() < 3) return;
   Eigen::Matrix3d points = Eigen::Matrix3d::Zero();
   Eigen::Vector3d points_right = Eigen::Vector3d::Zero();
@@ -127,6 +144,7 @@ void FourFrames::add_track(const FourFrameTrack& track, double threshold_px) {
     coupling.middleCols<6>(6 * row.frame) += row.weight * row.by_point.transpose() * row.by_pose;
   }
   ++kept_tracks_;
+  // The Schur complement of the point.
   normal_ -= coupling.transpose() * points_inverse * coupling;
   right_ -= coupling.transpose() * points_inverse * points_right;
 }
@@ -175,6 +193,7 @@ bool FourFrames::iterate(double threshold_px) {
   return true;
 }
 
+// A scale of 1 000 px weighs all rays alike: start and result are compared with the same points.
 std::vector<double> FourFrames::residuals() const {
   std::vector<double> lengths;
   for (const FourFrameTrack& track : tracks_) {
@@ -191,9 +210,11 @@ std::vector<double> FourFrames::residuals() const {
 }
 
 std::optional<FourFrames::Matrix6> FourFrames::covariance() const {
+  // The normal equations are those of the last iteration, with its threshold and weights.
   const Eigen::LDLT<Eigen::MatrixXd> factor(normal_);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return std::nullopt;
   const Matrix18 inverse = factor.solve(Matrix18::Identity());
+  // B and D are nearly given by their pairs: only the six unknowns of C count.
   const double freedom = 2.0 * kept_ - 3.0 * kept_tracks_ - 6;
   const double variance = freedom > 0 ? squares_ * inverse_variance_ / freedom : 1;
   Matrix6 covariance = inverse.block<6, 6>(6, 6) * std::max(1.0, variance);

@@ -13,11 +13,13 @@ std::vector<FrameResection> resect_frames(const Block& block, const std::vector<
   for (std::size_t i = 0; i < block.control_points.size(); ++i) {
     const ControlPoint& control = block.control_points[i];
     const bool held_out = !which.check_prefix.empty() && control.name.starts_with(which.check_prefix);
+    // Check points must not act on what they check.
     if (control.role != PointRole::kControl || held_out || !control.position.allFinite()) continue;
     for (const ImageMeasurement& m : control.measurements) {
       const auto ray =
           rig_ray(block.mount_of(m.image).pose, block.cameras[block.camera_of(m.image)].intrinsics, m.pixel);
       if (!ray) continue;
+      // The sigmas of a control point enter the whitening of its observations (rig_sights.h).
       const Eigen::Matrix3d covariance = control.sigma.cwiseAbs2().asDiagonal();
       sights[block.images[m.image].frame].push_back(
           {*ray, control.position, covariance, m.sigma_px, static_cast<std::int64_t>(i)});

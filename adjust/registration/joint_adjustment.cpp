@@ -1,3 +1,15 @@
+// The residuals, each a vector with unit covariance where it is good. W is a whitening matrix, W'W = C^-1.
+//
+//     link          W [Log(R_to R_from' R_m'),  R_from (C_to - C_from) - T]       (in_ground: C_to - C_from - T)
+//     resection     W [Log(R_0' R),  C - C_0]
+//     position      (C - C_0) sqrt(w / n) / sigma                                n neighbours share one error
+//     attitude      Log(R_0' R) / (sigma sqrt(n))
+//     control       P (s / |s| - v) / sigma_px,   s = R (X - C) - o               ray v from o, P: rig_ray.h
+//     point         (X - X_0) / sigma
+//
+// Reweighting. In round k of K the scale of a loss is c_k = c_0 (c_n / c_0)^(k / (K - 2)), not below c_n. All weights
+// are held while Ceres solves; they are numbers that the residuals point to. The first round has unit weights: the
+// registrations then pull the trajectory together, whatever its errors.
 #include "adjust/registration/joint_adjustment.h"
 
 #include <ceres/autodiff_cost_function.h>
@@ -24,6 +36,7 @@ using residual::Vector3;
 
 // A matrix W with W'W = C^-1.
 Matrix6 whitening(const Matrix6& covariance) {
+  // C = L L', W = L^-1.
   const Eigen::LLT<Matrix6> factor(covariance);
   if (factor.info() != Eigen::Success) throw ComputeError("the covariance of a relative pose is not positive definite");
   return factor.matrixL().solve(Matrix6::Identity());
@@ -54,6 +67,7 @@ struct LinkResidual {
   }
 };
 
+// The rotation error is taken on the right, as the covariance of a resection is that of PoseIncrement.
 struct ResectedResidual {
   Pose pose;
   Matrix6 white;
@@ -66,6 +80,7 @@ struct ResectedResidual {
   }
 };
 
+// `inverse_sigma` is that of the present round, with the weight in it.
 struct PositionResidual {
   Eigen::Vector3d position;
   const double* inverse_sigma;
@@ -88,6 +103,8 @@ struct AttitudeResidual {
   }
 };
 
+// The difference of unit vectors, in the tangent plane of the measured ray and in pixels. It is finite behind the
+// camera, where the point of a poor start may be.
 struct RayResidualOfPoint {
   RigRay ray;
   double inverse_sigma;
@@ -134,6 +151,7 @@ class JointProblem {
     ceres::Problem::Options problem_options;
     problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     ceres_ = std::make_unique<ceres::Problem>(problem_options);
+    // All frames are in the problem, also those that nothing observes: Ceres' damping leaves these at their start.
     for (std::size_t f = 0; f < frames_; ++f) ceres_->AddParameterBlock(frame(f), kPoseBlock, &manifold_);
     add_chain();
     add_registrations();
@@ -145,6 +163,7 @@ class JointProblem {
     JointResult result;
     for (int round = 0; round < options_.rounds; ++round) {
       reweight(round);
+      // A round needs only a few iterations, as the next weights change the problem anyway.
       result.iterations += run(round + 1 == options_.rounds ? options_.last_iterations : options_.iterations, result);
     }
     for (std::size_t f = 0; f < frames_; ++f) result.frames.push_back(from_block(frame(f)));
@@ -165,6 +184,7 @@ class JointProblem {
   void add_chain() {
     for (const ChainLink& link : input_.chain) {
       Matrix6 white = Matrix6::Identity();
+      // Chain links are independent in rotation and position, registrations have a full covariance.
       white.topLeftCorner<3, 3>() /= link.rotation_sigma_rad;
       white.bottomRightCorner<3, 3>() /= link.position_sigma_m;
       add_relative({link.pose, white, link.in_ground, &one_}, link.from, link.to);
@@ -190,6 +210,7 @@ class JointProblem {
       ceres_->AddResidualBlock(new ceres::AutoDiffCostFunction<ResectedResidual, 6, kPoseBlock>(
                                    new ResectedResidual{r.pose, whitening(r.covariance)}),
                                nullptr, frame(r.frame));
+    // n neighbours with the sigma sqrt(n) s weigh as much as one with s.
     const double attitude =
         1 / (options_.attitude_sigma_deg * kDegree * std::sqrt(static_cast<double>(options_.position_neighbours)));
     for (std::size_t f = 0; f < frames_; ++f) {
@@ -233,6 +254,7 @@ class JointProblem {
       const double scale =
           falling(options_.first_registration_scale, options_.registration_scale, round, options_.rounds);
       for (std::size_t i = 0; i < registration_weight_.size(); ++i)
+        // q is the mean of the six squares.
         registration_weight_[i] = round == 0 ? 1 : geman_mcclure(registration_squares(i) / 6, scale);
     }
     reweight_positions(round);
@@ -247,6 +269,7 @@ class JointProblem {
     const std::size_t half = static_cast<std::size_t>(options_.position_neighbours) / 2;
     for (std::size_t begin = 0, end = 0; begin < frames_; begin = end) {
       while (end < frames_ && input_.pass[end] == input_.pass[begin]) ++end;
+      // Running sums, so that a window of any width takes one subtraction.
       std::vector<double> sums(end - begin + 1, 0), counts(end - begin + 1, 0);
       for (std::size_t f = begin; f < end; ++f) {
         const Eigen::Vector3d off = Eigen::Map<const Eigen::Vector3d>(frame(f) + 4) - input_.start[f].centre;
@@ -257,6 +280,7 @@ class JointProblem {
         const std::size_t low = f - begin > half ? f - begin - half : 0,
                           high = std::min(end - begin, f - begin + half + 1);
         const double count = std::max(1.0, counts[high] - counts[low]);
+        // A single position cannot be tested: its error is that of its neighbours.
         const double q = round == 0 ? 0 : (sums[high] - sums[low]) / count;
         position_weight_[f] = input_.located[f] ? geman_mcclure(q, options_.position_scale) : 0;
         inverse_position_sigma_[f] = std::sqrt(position_weight_[f] / count) / sigma;
@@ -264,6 +288,7 @@ class JointProblem {
     }
   }
 
+  // Each observation of a control point has a weight of its own: a wrong one concerns one image.
   void reweight_views(int round) {
     const double scale = falling(options_.first_image_scale, options_.image_scale, round, options_.rounds);
     std::size_t row = 0;
@@ -275,6 +300,7 @@ class JointProblem {
       }
   }
 
+  // Runs one round and returns its number of iterations (Ceres counts the start as one).
   int run(int iterations, JointResult& result) {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -291,6 +317,8 @@ class JointProblem {
     return static_cast<int>(summary.iterations.size()) - 1;
   }
 
+  // The blocks of the inverse of the normal matrix at the frames asked for, in the tangent space (w, d) of
+  // PoseIncrement. Without resections, positions or control the normal matrix is singular.
   std::vector<Matrix6> covariances() {
     ceres::Covariance::Options options;
     options.num_threads = 1;

@@ -1,3 +1,10 @@
+// The iteration of register_pair() in symbols. The thresholds are t_i = t_0 (t_n / t_0)^(i / m) for the first m = 3/4
+// of the iterations and t_n for the others, so that the last ones converge with a fixed test.
+//
+// A robust start must resect the pair C, D from the points of A and B. These points are far away compared with the base
+// of A and B, and their errors along the rays are large. The resection weights every observation by the covariance of
+// its point, without which the far points would decide. The approximate pose has a third of the largest admitted shift
+// and turn as sigmas: a correct registration is then within three sigmas.
 #include "adjust/registration/pair_registration.h"
 
 #include <fmt/core.h>
@@ -21,6 +28,7 @@ std::vector<FourFrameTrack> seen_by_enough(const std::vector<FourFrameTrack>& tr
   for (const FourFrameTrack& track : tracks) {
     unsigned frames = 0;
     for (const FourFrameTrack::View& view : track.views) frames |= 1u << view.frame;
+    // A track must join the passes, and not only the two frames of one.
     if ((frames & 0b0011) != 0 && (frames & 0b1100) != 0 && std::popcount(frames) >= min_frames)
       result.push_back(track);
   }
@@ -38,6 +46,7 @@ std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vect
     for (const FourFrameTrack::View& view : tracks[t].views) {
       if (view.frame < 2) continue;
       RigSight sight;
+      // C and D are one rig: the rays of D are taken into the axes of C.
       sight.ray = view.frame == 2 ? view.ray : carried(view.ray, d_in_c);
       sight.point = intersection->point;
       // The base between A and B is not exact, which adds an error in proportion to the distance.
@@ -52,6 +61,8 @@ std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vect
   resection.samples = options.samples;
   resection.min_points = 4;
   resection.min_share = 0.2;
+  // Points of a street lie along it. The covariance decides whether they suffice; the adjustment of all four frames has
+  // more observations than this start.
   resection.min_line_ratio = 0;
   resection.max_position_sigma_m = 1;
   try {
@@ -74,6 +85,8 @@ bool adjust(FourFrames& system, double first_threshold_px, const PairRegistratio
 }
 
 // Why the registration is refused; empty: it is accepted.
+// The tests in their order: enough observations, enough of them, a fall of the residuals, a pose near the trajectory,
+// and its precision.
 std::string refusal(const PairRegistration& r, double turn_deg, const PairRegistrationOptions& options) {
   if (r.kept < options.min_measurements)
     return fmt::format("{} measurements stay, {} are needed", r.kept, options.min_measurements);
@@ -125,6 +138,7 @@ PairRegistration register_pair(const std::array<Pose, 4>& frames, const std::vec
     return result;
   }
   FourFrames system(frames, tracks, options);
+  // The pose of C by the trajectory, from which shift and turn are measured.
   const Pose trajectory = system.pose(2);
   result.median_before_px = median(system.residuals());
   double threshold = options.first_threshold_px;
@@ -166,6 +180,7 @@ std::optional<Pose> register_3d_3d(const std::array<Pose, 4>& frames, const std:
     second.push_back(c->point);
   }
   if (first.size() < 3) return std::nullopt;
+  // A similarity fit decides which points are inliers; the scale is then set to one, because both pairs are metric.
   const auto fit = fit_similarity_robust(second, first, std::vector<double>(first.size(), 0.2), 300, seed);
   if (!fit) return std::nullopt;
   // The transformation about the centroid, without a scale.

@@ -35,6 +35,8 @@ struct FourFrameTrack {
   std::vector<View> views;
 };
 
+// Iterations, first and last threshold, four frames for every point and "more than 20" observations are the values of
+// Cannelle 2013.
 struct PairRegistrationOptions {
   int iterations = 20;
   double first_threshold_px = 200;  // with the trajectory as start

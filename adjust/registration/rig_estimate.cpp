@@ -1,3 +1,6 @@
+// The windows become a block of their own, which adjust/tile adjusts: start poses as given poses, the chain as relative
+// poses, the first frame of each window with tight priors of position and attitude. A track lies in one window only; a
+// track of two passes would tell of the errors of the trajectory between them, and not of the rig.
 #include "adjust/registration/rig_estimate.h"
 
 #include <fmt/core.h>
@@ -25,6 +28,7 @@ std::size_t at(FrameIndex f) { return static_cast<std::size_t>(f.value); }
 using Links = std::map<FrameIndex, const ChainLink*>;  // by their second frame
 
 // The first frames of windows of successive linked frames, which follow each other along the passes.
+// A window ends at a missing link, and the next one begins there. Windows do not overlap.
 std::vector<FrameIndex> cut_windows(const JointInput& input, const Links& links, int size) {
   std::vector<FrameIndex> windows;
   for (std::int64_t f = 0; f + size <= static_cast<std::int64_t>(input.start.size());) {
@@ -48,6 +52,7 @@ std::vector<FrameIndex> choose_windows(const JointInput& input, const Links& lin
   const auto turn = [&](FrameIndex f) {
     const double angle = rotation_angle(
         input.start[at(f)].rotation, input.start[at(f) + static_cast<std::size_t>(options.window_frames) - 1].rotation);
+    // Above the bound all windows are equal, so that places where the trajectory jumps do not win.
     return std::min(angle, options.max_turn_deg * kDegree);
   };
   std::vector<FrameIndex> order = all;
@@ -56,6 +61,7 @@ std::vector<FrameIndex> choose_windows(const JointInput& input, const Links& lin
   std::vector<FrameIndex> rest(order.begin() + static_cast<std::ptrdiff_t>(wanted / 2), order.end());
   std::sort(rest.begin(), rest.end());
   const std::size_t more = wanted - chosen.size();
+  // The middle ones of equal sections of the rest.
   for (std::size_t i = 0; i < more; ++i) chosen.push_back(rest[(2 * i + 1) * rest.size() / (2 * more)]);
   std::sort(chosen.begin(), chosen.end());
   return chosen;
@@ -79,12 +85,15 @@ void add_frames(const Block& whole, const JointInput& input, const Links& links,
       frame.position_prior.reset();
       frame.attitude_prior.reset();
       if (from == windows[w]) {
+        // The first frame is tied to its start by sigmas far below those of the chain: it is held, and its window has a
+        // datum.
         frame.position_prior = PositionPrior{frame.given_pose->centre, Eigen::Vector3d::Constant(kFirstFramePosition)};
         frame.attitude_prior =
             AttitudePrior{frame.given_pose->rotation, Eigen::Vector3d::Constant(kFirstFrameRotation)};
       } else {
         const ChainLink& link = *links.at(from);
         Pose pose = link.pose;
+        // The tile adjustment knows relative poses in the axes of the first frame only.
         if (link.in_ground) pose.centre = input.start[at(link.from)].rotation * pose.centre;
         part.block.relative_poses.push_back(
             {FrameIndex(to.value - 1), to, pose, link.rotation_sigma_rad, link.position_sigma_m});
@@ -125,6 +134,8 @@ void add_tracks(const Block& whole, const TrackSet& tracks, const std::vector<st
     count.clear();
     for (std::size_t o = begin; o < end; ++o)
       if (window_of(o) >= 0) ++count[window_of(o)];
+    // A track that several windows share counts in one of them. Windows are not connected, so that the errors of the
+    // trajectory between them do not matter.
     const auto most =
         std::max_element(count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     if (most == count.end() || most->second < min_track) continue;
@@ -140,6 +151,8 @@ void add_tracks(const Block& whole, const TrackSet& tracks, const std::vector<st
   }
 }
 
+// The block of the windows: cameras, rigs and ground of the whole one, frames, images and tracks of the windows alone.
+// Frames are numbered window by window, so that the relative pose of a frame is to the one before it.
 Part make_part(const Block& whole, const JointInput& input, const TrackSet& tracks, const RigEstimateOptions& options) {
   Links links;
   for (const ChainLink& link : input.chain) links.emplace(link.to, &link);
@@ -154,6 +167,8 @@ Part make_part(const Block& whole, const JointInput& input, const TrackSet& trac
 
 // The median residual of all observations, with points intersected anew at the poses of the state.
 double median_residual(TileProblem problem, TileState state, const AdjustOptions& options) {
+  // All observations count, those that the adjustment rejected too: the rig that explains more of them is the better
+  // one.
   for (std::size_t row = 0; row < problem.kept.size(); ++row) problem.kept[row] = problem.image[row].valid();
   triangulate_points(problem, state, options);
   std::vector<double> lengths;
@@ -179,9 +194,11 @@ void adjust(const Part& part, const RigEstimateOptions& options, RigEstimate& es
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   TileState tile = make_tile_state(problem, state, std::vector<Eigen::Vector3d>(problem.points.size(), unknown));
   estimate.median_before_px = median_residual(problem, tile, options.adjustment);
+  // The tile adjustment screens the tracks and estimates frames, points, cameras and mounts together.
   const AdjustSummary summary = adjust_tile(problem, tile, options.adjustment);
   estimate.median_after_px = median_residual(problem, tile, options.adjustment);
   estimate.observations = summary.observations;
+  // Both medians have their points intersected in the same way, so that they differ by the rig and the frames alone.
   if (!(estimate.median_after_px < estimate.median_before_px)) {
     estimate.kept_as_given = fmt::format("residuals do not fall: median {:.2f} px before, {:.2f} px after",
                                          estimate.median_before_px, estimate.median_after_px);
@@ -216,6 +233,7 @@ RigEstimate estimate_rig(const Block& block, const JointInput& input, const Trac
   options.check();
   const BlockState given = initial_state(block);
   RigEstimate estimate;
+  // The given rig is the result wherever the estimate fails.
   estimate.cameras = given.cameras;
   estimate.mounts = given.mounts;
   const Part part = make_part(block, input, tracks, options);

@@ -1,3 +1,10 @@
+// The chain. Successive frames i, j of a pass are linked by their stated relative pose (R_m, T), or, where there is
+// none, by the difference of their start poses:
+//
+//     R_m = R_j R_i',   T = C_j - C_i  (in ground axes, in_ground)
+//
+// A relative pose that is stated in the other direction is inverted: relative_to(P, identity). A gap in time or place
+// has no link: the difference of two poses on both sides of it is not what odometry observed.
 #include "adjust/registration/trajectory.h"
 
 #include <fmt/core.h>
@@ -21,6 +28,7 @@ constexpr double kSamePlace = 1e-3;  // metres
 
 using RelativeOf = std::map<std::pair<FrameIndex, FrameIndex>, const RelativePose*>;
 
+// From position and attitude the centre is C = P - R'l, with l the lever arm in the axes of the rig.
 std::optional<Pose> stated_pose(const Frame& frame) {
   if (frame.given_pose) return frame.given_pose;
   if (!frame.position_prior || !frame.attitude_prior) return std::nullopt;
@@ -28,6 +36,7 @@ std::optional<Pose> stated_pose(const Frame& frame) {
   return Pose{rotation, frame.position_prior->position - rotation.conjugate() * frame.position_prior->lever_arm};
 }
 
+// R_j = R_m R_i, C_j = C_i + R_i'T.
 Pose carry_on(const Pose& from, const Pose& relative) {
   return {(relative.rotation * from.rotation).normalized(), from.centre + from.rotation.conjugate() * relative.centre};
 }
@@ -86,6 +95,8 @@ Pose start_of(const Block& block, FrameIndex f, const std::vector<Pose>& starts,
   return *pose;
 }
 
+// Links two successive frames of a pass by their relative pose, else by the difference of their start poses, or reports
+// a gap.
 void add_link(const Block& block, FrameIndex from, FrameIndex to, const RelativeOf& relative,
               const TrajectoryOptions& options, Trajectory& trajectory) {
   if (const auto stated = stated_link(from, to, relative)) {
@@ -105,6 +116,7 @@ void add_link(const Block& block, FrameIndex from, FrameIndex to, const Relative
                                            first.name, second.name));
     return;
   }
+  // A copy would tie the chain to itself with no motion between. It is only reported: a vehicle may stand still.
   if (distance < kSamePlace && seconds == 0)
     trajectory.notes.push_back(fmt::format("frames '{}' and '{}' have the same time and place: is one of them a copy?",
                                            first.name, second.name));
@@ -142,13 +154,16 @@ void add_points(const Block& block, const TrajectoryOptions& options, Trajectory
       if (ray) point.views.push_back({block.images[m.image].frame, *ray, m.sigma_px});
     }
     const auto meeting = intersect_rays(rays_of(point, trajectory.input.start));
+    // Known points start at their position; others at the intersection of their rays at the start poses.
     point.position = control.position;
     point.sigma = control.sigma;
+    // A control point without a height takes it from the intersection of its rays, as a free unknown.
     if (point.known && std::isnan(control.position.z())) {
       if (!meeting) continue;
       point.position.z() = meeting->z();
       point.sigma.z() = kFree;
     }
+    // A point whose position is not used needs two rays to have one.
     if (!point.known) {
       if (point.views.size() < 2 || !meeting) continue;
       point.position = *meeting;
