@@ -1,3 +1,6 @@
+// A sample must be connected well, or its cameras would be determined by single tie points. It therefore grows by the
+// frame that shares most tracks with it. Within the sample the tracks are thinned by a fixed step, so that the sample
+// is the same in every run.
 #include "adjust/calibration/block_sample.h"
 
 #include <algorithm>
@@ -27,6 +30,7 @@ class Sampler {
       for (const FrameIndex frame : frames_of(t)) tracks_of_frame_[frame].push_back(t);
   }
 
+  // Takes frames until there are `max_frames`, or until none shares a track with the sample. Returns their number.
   std::int64_t grow(std::int64_t max_frames) {
     FrameIndex next(0);
     for (FrameIndex f(0); tracks_of_frame_.contains(f); ++f.value)
@@ -36,6 +40,7 @@ class Sampler {
       take(next);
       next = FrameIndex();
       std::int64_t most = 0;
+      // The map is ascending, and only more tracks than before win: of equal frames the lowest one is taken.
       for (const auto& [frame, shared] : shared_)
         if (shared > most) {
           most = shared;
@@ -108,10 +113,12 @@ BlockSample sample_block(const Block& block, const BlockState& state, const Trac
       rows.push_back(row);
       frames.insert(frame);
     }
+    // A track within one frame says nothing of its distance.
     if (frames.size() < 2) continue;
     observations += std::ssize(rows);
     usable.emplace_back(t, std::move(rows));
   }
+  // Every step-th track brings the number of observations to about the limit.
   const auto step = static_cast<std::size_t>((observations + options.max_observations - 1) / options.max_observations);
   sample.tracks.begin = {0};
   for (std::size_t i = 0; i < usable.size(); i += std::max<std::size_t>(1, step))

@@ -1,3 +1,9 @@
+// With v_g the ray of a grid pixel m_g by the given camera, the parameters k of the other model minimise sum
+// |project(k, v_g) - m_g|^2 over 17 x 17 pixels. Levenberg-Marquardt steps with the columns scaled to unit length,
+//
+//     (D N D + lambda I) D^-1 dk = -D g,   D = diag(N)^-1/2,
+//
+// because the coefficients of high powers have units that differ by many orders of magnitude.
 #include "adjust/calibration/camera_fit.h"
 
 #include <cmath>
@@ -15,6 +21,8 @@ struct Sample {
   Eigen::Vector2d pixel;
 };
 
+// The corners and edges of the image are in the grid, because that is where models differ. Pixels without a ray by the
+// given camera are left out.
 std::vector<Sample> grid_of(const Intrinsics& given, int width, int height) {
   constexpr int kCells = 16;
   std::vector<Sample> samples;
@@ -33,12 +41,14 @@ struct Equations {
   bool valid = true;
 };
 
+// N = sum J'J, g = sum J'r with r = project(k, ray) - pixel, over the free parameters in the order of `parameters`.
 Equations equations_of(const std::vector<Sample>& samples, const Intrinsics& k, const std::vector<int>& parameters) {
   const auto size = static_cast<Eigen::Index>(parameters.size());
   Equations result{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
   Eigen::MatrixXd row(2, size);
   for (const Sample& s : samples) {
     const ProjectionJacobian p = project_with_jacobian(k, s.ray);
+    // A trial camera may fold the image in the corners. Such a step is refused unless the present camera folds too.
     if (!p.valid) {
       result.valid = false;
       continue;
@@ -56,6 +66,7 @@ Equations equations_of(const std::vector<Sample>& samples, const Intrinsics& k, 
 
 CameraFit fit_camera(const CameraModel& model, ParameterMask free, const Intrinsics& given, int width, int height) {
   constexpr int kMaxSteps = 50;
+  // The start has the focal length and the principal point of the given camera and no distortion.
   CameraFit fit{start_intrinsics(model, given[kFocal], width, height)};
   for (int p = kPrincipalX; p <= kPrincipalY; ++p) fit.camera[p] = given[p];
   std::vector<int> parameters;

@@ -24,6 +24,8 @@ IntrinsicSigmas loose_sigmas(const Intrinsics& start, int width, int height) {
   const double corner = std::min(1.0, 0.5 * std::hypot(width, height) / start[kFocal]);
   const std::vector<CameraParameter>& parameters = camera_parameters(start.model());
   for (std::size_t p = 0; p < parameters.size(); ++p)
+    // A radial term of degree d grows with r^d. Divided by (corner radius)^d the sigma means the same correction at the
+    // corner for every focal length.
     if (parameters[p].role == ParameterRole::kRadial) sigma[p] /= power_of(corner, parameters[p].degree);
   return sigma;
 }

@@ -1,3 +1,14 @@
+// The order of run(): a sample of the block is adjusted with its own cameras; the richest candidate screens it; every
+// candidate is then adjusted to the observations that are left.
+//
+// Why the richest model screens: residuals of a poor model at the corners look like outliers. A model that chose its
+// own data would be tested on what it can describe.
+//
+// Why there is no robust loss in a trial: residual fields and RMS are compared between models, and a loss would weigh
+// the observations differently for each of them.
+//
+// The degrees of freedom leave out the loose priors (loose_sigmas.h). They are numbers for the solver, not
+// observations.
 #include "adjust/calibration/model_comparison.h"
 
 #include <fmt/core.h>
@@ -22,6 +33,8 @@ ModelCandidate candidate_of(const CameraModel& model, int terms) {
   ModelCandidate candidate{model, free_parameters(model), model_name(model)};
   if (terms == kAllTerms) return candidate;
   candidate.name += "/" + std::to_string(terms);
+  // All but the first `terms` radial terms are held, and so is decentring: the candidates are to grow by one thing at a
+  // time.
   candidate.free &= ~radial_terms(model, kMaxIntrinsics) | radial_terms(model, terms);
   candidate.free &= ~parameters_with(model, ParameterRole::kTangential);
   return candidate;
@@ -51,6 +64,8 @@ ModelCandidate find_candidate(const std::string& name) {
   return candidate_of(*model, terms);
 }
 
+// Lenses that see 90 degrees off their axis have fisheyes as candidates alone, because perspective models have no pixel
+// there.
 std::vector<ModelCandidate> default_candidates(const CameraModel& given) {
   if (is_panorama(given))
     throw InputError("the camera is a stitched panorama (equirectangular), which has no lens to model");
@@ -124,7 +139,9 @@ class Comparer {
   void screen_with(const ModelCandidate& richest) {
     TileState state = start_;
     TileProblem problem = problem_of(richest, state);
+    // A camera converted to the richest model may not reach all pixels. The observations then stay as they are.
     if (!projectable(problem, state)) return;
+    // Two rounds: outliers bend the first solution, and good observations come back in the second.
     for (int round = 0; round < 2; ++round) {
       if (!solve_with_ceres(problem, state, {options_.max_iterations, 1e-7, {}}).usable) return;
       screen_observations(problem, state, screening_threshold(problem, state, options_.adjustment),
@@ -134,10 +151,13 @@ class Comparer {
     start_.frames = state.frames;
     start_.mounts = state.mounts;
     start_.points = state.points;
+    // The fitted cameras of the richest model are the best description of the lenses. All candidates are converted from
+    // them.
     given_ = state.cameras;
   }
 
   // Whether every kept observation has a finite residual.
+  // Ceres refuses a start at which a residual cannot be computed.
   static bool projectable(const TileProblem& problem, const TileState& state) {
     for (std::int64_t p = 0; p < problem.point_count(); ++p) {
       if (!problem.active(p)) continue;
@@ -147,6 +167,8 @@ class Comparer {
     return true;
   }
 
+  // Adjusts everything with the model of the candidate, from the same start and with the same observations as all
+  // others.
   ModelTrial trial(const ModelCandidate& candidate) const {
     ModelTrial result;
     result.candidate = candidate;
@@ -176,6 +198,7 @@ class Comparer {
   }
 
   void figures(const TileProblem& problem, const TileState& state, ModelTrial& result) const {
+    // Residuals are collected by camera, at the measured pixels: the structure of a lens is a function of the sensor.
     std::vector<std::vector<ResidualAtPixel>> residuals(problem.cameras.size());
     double squares = 0;
     std::int64_t observations = 0;
@@ -202,6 +225,8 @@ class Comparer {
     }
   }
 
+  // For each camera: the smallest model without structure, or, where every model leaves some, the smallest whose
+  // structure is within a tenth of the least.
   void choose() {
     const auto adjusted = [](const ModelTrial& t) { return t.failure.empty(); };
     if (std::none_of(result_.trials.begin(), result_.trials.end(), adjusted))
@@ -216,6 +241,7 @@ class Comparer {
         const ResidualStructure& s = result_.trials[t].cameras[c].structure;
         const bool clean = s.degrees > 0 && s.probability >= options_.probability;
         if (clean && (best < 0 || better(t, best, c))) best = t;
+        // Where every model leaves structure, a larger one must lower it by a tenth at least.
         constexpr double kWorthIt = 0.9;
         if (least < 0 || s.structure_px < kWorthIt * result_.trials[least].cameras[c].structure.structure_px) least = t;
       }

@@ -1,3 +1,11 @@
+// The start, the rounds and the tests of panoramic.h; the conditions themselves are in panoramic_system.h.
+//
+// The threshold. The length of a residual of two numbers has the median 1.1774 sigma. The residuals of an adjustment
+// with the redundancy share q = f / 2n are shorter by sqrt(q), so that sigma = median / (1.1774 sqrt(q)). Observations
+// beyond max_residual_sigmas of it are left out, times a width of 4 while the camera is rough, then of 64, 16, 4 and 1.
+//
+// The end of the iterations. The squared Newton decrement g' (N + lambda I)^-1 g is what a step promises to lower the
+// cost by. It is compared with the squares of one degree of freedom.
 #include "adjust/calibration/panoramic.h"
 
 #include <fmt/core.h>
@@ -31,6 +39,7 @@ struct HomologousPair {
   std::vector<std::pair<std::int64_t, std::int64_t>> rows;
 };
 
+// Every two images with enough common tracks, ascending, the lower image first in every row.
 std::vector<HomologousPair> linked_pairs(const PanoramicTracks& tracks, int min_common) {
   std::map<std::pair<int, int>, std::vector<std::pair<std::int64_t, std::int64_t>>> common;
   for (std::size_t t = 0; t + 1 < tracks.begin.size(); ++t)
@@ -64,6 +73,7 @@ PairFit fit_pair(const PanoramicTracks& tracks, const HomologousPair& pair, cons
   PairFit fit{fit_rotation_robust(from, to), 0, from.size()};
   std::vector<double> lengths;
   for (std::size_t i = 0; i < from.size(); ++i)
+    // In pixels: differences of rays alone would shrink with a longer focal length, and the longest one would win.
     lengths.push_back(camera[kFocal] * (to[i] - fit.rotation * from[i]).norm());
   fit.median_px = median(lengths);
   return fit;
@@ -76,6 +86,7 @@ Intrinsics with_best_focal(const PanoramicTracks& tracks, const std::vector<Homo
   constexpr int kSteps = 8;  // steps for a factor of two
   Intrinsics best = start;
   double lowest = std::numeric_limits<double>::infinity();
+  // Seventeen focal lengths in equal ratios. The best of them is at most 4.4 per cent off.
   for (int step = -kSteps; step <= kSteps; ++step) {
     Intrinsics camera = start;
     camera[kFocal] *= std::exp2(static_cast<double>(step) / kSteps);
@@ -122,6 +133,7 @@ class Calibration {
     for (int round = 0; round < kMaxRounds; ++round) {
       system_.linearise_at(state);
       const std::int64_t changed = system_.screen(state, width * threshold(state, free));
+      // The mean direction of a track changes with the rows that are kept.
       if (changed > 0) system_.linearise_at(state);
       if (solve(state, free) && changed == 0) return;
     }
@@ -136,6 +148,7 @@ class Calibration {
   double noise_px(const PanoramicState& state, ParameterMask free) const {
     return std::sqrt(system_.cost(state) / static_cast<double>(std::max<std::int64_t>(1, freedom(free))));
   }
+  // A row has two numbers, a track two unknowns (its mean direction in the tangent plane).
   std::int64_t freedom(ParameterMask free) const {
     return 2 * system_.kept_rows() - 2 * system_.kept_tracks() - system_.unknowns(free);
   }
@@ -169,6 +182,7 @@ class Calibration {
   }
 
   // Returns whether the state was at the minimum already.
+  // Levenberg-Marquardt with the linearisation points held.
   bool solve(PanoramicState& state, ParameterMask free) {
     constexpr int kMaxSteps = 30;
     constexpr double kSettled = 1e-6;  // Newton decrement squared, in units of the noise
@@ -186,6 +200,8 @@ class Calibration {
       const Eigen::VectorXd scaled_move = -solve_symmetric(damped, gradient);
       if (!scaled_move.allFinite()) return false;
       const double decrement = -scaled_move.dot(gradient);
+      // Squares of the noise per degree of freedom: decrements are measured in it, since the noise is not known
+      // beforehand.
       const double unit = normal.cost / static_cast<double>(std::max<std::int64_t>(1, freedom(free)));
       if (decrement <= kSettled * unit) return settled_at_once = step == 0;
       const PanoramicState next = system_.moved(state, free, scale.asDiagonal() * scaled_move);
@@ -206,6 +222,7 @@ class Calibration {
   PanoramicSystem system_;
 };
 
+// A shift of the principal point of some models is nothing but a rotation of the camera, which is an unknown already.
 ParameterMask estimated(const Intrinsics& start, ParameterMask held) {
   return free_parameters(start.model()) & ~held & ~parameters_like_rotation(start.model());
 }
@@ -234,6 +251,7 @@ PanoramicState start_state(const Intrinsics& camera, const std::vector<std::opti
     linked[i] = rotations[i].has_value();
     if (!linked[i]) continue;
     if (!first) first = rotations[i];
+    // R_i R_0': the panorama frame becomes that of the first linked image.
     state.rotations[i] = (*rotations[i] * first->conjugate()).normalized();
   }
   return state;
@@ -274,6 +292,8 @@ void warn_of_structure(const PanoramicOptions& options, PanoramicResult& result)
 // A parameter that the images do not determine follows its prior alone, and the result is refused. The centre of
 // symmetry is an exception, because it hardly matters for a lens with little distortion.
 void check_determined(const PanoramicPrior& prior, PanoramicResult& result) {
+  // With a posterior sigma of half that of the prior, the images give three times the information of the prior. A
+  // parameter with less follows its prior too much.
   constexpr double kWeakFocal = 0.1, kWeakPrior = 0.5;
   const CameraModel& model = result.camera.model();
   for (int p = 0; p < result.camera.size(); ++p) {
@@ -324,6 +344,7 @@ void take_residuals(const PanoramicTracks& tracks, PanoramicSystem& system, cons
   std::vector<ResidualAtPixel> over_sensor;
   for (std::size_t r = 0; r < result.residuals.size(); ++r) {
     Eigen::Vector2d& residual = result.residuals[r];
+    // The system has measured minus adjusted, the result adjusted minus measured.
     residual = -residual;
     if (residual.allFinite())
       over_sensor.push_back({tracks.pixel[r], residual});
@@ -336,6 +357,7 @@ void take_residuals(const PanoramicTracks& tracks, PanoramicSystem& system, cons
 void take_statistics(const Calibration& calibration, const PanoramicState& state, const PanoramicOptions& options,
                      PanoramicResult& result) {
   result.degrees_of_freedom = calibration.freedom(result.free);
+  // chi2 = squares / image_sigma^2. The covariance is scaled by the estimated noise, since the stated sigma is a guess.
   const auto degrees = static_cast<double>(result.degrees_of_freedom);
   result.sigma_px = calibration.noise_px(state, result.free);
   result.chi2 = degrees * std::pow(result.sigma_px / options.image_sigma_px, 2);
@@ -371,6 +393,7 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   require_freedom(tracks, start, calibration.freedom(result.free));
   // Where the images form a closed circle, even a small error of the focal length pulls correct observations far apart.
   // When the focal length is known they are tested again with wide limits, so that they can come back.
+  // Rotations first, then the leading parameters with them, then all: a wrong focal length would bend the distortion.
   for (const ParameterMask free : {ParameterMask{0}, leading(start.model(), result.free), result.free})
     calibration.adjust(state, free, kRough);
   for (const double wider : {64.0, 16.0, 4.0, 1.0}) calibration.adjust(state, result.free, wider);
@@ -385,6 +408,7 @@ PanoramicResult calibrate_panoramic(const PanoramicTracks& tracks, const Intrins
   warn_of_centre(options, result);
   warn_of_structure(options, result);
 
+  // The start is judged by the same observations, with its own best rotations.
   PanoramicState before{start, state.rotations};
   calibration.adjust_without_screening(before, 0);
   result.start_rms_px = rms_of(calibration.system().residuals(before));

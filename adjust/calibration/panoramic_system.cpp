@@ -1,6 +1,12 @@
 // With right perturbations R_i Exp(w) of the rotations, r = R'ray has the derivatives dr/dw = [r]x and dr/dk = R'
 // dray/dk. The mean of a track with rows L_i A_i = U and L_i = H (L_i = B_i^-1) is eliminated by the projector
+//
 //     J = U - H (H'H)^-1 H'U,    e = L y - H (H'H)^-1 H'L y.
+//
+// Names in a row: `adjusted` is the pixel m at which the condition is linearised, `whiten` is L = B^-1, and `offset` is
+// B (measured - m), so that y = T'R'ray(k, m) + B (measured - m) is the ray of the measured pixel to first order.
+//
+// The first linked image is held at its rotation, which fixes the panorama frame.
 #include "adjust/calibration/panoramic_system.h"
 
 #include <Eigen/LU>
@@ -12,6 +18,7 @@
 
 namespace megablock {
 
+// All rows of linked images start as kept. Columns are given to linked images in their order, except to the first.
 PanoramicSystem::PanoramicSystem(const PanoramicTracks& tracks, const std::vector<std::uint8_t>& linked,
                                  const PanoramicPrior& prior)
     : tracks_(tracks), linked_(linked), prior_(prior), column_of_image_(linked.size(), -1) {
@@ -32,6 +39,7 @@ PanoramicSystem::PanoramicSystem(const PanoramicTracks& tracks, const std::vecto
   planes_.resize(static_cast<std::size_t>(track_count()));
 }
 
+// A track with one row has no condition.
 std::vector<std::int64_t> PanoramicSystem::kept_in(std::int64_t track) const {
   std::vector<std::int64_t> rows;
   for (std::int64_t r = tracks_.begin[track]; r < tracks_.begin[track + 1]; ++r)
@@ -44,6 +52,9 @@ void PanoramicSystem::linearise_at(const PanoramicState& state) {
   for (std::int64_t t = 0; t < track_count(); ++t) linearise_track(t, state);
 }
 
+// Finds, for every row of a track, the pixel m of the mean direction (the adjusted observation), B = T'R' dray/dm
+// there, and the offset that takes the measured pixel into account. The tangent basis T of the mean is held until the
+// next call.
 void PanoramicSystem::linearise_track(std::int64_t track, const PanoramicState& state) {
   const std::int64_t begin = tracks_.begin[track], end = tracks_.begin[track + 1];
   // The mean direction of the kept pixels, or that of all usable rows where fewer than two are kept.
@@ -59,6 +70,7 @@ void PanoramicSystem::linearise_track(std::int64_t track, const PanoramicState& 
     all += direction;
     if (row.kept) kept += direction, ++kept_count;
   }
+  // Rays are compared in the plane that touches the sphere at their mean, where their differences are small.
   const Eigen::Vector3d mean = (kept_count >= 2 ? kept : all).normalized();
   planes_[track] = tangent_plane(mean);
   for (std::int64_t r = begin; r < end; ++r) {
@@ -68,6 +80,7 @@ void PanoramicSystem::linearise_track(std::int64_t track, const PanoramicState& 
     row.adjusted = project(state.camera, rotation * mean);
     RayJacobian ray;
     if (row.adjusted.allFinite()) ray = ray_with_jacobian(state.camera, row.adjusted);
+    // The mean may fall where the camera has no pixel. The measured pixel then takes its place.
     if (!ray.valid) {
       row.adjusted = tracks_.pixel[r];
       ray = ray_with_jacobian(state.camera, row.adjusted);
@@ -90,6 +103,7 @@ bool PanoramicSystem::ray_in_plane(std::int64_t row, const Plane& plane, const P
   return true;
 }
 
+// e_i = L_i (y_i - mu), mu = (sum W_i)^-1 sum W_i y_i, W_i = L_i'L_i.
 bool PanoramicSystem::residuals_of(const std::vector<std::int64_t>& rows, std::int64_t track,
                                    const PanoramicState& state, std::vector<Eigen::Vector2d>& e) const {
   e.resize(rows.size());
@@ -113,6 +127,7 @@ std::int64_t PanoramicSystem::screen(const PanoramicState& state, double thresho
     std::vector<std::int64_t> rows;
     for (std::int64_t r = tracks_.begin[t]; r < tracks_.begin[t + 1]; ++r)
       if (rows_[r].usable) rows.push_back(r);
+    // One outlier pulls the mean of a track. Only the worst row is left out before the rest is tested again.
     while (rows.size() >= 2) {
       if (!residuals_of(rows, t, state, e)) {
         rows.clear();
@@ -140,6 +155,7 @@ double PanoramicSystem::prior_cost(const PanoramicState& state) const {
     const auto k = static_cast<std::size_t>(p);
     if (prior_.sigma[k] > 0) sum += std::pow((state.camera[k] - prior_.value[k]) / prior_.sigma[k], 2);
   }
+  // The cost is in px^2, without the sigma of the pixels. The prior must be multiplied by it.
   return sum * prior_.image_sigma_px * prior_.image_sigma_px;
 }
 
@@ -165,6 +181,9 @@ std::vector<Eigen::Vector2d> PanoramicSystem::residuals(const PanoramicState& st
   return all;
 }
 
+// The columns of U of a row are those of the free parameters, L T'R' dray/dk, and the three of its image, L T'[r]x. The
+// projector removes what the mean direction of the track explains; J'J and J'e are then added at the columns of the
+// images.
 bool PanoramicSystem::add_track(std::int64_t track, const PanoramicState& state, const std::vector<int>& parameters,
                                 Normal& normal) const {
   const std::vector<std::int64_t> rows = kept_in(track);
@@ -220,6 +239,8 @@ std::vector<int> parameters_in(ParameterMask mask) {
 
 }  // namespace
 
+// N = sum J'J and g = sum J'e over the tracks, plus the priors in px^2. An empty matrix says that a pixel has no ray at
+// this state.
 PanoramicSystem::Normal PanoramicSystem::normal(const PanoramicState& state, ParameterMask free) const {
   const std::vector<int> parameters = parameters_in(free);
   const std::int64_t size = unknowns(free);
@@ -237,6 +258,7 @@ PanoramicSystem::Normal PanoramicSystem::normal(const PanoramicState& state, Par
   return normal;
 }
 
+// Adds a step: parameters first, then R_i Exp(w_i).
 PanoramicState PanoramicSystem::moved(const PanoramicState& state, ParameterMask free,
                                       const Eigen::VectorXd& step) const {
   PanoramicState result = state;
@@ -282,10 +304,12 @@ Parallax PanoramicSystem::parallax(const PanoramicState& state) const {
       weight += rows_[r].whiten.transpose() * rows_[r].whiten;
     }
     mean /= static_cast<double>(rows.size());
+    // The covariance of mu for unit noise: a residual y_i - mu has the covariance B B' - W^-1.
     const Eigen::Matrix2d of_mean = weight.inverse();
     const Plane& plane = planes_[t];
     const Eigen::Vector3d direction = plane.col(0).cross(plane.col(1));
     for (std::size_t i = 0; i < rows.size(); ++i) {
+      // B, which takes a residual in pixels back to the tangent plane.
       const Eigen::Matrix2d back = rows_[rows[i]].whiten.inverse();
       const Eigen::Matrix3d turned =
           state.rotations[static_cast<std::size_t>(tracks_.image[rows[i]])].toRotationMatrix() - mean;
@@ -319,6 +343,7 @@ Parallax PanoramicSystem::parallax(const PanoramicState& state) const {
     for (; i < ends[t]; ++i) excess += std::pow(terms[i].dot(s), 2) - across * s.dot(expected[i] * s);
     scatter += excess * excess;
   }
+  // Noise has the same energy along and across the lines: half of the squares lie across, and across / noise = 1.
   result.along = std::clamp(1 - 0.5 * across / noise, 0.0, 1.0);
   result.deviations = scatter > 0 ? (noise - across) / std::sqrt(scatter) : 0;
   return result;

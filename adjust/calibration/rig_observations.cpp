@@ -1,3 +1,11 @@
+// Which observations a calibration takes:
+//
+//     off-line   control points, no tie points: a surveyed target field
+//     on-line    tie points alone: a free network. The scale of the rig has no observation; the loose sigmas of the
+//                mounts are constant damping along it (Cannelle 2013, eq. 9 to 11)
+//     all        what the project gives
+//
+// A result is judged by what it did not use: tracks that were held out, and known points intersected with the new rig.
 #include "adjust/calibration/rig_observations.h"
 
 #include <algorithm>
@@ -137,11 +145,14 @@ WholeBlock adjust_with_rig_held(const Block& block, const BlockState& start, con
   for (const FrameIndex frame : like.problem.frames) state.oriented[frame] = 1;
   state.cameras = start.cameras;
   state.mounts = start.mounts;
+  // The problem must be the same as that of `like`: same frames, same tracks, same sigmas, same verdicts. Only then do
+  // the residuals compare two rigs.
   WholeBlock whole = whole_block(held, state, tracks, options.observations);
   whole.state.points = like.state.points;
   whole.problem.kept = like.problem.kept;
   whole.problem.inverse_sigma = like.problem.inverse_sigma;
   whole.problem.image_sigma_px = like.problem.image_sigma_px;
+  // Two adjustments are compared by their residuals. Both must count all of them in full.
   whole.problem.image_loss = {RobustLoss::Kind::kNone, 1};
   constexpr int kIterations = 50;
   constexpr double kTolerance = 1e-9;  // share of the cost
@@ -174,6 +185,8 @@ ImageFit total(const std::vector<ImageFit>& fits) {
   return sum;
 }
 
+// The held-out tracks are intersected at the poses of the result: their residuals tell the fit of the rig without
+// having been fitted.
 double intersection_sigma_px(const Block& block, const BlockState& state, const TrackSet& tracks,
                              const AdjustOptions& options) {
   constexpr double kMedian = 1.1774100225;  // median of a Rayleigh distribution of sigma 1
@@ -198,6 +211,7 @@ std::optional<PointFit> intersect_known_points(const Block& block, const BlockSt
                                                const AdjustOptions& options) {
   Block known = block;
   known.control_points = points;
+  // As check points their positions do not act on the intersection.
   for (ControlPoint& point : known.control_points) point.role = PointRole::kCheck;
   TrackSet none;
   none.begin.push_back(0);
@@ -211,8 +225,10 @@ std::optional<PointFit> intersect_known_points(const Block& block, const BlockSt
     found.push_back(whole.state.points[row]);
     given.push_back(position);
   }
+  // A similarity has seven unknowns: three points fit it nearly, and only a fourth one tells an error.
   if (found.size() < (align ? 4u : 1u)) return std::nullopt;
   if (align) {
+    // A free network has no datum. A similarity takes it away from the differences before they are summed.
     const auto move = fit_similarity(found, given);
     if (!move) return std::nullopt;
     for (Eigen::Vector3d& point : found) point = (*move)(point);
