@@ -1,3 +1,18 @@
+// The equations of coplanarity_adjustment.h in columns: angles of the cameras (3 each), then image coordinates of the
+// observations (2 each), without those that are held. A row is one pair of one point,
+//
+//     F = det(d_1 | d_2 | m),   m = C_2 - C_1,
+//
+// with the derivatives of coplanarity_determinant(). A forced parameter has a row of its own, weight * (sum of all its
+// corrections) = 0.
+//
+// Ranks. B is block diagonal by points. With B_j = U S V' of a point and U_0 the columns of U beyond its rank,
+//
+//     rank (A B) = sum rank B_j + rank of the stacked U_0' A_j,
+//
+// since U_0' takes out what the image coordinates of the point can absorb. Only matrices of one point and of all angles
+// are formed. Rows are divided by |m| |d_1| |d_2|, and columns of images multiplied by f, so that the singular values
+// of different points can be compared.
 #include "adjust/coplanarity/coplanarity_adjustment.h"
 
 #include <fmt/core.h>
@@ -119,6 +134,7 @@ struct Equations {
 Equations equations(const CoplanarityNetwork& network, const FreeColumns& free, const CoplanarityOptions& options,
                     const Eigen::VectorXd& total) {
   const std::int64_t rows = pair_count(network), forced = options.forced() ? free.count : 0;
+  // Rows: the pairs of all points in their order, then the forced parameters.
   std::vector<Eigen::Triplet<double, std::int64_t>> entries;
   Equations result;
   result.right = Eigen::VectorXd::Zero(rows + forced);
@@ -275,8 +291,11 @@ void add_normal(const Eigen::MatrixXd& rows, const std::vector<std::int64_t>& co
       normal(columns[r], columns[c]) += squared(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
 }
 
+// Normal equations hold the squares of the singular values. Their rounding, 1e-16 of the largest, is 1e-8 in the
+// singular values themselves.
 constexpr double kAngles = 1e-6;  // share of the largest singular value, from normal equations of the angles
 
+// The number of descending values above a share of the first.
 std::int64_t rank_of(const Eigen::VectorXd& values, double tolerance) {
   std::int64_t rank = 0;
   while (rank < values.size() && values(rank) > tolerance * values(0) && values(rank) > 0) ++rank;
@@ -345,6 +364,7 @@ void CoplanarityNetwork::check() const {
   require(pair_count(*this) > 0, "no point is seen by two cameras");
   for (std::size_t a = 0; a < centres.size(); ++a)
     for (std::size_t b = a + 1; b < centres.size(); ++b)
+      // Two cameras at one place have no base: their determinant is zero for any rays.
       require(centres[a] != centres[b], fmt::format("cameras {} and {} stand at the same place", a, b));
 }
 
@@ -378,6 +398,7 @@ CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   for (std::int64_t j = 0; j < network.point_count(); ++j) {
     if (!met[static_cast<std::size_t>(j)]) continue;
     const PointEquations point = point_equations(exact, free, j);
+    // Without free image coordinates of the point, nothing is absorbed.
     Eigen::MatrixXd remaining = point.by_angles;
     if (point.by_images.cols() > 0) {
       const SingularValues svd = singular_values(point.by_images);
@@ -390,6 +411,7 @@ CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network) {
   }
   result.rank = result.image_rank;
   if (free.angles == 0) return result;
+  // The scale of the ranks is that of A before anything is absorbed.
   const double largest = symmetric_eigen(whole).values(free.angles - 1);
   const SymmetricEigen values = symmetric_eigen(left);
   for (Eigen::Index i = 0; i < values.values.size(); ++i) result.rank += values.values(i) > kAngles * kAngles * largest;
@@ -401,6 +423,7 @@ CoplanaritySpectrum spectrum(const CoplanarityNetwork& network) {
   std::vector<std::uint8_t> met;
   const CoplanarityNetwork exact = brought_together(network, met);
   const FreeColumns free(network);
+  // Rows of points whose rays do not meet stay zero.
   Eigen::MatrixXd both = Eigen::MatrixXd::Zero(diagnosis.rows, free.count);
   Eigen::Index row = 0;
   for (std::int64_t j = 0; j < network.point_count(); ++j) {
@@ -415,6 +438,7 @@ CoplanaritySpectrum spectrum(const CoplanarityNetwork& network) {
   // rank of the scaled rows tells how many are not zero.
   const auto above_zero = [](const Eigen::MatrixXd& c, std::int64_t rank) -> std::vector<double> {
     Eigen::MatrixXd symmetric = Eigen::MatrixXd::Zero(c.rows() + c.cols(), c.rows() + c.cols());
+    // symmetric_eigen() reads the lower triangle.
     symmetric.bottomLeftCorner(c.cols(), c.rows()) = c.transpose();
     const Eigen::VectorXd values = symmetric_eigen(symmetric).values.reverse().head(rank);
     return {values.begin(), values.end()};
@@ -441,6 +465,7 @@ CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, con
                     free.count - solution.open_directions, free.count));
   Eigen::VectorXd total = Eigen::VectorXd::Zero(free.count);
   for (int step = 0; step < options.steps; ++step) {
+    // Each step linearises at the corrected angles and coordinates.
     const Equations system = equations(solution.network, free, options, total);
     Eigen::VectorXd x;
     if (options.solver == CoplanarityOptions::Solver::kLsqr) {
@@ -458,6 +483,8 @@ CoplanaritySolution adjust_by_coplanarity(const CoplanarityNetwork& network, con
   solution.rounding = after.rounding;
 
   constexpr double kFalseAlarm = 1e-6;
+  // The corrections of all parameters over their sigmas. Where held angles are right, the corrections are errors of the
+  // images, and the sum is chi-square with as many degrees of freedom as the equations have rank.
   const double chi2 = total.head(free.angles).squaredNorm() / std::pow(options.angle_sigma_rad, 2) +
                       total.tail(free.count - free.angles).squaredNorm() / std::pow(options.image_sigma_px, 2);
   const std::int64_t freedom = solution.diagnosis.rank;

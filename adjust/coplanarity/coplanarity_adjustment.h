@@ -40,6 +40,9 @@ struct CoplanarityNetwork {
   void check() const;  // throws InputError
 };
 
+// The method as published makes one step. Further steps bring F to zero without coming nearer to the truth. Without
+// forcing, LSQR finds the solution of least norm, in which radians and pixels count alike: 1e-6 rad costs nothing in
+// this norm and moves a point of a satellite image by a pixel, so that the noise of the pixels goes into the angles.
 struct CoplanarityOptions {
   enum class Solver : std::uint8_t {
     kLsqr,   // as published: it ends at twice the number of unknowns

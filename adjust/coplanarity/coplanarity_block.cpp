@@ -1,3 +1,9 @@
+// The network has cameras in the ground frame, without rigs: the pose of a camera is that of its frame times that of
+// its mount, and frame_pose() goes back with
+//
+//     R_frame = R_mount' R_camera,   C_frame = C_camera - R_frame' C_mount.
+//
+// Coordinates are those of a camera without distortion at the focal length f, (x, y) f / z of the viewing ray.
 #include "adjust/coplanarity/coplanarity_block.h"
 
 #include <algorithm>
@@ -67,6 +73,7 @@ void add_points(const Block& block, const KnownPoses& poses, const TrackSet& tra
 void add_cameras(const Block& block, const KnownPoses& poses, CoplanarityBlock& result) {
   CoplanarityNetwork& network = result.network;
   std::vector<std::int32_t> number(block.frames.size(), -1);
+  // Only frames that see a point of the network become cameras: any other would be an open direction of the system.
   for (const std::int32_t frame : network.camera) number[static_cast<std::size_t>(frame)] = 0;
   const IndexedVector<FrameIndex, const Mount*> mounts = single_mounts(block);
   double squares = 0, attitudes = 0;
