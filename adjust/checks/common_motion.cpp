@@ -1,3 +1,10 @@
+// The mathematics is in common_motion.h. Here `known` is G (or R_f of a frame) without attitude priors, `all` is G_a,
+// and `answer` is the sum over frames of the rotation w_f = -(R_f + A_f)^-1 W_f m of the best response to m, with A_f
+// the attitude priors. The sigma of the common rotation in the direction v, v'G_a v = 1, is |answer v| / frames: m = v
+// is a movement of one sigma, and the mean rotation of the frames is what the reader of the report can imagine.
+//
+// The points are taken along with the ground, so that no unknown of a point appears. The residual of an image changes
+// by A_X S_X m for the movement S_X m of the point and by B dx for the response of the frame.
 #include "adjust/checks/common_motion.h"
 
 #include <fmt/core.h>
@@ -49,6 +56,7 @@ class MotionSummation {
   MotionSummation(const TileProblem& problem, const TileState& state, const MotionReference& reference)
       : problem_(problem), state_(state), reference_(reference), frames_(problem.frames.size()) {}
 
+  // Collects the equations of all frames, then eliminates each of them. Frames that no image observes tell nothing.
   CommonMotion run() {
     add_images();
     add_priors();
@@ -68,6 +76,7 @@ class MotionSummation {
         if (problem_.kept[row]) add_image(row, state_.points[point], move);
     }
   }
+  // A_X S_X: the derivative by the point times its movement. The products with B give R_f, W_f and M.
   void add_image(std::size_t row, const Eigen::Vector3d& point, const Matrix37& move) {
     const TileImage& image = problem_.images[static_cast<std::size_t>(problem_.image[row].value)];
     const auto frame = static_cast<std::size_t>(image.frame.value);
@@ -84,6 +93,8 @@ class MotionSummation {
     equations.seen = true;
   }
   void add_priors() {
+    // Positions, lines and verticals stay where they are when the ground moves. They act on the response of the frame
+    // alone.
     for (const auto& term : problem_.positions) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
       const FrameResidual3 r = linearise_position(state_.frames[frame], term.prior);
@@ -93,6 +104,7 @@ class MotionSummation {
       const auto frame = static_cast<std::size_t>(term.frame.value);
       const LineResidual r =
           linearise_line(state_.frames[frame], state_.frames[static_cast<std::size_t>(term.seen_by().value)], term);
+      // Both frames of a horizontal line turn alike in a common rotation.
       const Eigen::Matrix<double, 1, 6> together = r.by_frame + r.by_other;
       const double weight = problem_.line_loss.evaluate(r.residual * r.residual)[1];
       frames_[frame].known += weight * together.transpose() * together;
@@ -108,6 +120,7 @@ class MotionSummation {
       const FrameResidual3 r = linearise_attitude(state_.frames[frame], term.prior);
       frames_[frame].attitude += weight_of(loss_of(problem_, term), r.residual) * r.by_frame.transpose() * r.by_frame;
     }
+    // A control point resists the movement of the ground itself: (S_X / sigma)'(S_X / sigma) is added to M.
     for (const auto& term : problem_.point_priors) {
       if (!problem_.active(term.point.value)) continue;
       const Matrix37 r = term.sigma.cwiseInverse().asDiagonal() *
@@ -128,6 +141,7 @@ class MotionSummation {
     return scale.asDiagonal() * ridged.ldlt().solve(scale.asDiagonal() * coupling);
   }
   void eliminate(const FrameEquations& frame, const Pose& pose) {
+    // M - W'R^-1 W: the frame responds so that its residuals grow least.
     sums_.known -= frame.coupling.transpose() * solved(frame.known, frame.coupling);
     const Matrix67 followed = solved(frame.known + frame.attitude, frame.coupling);
     sums_.all -= frame.coupling.transpose() * followed;
@@ -152,6 +166,7 @@ struct Shares {
   Eigen::MatrixXd vectors;
 };
 Shares shares_of(const CommonMotion& motion) {
+  // G_a = V D V'. With v = V D^-1/2 u the problem G v = mu G_a v becomes an ordinary one for u, and v'G_a v = u'u = 1.
   const SymmetricEigen all = symmetric_eigen(0.5 * (motion.all + motion.all.transpose()));
   constexpr double kNothing = 1e-15;
   const double least = kNothing * std::max(all.values(6), 0.0);
@@ -181,6 +196,7 @@ PlaceLine line_of(const CommonMotion& motion) {
 
 }  // namespace
 
+// The frames are read twice: for counts and means, then for the rms distances from these.
 std::vector<MotionReference> motion_references(const Block& block, const Tiles& tiles) {
   std::vector<MotionReference> references;
   std::vector<double> positions, attitudes;
@@ -221,6 +237,7 @@ void CommonMotion::add(const CommonMotion& other) {
   squared_places += other.squared_places;
 }
 
+// A list of numbers for files and messages; from_values() reads them in the same order.
 std::vector<double> CommonMotion::to_values() const {
   std::vector<double> values{frames};
   const auto append = [&](const auto& matrix) {
@@ -255,12 +272,15 @@ MotionVerdict judge(const CommonMotion& motion, const MotionReference& reference
   };
   for (int i = 0; i < 7 && shares.values(i) < kHalf; ++i) {
     ++verdict.weak;
+    // The eigenvalues ascend: the weak directions are the first ones. v has the length of one sigma of m.
     verdict.common_sigma_rad = std::max(verdict.common_sigma_rad, sigma_of(shares.vectors.col(i)));
   }
   const PlaceLine line = line_of(motion);
   if (verdict.weak == 0 || line.direction.isZero()) return verdict;
   Eigen::Matrix<double, 7, 1> turn;
+  // The rotation about a line through c + middle: phi = u, L t = -u x middle, so that points on the line stay.
   turn << line.direction, -line.direction.cross(line.middle) / reference.length, 0;
+  // The share of the rotation about the line: its information without and with the attitude priors.
   const double all = turn.dot(motion.all * turn), known = turn.dot(motion.known * turn);
   verdict.collinear = known < kHalf * all;
   if (!verdict.collinear) return verdict;

@@ -1,3 +1,8 @@
+// Two checks by numbers without unit. A strip: with the centres on their principal axis at the abscissae a_i,
+// `off_line` is the largest distance from the axis and `uneven` the largest |(a_i - a_{i-1}) / spacing - 1|. A level
+// scene: the distances of the points from the plane of most points are divided into two groups with the least scatter
+// within them (N. Otsu, 1979). Their separation is the difference of the means over the rms of the two standard
+// deviations.
 #include "adjust/checks/sanity_checks.h"
 
 #include <Eigen/Geometry>
@@ -33,6 +38,8 @@ Plane plane_of_most(const std::vector<Eigen::Vector3d>& points) {
     Plane plane{across.normalized(), 0};
     plane.offset = plane.normal.dot(a);
     for (std::size_t i = 0; i < points.size(); ++i) distances[i] = std::abs(plane.distance(points[i]));
+    // Three tenths and not one half: with two levels of half of the points each, the median distance from the plane of
+    // one level may be that of a point of the other.
     const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(3 * distances.size() / 10);
     std::nth_element(distances.begin(), middle, distances.end());
     if (*middle < least) {
@@ -63,6 +70,7 @@ StripCheck check_strip(const std::vector<Eigen::Vector3d>& centres) {
     along.push_back(direction.dot(c - mean));
     farthest = std::max(farthest, (c - mean - along.back() * direction).norm());
   }
+  // The mean spacing has the sign of the direction of travel along the axis.
   const double spacing = (along.back() - along.front()) / (count - 1);
   if (spacing == 0) return {kInfinite, kInfinite};
   check.off_line = farthest / std::abs(spacing);
@@ -90,6 +98,7 @@ LevelCheck check_one_level(const std::vector<Eigen::Vector3d>& given) {
 
   // The division into two groups with the least scatter within them (Otsu).
   const auto count = static_cast<double>(heights.size());
+  // Sums of the sorted values give means and scatters of both groups for every division in one run.
   double sum = 0, squares = 0;
   for (double h : heights) sum += h, squares += h * h;
   double below = 0, below_squares = 0, least = std::numeric_limits<double>::infinity();

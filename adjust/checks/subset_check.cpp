@@ -1,3 +1,6 @@
+// With x_ki the result of item i in subset k (K subsets), the spread is sum (x_ki - x_i)^2 / (K - 1) per component,
+// where x_i is the mean of the subsets: the variance of one subset. The mean of the subsets has the variance spread^2 /
+// K, to which the error common to all subsets is added.
 #include "adjust/checks/subset_check.h"
 
 #include <fmt/core.h>
@@ -75,7 +78,10 @@ SubsetCheck check_point_subsets(const TileProblem& problem, const TileState& sta
     if (!summary.usable) throw ComputeError(fmt::format("point subset {}: {}", subset, summary.text));
     turns.emplace_back();
     for (std::size_t f = 0; f < adjusted.frames.size(); ++f)
+      // Rotation vectors from the start, in the axes of the ground. They are small, so that their mean is that of the
+      // rotations.
       turns.back().push_back(rotation_log<double>(state.frames[f].rotation.conjugate() * adjusted.frames[f].rotation));
+    // Where the adjusted reference point falls in its images: observation plus residual.
     images.push_back(reference_images(part, adjusted, reference));
   }
   const Dispersion<Eigen::Vector3d> turning(turns);
@@ -84,6 +90,7 @@ SubsetCheck check_point_subsets(const TileProblem& problem, const TileState& sta
   check.rotation_spread_rad = turning.spread;
   check.rotation_move_rad = turning.mean;
   check.image_spread_px = Dispersion<Eigen::Vector2d>(images).spread;
+  // The error that all subsets share comes from the attitude priors, which all of them use.
   const MotionVerdict verdict = judge(common_motion(problem, state, motion), motion);
   check.common_sigma_rad = std::max(verdict.common_sigma_rad, verdict.line_sigma_rad);
   return check;
